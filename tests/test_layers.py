@@ -47,6 +47,8 @@ KNOWING = {
     "calibration.published": {"elm", "geometry", "maps"},
     # How the rows were measured decides: frame, probe points, orientations, a slip.
     "calibration.fit": {"placement", "probe", "tool_shift"},
+    # A fit must leave less than registration alone.
+    "calibration.validation": {"placement"},
     # A registration is what that effect fits.
     "calibration.registration": {"placement"},
     # A tracker that drifts moves fixed points rigidly.

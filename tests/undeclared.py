@@ -16,7 +16,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 
-from tests.calibration.planted import NAMED, NAMELESS, SIZES, WAVES
+from tests.calibration.planted import NAMED, NAMELESS, REVISED, SIZES, WAVES
 from tests.undeclared_trial import Trial, run
 
 SEEDS, NONE = 60, 200  # of a full run
@@ -25,7 +25,7 @@ FIRST_SEED = 7000  # seeds below are for trying things out
 
 def jobs_of(seeds: int, none: int) -> list[tuple[str, int, float]]:
     """List kind, seed and size of every trial; an unfinished list holds all kinds."""
-    kinds = (*NAMED, *WAVES, *NAMELESS, "two")
+    kinds = (*NAMED, *REVISED, *WAVES, *NAMELESS, "two")
     planted = [
         (k / seeds, (kind, FIRST_SEED + k, SIZES[k % len(SIZES)]))
         for k in range(seeds)

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import beta
 
-from tests.calibration.planted import NAMED, NAMELESS, SIZES, WAVES
+from tests.calibration.planted import NAMED, NAMELESS, REVISED, SIZES, WAVES
 from tests.undeclared_score import (
     WITHIN,
     close,
@@ -64,7 +64,7 @@ def write_table(
     by_kind: dict[str, list[Trial]] = defaultdict(list)
     for t in trials:
         by_kind[t.kind].append(t)
-    kinds = [k for k in (*NAMED, *WAVES, *NAMELESS, "two") if k in by_kind]
+    kinds = [k for k in (*NAMED, *REVISED, *WAVES, *NAMELESS, "two") if k in by_kind]
     planted = [t for t in trials if t.kind != "none"]
     lines = [
         *INTRODUCTION.format(command=command).splitlines(),
@@ -109,7 +109,7 @@ def _bounded(hits: Sequence[bool]) -> str:
 
 def _summary(trials: Sequence[Trial], wanted: int) -> list[str]:
     none = [t for t in trials if t.kind == "none"]
-    named = [t for t in trials if t.kind in (*NAMED, *WAVES)]
+    named = [t for t in trials if t.kind in (*NAMED, *REVISED, *WAVES)]
     nameless = [t for t in trials if t.kind in NAMELESS]
     two = [t for t in trials if t.kind == "two"]
     planted = [*named, *nameless, *two]
@@ -146,7 +146,7 @@ def _by_size(planted: Sequence[Trial]) -> list[str]:
     for size in SIZES:
         some = [t for t in planted if t.size == size]
         cells = [
-            _rate([ok(t) for t in some if t.kind in (*NAMED, *WAVES)]),
+            _rate([ok(t) for t in some if t.kind in (*NAMED, *REVISED, *WAVES)]),
             _rate([ok(t) for t in some if t.kind == "two"]),
             _rate([ok(t) for t in some if t.kind in NAMELESS]),
         ]
@@ -236,7 +236,7 @@ def plot(planted: Sequence[Trial], path: Path) -> Path:
     figure = Figure(figsize=(6, 4), layout="constrained")
     axes = figure.subplots()
     for label, kinds, mark in (
-        ("named", (*NAMED, *WAVES), "o-"),
+        ("named", (*NAMED, *REVISED, *WAVES), "o-"),
         ("two at once", ("two",), "s--"),
         ("no name", NAMELESS, "^:"),
     ):

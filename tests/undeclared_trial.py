@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.calibration.diagnosis.refit import Revision
 from postproc.calibration.diagnosis.trace import trace
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.selection import told_apart
@@ -188,7 +189,11 @@ def moved(fit: Fit, batch: Batch, origins: tuple[Origin, ...]) -> np.ndarray:
     """What effects of some origins do to other states, (n, 3) [m]."""
     keep = tuple(e for e in fit.combination.effects if e.belongs_to() in origins)
     values = fit.values[fit.combination.where(*origins)]
-    return Combination(keep).error(batch, values)
+    moved = Combination(keep).error(batch, values)
+    first = fit.combination.effects[0]
+    if isinstance(first, Revision):
+        moved = moved + first.model.effects.error(batch, first.model.values)
+    return moved
 
 
 def _mean_mm(left: np.ndarray) -> float:

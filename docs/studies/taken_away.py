@@ -56,7 +56,7 @@ def left(model: Model, data: DataSet, rows: Measurements) -> ErrorStatistics:
 def trial(
     data: DataSet, series: str, kind: str, seed: int
 ) -> tuple[ErrorStatistics, ErrorStatistics, ErrorStatistics, str]:
-    """Take a kind away; return errors before, after and of the whole model, and words."""
+    """Take a kind away; return errors before, after, of the whole model, and words."""
     first, fresh, unseen = parts_of(data.series[series], seed)
     how = {"frame": data.about.frame, "validate": False}
     whole = fit_measurements(first, data.cell, **how)

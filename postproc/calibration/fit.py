@@ -34,6 +34,7 @@ from postproc.calibration.stops import pool_readings
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.calibration.validation import Task, validate_fit
+from postproc.calibration.weight_direction import direction_warning
 from postproc.model.combination import Combination
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
@@ -169,6 +170,7 @@ def fit_measurements(
         *wrong_nests(fitted, points),
         *_rounding(model, fitted),
         *(() if validated is None else validated.notes),
+        *direction_warning(fitted),
     )
     survey = replace(survey, warnings=told)
     widths = newer_widths((), model, cell.arm, reversals)

@@ -19,7 +19,7 @@ from postproc.model.effects.elm import HiddenLayer
 from postproc.model.effects.geometry import Geometry
 from postproc.model.effects.maps import Interpolation
 from postproc.model.kinematics import Batch
-from postproc.model.model import Model
+from postproc.model.model import Model, weight_of
 from postproc.model.model_file import Method
 from postproc.model.noise import Noise
 from postproc.model.ranges import Ranges
@@ -109,6 +109,7 @@ def train_method(method: Method, survey: Measurements, arm: Arm, seed: int) -> M
             "residual_mean_mm": float(left.mean()),
             "residual_max_mm": float(left.max()),
         },
+        weight=weight_of(arm),
     )
 
 

@@ -27,7 +27,7 @@ from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
-from postproc.model.model import COMPENSATED, READING, WORST_STD, Model
+from postproc.model.model import COMPENSATED, READING, WORST_STD, Model, weight_of
 from postproc.model.noise import Noise, angle_step, poses_of
 from postproc.model.ranges import Ranges
 from postproc.robot.arm import Arm
@@ -172,7 +172,8 @@ def _fit_kept(
     free = free_forms(states) if with_free else ()
     for names in (named, *((name,) for name in free)):
         progress("fit and weigh " + ", ".join(names))
-        tried = (*kept, *propose(names, arm, states), *slipped(fitted))
+        more = pieces(propose(names, arm, states))
+        tried = (*kept, *more, *slipped(fitted))
         fitted = fit_effects(batch, position, tried, origin, fitted, until=NEARLY)
         kept = carried_over(fitted, keep_needed(fitted, always=base))
     if any(e.name in free for e in kept):
@@ -260,11 +261,22 @@ def weighed_again(
         named: Names of all that are weighed.
         always: Effects that are not in question.
     """
-    have = {e.name for e in kept}
     batch = fitted.batch
-    more = propose([k for k in named if k not in have], batch.arm, batch.states)
+    have = {(e.name, joints_of(e)) for e in kept}
+    every = pieces(propose(named, batch.arm, batch.states))
+    more = [e for e in every if (e.name, joints_of(e)) not in have]
     free = tuple(e for e in kept if e.name not in named and e not in always)
     return keep_needed(beside(fitted, (*kept, *more)), always, free)
+
+
+def pieces(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return what is weighed by itself of effects: each at one joint, or as it is."""
+    return tuple(piece for effect in effects for piece in effect.pieces())
+
+
+def joints_of(effect: Effect) -> frozenset[int | None]:
+    """Return the joints that the parameters of an effect act on."""
+    return frozenset(p.joint for p in effect.parameters())
 
 
 def slipped(fitted: Fit) -> tuple[Effect, ...]:
@@ -454,4 +466,5 @@ def model_of(fitted: Fit, survey: Measurements, wide: float = 1.0) -> Model:
         rows=int(used.sum()),
         data_sha256=survey.sha256,
         statistics=statistics,
+        weight=weight_of(arm),
     )

@@ -28,7 +28,7 @@ def keep_needed(
         fitted: A fit of all effects in question.
         always: Effects that are not in question.
         aside: Others that are not, and whose prior scales are not chosen anew.
-        enough: Evidence that each must be worth [nats].
+        enough: Evidence that each must be worth [nats], besides what the effect asks.
     """
     weighing = _Weighing.of(fitted, aside)
     kept = [e for e in fitted.combination.effects if e not in aside]
@@ -79,12 +79,13 @@ class _Weighing:
         Returns:
             None where each is worth enough.
         """
-        best, least = None, now - enough
+        best, most = None, 0.0  # by how much evidence one is worth too little
         for effect in asked:
             without = present & np.array([e is not effect for e in self.owner])
-            found = self.evidence(without, least)
-            if found > least:
-                best, least = (effect, without, found), found
+            required = enough + effect.least_evidence()
+            found = self.evidence(without, now - required + most)
+            if found > now - required + most:
+                best, most = (effect, without, found), found - now + required
         return best
 
     def evidence(self, present: Bools, least: float = -np.inf) -> float:

@@ -70,6 +70,7 @@ def from_urdf(
     """Write the arm file of a URDF: six revolute joints in series."""
     from postproc.robot.ortho_parallel import arm_text, closed_form_obstacle
     from postproc.robot.urdf import read_chain
+    from postproc.robot.urdf_links import placeholder
 
     with explained(urdf):
         check_places([as_path(output)], [urdf])
@@ -80,6 +81,8 @@ def from_urdf(
             say(f"{urdf}: {rounded}")
         if obstacle := closed_form_obstacle(chain):
             say(obstacle)
+        if (problem := placeholder(chain.weights)) is not None:
+            say(f"{urdf}: {problem}. [links] is not written")
         if output != "-":
             say(f"written {output}")
 

@@ -28,6 +28,7 @@ from postproc.simulation import (
     VirtualArm,
     VirtualCell,
     campaign_length,
+    gravity_of,
     land,
     measure_program,
     measure_rows,
@@ -160,6 +161,7 @@ def setup_of(cell: Cell) -> VirtualCell:
         payload_com=cell.payload_com,
         temperature=warm if np.isfinite(warm) else usual.temperature,
         tracker=usual.tracker if cell.tracker is None else cell.tracker,
+        gravity=gravity_of(cell.file.robot.mounting, cell.base.pose),
     )
 
 
@@ -208,7 +210,7 @@ def simulate_file(
         rows = read_rows(program)
         arm = virtual_arm(
             seed, names, coupling=setup.coupling, rows=len(rows.ids), tool=setup.tool,
-            gears=gears, tracker=setup.tracker,
+            gears=gears, tracker=setup.tracker, gravity=setup.gravity,
         )  # fmt: skip
         return Simulation(program.name, measure_rows(arm, setup, rows), None)
     visits, own, skipped = _read(program, cell)
@@ -220,6 +222,7 @@ def simulate_file(
         tool=setup.tool,
         gears=gears,
         tracker=setup.tracker,
+        gravity=setup.gravity,
     )
     campaign = measure_program(arm, setup, visits)
     track = record_track(arm, setup, visits, rate) if rate else None

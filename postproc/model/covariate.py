@@ -28,7 +28,7 @@ def covariate(batch: Batch, name: str) -> Floats:
     [rad]), ``lambda 5`` (its direction), ``before 5`` (its direction at the visit
     before), ``travel 5`` (since its last reversal [log rad]), ``loop 5`` (between its
     last two reversals [log rad]), ``torque 5`` (of gravity about it [N m]),
-    ``tilting`` (moment of all weight about the base's horizontal axes [N m]),
+    ``tilting`` (moment of all weight about the base's origin [N m]),
     ``speed``, ``payload``, ``temperature``, ``time`` and ``order`` (SI units).
 
     Raises:
@@ -36,7 +36,8 @@ def covariate(batch: Batch, name: str) -> Floats:
     """
     kind, _, number = name.partition(" ")
     if name == TILTING:
-        return np.asarray(np.hypot(*batch.loads.tilting.T))
+        about_x, about_y, about_z = batch.loads.tilting.T
+        return np.asarray(np.hypot(np.hypot(about_x, about_y), about_z))
     if kind in PLAIN and not number:
         return np.asarray(getattr(batch.states, kind), dtype=float)
     if kind in JOINT_KINDS and number in set("123456"):

@@ -195,9 +195,20 @@ class Loads:
 
     @cached_property
     def tilting(self) -> Floats:
-        """Moment of links and payload about the base's x and y axes, (n, 2) [N m]."""
+        """Moment of links and payload about the base's axes, (n, 3) [N m]."""
         s = self.states
         return self.arm.tilting_moment(s.q, np.nan_to_num(s.payload), self._com)
+
+    @cached_property
+    def bending(self) -> Floats:
+        """Moment of links and payload across every joint, (n, 6, 2) [N m]."""
+        s = self.states
+        return self.arm.bending_moments(s.q, np.nan_to_num(s.payload), self._com)
+
+    @cached_property
+    def bending_basis(self) -> Floats:
+        """The same per unit of the links' first moments, (n, 6, 2, 6, 3)."""
+        return self.arm.bending_basis(self.states.q)
 
     @cached_property
     def basis(self) -> Floats:

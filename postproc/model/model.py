@@ -34,7 +34,7 @@ from postproc.model.variance import (
     parameter_variance,
     side_variance,
 )
-from postproc.robot.arm import Arm
+from postproc.robot.arm import FLOOR, Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States
 
@@ -108,6 +108,8 @@ READING = "reading_spread"  # statistic: see `Fit.reading_spread`
 WORST_STD = "worst_std_mm"  # statistic: largest standard error at a surveyed pose
 UNSURE = "standard error above three times the survey's worst"
 Width = tuple[float, float]  # least and largest way from flank to flank [gaps]
+Direction = tuple[float, float, float]
+TILTED = 1.0  # [deg] by which a cell may say that weight pulls another way
 UNTOLD: Width = 1.0, np.inf
 CONFIRMED, NOT_SURE = "confirmed", "not sure"  # what a measured path says of a joint
 
@@ -135,6 +137,7 @@ class Model:
         flank_widths: Over how many gaps at the least and at the most each of the 6
             joints goes from flank to flank, by reversals of the survey; UNTOLD where
             they do not tell, empty where none were measured.
+        weight: Direction in which weight pulled, unit vector in the base frame.
     """
 
     method: Method
@@ -154,6 +157,7 @@ class Model:
     history: tuple[dict[str, Any], ...] = ()
     registration: Registration | None = None
     flank_widths: tuple[Width, ...] = ()
+    weight: Direction = FLOOR
 
     @cached_property
     def id(self) -> str:
@@ -202,8 +206,11 @@ class Model:
         """
         effects, values, _ = self.compensable()
         pairs = zip(effects.effects, effects.slices, strict=True)
-        theta = np.sum([e.zero_errors(values[part]) for e, part in pairs], axis=0)
-        return np.asarray(np.linalg.solve(arm.dh.mix, arm.dh.sense * theta))
+        theta, q = np.zeros(6), np.zeros(6)
+        for effect, part in pairs:
+            theta += effect.zero_errors(values[part])
+            q += effect.joint_zeros(values[part])
+        return np.asarray(np.linalg.solve(arm.dh.mix, arm.dh.sense * theta) + q)
 
     def error(self, arm: Arm, states: States) -> Floats:
         """Predict the error without its uncertainty, (n, 3) [m]."""
@@ -382,10 +389,10 @@ class Model:
         return np.asarray(self.reading_spread * std)
 
     def check_arm(self, arm: Arm, path: str | Path = "model") -> None:
-        """Refuse an arm that the model was not made for.
+        """Check that the model was made for an arm, mounted as it is.
 
         Raises:
-            ModelError: The kinematics differ.
+            ModelError: The kinematics differ, or the direction of weight.
         """
         if arm.id != self.arm_id:
             raise ModelError(
@@ -394,6 +401,17 @@ class Model:
                 f"{arm.name} ({arm.id})",
                 "Use the model of this arm, or fit one",
                 place="$.arm",
+            )
+        apart = _degrees_between(np.array(self.weight), arm.weight)
+        if apart > TILTED:
+            raise ModelError(
+                path,
+                f"was fitted with weight along {_listed(self.weight)} in the base "
+                f"frame of the arm, {apart:.0f} deg from {_listed(arm.weight)} as the "
+                "cell has it",
+                "Correct mounting under [robot], or [base], of the cell; an arm that "
+                "was mounted in another way needs a survey of its own",
+                place="$.weight",
             )
 
     def to_dict(self) -> dict[str, Any]:
@@ -435,6 +453,8 @@ class Model:
             data["flank_widths"] = [
                 None if width == UNTOLD else list(width) for width in self.flank_widths
             ]
+        if self.weight != FLOOR:
+            data["weight"] = list(self.weight)
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -486,10 +506,31 @@ def load_model(path: str | Path) -> Model:
         history=file.history,
         registration=None if file.registration is None else file.registration.read(),
         flank_widths=tuple(UNTOLD if w is None else w for w in file.flank_widths),
+        weight=file.weight,
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id
     return model
+
+
+def weight_of(arm: Arm) -> Direction:
+    """Return the direction of an arm's weight, as a model keeps it."""
+    x, y, z = arm.weight.tolist()
+    return x, y, z
+
+
+def _degrees_between(a: Floats, b: Floats) -> float:
+    """Return the angle between two directions (3,) [deg]."""
+    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
+
+
+def _listed(direction: Direction | Floats) -> str:
+    """Write a direction.
+
+    >>> _listed((0.0, -0.0, -1.0))
+    '[0, 0, -1]'
+    """
+    return "[" + ", ".join(f"{round(v, 3) + 0.0:g}" for v in direction) + "]"
 
 
 def _on_flanks(states: States) -> Bools:

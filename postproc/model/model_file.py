@@ -21,6 +21,7 @@ from pydantic import (
 from postproc.arrays import Floats
 from postproc.exceptions import ModelError
 from postproc.model.registration import Registration
+from postproc.robot.arm import FLOOR
 
 FORMAT = 1
 MAX_BYTES = 200_000_000
@@ -139,6 +140,7 @@ class ModelFile(ModelSection):
     history: tuple[dict[str, Any], ...]
     registration: RegistrationSection | None = None
     flank_widths: Annotated[tuple[WidthSection | None, ...], Field(max_length=6)] = ()
+    weight: tuple[float, float, float] = FLOOR
 
 
 def content_id(data: dict[str, Any]) -> str:

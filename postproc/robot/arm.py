@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -85,6 +85,9 @@ SPEED_UP, SPEED_UP_OF_PUSH = 0.4, 0.1  # [s] to full speed, to full acceleration
 NEARBY = 0.5  # [rad] that Newton's method goes from one solution to the next
 NEWTON_ROUNDS, NEWTON_CLOSE, NEWTON_SINGULAR = 8, 1e-11, 1e-6
 GRAVITY = 9.80665  # [m/s^2], standard gravity
+FLOOR = (0.0, 0.0, -1.0)  # direction of weight in the base frame of an arm that stands
+BEHIND = np.triu(np.ones((6, 6)))  # by joint, then link: 1 where the joint carries it
+LEVEL = 1e-9  # [rad] a smaller tilt is the rounding of a base frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +105,7 @@ class Arm:
         gear_ratio: Turns of every motor per turn of its joint, (6,); NaN where not
             known.
         repeatability: Pose repeatability RP of ISO 9283 [m].
+        weight: Direction in which weight pulls, unit vector, (3,), base frame.
     """
 
     file: ArmFile
@@ -114,10 +118,31 @@ class Arm:
     coupling: Floats
     gear_ratio: Floats
     repeatability: float
+    weight: Floats = field(default_factory=lambda: np.array(FLOOR))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel between processes as the arm file: compiled parts cannot."""
-        return build_arm, (self.file,)
+        return _mounted_arm, (self.file, self.weight)
+
+    def mounted(self, weight: Floats) -> Arm:
+        """Return the arm with weight that pulls in another direction.
+
+        Args:
+            weight: The direction, (3,), base frame, of any length.
+        """
+        unit: Floats = weight / np.linalg.norm(weight)
+        level = np.linalg.norm(unit - FLOOR) < LEVEL
+        return replace(self, weight=np.array(FLOOR) if level else unit)
+
+    @property
+    def stands(self) -> bool:
+        """Return True if weight pulls along -z of the base, as on a level floor."""
+        return bool((self.weight == FLOOR).all())
+
+    @property
+    def _pull(self) -> Floats:
+        """Acceleration of gravity, (3,) [m/s^2], base frame."""
+        return GRAVITY * self.weight
 
     @cached_property
     def velocity(self) -> Floats:
@@ -259,14 +284,57 @@ class Arm:
         load[:, 0], load[:, 1:] = payload, payload_com
         if not (self._links[:, 0].any() or load[:, 0].any()):
             return np.zeros((len(q), 6)), np.zeros((len(q), 6))
+        if not self.stands:
+            z = self.link_frames(q)[:, :6, :3, 2]
+            both = self.moments(q, payload, payload_com)
+            own, carried = (np.einsum("njc,njc->nj", z, moment) for moment in both)
+            return self._to_controller(own), self._to_controller(carried)
         packed = self.dh.packed()
         own, carried = _native.torque(packed, floats(q), floats(self._links), load)
         return -GRAVITY * own, -GRAVITY * carried
 
+    def _to_controller(self, per_axis: Floats) -> Floats:
+        """Convert torques about the D-H axes, (n, 6, ..), to the controller's joints.
+
+        The first index after the pose is that of the axis.
+        """
+        dh, last = self.dh, np.moveaxis(per_axis, 1, -1)
+        turned: Floats = (last * dh.sense) @ dh.mix
+        return np.moveaxis(turned, -1, 1)
+
+    def moments(
+        self, q: Floats, payload: Floats | float, payload_com: Floats | float
+    ) -> tuple[Floats, Floats]:
+        """Compute the moments of all weight behind every joint, of links and payload.
+
+        Args:
+            q: Joint angles, (n, 6) [rad].
+            payload: Payload mass, (n,) [kg].
+            payload_com: Its centre of mass in the flange frame, (n, 3) [m]; without a
+                payload it may be unknown.
+
+        Returns:
+            (n, 6, 3) [N m] each, base frame: number k about the origin of D-H frame k,
+            through which joint k + 1 turns, of the links k + 1 to 6.
+        """
+        frames, links = self.link_frames(q), self._links
+        origin, mass = frames[:, :6, :3, 3], links[:, 0]
+        centre = np.einsum("niab,ib->nia", frames[:, 1:, :3, :3], links[:, 1:])
+        first = mass[:, None] * (centre + frames[:, 1:, :3, 3])
+        behind = np.cumsum(first[:, ::-1], axis=1)[:, ::-1]
+        heavy = np.cumsum(mass[::-1])[::-1]
+        own = behind - heavy[:, None] * origin
+        load = np.broadcast_to(payload, (len(q),))
+        com = np.broadcast_to(payload_com, (len(q), 3))
+        com = np.where((load > 0.0)[:, None], com, 0.0)
+        held = np.einsum("nab,nb->na", frames[:, 6, :3, :3], com) + frames[:, 6, :3, 3]
+        carried = load[:, None, None] * (held[:, None] - origin)
+        return np.cross(own, self._pull), np.cross(carried, self._pull)
+
     def tilting_moment(
         self, q: Floats, payload: Floats | float, payload_com: Floats | float
     ) -> Floats:
-        """Give the moment of all weight about the base's horizontal axes, (n, 2) [N m].
+        """Give the moment of all weight about the base's axes, (n, 3) [N m].
 
         Args:
             q: Joint angles, (n, 6) [rad].
@@ -274,7 +342,7 @@ class Arm:
             payload_com: Its centre of mass in the flange frame, (n, 3) [m].
 
         Returns:
-            About the x and the y axis through the base's origin.
+            About x, y and z through the base's origin; about z it is 0 on a floor.
         """
         frames, mass = self.link_frames(q)[:, 1:], self._links[:, 0]
         centre = np.einsum("niab,ib->nia", frames[..., :3, :3], self._links[:, 1:])
@@ -282,7 +350,7 @@ class Arm:
         com = np.broadcast_to(payload_com, (len(q), 3))
         carried = np.einsum("nab,nb->na", frames[:, 5, :3, :3], com)
         place += np.multiply(payload, (carried + frames[:, 5, :3, 3]).T).T
-        return GRAVITY * np.column_stack([-place[:, 1], place[:, 0]])
+        return np.cross(place, self._pull)
 
     def gravity_basis(self, q: Floats) -> Floats:
         """Give the joint torque per unit of every lumped mass parameter.
@@ -294,18 +362,54 @@ class Arm:
             (n, 6, 24); redundant: only some combinations reach the joints.
         """
         frames = self.link_frames(q)
-        axes, points = self.joint_axes(q)
-        basis = np.zeros((len(q), 6, 6, 4))
-        for link in range(6):
-            moved = np.arange(6) <= link
-            arm = frames[:, link + 1, None, :3, 3] - points
-            basis[:, :, link, 0] = np.where(moved, np.cross(axes, arm)[..., 2], 0.0)
-            for k in range(3):
-                lever = frames[:, link + 1, None, :3, k]
-                turn = np.cross(axes, lever)[..., 2]
-                basis[:, :, link, 1 + k] = np.where(moved, turn, 0.0)
-        flat: Floats = -GRAVITY * basis.reshape(len(q), 6, 24)
-        return flat
+        axis, origin = frames[:, :6, :3, 2], frames[:, :6, :3, 3]
+        lever = frames[:, None, 1:, :3, 3] - origin[:, :, None]  # joint, then link
+        basis = np.empty((len(q), 6, 6, 4))
+        basis[..., 0] = np.cross(axis[:, :, None], lever) @ self._pull
+        basis[..., 1:] = self._by_first_moments(frames, axis[..., None])[:, :, 0]
+        basis *= BEHIND[:, :, None]
+        return self._to_controller(basis).reshape(len(q), 6, 24)
+
+    def bending_basis(self, q: Floats) -> Floats:
+        """Give the moment across every joint per unit of the links' first moments.
+
+        Returns:
+            (n, 6, 2, 6, 3) [N m/(kg m)]: by joint k, about x and y of D-H frame k - 1,
+            which does not turn with it, per first moment of every link in its frame.
+        """
+        frames = self.link_frames(q)
+        across = self._by_first_moments(frames, frames[:, :6, :3, :2])
+        return np.asarray(across * BEHIND[:, None, :, None])
+
+    def bending_moments(
+        self, q: Floats, payload: Floats | float, payload_com: Floats | float
+    ) -> Floats:
+        """Compute the moment of links and payload across every joint.
+
+        Args:
+            q: Joint angles, (n, 6) [rad].
+            payload: Payload mass, (n,) [kg].
+            payload_com: Its centre of mass in the flange frame, (n, 3) [m].
+
+        Returns:
+            (n, 6, 2) [N m]: by joint k, about x and y of D-H frame k - 1.
+        """
+        own, carried = self.moments(q, payload, payload_com)
+        across = self.link_frames(q)[:, :6, :3, :2]
+        moment: Floats = np.einsum("njca,njc->nja", across, own + carried)
+        return moment
+
+    def _by_first_moments(self, frames: Floats, axes: Floats) -> Floats:
+        """Give moments per unit of first moment of every link, (n, 6, k, 6, 3).
+
+        Args:
+            frames: (n, 7, 4, 4).
+            axes: By joint, as columns, (n, 6, 3, k).
+        """
+        along = np.swapaxes(frames[:, 1:, :3, :3], 2, 3)  # (n, link, axis of it, 3)
+        turned = np.cross(along, self._pull)
+        across: Floats = np.einsum("njca,nibc->njaib", axes, turned, optimize=True)
+        return across
 
     def inverse(self, flange: Floats) -> Branches:
         """Solve the inverse kinematics of flange poses (n, 4, 4) [m]."""
@@ -424,6 +528,11 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     if arm.file.opw is not None:
         _check_inverse(arm, path)
     return arm
+
+
+def _mounted_arm(file: ArmFile, weight: Floats) -> Arm:
+    """Build an arm with weight that pulls in a direction, (3,)."""
+    return build_arm(file).mounted(weight)
 
 
 def build_arm(file: ArmFile) -> Arm:

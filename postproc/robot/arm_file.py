@@ -221,10 +221,15 @@ class ArmJointSection(Strict):
 
 
 class LinkSection(Strict):
-    """Masses and centres of mass of the six links, in their D-H frames."""
+    """Masses and centres of mass of the six links, in their D-H frames.
+
+    Their true moments differ by `spread`, a share: 0.1 where a maker states them, 0.5
+    where they are those of a URDF.
+    """
 
     mass_kg: Sextuple
     com_mm: Annotated[list[Triple], Field(min_length=6, max_length=6)]
+    spread: Annotated[float, Field(gt=0.0, le=1.0)] = 0.1
 
 
 class OpwSection(Strict):

@@ -30,6 +30,11 @@ STILL = "still"  # beside names: the key whose value lists patterns
 
 NO_ANGLES = [0.0, 0.0, 0.0]
 TAUGHT_POINTS = ("the origin", "a point on +x", "a point at +y")
+MOUNTINGS = {
+    "floor": (0.0, 0.0, -1.0),
+    "ceiling": (0.0, 0.0, 1.0),
+    "wall": (1.0, 0.0, 0.0),
+}  # where weight pulls in the arm's base frame
 LONGEST_MM = 50_000.0  # no frame is farther away: a longer one has a wrong unit
 
 
@@ -78,11 +83,36 @@ class FrameSection(Strict):
 
 
 class RobotSection(Strict):
-    """Which arm, and what its controller does."""
+    """Which arm, how it is mounted, and what its controller does.
+
+    Attributes:
+        arm: Name of a shipped arm, or an arm file.
+        arm_number: Which arm of its controller it is.
+        absolute_accuracy: Whether the controller compensates the arm itself.
+        mounting: Where weight pulls in the arm's base frame: "floor" along -z,
+            "ceiling" along +z, "wall" along +x, or a vector of any length. Without it
+            weight pulls along -z of the world, in which [base] places the arm.
+    """
 
     arm: str
     arm_number: ArmNumber = 1
     absolute_accuracy: bool = False
+    mounting: Literal["floor", "ceiling", "wall"] | Triple | None = None
+
+    @field_validator("mounting", mode="before")
+    @classmethod
+    def _direction(cls, value: object) -> object:
+        """Check that a mounting is one of the words, or a vector with a direction."""
+        if isinstance(value, str) and value in MOUNTINGS:
+            return value
+        if isinstance(value, list) and len(value) == 3:
+            numbers = [v for v in value if isinstance(v, int | float)]
+            if len(numbers) == 3 and 0.0 < sum(v * v for v in numbers) < np.inf:
+                return value
+        raise ValueError(
+            '"floor", "ceiling", "wall", or the direction in which weight pulls in the '
+            "base frame of the arm, such as [1, 0, 0]"
+        )
 
 
 class JointPositionSection(Strict):
@@ -296,7 +326,7 @@ def load_cell(path: str | Path) -> Cell:
     """
     path = Path(path)
     file = read_toml(path, CellFile, CellError)
-    arm = load_arm(file.robot.arm, beside=path.parent)
+    arm = load_arm(file.robot.arm, beside=path.parent).mounted(_weight(file))
     payload, tracker = file.payload, file.tracker
     return Cell(
         path=path,
@@ -328,6 +358,16 @@ def load_cell(path: str | Path) -> Cell:
         taught_frames=_taught_frames(file),
         taught_sides=_taught_sides(file),
     )
+
+
+def _weight(file: CellFile) -> Floats:
+    """Return the direction in which weight pulls, (3,), base frame of the arm."""
+    mounting = file.robot.mounting
+    if isinstance(mounting, list):
+        return np.array(mounting)
+    if mounting is not None:
+        return np.array(MOUNTINGS[mounting])
+    return -_frame(file.base).pose[2, :3]  # -z of the world, turned into the base
 
 
 def _patterns(said: object) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from postproc.robot.arm_file import ArmFile, parse_toml
 from postproc.robot.denavit_hartenberg import PARALLEL, DhParameters, dh_parameters
 from postproc.robot.pose import MM
 from postproc.robot.urdf import MOVING, UrdfChain, turned
+from postproc.robot.urdf_links import links_text
 
 # What the chain is: lengths and zeros of an ortho-parallel basis with a wrist.
 #
@@ -267,7 +268,7 @@ def arm_text(chain: UrdfChain, repeatability_mm: float, name: str | None = None)
     if obstacle is not None:
         _check_mobility(arm, obstacle)
     _verify(chain, arm)
-    return text
+    return text + links_text(chain.weights, arm)
 
 
 def closed_form_obstacle(chain: UrdfChain) -> str:
@@ -303,7 +304,7 @@ lower_deg = {lower}
 upper_deg = {upper}
 velocity_deg_s = {velocity}
 # Accelerations and jerks are guesses, full speed in 0.4 s, full acceleration in 0.1 s.
-# Masses, gear ratios and coupled gears are not taken over.
+# A URDF states no gear ratios and no coupled gears.
 guessed = ["acceleration", "jerk"]
 acceleration_deg_s2 = {acceleration}
 jerk_deg_s3 = {jerk}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.parsers import expat
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError
+from postproc.robot.urdf_links import Weight, body_of
 
 # The file: elements that know their line.
 
@@ -147,6 +148,7 @@ class UrdfChain:
         base, tip: The links at its ends.
         before: The base link in the frame that the first joint hangs on, (4, 4) [m].
         joints: All joints on the way, fixed ones too.
+        weights: Masses and centres of the links behind the first joint, as stated.
     """
 
     path: Path
@@ -155,6 +157,7 @@ class UrdfChain:
     tip: str
     before: Floats
     joints: tuple[UrdfJoint, ...]
+    weights: tuple[Weight, ...] = ()
 
     @property
     def moving(self) -> tuple[UrdfJoint, ...]:
@@ -214,7 +217,40 @@ def read_chain(
     name = robot.attributes.get("name") or path.stem
     chain = UrdfChain(path, name, base, tip, before, tuple(reversed(down)))
     _check_joints(chain)
-    return chain
+    return replace(chain, weights=tuple(_weights(chain, robot, joints)))
+
+
+def _weights(
+    chain: UrdfChain, robot: Element, joints: dict[str, UrdfJoint]
+) -> Iterator[Weight]:
+    """Read <inertial> of all links that hang on the chain's joints.
+
+    Raises:
+        ArmError: A number is none.
+    """
+    above = {child: (joint.name, joint.parent) for child, joint in joints.items()}
+    moving = [joint.name for joint in chain.moving]
+    base = np.linalg.inv(_place(chain.path, joints, chain.base))
+    for link in (c for c in robot.children if c.tag == "link"):
+        name = link.attributes.get("name", "")
+        stated = next((c for c in link.children if c.tag == "inertial"), None)
+        body = body_of(name, above, moving)
+        if stated is None or body is None:
+            continue
+        parts = {child.tag: child for child in stated.children}
+        none = Element("", {}, stated.line)
+        mass = _numbers(chain.path, parts.get("mass", none), "value", (0.0,))[0]
+        xyz = _numbers(chain.path, parts.get("origin", none), "xyz", (0.0, 0.0, 0.0))
+        place = base @ _place(chain.path, joints, name) @ [*xyz, 1.0]
+        yield Weight(name, body, mass, place[:3])
+
+
+def _place(path: Path, joints: Mapping[str, UrdfJoint], link: str) -> Floats:
+    """Place a link in the root's frame where all joints are at 0, (4, 4) [m]."""
+    place = np.eye(4)
+    for joint in _way(path, joints, link):
+        place = joint.origin @ place
+    return place
 
 
 def _before(path: Path, base: str, up: Sequence[UrdfJoint]) -> Floats:

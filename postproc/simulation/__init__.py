@@ -9,7 +9,7 @@ from __future__ import annotations
 from postproc.simulation.arm import GearKind, VirtualArm
 from postproc.simulation.controller import VirtualCell
 from postproc.simulation.draw import stream, virtual_arm
-from postproc.simulation.kinematics import NJ220, Chain
+from postproc.simulation.kinematics import NJ220, Chain, gravity_of
 from postproc.simulation.laws import DEFAULT, NAMES, Planted, parse_effects
 from postproc.simulation.program import Landing, ProgramRun, land, run_program
 from postproc.simulation.state import VirtualArrivals, arrivals_of_states, make_arrivals
@@ -43,6 +43,7 @@ __all__ = [
     "arrivals_of_states",
     "campaign_length",
     "follow_rows",
+    "gravity_of",
     "in_tracker_frame",
     "land",
     "make_arrivals",

@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.simulation.kinematics import (
+    GRAVITY,
     Chain,
     LinkMasses,
     small_motion,
@@ -69,11 +70,19 @@ def draw_as_built(
     return AsBuilt(chain, base, mount if tool else 0 * mount)
 
 
-def draw_body(rng: np.random.Generator, chain: Chain) -> LinkMasses:
-    """Draw the weights of one arm: 10 % and 20 mm off the estimates."""
+def draw_body(
+    rng: np.random.Generator, chain: Chain, gravity: Floats = GRAVITY
+) -> LinkMasses:
+    """Draw the weights of one arm: 10 % and 20 mm off the estimates.
+
+    Args:
+        rng: Random numbers of the weights alone.
+        chain: The arm of the drawing.
+        gravity: Acceleration of gravity in the arm base, (3,) [m/s^2].
+    """
     mass = chain.mass * rng.uniform(0.9, 1.1, 6)
     centre = chain.centre + rng.uniform(-0.02, 0.02, (6, 3))
-    return LinkMasses(chain, mass, centre)
+    return LinkMasses(chain, mass, centre, gravity)
 
 
 def _off(
@@ -329,10 +338,17 @@ class VirtualArm:
         growth = total(self.laws, Where.LENGTHS, arrivals)
         base = self.as_built.base + total(self.laws, Where.BASE, arrivals)
         mount = self.as_built.mount + total(self.laws, Where.TOOL, arrivals)
-        flange = self.as_built.chain.bent(growth).flange(angles)
+        chain = self.as_built.chain.bent(growth)
+        flange = chain.flange(angles, self._leans(arrivals))
         return np.asarray(
             small_motion(base) @ flange @ small_motion(mount) @ arrivals.tool
         )
+
+    def _leans(self, arrivals: VirtualArrivals) -> Floats | None:
+        """Return by what the arm is bent before every joint, (n, 6, 2), None if not."""
+        if not any(law.where is Where.LEANS for law in self.laws):
+            return None
+        return total(self.laws, Where.LEANS, arrivals).reshape(-1, 6, 2)
 
     def error(self, arrivals: VirtualArrivals) -> Floats:
         """Return the true error, actual minus nominal TCP, (n, 3), without noise."""

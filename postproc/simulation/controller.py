@@ -14,6 +14,7 @@ from postproc.language.visits import START, Blend, Meaning, Visits, ZoneRule
 from postproc.robot.trajectory import Motion
 from postproc.simulation.kinematics import (
     ELBOW,
+    GRAVITY,
     NJ220,
     SHOULDER,
     WRIST,
@@ -325,6 +326,7 @@ class VirtualCell:
         payload_com: In the flange frame, (3,) [m].
         temperature: At the start, [deg C].
         tracker: Where the tracker stands, (3,) [m] in the arm base frame.
+        gravity: Acceleration of gravity in the arm base, (3,) [m/s^2].
     """
 
     chain: Chain = NJ220
@@ -339,6 +341,7 @@ class VirtualCell:
     payload_com: Floats = field(default_factory=lambda: np.zeros(3))
     temperature: float = 22.0
     tracker: Floats = field(default_factory=lambda: USUAL_TRACKER.copy())
+    gravity: Floats = field(default_factory=GRAVITY.copy)
 
     def tool_of(self, tool_id: NDArray[np.int64]) -> Floats:
         """Return the tool poses (n, 4, 4) of tool numbers (n,) from 0.

@@ -18,7 +18,13 @@ from postproc.simulation.arm import (
     draw_as_built,
     draw_body,
 )
-from postproc.simulation.kinematics import NJ220, Chain, LinkMasses, total_torque
+from postproc.simulation.kinematics import (
+    GRAVITY,
+    NJ220,
+    Chain,
+    LinkMasses,
+    total_torque,
+)
 from postproc.simulation.laws import (
     AS_BUILT,
     DEFAULT,
@@ -55,6 +61,7 @@ def virtual_arm(
     tool: Floats | None = None,
     gears: GearKind | str = GearKind.SHARP,
     tracker: Floats | None = None,
+    gravity: Floats = GRAVITY,
 ) -> VirtualArm:
     """Draw an arm.
 
@@ -70,6 +77,7 @@ def virtual_arm(
         gears: What the gears do in their gaps; nothing else depends on it.
         tracker: Where the tracker stands, (3,) [m]; only what it reads wrongly depends
             on it.
+        gravity: Acceleration of gravity in the arm base, (3,) [m/s^2].
 
     Raises:
         PostprocError: An effect that does not exist.
@@ -77,7 +85,7 @@ def virtual_arm(
     planted = parse_effects(effects)
     names = {item.name for item in planted}
     perfect = _perfect(chain, coupling)
-    body = draw_body(stream(seed, "body"), chain)
+    body = draw_body(stream(seed, "body"), chain, gravity)
     stand = USUAL_TRACKER if tracker is None else tracker
     planter = _Planter(seed, body, rows, stand, reference_arrivals(rows, tool), perfect)
     laws = {item: planter.law(item) for item in planted if item.name not in AS_BUILT}

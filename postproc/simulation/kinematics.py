@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -118,9 +119,24 @@ class Chain:
             np.matmul(out[:, i], links[:, i], out=out[:, i + 1])
         return out
 
-    def flange(self, q: Floats) -> Floats:
-        """Return the flange poses (n, 4, 4) in the arm base [m]."""
-        return np.asarray(self.frames(q)[:, 6])
+    def flange(self, q: Floats, leans: Floats | None = None) -> Floats:
+        """Return the flange poses (n, 4, 4) in the arm base [m].
+
+        Args:
+            q: Controller joint angles, (n, 6) [rad].
+            leans: By what the arm is bent before every joint turns, about x and y of
+                the frame there, (n, 6, 2) [rad].
+        """
+        if leans is None:
+            return np.asarray(self.frames(q)[:, 6])
+        links = self.links(np.asarray(q, dtype=float))
+        about = np.concatenate([leans, np.zeros_like(leans[..., :1])], axis=2)
+        bent = exponential(about)
+        placed = np.broadcast_to(np.eye(4), (len(links), 4, 4)).copy()
+        for i in range(6):
+            placed[:, :3, :3] = placed[:, :3, :3] @ bent[:, i]
+            placed = placed @ links[:, i]
+        return placed
 
     def bent(self, growth: Floats) -> Chain:
         """Return a chain whose lengths grew by the relative amounts (n, 6)."""
@@ -345,16 +361,40 @@ def small_motion(twist: Floats) -> Floats:
 
 # Gravity torques by moments about the joint axes, written for the virtual arm.
 
-GRAVITY = np.array([0.0, 0.0, -9.80665])  # [m/s^2]
+GRAVITY = np.array([0.0, 0.0, -9.80665])  # [m/s^2] of an arm on the floor
+MOUNTED = {"floor": GRAVITY, "ceiling": -GRAVITY, "wall": -GRAVITY[[2, 0, 1]]}
+
+
+def gravity_of(mounting: str | Sequence[float] | None, base: Floats) -> Floats:
+    """Return the acceleration of gravity in the arm base, (3,) [m/s^2].
+
+    Args:
+        mounting: "floor", "ceiling", "wall" or a direction; None: by the base.
+        base: World to arm base, (4, 4).
+    """
+    if mounting is None:
+        return np.asarray(undo(base)[:3, :3] @ GRAVITY)
+    if isinstance(mounting, str):
+        return MOUNTED[mounting]
+    along = np.array(mounting, dtype=float)
+    return np.asarray(along * (-GRAVITY[2] / np.sqrt(along @ along)))
 
 
 @dataclass(frozen=True)
 class LinkMasses:
-    """What the arm weighs: link masses (6,) [kg], centres in link frames (6, 3) [m]."""
+    """What the arm weighs.
+
+    Attributes:
+        chain: The chain that the weights hang on.
+        mass: Link masses, (6,) [kg].
+        centre: Their centres in the link frames, (6, 3) [m].
+        gravity: Acceleration of gravity in the arm base, (3,) [m/s^2].
+    """
 
     chain: Chain
     mass: Floats
     centre: Floats
+    gravity: Floats = field(default_factory=GRAVITY.copy)
 
 
 def link_torque(body: LinkMasses, q: Floats) -> Floats:
@@ -373,7 +413,7 @@ def link_torque(body: LinkMasses, q: Floats) -> Floats:
     frames = body.chain.frames(q)
     centre = np.einsum("niab,ib->nia", frames[:, 1:, :3, :3], body.centre)
     centre = centre + frames[:, 1:, :3, 3]
-    return _moments(body.chain, frames, centre, body.mass[None, :] + 0 * centre[..., 0])
+    return _moments(body, frames, centre, body.mass[None, :] + 0 * centre[..., 0])
 
 
 def total_torque(body: LinkMasses, q: Floats, mass: Floats, com: Floats) -> Floats:
@@ -385,23 +425,23 @@ def total_torque(body: LinkMasses, q: Floats, mass: Floats, com: Floats) -> Floa
         mass: As in `payload_torque`.
         com: Likewise.
     """
-    return link_torque(body, q) + payload_torque(body.chain, q, mass, com)
+    return link_torque(body, q) + payload_torque(body, q, mass, com)
 
 
-def payload_torque(chain: Chain, q: Floats, mass: Floats, com: Floats) -> Floats:
+def payload_torque(body: LinkMasses, q: Floats, mass: Floats, com: Floats) -> Floats:
     """Return the torque of a payload about every joint, (n, 6) [N m].
 
     Args:
-        chain: The arm.
+        body: The arm.
         q: Controller joint angles, (n, 6) [rad].
         mass: Payload mass, (n,) [kg].
         com: Its centre of mass in the flange frame, (n, 3) [m].
     """
-    frames = chain.frames(q)
+    frames = body.chain.frames(q)
     centre = np.einsum("nab,nb->na", frames[:, 6, :3, :3], com) + frames[:, 6, :3, 3]
     masses = np.zeros_like(q)
     masses[:, 5] = mass
-    return _moments(chain, frames, np.repeat(centre[:, None], 6, axis=1), masses)
+    return _moments(body, frames, np.repeat(centre[:, None], 6, axis=1), masses)
 
 
 def foundation_moment(body: LinkMasses, q: Floats, mass: Floats, com: Floats) -> Floats:
@@ -417,17 +457,43 @@ def foundation_moment(body: LinkMasses, q: Floats, mass: Floats, com: Floats) ->
     total = np.zeros((len(q), 3))
     for i in range(6):
         centre = frames[:, i + 1, :3, :3] @ body.centre[i] + frames[:, i + 1, :3, 3]
-        total += np.cross(centre, body.mass[i] * GRAVITY)
+        total += np.cross(centre, body.mass[i] * body.gravity)
     held = frames[:, 6] @ np.append(com, np.ones((len(q), 1)), axis=1)[..., None]
-    return np.asarray(total + np.cross(held[:, :3, 0], mass[:, None] * GRAVITY))
+    return np.asarray(total + np.cross(held[:, :3, 0], mass[:, None] * body.gravity))
 
 
-def _moments(chain: Chain, frames: Floats, centre: Floats, mass: Floats) -> Floats:
+def bending_moment(body: LinkMasses, q: Floats, mass: Floats, com: Floats) -> Floats:
+    """Return the moment of all weight behind every joint, across its axis.
+
+    Args:
+        body: As in `link_torque`.
+        q: Controller joint angles, (n, 6) [rad].
+        mass: As in `payload_torque`.
+        com: Likewise.
+
+    Returns:
+        (n, 6, 2) [N m], about x and y of the frame before each joint.
+    """
+    frames = body.chain.frames(q)
+    held = frames[:, 6, :3, 3] + np.einsum("nab,nb->na", frames[:, 6, :3, :3], com)
+    out = np.empty((len(q), 6, 2))
+    for j in range(6):
+        at, axes = frames[:, j, :3, 3], frames[:, j, :3, :2]
+        total = np.cross(held - at, mass[:, None] * body.gravity)
+        for i in range(j, 6):
+            link = frames[:, i + 1]
+            centre = link[:, :3, :3] @ body.centre[i] + link[:, :3, 3]
+            total += np.cross(centre - at, body.mass[i] * body.gravity)
+        out[:, j] = np.einsum("nca,nc->na", axes, total)
+    return out
+
+
+def _moments(body: LinkMasses, frames: Floats, centre: Floats, mass: Floats) -> Floats:
     """Sum the moments about every axis of the masses outward of it."""
-    weight = mass[..., None] * GRAVITY
+    weight = mass[..., None] * body.gravity
     torque = np.empty((len(frames), 6))
     for j in range(6):
         lever = centre[:, j:] - frames[:, j, None, :3, 3]
         moment = np.cross(lever, weight[:, j:]).sum(axis=1)
         torque[:, j] = np.sum(frames[:, j, :3, 2] * moment, axis=-1)
-    return chain.by_joints(torque)
+    return body.chain.by_joints(torque)

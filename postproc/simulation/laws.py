@@ -13,6 +13,7 @@ from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
 from postproc.simulation.kinematics import (
     LinkMasses,
+    bending_moment,
     foundation_moment,
     payload_torque,
     total_torque,
@@ -26,9 +27,10 @@ Shape = Callable[[VirtualArrivals], Floats]
 
 
 class Where(Enum):
-    """What a law changes; always six numbers an arrival."""
+    """What a law changes: six numbers an arrival, twelve of `LEANS`."""
 
     JOINTS = "joints"  # joint angles [rad]
+    LEANS = "leans"  # about x and y of the frame before every joint [rad]
     LENGTHS = "lengths"  # relative growth of every link
     BASE = "base"  # twist of the arm on its foundation [m, rad]
     TOOL = "tool"  # twist of the tool on the flange [m, rad]
@@ -46,7 +48,7 @@ class Law:
         source: The joint, or the coupled drive, that drives a joint's error, from 1,
             or 0.
         parameters: The law's own numbers, SI units, for the record.
-        shape: (n,) arrivals -> (n, 6) per unit of `scale`.
+        shape: (n,) arrivals -> (n, 6) or (n, 12) per unit of `scale`.
         scale: Size of the law.
         peak_mm: Largest TCP displacement over the reference campaign.
     """
@@ -108,9 +110,10 @@ def on_joint(joint: int, values: Floats) -> Floats:
 
 
 def total(laws: Sequence[Law], where: Where, arrivals: VirtualArrivals) -> Floats:
-    """Sum the changes (n, 6) of all laws that act at one place."""
+    """Sum the changes (n, 6) or (n, 12) of all laws that act at one place."""
     parts = [law(arrivals) for law in laws if law.where is where]
-    return np.asarray(sum(parts, np.zeros((len(arrivals), 6))))
+    width = 12 if where is Where.LEANS else 6
+    return np.asarray(sum(parts, np.zeros((len(arrivals), width))))
 
 
 # Laws that bend or turn a joint: weight, gear teeth, encoders, wear.
@@ -141,13 +144,30 @@ def compliance(draw: Draw) -> Law:
     return Law("compliance", Where.JOINTS, tuple(joints), 0, parameters, shape)
 
 
+def bending(draw: Draw) -> Law:
+    """Links and bearings behind a joint yield to the weight across its axis."""
+    joint = draw.pick([2, 3, 4, 5, 6])
+    softness = np.zeros((6, 2))  # relative; the scale makes it rad / kN m
+    softness[joint - 1] = draw.rng.uniform(0.3, 1.0, 2)
+
+    def shape(arrivals: VirtualArrivals) -> Floats:
+        moment = bending_moment(
+            draw.body, arrivals.q, arrivals.payload, arrivals.payload_com
+        )
+        return np.reshape(moment / KILO * softness, (len(arrivals), 12))
+
+    parameters = {f"softness_{a}": float(softness[joint - 1, k])
+                  for k, a in enumerate("xy")}  # fmt: skip
+    return Law("bending", Where.LEANS, (joint,), 0, parameters, shape)
+
+
 def payload(draw: Draw) -> Law:
     """A joint yields to the declared payload."""
     joint = draw.pick([2, 3, 5])
 
     def shape(arrivals: VirtualArrivals) -> Floats:
         torque = payload_torque(
-            draw.body.chain, arrivals.q, arrivals.payload, arrivals.payload_com
+            draw.body, arrivals.q, arrivals.payload, arrivals.payload_com
         )
         return on_joint(joint, torque[:, joint - 1] / KILO)
 
@@ -471,6 +491,16 @@ def joint_step(draw: Draw) -> Law:
     return Law("joint_step", Where.JOINTS, (joint,), 0, {"row": float(row)}, shape)
 
 
+def joint_offset(draw: Draw) -> Law:
+    """A joint was mastered again before the campaign: its zero is another."""
+    joint, sign = draw.pick(range(1, 7)), draw.sign()
+
+    def shape(arrivals: VirtualArrivals) -> Floats:
+        return on_joint(joint, np.full(len(arrivals), sign))
+
+    return Law("joint_offset", Where.JOINTS, (joint,), 0, {}, shape)
+
+
 def base_tilt(draw: Draw) -> Law:
     """A table or foundation leans under the weight that hangs over it.
 
@@ -563,6 +593,7 @@ class LawKind:
 
 KINDS = {
     "compliance": LawKind(compliance, 0.1, 1.0),
+    "bending": LawKind(bending, 0.05, 0.5),
     "payload": LawKind(payload, 0.2, 2.0),
     "counterbalance": LawKind(counterbalance, 0.1, 0.5),
     "transmission": LawKind(transmission, 0.05, 0.3),
@@ -582,6 +613,7 @@ KINDS = {
     "tool_shift": LawKind(tool_shift, 0.05, 0.5),
     "tracker_drift": LawKind(tracker_drift, 0.03, 0.1),
     "joint_step": LawKind(joint_step, 0.05, 0.5),
+    "joint_offset": LawKind(joint_offset, 0.1, 1.0),
     "base_tilt": LawKind(base_tilt, 0.1, 1.0),
     "elastic_flank": LawKind(elastic_flank, 0.03, 0.15),
     "azimuth": LawKind(azimuth, 0.03, 0.1),

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from postproc.calibration.design import DesignMatrix, JointColumns
 from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.refit import revise
+from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
+from postproc.calibration.selection import fit_survey, model_of
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.state import States, make_states
@@ -31,11 +36,12 @@ PAYLOADS = np.array([0.0, 40.0, 120.0])  # [kg]
 BASE = ("geometry", "tool", "backlash")
 
 NAMED = (
-    "compliance", "payload", "counterbalance", "transmission", "transmission_free",
-    "scale", "coupling", "load_backlash", "gravity_side", "thermal", "warmup", "windup",
-    "lag", "base_shift", "tool_shift", "tracker_drift", "worn_spot", "joint_step",
-    "base_tilt", "elastic_flank", "azimuth", "refraction",
+    "compliance", "bending", "payload", "counterbalance", "transmission",
+    "transmission_free", "scale", "coupling", "load_backlash", "gravity_side",
+    "thermal", "warmup", "windup", "lag", "base_shift", "tool_shift", "tracker_drift",
+    "worn_spot", "joint_step", "base_tilt", "elastic_flank", "azimuth", "refraction",
 )  # fmt: skip
+REVISED = ("joint_offset",)  # what is one with the geometry: a model must be given
 NAMELESS = ("joint_product", "hysteresis")
 READINGS = ("tracker_drift", "azimuth", "refraction")  # nothing moves, it only seems to
 UNTOLD = ("elastic_flank",)  # measured row by row: no travels, no directions told
@@ -65,10 +71,38 @@ class Campaign:
     declared: Arm = ARM
 
     def base_fit(self) -> Fit:
-        """Fit geometry and backlash: what a user declares."""
+        """Fit geometry and backlash: what a user declares, or revise such a model."""
+        if any(p.name in REVISED for p in self.planted):
+            return self.revised()
         effects = propose(BASE_EFFECTS, self.declared, self.states)
         batch = Batch(self.declared, self.states)
         return fit_effects(batch, self.position, effects, tuple(TRACKER))
+
+    def revised(self) -> Fit:
+        """Revise, by the rows, a model of the arm before its effects came."""
+        seed, rows = self.arm.seed, len(self.states)
+        clean = planted_arm(seed, rows=rows)
+        old = survey(clean, seed + 500_000, rows)
+        position = clean.measure(old, TRACKER, stream(seed, "before"))
+        model = base_model(measurements(states_of(old), position, "old"), self.declared)
+        batch = Batch(self.declared, self.states)
+        fresh = measurements(self.states, self.position, "fresh")
+        origin = (float(TRACKER[0]), float(TRACKER[1]), float(TRACKER[2]))
+        return revise(fresh, model, batch, origin)[0]
+
+
+def measurements(states: States, position: np.ndarray, name: str) -> Measurements:
+    """Put states and readings together as a measurement file does."""
+    n = len(states)
+    ids = tuple(map(str, range(n)))
+    lines = np.arange(n) + 2
+    inferred = np.zeros(n, dtype=bool)
+    return Measurements(Path(name), states, position, ids, lines, inferred, name)
+
+
+def base_model(rows: Measurements, arm: Arm = ARM) -> Model:
+    """Fit what a user declares, and keep it as a model."""
+    return model_of(fit_survey(rows, arm, BASE_EFFECTS, TRACKER), rows)
 
 
 def campaign(
@@ -211,6 +245,8 @@ def _size(
     """rms of an effect after projection on the base model, in units of the noise."""
     fit = _clean_fit(clean, seed, arrivals)
     added = fit.whiten(displacement(clean, seed, planted, arrivals, rows))
+    if planted.name in REVISED:
+        return float(np.sqrt((added**2).mean()))
     left = Projection.of(fit).filter(added[:, None])[:, 0]
     return float(np.sqrt((left**2).mean()))
 

@@ -63,7 +63,10 @@ def test_it_goes_to_standard_output_and_says_what_was_rounded(urdf):
     urdf.write_text(urdf_text(NJ130_SERIAL).replace("-1.5707963267948966", "-1.57"))
     found = cli("arm", "from-urdf", urdf, "--name", "nj130", "--base", "l0")
     assert found.exit_code == 0 and 'name = "nj130"' in found.stdout
-    assert found.stderr == f"{urdf}: joint j3: -1.57 rad taken as -90 deg\n"
+    assert found.stderr == (
+        f"{urdf}: joint j3: -1.57 rad taken as -90 deg\n"
+        f"{urdf}: states no masses. [links] is not written\n"
+    )
 
 
 def test_an_offset_wrist_has_a_numeric_inverse_and_that_is_said(urdf):

@@ -17,7 +17,7 @@ from postproc.calibration.selection import fit_survey, model_of
 from postproc.exceptions import ModelError, OutputError
 from postproc.model.effects import BASE_EFFECTS, BY_NAME, propose
 from postproc.model.kinematics import Batch
-from postproc.model.model import Model, load_model
+from postproc.model.model import Model, load_model, weight_of
 from postproc.model.model_file import content_id
 from postproc.robot.state import make_states
 from tests.calibration.simulator import (
@@ -127,6 +127,23 @@ def test_files_that_do_not_hold_together_are_refused(tmp_path: Path) -> None:
         load_model(tmp_path / "nowhere.json")
     with pytest.raises(ModelError, match="not for other"):
         model().check_arm(replace(NJ, name="other", id="0"), path)
+
+
+def test_a_model_holds_for_the_mounting_that_it_was_fitted_in(tmp_path: Path) -> None:
+    path, wall = tmp_path / "m.json", NJ.mounted(np.array([1.0, 0.0, 0.0]))
+    model().save(path)
+    assert "weight" not in json.loads(path.read_text())  # a floor is no news
+    with pytest.raises(
+        ModelError, match=r"along \[0, 0, -1\] .* 90 deg from \[1, 0, 0\]"
+    ):
+        load_model(path).check_arm(wall)
+    replace(model(), weight=weight_of(wall)).save(path)
+    on_wall = load_model(path)
+    assert on_wall.weight == (1.0, 0.0, 0.0)
+    on_wall.check_arm(wall)
+    on_wall.check_arm(NJ.mounted(np.array([1.0, 0.0, 0.015])))  # less than 1 deg
+    with pytest.raises(ModelError, match="mounting under"):
+        on_wall.check_arm(NJ)
 
 
 def test_an_unknown_side_is_the_middle_and_costs_the_backlash() -> None:

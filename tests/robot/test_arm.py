@@ -1,11 +1,13 @@
 """The NJ 220-2.7 against its published numbers, and derivatives by differences."""
 
+import pickle
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from postproc.exceptions import ArmError
-from postproc.robot.arm import GRAVITY, load_arm
+from postproc.robot.arm import GRAVITY, build_arm, load_arm
 from postproc.robot.pose import record_from_pose
 
 TOOL = np.array([0.08, -0.04, 0.15])
@@ -94,16 +96,24 @@ def test_joint_axes_span_the_jacobian(arm, q):
 
 
 def _potential_energy(arm, q, payload, com):
+    up = np.append(-GRAVITY * arm.weight, 0.0)
     frames = arm.link_frames(q)
-    energy = payload * GRAVITY * (frames[:, 6] @ [*com, 1.0])[:, 2]
+    energy = payload * (frames[:, 6] @ [*com, 1.0]) @ up
     links = arm.file.links
     for i in range(6):
         centre = frames[:, i + 1] @ [*(np.array(links.com_mm[i]) * 1e-3), 1.0]
-        energy += links.mass_kg[i] * GRAVITY * centre[:, 2]
+        energy += links.mass_kg[i] * (centre @ up)
     return energy
 
 
-def test_gravity_torque_is_the_energy_gradient(arm, q):
+WEIGHTS = pytest.mark.parametrize(
+    "weight", [(0, 0, -1), (0, 0, 1), (1, 0, 0), (0.3, -2.0, 0.4)]
+)
+
+
+@WEIGHTS
+def test_gravity_torque_is_the_energy_gradient(arm, q, weight):
+    arm = arm.mounted(np.array(weight, dtype=float))
     q, com = q[:30], np.array([0.1, 0.0, 0.2])
     torque = arm.gravity_torque(q, 60.0, com)
     step = 1e-5
@@ -116,7 +126,9 @@ def test_gravity_torque_is_the_energy_gradient(arm, q):
         np.testing.assert_allclose(torque[:, j], -slope, atol=1e-5)
 
 
-def test_gravity_basis_spans_the_torque(arm, q):
+@WEIGHTS
+def test_gravity_basis_spans_the_torque(arm, q, weight):
+    arm = arm.mounted(np.array(weight, dtype=float))
     links = arm.file.links
     lumped = [
         value
@@ -125,6 +137,57 @@ def test_gravity_basis_spans_the_torque(arm, q):
     ]
     torque = arm.gravity_basis(q[:50]) @ lumped
     np.testing.assert_allclose(torque, arm.gravity_torque(q[:50]), atol=1e-9)
+
+
+@WEIGHTS
+def test_a_parallelogram_takes_part_of_the_torque(arm, q, weight):
+    """Axis 3 follows axis 2: the controller's joint 2 turns both."""
+    dh = arm.file.dh.model_copy(update={"axis3_adds_axis2": True})
+    rod = build_arm(arm.file.model_copy(update={"dh": dh, "opw": None}))
+    test_gravity_basis_spans_the_torque(rod, q, weight)
+    test_gravity_torque_is_the_energy_gradient(rod, q, weight)
+
+
+@WEIGHTS
+def test_moments_about_the_joints_are_the_torque(arm, q, weight):
+    arm = arm.mounted(np.array(weight, dtype=float))
+    q, com = q[:20], np.tile([0.1, 0.0, 0.2], (20, 1))
+    axes, load = arm.joint_axes(q)[0], np.full(20, 30.0)
+    for moment, torque in zip(
+        arm.moments(q, load, com), arm.torques(q, load, com), strict=True
+    ):
+        about = np.einsum("njc,njc->nj", axes, moment)
+        np.testing.assert_allclose(about, torque, atol=1e-9)
+
+
+def test_a_rotated_base_turns_moments_and_leaves_torques(arm, q):
+    """An arm on a wall: the world's weight, written in the base of the arm."""
+    wall = arm.mounted(np.array([2.0, 0.0, 0.0]))
+    assert not wall.stands and np.array_equal(wall.weight, [1.0, 0.0, 0.0])
+    moment = wall.tilting_moment(q[:20], 0.0, 0.0)
+    np.testing.assert_allclose(moment[:, 0], 0.0, atol=1e-9)
+    whole = wall.moments(q[:20], 0.0, np.zeros((20, 3)))[0][:, 0]
+    np.testing.assert_allclose(moment, whole, atol=1e-9)  # joint 1 stands on the base
+
+
+def test_bending_moments_are_those_of_the_first_moments(arm, q):
+    links, wall = arm.file.links, arm.mounted(np.array([0.0, 1.0, 1.0]))
+    mass, centre = np.array(links.mass_kg), np.array(links.com_mm) * 1e-3
+    frames = wall.link_frames(q[:10])
+    # All weight behind a link hangs at its origin too: D-H origins are fixed to links.
+    first = mass[:, None] * centre
+    behind = np.append(np.cumsum(mass[::-1])[::-1], 0.0)
+    for i in range(6):
+        before, after = frames[0, i], frames[0, i + 1]
+        first[i] += behind[i] * after[:3, :3].T @ (after[:3, 3] - before[:3, 3])
+    across = np.einsum("njaib,ib->nja", wall.bending_basis(q[:10]), first)
+    wanted = wall.bending_moments(q[:10], 0.0, np.full((10, 3), np.nan))
+    np.testing.assert_allclose(across, wanted, atol=1e-8)
+
+
+def test_an_arm_keeps_its_mounting_between_processes(arm):
+    wall = pickle.loads(pickle.dumps(arm.mounted(np.array([1.0, 0.0, 0.0]))))
+    assert np.array_equal(wall.weight, [1.0, 0.0, 0.0]) and wall.id == arm.id
 
 
 def test_every_branch_leads_back(arm, q):

@@ -108,3 +108,22 @@ def test_missing_cell(tmp_path):
 def test_unknown_arm(tmp_path):
     with pytest.raises(ArmError, match="Shipped arms"):
         load_cell(write(tmp_path, '[robot]\narm = "xyz"\n'))
+
+
+def test_mountings(tmp_path):
+    robot = '[robot]\narm = "nj220-2.7"\n'
+    turned = "[base]\nxyz_mm = [0, 0, 0]\neuler_zyz_deg = [0.0, 90.0, 0.0]\n"
+    for text, weight in (
+        ("", (0, 0, -1)),
+        ('mounting = "ceiling"\n', (0, 0, 1)),
+        ('mounting = "wall"\n', (1, 0, 0)),
+        ("mounting = [0, -3, -4]\n", (0, -0.6, -0.8)),
+        (turned, (1, 0, 0)),
+        ('mounting = "floor"\n' + turned, (0, 0, -1)),  # stated: [base] is not asked
+    ):
+        cell = load_cell(write(tmp_path, robot + text))
+        np.testing.assert_allclose(cell.arm.weight, weight, atol=1e-12)
+    for wrong in ('"roof"', "[0, 0, 0]", "[1, 0]", "[1, 0, nan]", '["a", 0, 0]', "3"):
+        with pytest.raises(CellError, match="direction in which weight pulls") as found:
+            load_cell(write(tmp_path, robot + f"mounting = {wrong}\n"))
+        assert "$.robot.mounting" in str(found.value)

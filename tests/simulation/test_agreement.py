@@ -3,7 +3,9 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from postproc.cli.simulate import setup_of
 from postproc.compensation.targets import targets_from_visits
 from postproc.motion.planner import plan
 from postproc.robot.arm import load_arm
@@ -19,6 +21,7 @@ from postproc.simulation import (
 )
 from postproc.simulation.kinematics import (
     LinkMasses,
+    foundation_moment,
     link_torque,
     payload_torque,
     solve_branch,
@@ -45,11 +48,30 @@ def test_inverse_kinematics_branch_by_branch() -> None:
         np.testing.assert_allclose(np.abs(gap[both]), 0.0, atol=1e-8)
 
 
-def test_gravity_torques() -> None:
+BASES = {
+    "floor": 'mounting = "floor"',
+    "ceiling": "[base]\nxyz_mm = [0, 0, 0]\neuler_zyz_deg = [0, 180, 30]",
+    "wall": 'mounting = "wall"',
+    "by the base": "[base]\nxyz_mm = [0, 0, 500]\neuler_zyz_deg = [20, 35, -70]",
+    "by a vector": "mounting = [0.0, 3.0, -4.0]",
+}
+
+
+@pytest.mark.parametrize("base", BASES.values(), ids=BASES)
+def test_weight(base: str, tmp_path: Path) -> None:
+    """Both have their own way from the cell to torques and moments."""
+    path = tmp_path / "cell.toml"
+    path.write_text(f'[robot]\narm = "nj220-2.7"\n{base}\n')
+    cell = load_cell(path)
+    gravity = setup_of(cell).gravity
+    np.testing.assert_allclose(gravity, 9.80665 * cell.arm.weight, atol=1e-6)
     mass, com = np.full(50, 60.0), np.tile([0.02, 0.1, 0.2], (50, 1))
-    ours = link_torque(LinkMasses(NJ220, NJ220.mass, NJ220.centre), Q)
-    ours = ours + payload_torque(NJ220, Q, mass, com)
-    np.testing.assert_allclose(ours, ARM.gravity_torque(Q, mass, com), atol=0.5)
+    body = LinkMasses(NJ220, NJ220.mass, NJ220.centre, gravity)
+    ours = link_torque(body, Q) + payload_torque(body, Q, mass, com)
+    np.testing.assert_allclose(ours, cell.arm.gravity_torque(Q, mass, com), atol=0.5)
+    moment = foundation_moment(body, Q, mass, com)
+    theirs = cell.arm.tilting_moment(Q, mass, com)
+    np.testing.assert_allclose(moment, theirs, atol=0.5)
 
 
 def test_limits_and_speeds() -> None:

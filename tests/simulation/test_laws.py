@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import PostprocError
-from postproc.simulation import NAMES, Planted, VirtualArm, make_arrivals, virtual_arm
+from postproc.simulation import (
+    NAMES,
+    NJ220,
+    Planted,
+    VirtualArm,
+    make_arrivals,
+    virtual_arm,
+)
 from postproc.simulation.laws import AS_BUILT, KINDS, Where
 from postproc.simulation.reference import PROBE, reference_arrivals
 
@@ -42,8 +49,9 @@ def test_the_usual_size_lies_in_the_usual_range(name: str) -> None:
 
 # What each law may depend on besides the joint angles.
 COVARIATES = {
-    "compliance": {"payload"}, "payload": {"payload"}, "counterbalance": set(),
-    "transmission": set(), "transmission_free": set(), "scale": set(),
+    "compliance": {"payload"}, "bending": {"payload"}, "payload": {"payload"},
+    "counterbalance": set(), "transmission": set(), "transmission_free": set(),
+    "scale": set(),
     "coupling": set(), "worn_spot": set(), "joint_product": set(),
     "motor_wave": set(), "drive_wave": set(), "drive_backlash": {"flank"},
     "backlash": {"flank"}, "load_backlash": {"flank", "payload"},
@@ -52,7 +60,7 @@ COVARIATES = {
     "thermal": {"temperature"}, "warmup": {"time"}, "base_shift": {"order"},
     "tool_shift": {"order"}, "tracker_drift": {"time"}, "joint_step": {"order"},
     "base_tilt": {"payload"}, "elastic_flank": {"flank", "travel", "loop"},
-    "azimuth": set(), "refraction": set(),
+    "azimuth": set(), "refraction": set(), "joint_offset": set(),
 }  # fmt: skip
 OTHER = {
     "flank": -REFERENCE.flank,
@@ -99,6 +107,23 @@ def test_backlash_changes_sign_with_the_side_and_size_with_the_angle() -> None:
     assert (np.abs(forward).max(axis=0) < 0.2e-3 * 1.4).all()
     assert (np.abs(forward).min(axis=0) > 0.05e-3 * 0.6).all()
     assert (np.ptp(forward, axis=0) > 1e-6).all()
+
+
+def test_bending_leaves_what_stands_before_its_joint() -> None:
+    arm = arm_with("bending", joint=5, peak_mm=0.4)
+    tool = np.tile(np.eye(4), (len(REFERENCE), 1, 1))
+    tool[:, 2, 3] = -NJ220.d[5]  # the wrist's centre, on axes 4, 5 and 6
+    at_wrist = replace(REFERENCE, tool=tool)
+    assert np.abs(displacement(arm, at_wrist)).max() < 1e-12
+    moved = displacement(arm)
+    # A rotation about axes across axis 5: nothing moves along what it turns about.
+    law = arm.laws[0](REFERENCE).reshape(-1, 6, 2)
+    assert (np.abs(law).max(axis=(0, 2)) > 0).tolist() == [False] * 4 + [True, False]
+    frames = NJ220.frames(REFERENCE.q)
+    turn = np.einsum("nca,na->nc", frames[:, 4, :3, :2], law[:, 4])
+    tcp = (frames[:, 6] @ REFERENCE.tool)[:, :3, 3]
+    wanted = np.cross(turn, tcp - frames[:, 4, :3, 3])
+    np.testing.assert_allclose(moved, wanted, atol=1e-6)
 
 
 def test_compliance_is_torque_over_stiffness() -> None:

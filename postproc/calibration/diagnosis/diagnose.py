@@ -406,6 +406,8 @@ def _unlike(found: Search, diagnosis: Diagnosis) -> set[str]:
     """
     only, every = set[str](), {*map(str, JOINTS), "payload"}
     for addition in found.additions:
+        if addition.candidate.effect.everywhere:
+            continue
         for source in addition.candidate.source.split(" x "):
             kind, _, joint = source.partition(" ")
             if kind in BY_ANGLE:

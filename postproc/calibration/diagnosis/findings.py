@@ -38,7 +38,12 @@ def _describe(
     effect = fit.combination.effects[found.place(number)]
     part = fit.combination.slices[found.place(number)]
     moved = np.linalg.norm(fit.moved(part), axis=1)
-    confusable = tuple((s.family.effect, s.family.joint) for s in standing.confusable)
+    confusable = [(s.family.effect, s.family.joint) for s in standing.confusable]
+    tied = [
+        name for name in effect.tied(fit.batch) if name not in found.library.without
+    ]
+    named = {name for name, _ in confusable}
+    confusable += [(name, None) for name in tied if name not in named]
     return Finding(
         effect=family.effect,
         joint=family.joint,
@@ -50,7 +55,7 @@ def _describe(
         share=share,
         peak_mm=float(moved.max(initial=0.0) / MM),
         parameters=_parameters(effect, fit.values[part], fit.covariance[part, part]),
-        confusable_with=confusable,
+        confusable_with=tuple(confusable),
         settings=effect.settings(),
         held_out_gain=(addition.gain.mean, addition.gain.std_error),
         impossible=impossible(fit, _own(fit, part)),

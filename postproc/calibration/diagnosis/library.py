@@ -278,6 +278,13 @@ class Shelf:
     candidates: tuple[Candidate, ...]
     columns: Floats | None
 
+    @property
+    def mean_of(self) -> int | None:
+        """Joint, from 1, whose zero holds the mean of the candidates, or None."""
+        if self.joint is None or not self.candidates[0].effect.has_mean():
+            return None
+        return self.joint + 1
+
     def made(self, batch: Batch, whitener: Whitener) -> Shelf:
         """Make the columns."""
         columns = make_columns(self.joint, self.candidates, batch, whitener)
@@ -328,7 +335,8 @@ class Library:
         tried = [c for c in every if c.family.effect not in without]
         shelves = [
             Shelf(joint, alike[first : first + step], None)
-            for joint, alike in by_joint_and_width(tried)
+            for some in by_mean(tried)
+            for joint, alike in by_joint_and_width(some)
             for step in [max(1, CHUNK // numbers(joint, alike[:1], len(at)))]
             for first in range(0, len(alike), step)
         ]
@@ -336,6 +344,14 @@ class Library:
         if total <= KEPT:
             shelves = [shelf.made(at, fit.whitener) for shelf in shelves]
         return cls(tuple(shelves), frozenset(without))
+
+    def of_mean(self, joint: int | None) -> Library:
+        """Return the laws of a joint, from 1, with a mean; None: all other candidates.
+
+        The zero of a given model holds the mean of what the model lacks.
+        """
+        some = tuple(s for s in self.shelves if s.mean_of == joint)
+        return replace(self, shelves=some)
 
     def at_rows(self, rows: NDArray[np.int64]) -> Library:
         """Return the library for some of the rows."""
@@ -361,6 +377,12 @@ def candidates(
     every = [c for kind in EFFECTS for c in kind.candidates(batch)]
     every += [c for kind in EFFECTS for c in kind.sighted(batch, tracker)]
     return sorted(every, key=lambda c: c.family.tier)
+
+
+def by_mean(candidates: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
+    """Split candidates by whether the zero of their joint holds their mean."""
+    some = [c for c in candidates if c.effect.has_mean()]
+    return some, [c for c in candidates if not c.effect.has_mean()]
 
 
 def numbers(joint: int | None, alike: Sequence[Candidate], rows: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -16,6 +17,7 @@ from postproc.exceptions import PostprocError
 from postproc.model.combination import Combination
 from postproc.model.effects import propose
 from postproc.model.effects.effect import Effect, Parameter
+from postproc.model.effects.joint_offset import MASTERED
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.robot.arm import Arm
@@ -34,6 +36,7 @@ UNSEEN = 1e-7  # [m rms] a direction that moves the rows by less is not revised
 GIVEN = "model"  # group of the given model's own uncertainty
 TRACKER = "tracker"  # group of a set-up's parameters that place the base
 CLEARLY = 3.0  # standard errors
+ZERO = "zero"  # groups of zeros of joints that are open again
 SET_ANEW = ("base shift", "base turn", "tool")  # groups of what may be others since
 
 
@@ -86,10 +89,46 @@ class Revision(Effect):
             aside @ aside.T,
         )
 
+    def beside(self, others: Sequence[Effect]) -> Revision:
+        """Return the revision as it is fitted beside laws that the model lacks.
+
+        The model's zero of a joint holds the mean of what the model lacks there: a law
+        that is added has that mean too, and the zero is open again. It stays known
+        beside a `joint_offset`, which is the change of the zero itself.
+        """
+        offsets = {j for e in others if e.everywhere for j in joints_of(e)}
+        lacking = {j for e in others if e.has_mean() for j in joints_of(e)}
+        known = [k for k, g in enumerate(self.groups) if not g.startswith(ZERO)]
+        closed = replace(
+            self,
+            factor=self.factor[:, known],
+            groups=tuple(self.groups[k] for k in known),
+        )
+        return closed.opened(lacking - offsets)
+
+    def opened(self, joints: Collection[int]) -> Revision:
+        """Return the revision with the zeros of joints to be fitted again."""
+        names = self.model.effects.names
+        zeros = {f"{ZERO}{j}": f"geometry.theta{j}" for j in sorted(joints)}
+        added = {
+            group: names.index(name) for group, name in zeros.items()
+            if name in names and group not in self.groups
+        }  # fmt: skip
+        if not added:
+            return self
+        more = np.zeros((len(names), len(added)))
+        more[list(added.values()), range(len(added))] = MASTERED
+        return replace(
+            self,
+            factor=np.concatenate([self.factor, more], axis=1),
+            groups=(*self.groups, *added),
+        )
+
     def parameters(self) -> tuple[Parameter, ...]:
-        """Number the directions of the uncertainty."""
+        """Number the directions of the uncertainty, and name open zeros."""
         return tuple(
-            Parameter(f"eta{k}", "1", 1.0, group) for k, group in enumerate(self.groups)
+            Parameter(g if g.startswith(ZERO) else f"eta{k}", "1", 1.0, g)
+            for k, g in enumerate(self.groups)
         )
 
     def columns(self, batch: Batch) -> Floats:
@@ -106,6 +145,11 @@ class Revision(Effect):
     def settings(self) -> dict[str, Any]:
         """Refuse: it is folded back into the model before anything is written."""
         raise TypeError("a revision is no part of a model file")
+
+
+def joints_of(effect: Effect) -> set[int]:
+    """Return the joints that the parameters of an effect act on."""
+    return {p.joint for p in effect.parameters() if p.joint is not None}
 
 
 def only_arm(model: Model) -> Model:

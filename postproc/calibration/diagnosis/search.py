@@ -15,8 +15,10 @@ from postproc.calibration.diagnosis.held_out import (
 )
 from postproc.calibration.diagnosis.library import Library, Projection, reduce_some
 from postproc.calibration.diagnosis.score import Null, Score, rank
-from postproc.calibration.regression import Fit, fit_effects
+from postproc.calibration.regression import Fit, beside, fit_effects
+from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import FREE, NAMED, Candidate, Effect, Family
+from postproc.model.effects.joint_offset import JointOffset
 
 # Finer settings around a candidate that a grid found.
 
@@ -92,26 +94,77 @@ LOOKED_AT = 4  # families whose settings are refined before the best is taken
 
 
 def ranking(projection: Projection, library: Library) -> list[Score]:
-    """Score the library, the settings of the leading families refined."""
-    square = float(projection.rest @ projection.rest)
-    reduced = library.reduce(projection, projection.rest[:, None])
-    known = frozenset(projection.names)
-    scores = rank(reduced, square, projection.rows, without=known)
+    """Score the library, the settings of the leading families refined.
+
+    Where a given model is revised, a law of a joint is scored beside the zero of this
+    joint, which holds the law's mean: it must explain more than a joint that was
+    mastered again.
+    """
+    views = {None: projection} | {j: opened(projection, j) for j in JOINTS}
+    scores = []
+    for joint, view in views.items():
+        some = library.of_mean(joint)
+        if some.shelves:
+            square = float(view.rest @ view.rest)
+            reduced = some.reduce(view, view.rest[:, None])
+            known = frozenset(view.names)
+            scores += rank(reduced, square, view.rows, without=known)
+    scores.sort(key=lambda s: -s.evidence)
     leading: list[Score] = []
     for tier in (NAMED, FREE):
         leading += [s for s in scores if s.family.tier == tier][:LOOKED_AT]
-    refined = [refine(projection, s) for s in leading]
-    refined = [readable(projection, s, library) for s in refined]
+    refined = []
+    for score in leading:
+        effect, joint = score.best.effect, score.family.joint
+        view = views[joint if effect.has_mean() else None]
+        refined.append(readable(view, refine(view, score), library))
     rest = [s for s in scores if s not in leading]
     return sorted([*refined, *rest], key=lambda s: -s.evidence)
 
 
+def opened(projection: Projection, joint: int) -> Projection:
+    """Return a filter that takes the zero of a joint, from 1, out of the rows too.
+
+    It is the same where no given model is revised, or its zero is open already.
+    """
+    fit = projection.fit
+    first, *others = fit.combination.effects or (JointOffset(()),)
+    offsets = [j for e in others if isinstance(e, JointOffset) for j in e.joints]
+    if joint in offsets or first.opened((joint,)) is first:
+        return projection
+    laid = beside(fit, (first.opened((joint,)), *others))
+    left = {n for n in fit.combination.names if n not in projection.names}
+    out = [k for k, n in enumerate(laid.combination.names) if n in left]
+    return Projection.leaving(laid, np.array(out, dtype=np.int64))
+
+
 def choose(scores: list[Score]) -> Score:
-    """Take the best name, unless a free form is clearly ahead of it."""
-    name = next(s for s in scores if s.family.tier == NAMED)
+    """Take the best name, unless a free form is clearly ahead of it.
+
+    A free form of the torque never comes before the law of the same torque, which is
+    what a joint that yields does: the law stays, and the free form gets what it leaves.
+    """
+    names = [s for s in scores if s.family.tier == NAMED]
+    name = max(names, key=lambda s: s.evidence - s.best.effect.least_evidence())
     free = next((s for s in scores if s.family.tier == FREE), name)
-    lead = free.evidence - name.evidence
-    return _forerunner(free if lead > ahead(name.evidence) else name, scores)
+    if free.evidence - name.evidence > ahead(name.evidence):
+        return _law(free, names) or free
+    return _forerunner(name, scores)
+
+
+def _law(free: Score, names: list[Score]) -> Score | None:
+    """Find the law that the torque drives as it does a free form, if rows speak for it.
+
+    Args:
+        free: The free form.
+        names: Scores of names, best first.
+    """
+    source = free.best.source
+    for s in names if source.startswith("torque") else ():
+        same = s.family.joint == free.family.joint and s.best.source == source
+        if same and s.evidence > CLEARLY[0]:
+            return s
+    return None
 
 
 def ahead(evidence: float) -> float:
@@ -149,9 +202,15 @@ def without(fit: Fit, place: int) -> Fit:
 
 
 def with_effects(fit: Fit, effects: Sequence[Effect]) -> Fit:
-    """Fit other effects to the rows of a fit, beginning where it ended."""
-    origin = fit.noise.origin
-    return fit_effects(fit.batch, fit.position, tuple(effects), origin, fit)
+    """Fit other effects to the rows of a fit, beginning where it ended.
+
+    The first of them is the given model where one is revised: it counts as known beside
+    the others.
+    """
+    origin, effects = fit.noise.origin, tuple(effects)
+    if effects:
+        effects = (effects[0].beside(effects[1:]), *effects[1:])
+    return fit_effects(fit.batch, fit.position, effects, origin, fit)
 
 
 # A free form must not stand for causes that have names.

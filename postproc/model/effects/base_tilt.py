@@ -22,7 +22,6 @@ from postproc.robot.arm import GRAVITY, Arm
 from postproc.robot.state import States
 
 SCALE = 1e-8  # [rad/(N m)] softness of a usual foundation
-UNSURE = 0.1  # share of the arm's mass that sits elsewhere than its file says
 LEAST = 1.0  # [kg] of an arm whose links are not known
 DEEP = 0.5  # [m] below the base's origin that a table may turn about
 PLACES = ("", "_elbow", "_wrist")  # of the moment, and of what is unsure of it
@@ -30,15 +29,17 @@ PLACES = ("", "_elbow", "_wrist")  # of the moment, and of what is unsure of it
 
 @dataclass(frozen=True)
 class BaseTilt(Effect):
-    """The base turns about its horizontal axes by tilting moment / stiffness.
+    """The base turns about its axes x and y by tilting moment / stiffness.
 
     The moment is that of the nominal links and of the payload; what is unsure of the
-    links is taken to hang at the elbow and at the wrist.
+    links is taken to hang at the elbow and at the wrist. Of an arm that does not stand
+    on a floor weight has a moment about z too, and the base may turn about it.
 
     Attributes:
         skew: Whether the stiff directions may lie askew of the base's axes, and what
             it turns about below its origin.
         unsure: Mass that may hang elsewhere [kg].
+        twist: Whether the base turns about z too.
     """
 
     name: ClassVar[str] = "base_tilt"
@@ -47,24 +48,27 @@ class BaseTilt(Effect):
 
     skew: bool = False
     unsure: float = 10.0
+    twist: bool = False
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """Take what is unsure of the arm's own weight."""
-        return cls(unsure=unsure_mass(arm))
+        return cls(unsure=unsure_mass(arm), twist=not arm.stands)
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
         """Try a foundation along the base's axes, and any other, where weight moves."""
-        if not varies(batch.loads.tilting[:, 0]):
+        if not any(map(varies, batch.loads.tilting.T)):
             return []
-        unsure = unsure_mass(batch.arm)
-        members = [(cls(skew, unsure), TILTING) for skew in (False, True)]
+        unsure, twist = unsure_mass(batch.arm), not batch.arm.stands
+        members = [(cls(skew, unsure, twist), TILTING) for skew in (False, True)]
         return alternatives(members)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name softness about the axes, and softness times unsure mass."""
-        names, out = ("kx", "ky", "kxy") if self.skew else ("kx", "ky"), []
+        names, out = ["kx", "ky"], []
+        names += ["kz"] if self.twist else []
+        names += ["kxy"] if self.skew else []
         for name in names:
             out.append(Parameter(name, "rad/(N m)", SCALE, name, None, name != "kxy"))
             scale = SCALE * self.unsure
@@ -87,11 +91,13 @@ class BaseTilt(Effect):
 
     def _leaning(self, batch: Batch, moved: Floats) -> Floats:
         """Multiply six motions of the base (n, 3, 6) by the moments, (n, 3, p)."""
-        about_x, about_y = _moments(batch)
-        by_x, by_y = (moved[:, :, 3 + k, None] for k in range(2))
-        out = [by_x * about_x, by_y * about_y]
+        about = _moments(batch)
+        by = moved[:, :, 3:, None]
+        axes = range(3 if self.twist else 2)
+        out = [by[:, :, k] * about[:, None, k] for k in axes]
         if self.skew:
-            out.append(by_x * about_y + by_y * about_x)
+            about_x, about_y = about[:, None, 0], about[:, None, 1]
+            out.append(by[:, :, 0] * about_y + by[:, :, 1] * about_x)
             out.append(moved[:, :, 0, None] * about_y[..., :1])
             out.append(-moved[:, :, 1, None] * about_x[..., :1])
         return np.concatenate(out, axis=2)
@@ -99,13 +105,13 @@ class BaseTilt(Effect):
 
 def unsure_mass(arm: Arm) -> float:
     """Say how much of an arm's mass may hang elsewhere than its file says [kg]."""
-    return max(UNSURE * arm.mass, LEAST)
+    links = arm.file.links
+    return LEAST if links is None else max(links.spread * arm.mass, LEAST)
 
 
-def _moments(batch: Batch) -> tuple[Floats, Floats]:
-    """Give the moments about x and y, and those of 1 kg at each place, (n, 1, 3)."""
+def _moments(batch: Batch) -> Floats:
+    """Give the moments about x, y, z, and those of 1 kg at each place, (n, 3, 3)."""
     at = batch.arm.landmarks(batch.states.q, batch.states.tool)[:, :2]
-    own = batch.loads.tilting
-    about_x = np.column_stack([own[:, 0], -GRAVITY * at[:, :, 1]])
-    about_y = np.column_stack([own[:, 1], GRAVITY * at[:, :, 0]])
-    return about_x[:, None], about_y[:, None]
+    places = np.cross(at, GRAVITY * batch.arm.weight)  # (n, place, axis)
+    own = batch.loads.tilting[:, None]
+    return np.swapaxes(np.concatenate([own, places], axis=1), 1, 2)

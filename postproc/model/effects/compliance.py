@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.covariate import carrying
+from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
     Candidate,
     JointEffect,
@@ -18,12 +18,15 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
+from postproc.robot.state import States
 
-SCALE = 1e-7  # [rad/(N m)] softness of a usual gear
-UNSURE = 0.1  # share of the nominal moments by which real links differ
+SCALE = 1e-7  # [rad/(N m)] softness of the gears of a large arm
+YIELDS = 2e-4  # [rad] by which a joint may be expected to yield to its largest torque
+LOADED = 1e-3  # of the torque that varies most: less is no load of a joint
+USUAL, RARE = 1.0, 3.0  # nats that one of `YIELDING`, or another, must be worth besides
 UNSURE_PAYLOAD = 0.1  # [m] how well a payload's centre of mass is known
 MASS_UNKNOWN = 10.0  # [kg] at a link's end, of an arm whose links are not known
-YIELDING = (2, 3, 5)  # joints that carry weight on most arms
+YIELDING = (2, 3, 5)  # joints that carry most of the weight on most arms
 AXES = "xyz"
 
 
@@ -45,8 +48,37 @@ def moments(arm: Arm, joint: int) -> tuple[tuple[int, float], ...]:
             continue
         mass, com = np.array(links.mass_kg), np.array(links.com_mm) * 1e-3
         own = mass[link - 1] * np.linalg.norm(com[link - 1])
-        out.append((link, float(UNSURE * (own + mass[link:].sum() * length) + 0.1)))
+        out.append(
+            (link, float(links.spread * (own + mass[link:].sum() * length) + 0.1))
+        )
     return tuple(out)
+
+
+def loads(batch: Batch, torque: Floats, unit: Floats) -> Floats:
+    """Estimate by how much the load of every joint varies, (n, 6) [N m].
+
+    Args:
+        batch: The states.
+        torque: Of nominal links and payload, (n, 6) [N m].
+        unit: The same per first moment of every link, (n, 6, 6, 3).
+
+    Returns:
+        Standard deviation over the states, (6,) [N m]: that of the torque, and what
+        is unsure of it.
+    """
+    variance = torque.var(axis=0) if len(torque) else np.zeros(6)
+    if not len(torque):
+        return variance
+    for j in JOINTS:
+        for link, spread in moments(batch.arm, j):
+            own = unit[:, j - 1, link - 1].var(axis=0).sum()
+            variance[j - 1] += spread**2 * own
+    return np.sqrt(variance)
+
+
+def softness_of(load: float) -> float:
+    """Return the usual softness of a joint whose load varies by so much [rad/(N m)]."""
+    return max(SCALE, YIELDS / max(load, 1e-3))
 
 
 @dataclass(frozen=True)
@@ -60,6 +92,7 @@ class Compliance(JointEffect):
         joints: Joints that yield.
         moments: Per joint, (link, standard deviation of its first moment [kg m]).
         payload: Whether the payload's centre of mass is to be corrected too.
+        softness: Prior scale of each joint [rad/(N m)]; none: `SCALE`.
     """
 
     name: ClassVar[str] = "compliance"
@@ -69,40 +102,65 @@ class Compliance(JointEffect):
     joints: tuple[int, ...] = YIELDING
     moments: tuple[tuple[tuple[int, float], ...], ...] = ((), (), ())
     payload: bool = False
+    softness: tuple[float, ...] = ()
 
     @classmethod
-    def on(cls, arm: Arm, joints: tuple[int, ...], payload: bool) -> Compliance:
-        """Make the effect for some joints of an arm."""
-        return cls(joints, tuple(moments(arm, j) for j in joints), payload)
+    def on(cls, batch: Batch) -> Self:
+        """Make the effect of all joints whose load varies over the states."""
+        total, unit = batch.loads.total, batch.loads.basis
+        load = loads(batch, total, unit.reshape(len(batch), 6, 6, 4)[..., 1:])
+        least = LOADED * float(load.max(initial=0.0))
+        joints = tuple(j for j in JOINTS if load[j - 1] > max(least, 1e-9))
+        if not joints:
+            joints = YIELDING
+        carried = bool(np.nan_to_num(batch.states.payload).any())
+        return cls(
+            joints,
+            tuple(moments(batch.arm, j) for j in joints),
+            carried,
+            tuple(softness_of(float(load[j - 1])) for j in joints),
+        )
 
     @classmethod
-    def propose(cls, arm: Arm, states: object) -> Compliance:
-        """Let the joints yield that carry weight."""
-        carried = getattr(states, "payload", np.zeros(0))
-        return cls.on(arm, YIELDING, bool(np.nan_to_num(carried).any()))
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """Let all joints yield that carry weight."""
+        return cls.on(Batch(arm, states))
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
         """Try every joint that carries weight, or may if no weight is known."""
-        loaded = bool(np.nan_to_num(batch.states.payload).any())
         return [
             c
-            for j in carrying(batch) or YIELDING
-            for c in alternatives([(cls.on(batch.arm, (j,), loaded), f"torque {j}")], j)
+            for effect in cls.on(batch).pieces()
+            for j in effect.joints
+            for c in alternatives([(effect, f"torque {j}")], j)
         ]
+
+    def pieces(self) -> tuple[Self, ...]:
+        """Return the effect of each joint alone."""
+        scales = self.softness or (SCALE,) * len(self.joints)
+        return tuple(
+            replace(self, joints=(j,), moments=(links,), softness=(scale,))
+            for j, links, scale in zip(self.joints, self.moments, scales, strict=True)
+        )
+
+    def least_evidence(self) -> float:
+        """Ask more of joints that carry little weight on most arms."""
+        return USUAL if set(self.joints) <= set(YIELDING) else RARE
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name softness, and moments over stiffness, joint by joint."""
         out = []
-        for j, links in zip(self.joints, self.moments, strict=True):
-            out.append(Parameter(f"k{j}", "rad/(N m)", SCALE, f"{j}", j, True))
+        scales = self.softness or (SCALE,) * len(self.joints)
+        for j, links, scale in zip(self.joints, self.moments, scales, strict=True):
+            out.append(Parameter(f"k{j}", "rad/(N m)", scale, f"{j}", j, True))
             for link, spread in links:
                 out += [
-                    Parameter(f"k{j}_m{link}{a}", "rad kg/N", SCALE * spread, f"{j}", j)
+                    Parameter(f"k{j}_m{link}{a}", "rad kg/N", scale * spread, f"{j}", j)
                     for a in AXES
                 ]
             if self.payload:
-                wide = SCALE * UNSURE_PAYLOAD
+                wide = scale * UNSURE_PAYLOAD
                 out += [
                     Parameter(f"k{j}_com_{a}", "rad/N", wide, f"{j}", j) for a in AXES
                 ]

@@ -198,6 +198,10 @@ class Curve(Effect):
             value *= terms[:, order[:, k]]
         return np.asarray(value * inside[:, None])
 
+    def has_mean(self) -> bool:
+        """Return True for a curve of a joint's error."""
+        return self.only_joint() is not None
+
     def only_joint(self) -> int | None:
         """Tell from the direction."""
         kind, _, which = self.direction.partition(" ")

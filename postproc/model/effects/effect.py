@@ -72,6 +72,7 @@ class Effect(ABC):
         variation_of: Name of the plainer effect that a search takes first.
         nameless: True where finding it says no more than that something is there.
         free: True for a function that may have any shape: what no law predicts.
+        everywhere: True for what is the same at all poses, unseen ones too.
         published: True for what a method of the literature trains: no fit of effects
             knows it.
     """
@@ -84,12 +85,24 @@ class Effect(ABC):
     variation_of: ClassVar[str | None] = None
     nameless: ClassVar[bool] = False
     free: ClassVar[bool] = False
+    everywhere: ClassVar[bool] = False
     published: ClassVar[bool] = False
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """Make the effect with the settings that fit an arm and a survey."""
         return cls()
+
+    def pieces(self) -> tuple[Self, ...]:
+        """Return what is weighed by itself of it: the effect at each of its joints."""
+        return (self,)
+
+    def least_evidence(self) -> float:
+        """Return the evidence beyond that of others that it must be worth [nats].
+
+        What few arms have, and what many columns tell, is a false name sooner.
+        """
+        return 0.0
 
     @classmethod
     def may_show(cls, states: States) -> bool:
@@ -173,6 +186,14 @@ class Effect(ABC):
         Args:
             states: States of the rows.
         """
+        return self
+
+    def has_mean(self) -> bool:
+        """Return True if the zero of its joint, fitted without it, holds its mean."""
+        return False
+
+    def opened(self, joints: Collection[int]) -> Effect:
+        """Return it with the zeros of joints, from 1, to be fitted again."""
         return self
 
     def told_apart(self, told: bool, batch: Batch) -> Effect:
@@ -260,6 +281,22 @@ class Effect(ABC):
         """
         return np.zeros(6)
 
+    def joint_zeros(self, p: Floats) -> Floats:
+        """Return by what it turns every controller angle at all poses, (6,) [rad].
+
+        Args:
+            p: Its parameters.
+        """
+        return np.zeros(6)
+
+    def tied(self, batch: Batch) -> tuple[str, ...]:
+        """Name effects that explain the same at any poses: one is never named alone.
+
+        Args:
+            batch: The states.
+        """
+        return ()
+
     def settings(self) -> dict[str, Any]:
         """Return the settings as plain data, for a model file."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
@@ -302,6 +339,10 @@ class JointEffect(Effect):
     def _acts_on(self) -> NDArray[np.int64]:
         """Find them once: a program asks some hundred times."""
         return np.array([(p.joint or 1) - 1 for p in self.parameters()], dtype=int)
+
+    def has_mean(self) -> bool:
+        """Return True but for constants, and for what the direction changes."""
+        return not self.direct and not self.everywhere
 
     def only_joint(self) -> int | None:
         """Tell from the parameters."""

@@ -50,6 +50,10 @@ class JointStep(CampaignStep, JointEffect):
             )
         ]
 
+    def has_mean(self) -> bool:
+        """Return False: rows before the step alone tell of it."""
+        return False
+
     def refers_to(self) -> str:
         """Name the state after the step."""
         return "the zero of the joint as it is after the step"

@@ -24,6 +24,8 @@ from postproc.robot.state import States
 SCALE = 1e-4  # [rad] at the threshold torque
 UNSURE = 0.2  # of the power of the load, and of torque against t0
 FLANKS = (0.1, 0.3, 0.8)  # of the usual torque: t0 that are tried
+SHOWN = 0.05  # of the rows that must be on either side of the bend
+BELOW, BEYOND = 0.5, 1.5  # of t0: clearly on one side of the bend
 STRAIGHT = 3.0  # of it: the law is nearly proportional
 
 
@@ -60,19 +62,42 @@ class LoadBacklash(JointEffect):
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
         """Try all forms at every joint that carries weight."""
-        torque = np.abs(batch.loads.gravity + batch.loads.payload)
-        typical = np.median(torque, axis=0)
+        typical = np.median(np.abs(batch.loads.total), axis=0)
         out = []
         for j in carrying(batch):
             t0 = max(float(typical[j - 1]), 1e-3)
-            out += alternatives([(law, f"torque {j}") for law in laws(j, t0)], j)
+            tried = [law for law in laws(j, t0) if law.passes_bend(batch)]
+            out += alternatives([(law, f"torque {j}") for law in tried], j)
         return out
+
+    def has_mean(self) -> bool:
+        """Return True: weight mostly chooses one flank of a joint."""
+        return True
+
+    def passes_bend(self, batch: Batch) -> bool:
+        """Return True if the rows can tell its law from laws of other causes.
+
+        A flank that weight chooses shows where weight pushes both ways beyond the bend
+        of tanh, or is now clearly below the bend and now beyond. Below the bend the law
+        is that of `compliance`, beyond it on one side a constant.
+        """
+        if self.form != "gravity_side":
+            return True
+        torque = batch.loads.total[:, np.array(self.joints) - 1] / self.t0
+        sides = torque > 1.0, torque < -1.0
+        sizes = np.abs(torque) < BELOW, np.abs(torque) > BEYOND
+        shown = [
+            np.minimum(a.mean(axis=0), b.mean(axis=0)) > SHOWN
+            for a, b in (sides, sizes)
+        ]
+        return bool(np.logical_or(*shown).all())
 
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
         """Change the torque at which the flank changes."""
         if self.form == "load":
             return []
-        return [replace(self, t0=float(self.t0 * 3.0**x)) for x in offsets]
+        finer = [replace(self, t0=float(self.t0 * 3.0**x)) for x in offsets]
+        return [law for law in finer if law.passes_bend(batch)]
 
     def nonlinear(self) -> dict[str, tuple[float, str]]:
         """Tell the torque."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -51,6 +51,10 @@ class Payload(JointEffect):
             for j in carrying(batch)
             for c in alternatives([(cls((j,)), "payload")], j)
         ]
+
+    def pieces(self) -> tuple[Self, ...]:
+        """Return the effect of each joint alone."""
+        return tuple(replace(self, joints=(j,)) for j in self.joints)
 
     def belongs_to(self) -> Origin:
         """Say that it is of the state: the cell declares the payload."""

@@ -37,23 +37,20 @@ from postproc.model.model import Model, load_model
 from postproc.report.html import diagnosis_report
 from postproc.report.plots import plot_diagnosis
 from postproc.robot.arm import load_arm
-from postproc.robot.state import States, make_states
+from postproc.robot.state import make_states
 from postproc.simulation import Planted, stream, virtual_arm
-from tests.calibration.planted import ARM, BASE, TRACKER, campaign, states_of, survey
+from tests.calibration.planted import (
+    ARM,
+    BASE,
+    TRACKER,
+    base_model,
+    campaign,
+    measurements,
+    states_of,
+    survey,
+)
 from tests.calibration.simulator import NJ
 from tests.calibration.test_directions import flipped
-
-
-def measurements(states: States, position: np.ndarray, name: str) -> Measurements:
-    n = len(states)
-    ids = tuple(map(str, range(n)))
-    lines = np.arange(n) + 2
-    inferred = np.zeros(n, dtype=bool)
-    return Measurements(Path(name), states, position, ids, lines, inferred, name)
-
-
-def base_model(rows: Measurements) -> Model:
-    return model_of(fit_survey(rows, ARM, BASE_EFFECTS, TRACKER), rows)
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from postproc.calibration.diagnosis.refit import (
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.selection import model_of
 from postproc.cli.diagnose import tell
+from postproc.model.effects import BY_NAME
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.robot.pose import MM, lengths
@@ -30,8 +31,15 @@ from postproc.simulation import (
     virtual_arm,
 )
 from postproc.simulation.reference import WORKING_RANGE
-from tests.calibration.diagnosis.test_diagnose import base_model, measurements
-from tests.calibration.planted import ARM, BASE, TRACKER, states_of, survey
+from tests.calibration.planted import (
+    ARM,
+    BASE,
+    TRACKER,
+    base_model,
+    measurements,
+    states_of,
+    survey,
+)
 
 SEED = 29
 
@@ -198,3 +206,18 @@ def test_rows_that_agree_by_chance_make_a_model_no_surer(known: Known) -> None:
     np.testing.assert_allclose(own.covariance, expected, atol=1e-9)
     surer = replace(fit, log_scale=np.full(len(fit.groups), 0.5))
     assert no_surer(surer) is surer
+
+
+def test_a_zero_is_open_again_beside_a_law_that_the_model_lacked(known: Known) -> None:
+    _, model, _, revision = known
+    two, three = (BY_NAME["compliance"]((j,), ((),)) for j in (2, 3))
+    beside = revision.beside((two, three))
+    assert beside.groups[-2:] == ("zero2", "zero3")
+    assert [p.name for p in beside.parameters()[-2:]] == ["zero2", "zero3"]
+    place = model.effects.names.index("geometry.theta3")
+    assert np.flatnonzero(beside.factor[:, -1]).tolist() == [place]
+    # An offset is the change of the zero itself, and directions have no mean.
+    offset, gap = BY_NAME["joint_offset"]((2,)), BY_NAME["backlash"]()
+    assert beside.beside((two, offset, gap)).groups == revision.groups
+    assert revision.opened((2,)).opened((2,)).groups == (*revision.groups, "zero2")
+    np.testing.assert_array_equal(beside.beside(()).factor, revision.factor)

@@ -1,0 +1,71 @@
+"""Joint offset: a joint was mastered again, and its zero is another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.covariate import JOINTS
+from postproc.model.effects.effect import (
+    Candidate,
+    JointEffect,
+    Parameter,
+    alternatives,
+)
+from postproc.model.kinematics import Batch
+
+MASTERED = 3e-4  # [rad] by which two masterings of a joint differ
+FIRST, LAST = 1, 6  # joints that turn as the base, and as the tool, is turned
+
+
+@dataclass(frozen=True)
+class JointOffset(JointEffect):
+    """A constant error of some joints, since the model was made.
+
+    Geometry holds the same constant. A model that is revised has it known already, as
+    the survey left it, and a joint that was mastered again is far outside of that. A
+    change at one row of the campaign is `joint_step`.
+
+    Attributes:
+        joints: Joints whose zero is another.
+    """
+
+    name: ClassVar[str] = "joint_offset"
+    everywhere: ClassVar[bool] = True
+
+    joints: tuple[int, ...] = JOINTS
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try every joint."""
+        return [c for j in JOINTS for c in alternatives([(cls((j,)), f"joint {j}")], j)]
+
+    def tied(self, batch: Batch) -> tuple[str, ...]:
+        """Name the shift of base or tool that turns the arm as the joint does.
+
+        Joint 1 turns about the axis of the base, joint 6 about that of the flange: one
+        nest on the flange does not tell its zero from a tool that has moved.
+        """
+        nests = len(np.unique(batch.states.tool.round(6), axis=0))
+        base = ("base_shift",) if self.joints == (FIRST,) else ()
+        tool = ("tool_shift",) if self.joints == (LAST,) and nests < 2 else ()
+        return (*base, *tool)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name the constant of every joint."""
+        return tuple(
+            Parameter(f"theta{j}", "rad", MASTERED, f"{j}", j) for j in self.joints
+        )
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate 1, (n, p)."""
+        return np.ones((len(batch), len(self.joints)))
+
+    def joint_zeros(self, p: Floats) -> Floats:
+        """Return the constants, (6,) [rad]."""
+        out = np.zeros(6)
+        out[np.array(self.joints, dtype=int) - 1] = p
+        return out
