@@ -264,6 +264,7 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
 # are joined with the program that was measured.
 
 NAMES = ("id", "name", "point", "point name", "point id", "target")
+WHOLE = re.compile(r"^\d+$")
 AXIS = {a: re.compile(rf"^{a}(\s*[\[(]?\s*mm\s*[\])]?|_mm)?$", re.I) for a in "xyz"}
 
 
@@ -275,13 +276,29 @@ def read_points(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
     Raises:
         MeasurementError: No names or coordinates are found.
     """
-    table = read_headed(path, comment="//", **reading.given)
+    if reading.columns is not None:
+        table = read_foreign(path, reading)
+        table.require("id", *POSITION)
+        return table
+    table = read_headed(path, **reading.given)
     if table.has("id", *POSITION):
         return table
     name, axes = _columns(table)
     scaled = {ours: ((axis, reading.mm_per_unit),)
               for ours, axis in zip(POSITION, axes, strict=True)}  # fmt: skip
-    return translate(table, Format({"id": ((name, 1.0),), **scaled}))
+    points = translate(table, Format({"id": ((name, 1.0),), **scaled}))
+    cells = points.cells.copy()
+    cells[:, 0] = [target_of(text) for text in points.text("id")]
+    return replace(points, cells=cells)
+
+
+def target_of(name: str) -> str:
+    """Return the target of a name as SpatialAnalyzer writes it.
+
+    >>> target_of("A::Main::1a")
+    '1a'
+    """
+    return name.rpartition("::")[2].strip() or name
 
 
 def _columns(table: TextTable) -> tuple[str, tuple[str, str, str]]:
@@ -290,12 +307,8 @@ def _columns(table: TextTable) -> tuple[str, tuple[str, str, str]]:
     Raises:
         MeasurementError: They are not there.
     """
-    if table.columns[0] == "1":  # no header: name first, then the first three numbers
-        row = [bool(NUMBER.match(str(cell))) for cell in table.cells[0]]
-        numbers = [k for k, is_number in enumerate(row) if is_number and k > 0][:3]
-        if len(numbers) == 3:
-            x, y, z = (table.columns[k] for k in numbers)
-            return table.columns[0], (x, y, z)
+    if not table.headed:
+        return _places_of(table)
     name = next((c for c in table.columns if c.lower() in NAMES), None)
     axes = [next((c for c in table.columns if AXIS[a].match(c)), None) for a in "xyz"]
     if name is None or None in axes:
@@ -308,3 +321,32 @@ def _columns(table: TextTable) -> tuple[str, tuple[str, str, str]]:
         )
     x, y, z = (str(axis) for axis in axes)
     return name, (x, y, z)
+
+
+def _places_of(table: TextTable) -> tuple[str, tuple[str, str, str]]:
+    """Find name and coordinates by their cells, in a table without a header.
+
+    The coordinates are the first three columns of numbers side by side; the name stands
+    before them, after collection and group where there are any. A column of whole
+    numbers before three others that are none is a name, too.
+
+    Raises:
+        MeasurementError: No name stands before three numbers.
+    """
+    cells = [[str(c) for c in column] for column in table.cells.T]
+    number = [all(NUMBER.match(c) for c in column) for column in cells]
+    whole = [all(WHOLE.match(c) for c in column) for column in cells]
+    starts = [k for k in range(len(cells) - 2) if all(number[k : k + 3])]
+    first = starts[0] if starts else None
+    if first is not None and first + 1 in starts:
+        if first == 0 or (whole[first] and not all(whole[first + 1 : first + 4])):
+            first += 1
+    if not first:
+        raise MeasurementError(
+            table.path,
+            "has no header, and its rows are not a name followed by x, y, z",
+            "Write a header with id, x_mm, y_mm, z_mm",
+            line=int(table.line[0]),
+        )
+    x, y, z = table.columns[first : first + 3]
+    return table.columns[first - 1], (x, y, z)

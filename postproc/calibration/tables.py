@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
-import io
 import re
 import tomllib
 from collections.abc import Mapping
@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -29,6 +28,10 @@ from postproc.robot.pose import MM
 MAX_BYTES = 500_000_000
 NUMBER = re.compile(r"^\s*[-+]?\d+([.,]\d+)?([eE][-+]?\d+)?\s*$")
 FEW_NUMBERS = 3  # a first line with as many numbers is no header
+BLANKS = r"\s+"  # the separator of tables in columns
+SEPARATOR = re.compile(r'^\s*"?sep=(.)"?[;,\t]*\s*$', re.I)  # Excel's first line
+COMMENTS = ("#", "//", "%")
+EMPTY_CURE = "Expected a header and one row per measurement"
 DECIMAL_COMMA = re.compile(r"^\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*$")
 
 
@@ -43,6 +46,7 @@ class TextTable:
         line: 1-based line of every row, (n,).
         decimal: "." or ",".
         sha256: Hash of the file's bytes.
+        headed: Whether the file names its columns; else they are 1, 2, ..
     """
 
     path: Path
@@ -51,6 +55,7 @@ class TextTable:
     line: NDArray[np.int64]
     decimal: str
     sha256: str
+    headed: bool = True
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -95,6 +100,15 @@ class TextTable:
             MeasurementError: Naming the missing columns and those that are there.
         """
         missing = [name for name in names if name not in self.columns]
+        if missing and not self.headed:
+            raise MeasurementError(
+                self.path,
+                f"has no header: its columns are 1 to {len(self.columns)}, column "
+                f"{', '.join(missing)} is missing",
+                "Write a header, or name the columns by number in a column map "
+                '(--columns) with lines as q1_deg = "8"',
+                line=int(self.line[0]),
+            )
         if missing:
             raise MeasurementError(
                 self.path,
@@ -128,43 +142,53 @@ def read_table(
     delimiter: str | None = None,
     decimal: str | None = None,
     comment: str | None = None,
-    header: bool = True,
+    header: bool | None = True,
 ) -> TextTable:
     """Read a table; what is not given is detected.
+
+    A line ``sep=;`` names the separator, as Excel writes it. Comment lines, a title
+    above the header, empty rows and empty cells at the ends of rows are no data.
 
     Args:
         path: The file.
         encoding: Name of a Python codec.
         delimiter: Between cells.
         decimal: "." or ",".
-        comment: Lines that begin with it are no data.
-        header: Whether the first line names the columns; else they are 0, 1, ..
+        comment: Lines that begin with it are no data; default: # and // and %.
+        header: Whether the first line names the columns; else they are 1, 2, ..; None:
+            it does unless it holds numbers.
 
     Raises:
         MeasurementError: The file cannot be read, is empty, or its lines differ.
     """
     path = Path(path)
     raw = _read(path)
-    lines = _decode(raw, encoding, path).splitlines()
-    kept = [
+    lines = [
         (i + 1, text)
-        for i, text in enumerate(lines)
-        if text.strip() and not (comment and text.lstrip().startswith(comment))
+        for i, text in enumerate(_decode(raw, encoding, path).splitlines())
+        if text.strip()
     ]
-    if len(kept) < 1 + header:
-        cure = "Expected a header and one row per measurement"
-        raise MeasurementError(path, "has no measurements", cure)
-    split = delimiter or _delimiter(kept[0][1])
-    cells = _cells(path, [text for _, text in kept], split)
-    names = [str(c).strip() for c in cells[0]] if header else _numbered(cells)
-    if len(set(names)) < len(names):
-        twice = next(n for n in names if names.count(n) > 1)
-        raise MeasurementError(path, f"column {twice!r} appears twice", line=kept[0][0])
-    body = cells[1:] if header else cells
-    line = np.array([i for i, _ in kept][int(header) :], dtype=np.int64)
-    sign = decimal or _decimal(body, split)
+    separator = SEPARATOR.match(lines[0][1]) if lines else None
+    if separator is not None:
+        delimiter, lines = delimiter or separator.group(1), lines[1:]
+    lines, comments = _without_comments(lines, comment)
+    if not lines:
+        raise MeasurementError(path, "has no measurements", EMPTY_CURE)
+    split = delimiter or _delimiter([text for _, text in lines])
+    rows = _without_title(_cut(path, lines, split))
+    headed = _is_header(rows[0][1]) if header is None else header
+    names_of_columns = _header_in(comments, split, rows) if not headed else None
+    if header is not False and names_of_columns is not None:
+        rows, headed = [names_of_columns, *rows], True
+    if len(rows) < 1 + headed:
+        raise MeasurementError(path, "has no measurements", EMPTY_CURE)
+    body = rows[1:] if headed else rows
+    names = _trimmed(rows[0][1]) if headed else _numbered(body)
+    cells, names = _block(path, names, body, rows[0][0], headed)
+    line = np.array([i for i, _ in body], dtype=np.int64)
+    sign = decimal or _decimal(cells, split)
     digest = hashlib.sha256(raw).hexdigest()
-    return TextTable(path, tuple(names), body, line, sign, digest)
+    return TextTable(path, tuple(names), cells, line, sign, digest, headed)
 
 
 def read_headed(path: str | Path, **options: Any) -> TextTable:
@@ -173,11 +197,7 @@ def read_headed(path: str | Path, **options: Any) -> TextTable:
     Raises:
         MeasurementError: See `read_table`.
     """
-    table = read_table(path, header=False, **options)
-    numbers = sum(bool(NUMBER.match(str(cell))) for cell in table.cells[0])
-    if numbers >= FEW_NUMBERS and len(table.cells):
-        return table
-    return read_table(path, **options)
+    return read_table(path, **{"header": None, **options})
 
 
 def _read(path: Path) -> bytes:
@@ -208,25 +228,134 @@ def _decode(raw: bytes, encoding: str | None, path: Path) -> str:
     return raw.decode("latin-1")
 
 
-def _delimiter(header: str) -> str:
-    """Take the separator that cuts the header into most cells."""
-    best = max((";", "\t", ","), key=header.count)
-    return best if header.count(best) else r"\s+"
+Lines = list[tuple[int, str]]  # 1-based line and its text
+Row = tuple[int, list[str]]  # 1-based line and its cells
 
 
-def _cells(path: Path, lines: list[str], split: str) -> NDArray[np.object_]:
-    """Cut lines into cells."""
-    try:
-        frame = pd.read_csv(
-            io.StringIO("\n".join(lines)),
-            sep=split, header=None, dtype=str, keep_default_na=False,
-            skipinitialspace=True, engine="python" if len(split) > 1 else "c",
-        )  # fmt: skip
-    except (pd.errors.ParserError, pd.errors.EmptyDataError, ValueError) as exc:
-        problem = f"is not a regular table ({str(exc).strip()})"
-        cure = "Every row needs as many cells as the header"
-        raise MeasurementError(path, problem, cure) from None
-    return np.asarray(frame.to_numpy(dtype=object, na_value=""))
+def _without_comments(lines: Lines, comment: str | None) -> tuple[Lines, Lines]:
+    """Part the rows from comment lines; return both.
+
+    Where most lines begin with the sign, it belongs to the names of the points.
+    """
+    signs = (comment,) if comment else COMMENTS
+    noted = [text.lstrip(' "').startswith(signs) for _, text in lines]
+    if comment is None and 2 * sum(noted) > len(lines) + 4:
+        return lines, []
+    pairs = list(zip(lines, noted, strict=True))
+    return [t for t, is_note in pairs if not is_note], [t for t, note in pairs if note]
+
+
+def _header_in(comments: Lines, split: str, rows: list[Row]) -> Row | None:
+    """Find a header in the last comment above the rows, as numpy.savetxt writes it."""
+    above = [line for line in comments if line[0] < rows[0][0]]
+    if not above:
+        return None
+    number, text = above[-1]
+    cells = _trimmed(_cells_of(text.lstrip().lstrip("#/% "), split))
+    fits = len(cells) == len(_trimmed(rows[0][1])) and len(set(cells)) == len(cells)
+    return (number, cells) if fits and _is_header(cells) else None
+
+
+def _is_header(cells: list[str]) -> bool:
+    """Return True if cells name columns: few numbers, or the columns' own numbers."""
+    cells = _trimmed(cells)
+    numbers = sum(bool(NUMBER.match(cell)) for cell in cells)
+    counted = [[str(k + first) for k in range(len(cells))] for first in (0, 1)]
+    return numbers < FEW_NUMBERS or cells in counted
+
+
+def _without_title(rows: list[Row]) -> list[Row]:
+    """Leave out lines of text above the header, which have fewer cells than rows."""
+    widths = [sum(cell != "" for cell in cells) for _, cells in rows]
+    usual = float(np.median(widths))
+    for k, (_, cells) in enumerate(rows):
+        numbers = sum(bool(NUMBER.match(cell)) for cell in cells)
+        if 2 * widths[k] >= usual or numbers > 1:
+            return rows[k:]
+    return rows
+
+
+def _delimiter(lines: list[str]) -> str:
+    """Take the separator that cuts the first line into most cells."""
+    first = max(lines[:3], key=len)
+    best = max((";", "\t", ","), key=first.count)
+    if best == ",":  # or they are decimal commas between blanks
+        cells = lines[min(1, len(lines) - 1)].split()
+        if sum(bool(DECIMAL_COMMA.match(cell)) for cell in cells) >= FEW_NUMBERS:
+            return BLANKS
+    return best if first.count(best) else BLANKS
+
+
+def _cut(path: Path, lines: Lines, split: str) -> list[Row]:
+    """Cut lines into cells, stripped; rows of empty cells are left out."""
+    if split == BLANKS or len(split) > 1 or sum(t.count('"') for _, t in lines) % 2:
+        rows = [(number, _cells_of(text, split)) for number, text in lines]
+    else:  # a quoted cell may go over several lines
+        reader = csv.reader(
+            (text + "\n" for _, text in lines), delimiter=split, skipinitialspace=True
+        )
+        rows, before = [], 0
+        try:
+            for cells in reader:
+                number = lines[before][0]
+                rows.append((number, [" ".join(c.split()) for c in cells]))
+                before = reader.line_num
+        except csv.Error:
+            problem = "holds a cell of more than 100,000 characters"
+            cure = "Export the measurements as CSV text"
+            raise MeasurementError(path, problem, cure, line=lines[before][0]) from None
+    rows = [row for row in rows if any(row[1])]
+    if not rows:
+        raise MeasurementError(path, "has no measurements", EMPTY_CURE)
+    return rows
+
+
+def _cells_of(text: str, split: str) -> list[str]:
+    """Cut one line into cells."""
+    if split == BLANKS:
+        return [cell.strip('"') for cell in re.findall(r'"[^"]*"|\S+', text)]
+    if len(split) > 1:
+        return [cell.strip().strip('"') for cell in re.split(split, text.strip())]
+    return [cell.strip().strip('"').strip() for cell in text.split(split)]
+
+
+def _trimmed(cells: list[str]) -> list[str]:
+    """Leave out empty cells at the end."""
+    count = len(cells)
+    while count and cells[count - 1] == "":
+        count -= 1
+    return cells[:count]
+
+
+def _block(
+    path: Path, names: list[str], body: list[Row], top: int, headed: bool
+) -> tuple[NDArray[np.object_], list[str]]:
+    """Put rows under the names of their columns; columns without a name are left out.
+
+    Raises:
+        MeasurementError: A row has more cells than there are names, or a name is twice.
+    """
+    twice = next((n for n in names if n and names.count(n) > 1), None)
+    if twice is not None:
+        cure = "Give every column a name of its own"
+        problem = f"column {twice!r} appears twice"
+        raise MeasurementError(path, problem, cure, line=top)
+    width = len(names)
+    cells = np.full((len(body), width), "", dtype=object)
+    for k, (line, row) in enumerate(body):
+        used = _trimmed(row)
+        if len(used) > width:
+            what = "the header names" if headed else "the first row has"
+            raise MeasurementError(
+                path,
+                f"has {len(used)} cells, {what} {width}",
+                "Every row needs as many cells as the header. A decimal comma needs "
+                "another separator (--delimiter), a separator in a cell needs quotes",
+                line=line,
+            )
+        cells[k, : len(used)] = used
+    named = [k for k, name in enumerate(names) if name]
+    return cells[:, named], [names[k] for k in named]
 
 
 def _decimal(cells: NDArray[np.object_], split: str) -> str:
@@ -237,9 +366,10 @@ def _decimal(cells: NDArray[np.object_], split: str) -> str:
     return "," if comma else "."
 
 
-def _numbered(cells: NDArray[np.object_]) -> list[str]:
-    """Name columns by their number, from 1."""
-    return [str(k + 1) for k in range(cells.shape[1])]
+def _numbered(rows: list[Row]) -> list[str]:
+    """Name columns by their number, from 1: as many as the first rows have cells."""
+    width = int(np.median([len(_trimmed(cells)) for _, cells in rows]))
+    return [str(k + 1) for k in range(max(width, len(_trimmed(rows[0][1]))))]
 
 
 # Single columns of a measurement file: ids, directions, probe points.
@@ -416,7 +546,7 @@ def from_robodk(table: TextTable) -> TextTable:
 # How to read a measurement file, where what is detected would be wrong.
 
 UNITS = {"mm": 1.0, "m": 1000.0, "inch": 25.4}  # mm per unit
-NAMED = {"tab": "\t", "space": r"\s+", "comma": ",", "semicolon": ";"}
+NAMED = {"tab": "\t", "space": BLANKS, "comma": ",", "semicolon": ";"}
 
 
 @dataclass(frozen=True)
@@ -476,11 +606,12 @@ DETECT = TableFormat()
 #     decimal = ","
 #     encoding = "latin-1"
 #     comment = "//"
+#     header = false                                # columns are "1", "2", ..
 
 DEGREES = float(np.rad2deg(1.0))  # per radian
 TEXTS = ("id", "reference")  # columns of ours that hold no numbers
 MAP_KEYS = ("columns", "file")
-FILE_KEYS = ("delimiter", "decimal", "encoding", "comment")
+FILE_KEYS = ("delimiter", "decimal", "encoding", "comment", "header")
 
 
 @dataclass(frozen=True)
@@ -493,7 +624,7 @@ class Format:
     """
 
     columns: Mapping[str, tuple[tuple[str, float], ...]]
-    reading: Mapping[str, str] = field(default_factory=dict)
+    reading: Mapping[str, Any] = field(default_factory=dict)
 
     def fits(self, table: TextTable) -> bool:
         """Tell whether a table has all columns of the format."""
@@ -538,7 +669,7 @@ def read_foreign(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
         form = reading.columns
         if not isinstance(form, Format):
             form = read_column_map(form)
-        table = read_table(path, **{**form.reading, **reading.given})  # type: ignore[arg-type]
+        table = read_headed(path, **{**form.reading, **reading.given})
         table.require(*form.sources)
         return translate(table, form)
     table = read_headed(path, **reading.given)
@@ -609,6 +740,12 @@ def column_map(path: str | Path, data: Mapping[str, Any]) -> Format:
     if not columns:
         cure = 'Write [columns] with lines as q1_deg = "A1"'
         raise MeasurementError(path, "maps no column", cure, place="$.columns")
+    if not isinstance(reading.get("header", True), bool):
+        place = "$.file.header"
+        raise MeasurementError(path, "not true or false", "Correct it", place=place)
+    named = reading.get("delimiter")
+    if isinstance(named, str):
+        reading = {**reading, "delimiter": NAMED.get(named, named)}
     return Format(columns, reading)
 
 
