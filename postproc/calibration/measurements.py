@@ -25,6 +25,7 @@ from postproc.calibration.tables import (
     Format,
     TableFormat,
     TextTable,
+    in_visit_order,
     read_directions,
     read_foreign,
     read_headed,
@@ -129,7 +130,8 @@ def read_measurements(
     """Read a measurement file.
 
     Args:
-        path: CSV with the columns of the documentation; rows in visit order.
+        path: CSV with the columns of the documentation; rows in visit order, unless a
+            column order or time_s tells another.
         arm: The arm, for directions that must be inferred.
         tools: Probe points in the flange frame, (k, 3) [m] or by `tool_id`. Columns
             tool_x_mm, tool_y_mm, tool_z_mm override them.
@@ -152,6 +154,7 @@ def from_table(
 ) -> Measurements:
     """Interpret a table with the columns of the documentation."""
     table.require("id", *JOINTS, *(POSITION if positions else ()))
+    table = in_visit_order(table)
     table, references = split_references(table)
     ids = unique_ids(table)
     q = np.deg2rad(table.block(JOINTS))
@@ -161,6 +164,8 @@ def from_table(
         for column, (name, scale) in COVARIATES.items()
         if table.has(column)
     }
+    if table.has("order"):
+        covariates["order"] = table.numbers("order")
     tool, tool_id = read_tools(table, tools)
     states = make_states(q, side, tool, tool_id=tool_id, travel=travel, **covariates)
     read = table.has(*POSITION)
@@ -240,9 +245,12 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
         for name in first.states.__dataclass_fields__
         if name != "order"
     }
-    order = np.arange(sum(map(len, parts)), dtype=float)
+    offsets = _offsets(parts)
+    order = np.concatenate(
+        [p.states.order + by for p, by in zip(parts, offsets, strict=True)]
+    )
     rotations = [p.rotation for p in parts if p.rotation is not None]
-    return Measurements(
+    joint = Measurements(
         path=first.path,
         states=States(order=order, **joined),
         position=np.concatenate([p.position for p in parts]),
@@ -253,8 +261,30 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
         dropped=tuple(d for p in parts for d in p.dropped),
         warnings=tuple(w for p in parts for w in p.warnings),
         rotation=np.concatenate(rotations) if len(rotations) == len(parts) else None,
-        references=join_references([(p.references, len(p)) for p in parts]),
+        references=join_references(
+            [(p.references, by) for p, by in zip(parts, offsets, strict=True)]
+        ),
     )
+    if (np.diff(order) > 0).all():
+        return joint
+    return joint[np.argsort(order, kind="stable")]
+
+
+def _offsets(parts: Sequence[Measurements]) -> list[float]:
+    """Say by how much the order of every file moves, where one follows the other.
+
+    Places that no two rows share were numbered through all files.
+    """
+    every = np.concatenate([p.states.order for p in parts])
+    offsets, following = [0.0] * len(parts), -np.inf
+    if len(np.unique(every)) == len(every):
+        return offsets
+    for k, part in enumerate(parts):
+        if len(part):
+            order = part.states.order
+            offsets[k] = max(following - float(order.min()), 0.0) if k else 0.0
+            following = float(order.max()) + offsets[k] + 1.0
+    return offsets
 
 
 # Lists of measured points that carry names but no joint angles.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import itertools
 import re
 import tomllib
 from collections.abc import Mapping
@@ -379,6 +380,7 @@ TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
 ROTATION = ("rx_deg", "ry_deg", "rz_deg")
 JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
 DETOURS = 0.05  # share of other sides from which rows do not follow straight ways
+MOST_RESTARTS = 4  # of a clock in one file: rows that step back more often are sorted
 MANY = 20  # rows that are in order of a column by no accident
 TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 
@@ -403,18 +405,132 @@ def unique_ids(table: TextTable) -> tuple[str, ...]:
     return tuple(ids)
 
 
+CLOCKS = ("order", "time_s")  # columns that put rows in the order of visits
+
+
+def in_visit_order(table: TextTable) -> TextTable:
+    """Sort rows by column order, else by time_s, where all of them have it.
+
+    Raises:
+        MeasurementError: Both are there and disagree, or the times of two parts of the
+            file overlap: then the clock began again, and nothing says which came first.
+    """
+    clocks = {name: table.numbers(name, empty=True) for name in _clocks_of(table)}
+    order = clocks.get("order")
+    if order is not None:
+        _check_order(table, order)
+    clocks = {name: c for name, c in clocks.items() if _runs(c)}
+    if len(clocks) == len(CLOCKS):
+        _check_clash(table, **clocks)
+    if not clocks:
+        return table
+    name, passed = next(iter(clocks.items()))
+    if name == "time_s":
+        _check_restart(table, passed)
+    rows = np.argsort(passed, kind="stable")
+    return replace(table, cells=table.cells[rows], line=table.line[rows])
+
+
+def clock_of(table: TextTable) -> str:
+    """Name the column that gives the order of visits, "" where it is that of rows."""
+    for name in _clocks_of(table):
+        if _runs(table.numbers(name, empty=True)):
+            return name
+    return ""
+
+
+def _clocks_of(table: TextTable) -> tuple[str, ...]:
+    """Name the columns of the table that tell the moment of a row."""
+    return tuple(name for name in CLOCKS if table.has(name))
+
+
+def _runs(clock: Floats) -> bool:
+    """Return True if every row has a moment, and not all the same."""
+    return bool(len(clock) > 1 and not np.isnan(clock).any() and np.ptp(clock) > 0)
+
+
+def _check_order(table: TextTable, order: Floats) -> None:
+    """Refuse a column order that puts two rows at one place, or has gaps in it."""
+    lost = np.isnan(order)
+    if lost.any():
+        cure = "Number all rows, those on fixed points too, or leave the column out"
+        line = int(table.line[np.argmax(lost)])
+        raise MeasurementError(table.path, "has no order", cure, line=line)
+    place = np.argsort(order, kind="stable")
+    same = np.flatnonzero(np.diff(order[place]) == 0)
+    if len(same):
+        line, other = table.line[place[same[0] + 1]], table.line[place[same[0]]]
+        raise MeasurementError(
+            table.path,
+            f"order {order[place[same[0]]]:g} is also in line {other}",
+            "Give every row its own place in the order of visits",
+            line=int(line),
+        )
+
+
+def _check_clash(table: TextTable, order: Floats, time_s: Floats) -> None:
+    """Refuse an order that times contradict."""
+    place = np.argsort(order, kind="stable")
+    back = np.flatnonzero(np.diff(time_s[place]) < 0)
+    if len(back):
+        first, second = place[back[0]], place[back[0] + 1]
+        raise MeasurementError(
+            table.path,
+            f"order and time_s disagree: line {table.line[second]} follows line "
+            f"{table.line[first]} by order, but is {np.ptp(time_s[[first, second]]):g} "
+            f"s earlier ({len(back)} such pairs)",
+            "Which of them is the order of visits? Leave the other column out",
+            line=int(table.line[second]),
+        )
+
+
+def _check_restart(table: TextTable, time: Floats) -> None:
+    """Refuse times of a clock that began again within the file.
+
+    Rows that are sorted by another column step back often, rows newest first always;
+    parts that were put together step back once for each, and cover the same times.
+    """
+    forward = time if (np.diff(time) > 0).sum() >= (np.diff(time) < 0).sum() else -time
+    back = np.flatnonzero(np.diff(forward) < 0)
+    if len(back) == 0 or len(back) > MOST_RESTARTS or len(time) < MANY:
+        return
+    ends = [0, *(back + 1).tolist(), len(time)]
+    parts = sorted(
+        (float(forward[a:b].min()), float(forward[a:b].max()))
+        for a, b in itertools.pairwise(ends)
+    )
+    for (_, high), (low, _) in itertools.pairwise(parts):
+        if low < high:
+            raise MeasurementError(
+                table.path,
+                f"time_s goes back in line {table.line[back[0] + 1]}, and rows before "
+                "and after it cover the same times",
+                "Did the clock begin again? Then split the file there. Were rows "
+                "sorted? Then add a column order",
+                line=int(table.line[back[0] + 1]),
+            )
+
+
 def read_directions(
     table: TextTable, arm: Arm, q: Floats
 ) -> tuple[Floats, Floats, Bools, tuple[str, ...]]:
-    """Read the arrival directions and travels, or infer them from the row order."""
+    """Read the arrival directions and travels, or infer them from the order of visits.
+
+    Args:
+        table: Rows in the order of visits.
+        arm: The arm.
+        q: Joint angles, (n, 6) [rad].
+    """
     arrived = arrivals_of_rows(arm, q)
     travel = arrived.travel
     if table.has(*TRAVELS):
         travel = np.deg2rad(table.block(TRAVELS))
     if not table.has(*SIDES):
+        clock = clock_of(table)
+        by, doubt = (clock, "") if clock else ("the order of the rows", _sorted(table))
         warnings = (
-            f"{table.path}: no lambda columns; directions inferred from the order of "
-            f"the rows, as JOINT moves. {_sorted(table)}",
+            f"{table.path}: no lambda columns; directions inferred from {by}, as JOINT "
+            f"moves{doubt}",
         )
         return arrived.direction, travel, np.ones(len(q), dtype=bool), warnings
     side = table.block(SIDES)
@@ -488,12 +604,14 @@ def _sorted(table: TextTable) -> str:
     """Say whether the rows still are in the order in which they were measured."""
     for name in (*JOINTS, "x_mm", "y_mm", "z_mm"):
         step = np.diff(table.numbers(name)) if table.has(name) else np.zeros(0)
-        if len(step) > MANY and ((step >= 0).all() or (step <= 0).all()):
+        one_way = (step >= 0).all() or (step <= 0).all()
+        if len(step) > MANY and one_way and step.any():
             return (
-                f"The rows are sorted by {name}: the order of visits is lost, and "
-                "backlash with it. Use the file as it was measured"
+                f". The rows are sorted by {name}: the order of visits is lost, and "
+                "backlash with it. Use the file as it was measured, or add a column "
+                "time_s or order"
             )
-    return "Wrong if the rows were sorted"
+    return ". Wrong if the rows were sorted: a column time_s or order tells"
 
 
 # The table that RoboDK's calibration project saves (SaveTable): 18 columns.

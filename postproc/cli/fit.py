@@ -42,6 +42,7 @@ from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program, tell_directions
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.files import write_all
+from postproc.model.kinematics import Batch
 from postproc.model.model import (
     FreePart,
     Model,
@@ -51,6 +52,7 @@ from postproc.model.model import (
 )
 from postproc.model.registration import Registration
 from postproc.model.statistics import ErrorStatistics
+from postproc.model.variance import moment_variance
 from postproc.report.terminal import Column, table_text
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import MM
@@ -455,10 +457,13 @@ class Readings:
             the error of the arm is asked for.
         refit: What of the set-up is found from the rows themselves: "registration",
             or None where the set-up is that of the model's survey.
+        after: Whether the rows were read after the survey: what passes with time is as
+            at its end.
     """
 
     frame: str | None = None
     refit: str | None = None
+    after: bool = False
 
     def __post_init__(self) -> None:
         if self.refit not in (None, "registration"):
@@ -563,6 +568,7 @@ def read_setup(
     """
     found = readings.refit is not None
     rows = _rows(table, cell, positions=found)
+    rows, known = at_moments(rows, table, model, readings.after)
     if found:
         placed, read = predict_registered(model, cell.arm, rows.states, rows.position)
         at = ", ".join(f"{v / MM:.1f}" for v in placed.tracker)
@@ -574,7 +580,56 @@ def read_setup(
             cure = "Find it from these rows: --refit registration"
             raise MeasurementError(table.path, problem, cure)
         rows = _placed(rows, model.registration, table.path)
-    return rows, model.reading(cell.arm, rows.states), ""
+    told = clock_missing(model, known, cell, rows.states)
+    return rows, model.without_clock(known).reading(cell.arm, rows.states), told
+
+
+LATER = 1e9  # [s], or rows: a moment after any survey
+
+
+def at_moments(
+    rows: Measurements, table: Cells, model: Model, after: bool
+) -> tuple[Measurements, frozenset[str]]:
+    """Place rows in the survey's time; return the clocks that they have, too.
+
+    A row whose order is not given comes after the survey's steps. The rows of the
+    survey's own file have its moments.
+
+    Args:
+        rows: The rows.
+        table: Their file.
+        model: The model, for its survey.
+        after: Whether they were read after the survey.
+    """
+    states = rows.states
+    if after:
+        later = np.arange(len(rows)) + LATER
+        states = states.with_(order=later, time=np.full(len(rows), LATER))
+        return rows.with_states(states), frozenset(("order", "time"))
+    known = {"time"} if len(rows) and not np.isnan(states.time).any() else set()
+    if table.has("order") or table.sha256 in model.data_sha256:
+        return rows, frozenset({"order", *known})
+    states = states.with_(order=np.arange(len(rows)) + LATER)
+    return rows.with_states(states), frozenset(known)
+
+
+def clock_missing(
+    model: Model, known: frozenset[str], cell: Cell, states: States
+) -> str:
+    """Say which effects pass with time, where rows do not tell theirs, and the cost."""
+    lost = model.without_clock(known)
+    pairs = zip(model.effects.effects, lost.effects.effects, strict=True)
+    names = [was.name for was, now in pairs if now is not was]
+    if not names:
+        return ""
+    at = Batch(cell.arm, states)
+    spread = np.sqrt(moment_variance(lost.effects, at, lost.values).mean()) / MM
+    clocks = sorted({"time_s" if c == "time" else c for c in model.clocks - known})
+    return (
+        f"\nno {' and no '.join(clocks)} in the file: {', '.join(names)} at the mean "
+        f"over the survey, +- {spread:.4f} mm per axis. The column gives the moment, "
+        "--after takes the end of the survey"
+    )
 
 
 def _rows(table: Cells, cell: Cell, positions: bool) -> Measurements:

@@ -221,6 +221,12 @@ def predict(
         str | None,
         typer.Option("--refit", help="registration: find the set-up from these rows."),
     ] = None,
+    after: Annotated[
+        bool,
+        typer.Option(
+            "--after", help="Take what passes with time as at the end of the survey."
+        ),
+    ] = False,
     columns: ColumnsOption = None,
     delimiter: DelimiterOption = None,
     decimal: DecimalOption = None,
@@ -233,7 +239,7 @@ def predict(
     with explained():
         check_places([output], [states, cell, model, columns])
         reading = TableFormat(columns, delimiter, decimal, encoding)
-        asked = fit.Readings(None if frame is None else frame.value, refit)
+        asked = fit.Readings(None if frame is None else frame.value, refit, after)
         with busy("predict"):
             text, summary = fit.predict_file(states, cell, model, asked, reading)
         write_text("-" if output is None else str(output), text)

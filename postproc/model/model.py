@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from collections.abc import Collection
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ from postproc.model.ranges import Ranges
 from postproc.model.registration import Registration
 from postproc.model.variance import (
     beyond_variance,
+    moment_variance,
     parameter_variance,
     side_variance,
 )
@@ -338,7 +340,24 @@ class Model:
         if effects is not self.effects and len(prior_std):
             prior_std = prior_std[self.effects.where(*COMPENSATED)]
         beyond = beyond_variance(effects, at, prior_std)
+        beyond += moment_variance(effects, at, values)
         return side_variance(effects, at, values) + np.square(self.spread) + beyond
+
+    @property
+    def clocks(self) -> frozenset[str]:
+        """Name the clocks that effects follow: "time", "order"."""
+        return frozenset(str(getattr(e, "clock", "")) for e in self.effects.effects) - {
+            ""
+        }
+
+    def without_clock(self, known: Collection[str]) -> Model:
+        """Return it for rows of an unknown moment: what passes with time at its mean.
+
+        Args:
+            known: Clocks that the rows have, of "time" and "order".
+        """
+        effects = tuple(e.without_clock(known) for e in self.effects.effects)
+        return replace(self, effects=Combination(effects))
 
     def reading(self, arm: Arm, states: States) -> PredictedReading:
         """Predict what the survey's own set-up reads, and how sure one reading is.
