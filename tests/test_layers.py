@@ -46,9 +46,9 @@ KNOWING = {
     # What the methods of the literature train.
     "calibration.published": {"elm", "geometry", "maps"},
     # How the rows were measured decides: frame, probe points, orientations, a slip.
-    "calibration.fit": {"placement", "probe", "tool_shift"},
-    # A registration is what that effect fits.
-    "calibration.registration": {"placement"},
+    "calibration.fit": {"placement", "probe", "station_shift", "tool_shift"},
+    # A registration is what that effect fits, by the rigid motions of a base.
+    "calibration.registration": {"base_shift", "placement"},
     # A tracker that drifts moves fixed points rigidly.
     "calibration.references": {"base_shift", "tracker_drift"},
     "calibration.selection": {"probe_turn", "tool_shift"},

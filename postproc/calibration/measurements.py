@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats
 from postproc.calibration.references import (
+    ONE_POINT,
     ReferenceRows,
     TrackerMotion,
     join_references,
@@ -81,6 +82,8 @@ class Measurements:
         references: Readings of fixed points between the rows, or None.
         motion: What they say of the tracker, whose drift is taken out of `position`;
             None without them.
+        stations: Names of the places of the tracker, or of the files, by
+            `states.station`.
     """
 
     path: Path
@@ -96,6 +99,7 @@ class Measurements:
     mounting: Floats | None = field(default=None, repr=False)
     references: ReferenceRows | None = field(default=None, repr=False)
     motion: TrackerMotion | None = field(default=None, repr=False)
+    stations: tuple[str, ...] = ("",)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -166,15 +170,28 @@ def from_table(
     }
     if table.has("order"):
         covariates["order"] = table.numbers("order")
+    stations, station = read_stations(table)
     tool, tool_id = read_tools(table, tools)
-    states = make_states(q, side, tool, tool_id=tool_id, travel=travel, **covariates)
+    states = make_states(
+        q, side, tool, tool_id=tool_id, station=station, travel=travel, **covariates
+    )
     read = table.has(*POSITION)
     position = table.block(POSITION) * MM if read else np.full((len(q), 3), np.nan)
     found = Measurements(
         table.path, states, position, ids, table.line, inferred, table.sha256,
         warnings=warnings, rotation=read_rotation(table), references=references,
+        stations=stations,
     )  # fmt: skip
     return drop_lost_beams(found)
+
+
+def read_stations(table: TextTable) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+    """Read the column station: names in the order of visits, and each row's number."""
+    if not table.has("station"):
+        return ("",), np.zeros(len(table), dtype=np.int64)
+    texts = table.text("station")
+    names = tuple(dict.fromkeys(texts)) or ("",)
+    return names, np.array([names.index(t) for t in texts], dtype=np.int64)
 
 
 def drop_lost_beams(measured: Measurements) -> Measurements:
@@ -205,11 +222,29 @@ def _nowhere(position: Floats) -> Bools:
 def concatenate(parts: Sequence[Measurements]) -> Measurements:
     """Put several files one after the other, and take the tracker's own drift out.
 
+    Fixed points that lie apart from file to file were read from another station: each
+    file then has a drift of its own.
+
     Raises:
         MeasurementError: An id appears in two files, or readings of fixed points tell
             nothing.
     """
+    if _moved_between(parts):
+        return replace(_joined([_steadied(p) for p in parts]), motion=None)
     return _steadied(_joined(parts))
+
+
+def _moved_between(parts: Sequence[Measurements]) -> bool:
+    """Return True if a fixed point is elsewhere in another file."""
+    places: dict[str, Floats] = {}
+    for part in parts:
+        fixed = part.references
+        for name, xyz in (
+            () if fixed is None else zip(fixed.name, fixed.position, strict=True)
+        ):
+            if np.linalg.norm(places.setdefault(name, xyz) - xyz) > ONE_POINT:
+                return part is not parts[0]
+    return False
 
 
 def _steadied(survey: Measurements) -> Measurements:
@@ -240,10 +275,11 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
                 problem = f"id {name!r} is also in {seen[name]}"
                 raise MeasurementError(part.path, problem, cure, line=int(line))
             seen[name] = part.path
+    names, station = _joined_stations(parts)
     joined = {
         name: np.concatenate([getattr(p.states, name) for p in parts])
         for name in first.states.__dataclass_fields__
-        if name != "order"
+        if name not in ("order", "station")
     }
     offsets = _offsets(parts)
     order = np.concatenate(
@@ -252,7 +288,7 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
     rotations = [p.rotation for p in parts if p.rotation is not None]
     joint = Measurements(
         path=first.path,
-        states=States(order=order, **joined),
+        states=States(order=order, station=station, **joined),
         position=np.concatenate([p.position for p in parts]),
         ids=tuple(i for p in parts for i in p.ids),
         line=np.concatenate([p.line for p in parts]),
@@ -264,10 +300,31 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
         references=join_references(
             [(p.references, by) for p, by in zip(parts, offsets, strict=True)]
         ),
+        stations=names,
     )
     if (np.diff(order) > 0).all():
         return joint
     return joint[np.argsort(order, kind="stable")]
+
+
+def _joined_stations(
+    parts: Sequence[Measurements],
+) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+    """Number the stations of several files: one name is one station.
+
+    A file that names none is a station of its own, by the file's name.
+    """
+    names: list[str] = []
+    numbers = []
+    for k, part in enumerate(parts):
+        own = list(part.stations)
+        if own == [""]:
+            same = [p.path.name for p in parts].count(part.path.name) > 1
+            own = [f"{part.path.name} ({k + 1})" if same else part.path.name]
+        names += [name for name in own if name not in names]
+        index = np.array([names.index(name) for name in own], dtype=np.int64)
+        numbers.append(index[part.states.station])
+    return tuple(names), np.concatenate(numbers)
 
 
 def _offsets(parts: Sequence[Measurements]) -> list[float]:

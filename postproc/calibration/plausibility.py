@@ -11,7 +11,12 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
-from postproc.calibration.registration import register, typical_gap
+from postproc.calibration.registration import (
+    STOPS,
+    register,
+    spread_out,
+    typical_gap,
+)
 from postproc.calibration.regression import observe
 from postproc.calibration.tool_groups import find_groups
 from postproc.exceptions import MeasurementError
@@ -33,7 +38,8 @@ def likely_cure(survey: Measurements, arm: Arm) -> str:
     """Name the mistake that would explain the positions, if one does."""
     few = survey[np.unique(np.linspace(0, len(survey) - 1, TRIED).astype(np.int64))]
     for cure, states, position in _guesses(few.states, few.position):
-        found = register(arm, states, position, NOTHING, np.zeros(0))
+        names = survey.stations
+        found = register(arm, states, position, NOTHING, np.zeros(0), names)
         if typical_gap(found, arm, states, position) < CLOSE:
             return cure
     return "Check units, joint order and signs, the tool and the frame (--frame)"
@@ -195,6 +201,29 @@ def check_registered(
         check_tools(registered, arm)
         problem = f"the registration leaves {typical / MM:.0f} mm"
         raise MeasurementError(survey.path, problem, likely_cure(survey, arm))
+
+
+def check_stops(survey: Measurements, arm: Arm) -> None:
+    """Check that every station's rows can place the tracker.
+
+    Raises:
+        MeasurementError: Naming a station with fewer than six stops, or one whose
+            stops lie about a line.
+    """
+    for number, name in enumerate(survey.stations):
+        rows = survey.states.station == number
+        of = f" of station {name}" if name else ""
+        poses = len(np.unique(np.round(survey.states.q[rows], 4), axis=0))
+        if poses >= STOPS and spread_out(arm, survey.states[rows]):
+            continue
+        where = ", all about one line," if poses >= STOPS else ""
+        raise MeasurementError(
+            survey.path,
+            f"{int(rows.sum())} rows{of} at {poses} poses{where} do not tell where the "
+            "tracker stands",
+            f"Measure {STOPS} poses or more, spread over the workspace. Files of one "
+            "station say so in a column station",
+        )
 
 
 def check_rows(survey: Measurements, arm: Arm) -> None:

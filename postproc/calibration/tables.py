@@ -727,7 +727,7 @@ DETECT = TableFormat()
 #     header = false                                # columns are "1", "2", ..
 
 DEGREES = float(np.rad2deg(1.0))  # per radian
-TEXTS = ("id", "reference")  # columns of ours that hold no numbers
+TEXTS = ("id", "reference", "station")  # columns of ours that hold no numbers
 MAP_KEYS = ("columns", "file")
 FILE_KEYS = ("delimiter", "decimal", "encoding", "comment", "header")
 

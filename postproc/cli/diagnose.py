@@ -14,14 +14,16 @@ from postproc.calibration.diagnosis.diagnose import Extension, diagnose
 from postproc.calibration.diagnosis.result import Diagnosis
 from postproc.calibration.diagnosis.search import Progress
 from postproc.calibration.diagnosis.trace import REMAINS, silent
-from postproc.calibration.fit import read_surveys, several_points
+from postproc.calibration.fit import read_surveys, several_points, shifted_files
 from postproc.calibration.measurements import (
     COVARIATES,
     POSITION,
     Measurements,
     concatenate,
     read_points,
+    read_stations,
 )
+from postproc.calibration.plausibility import check_stops
 from postproc.calibration.references import split_references
 from postproc.calibration.registration import register
 from postproc.calibration.report import DirectionReport
@@ -77,9 +79,11 @@ def join_program(
     if len(lost):
         row = order[lost[0]]
         raise _unplanned(data, ids[row], int(table.line[row]), planned, int(rows[row]))
+    stations, station = read_stations(table)
     return Measurements(
         path=table.path,
-        states=states.with_(**recorded),
+        states=states.with_(**recorded, station=station[order]),
+        stations=stations,
         position=table.block(POSITION)[order] * MM,
         ids=tuple(ids[k] for k in order),
         line=table.line[order],
@@ -198,7 +202,9 @@ def diagnose_files(
         survey = from_user_frame(survey, cell)
     elif asked.measured_frame == "tracker":
         survey, placed = from_tracker_frame(survey, cell, model)
-        tracker, setup = placed.tracker, REGISTERED
+        tracker, setup = placed.origin, REGISTERED
+    if placed is None:
+        setup = (*setup, *shifted_files(survey, cell.arm, cell.tracker))
     found = diagnose(
         survey, cell.arm, model, tracker=tracker, setup=setup, seed=asked.seed,
         progress=progress,
@@ -231,13 +237,16 @@ def from_tracker_frame(
         The measurements in the base frame, and where tracker and probes are.
     """
     effects, values, _ = model.compensable()
-    placed = register(cell.arm, survey.states, survey.position, effects, values)
+    check_stops(survey, cell.arm)
     states = survey.states
+    placed = register(
+        cell.arm, states, survey.position, effects, values, survey.stations
+    )
     _, first, which = np.unique(states.tool_id, return_index=True, return_inverse=True)
     if any(isinstance(e, Placement) for e in model.effects.effects):
         states = states.with_(tool=placed.probes[which])
     placed = replace(placed, probes=states.tool[first])
-    position = placed.to_base(survey.position)
+    position = placed.to_base(survey.position, states.station)
     return replace(survey, states=states, position=position), placed
 
 

@@ -420,9 +420,10 @@ def _trial(train: Measurements, test: Measurements, cell: Cell, frame: str) -> T
     if frame != "tracker":
         return Trial(train, test, cell.tracker)
     train, found = into_base_frame(train, cell.arm)
-    states, position = found.on_probes(test.states), found.to_base(test.position)
+    states = found.on_probes(test.states)
+    position = found.to_base(test.position, states.station)
     test = replace(test, states=states, position=position)
-    return Trial(train, test, found.tracker)
+    return Trial(train, test, found.origin)
 
 
 def comparison_json(found: Comparison) -> str:

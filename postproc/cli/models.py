@@ -223,9 +223,7 @@ def predict(
     ] = None,
     after: Annotated[
         bool,
-        typer.Option(
-            "--after", help="Take what passes with time as at the end of the survey."
-        ),
+        typer.Option("--after", help="Take drifts as they were at the survey's end."),
     ] = False,
     columns: ColumnsOption = None,
     delimiter: DelimiterOption = None,

@@ -443,7 +443,7 @@ class Model:
         }
         if self.registration is not None:
             kept = RegistrationSection.of(self.registration)
-            data["registration"] = kept.model_dump()
+            data["registration"] = kept.content()
         if self.flank_widths:
             data["flank_widths"] = [
                 None if width == UNTOLD else list(width) for width in self.flank_widths

@@ -31,6 +31,8 @@ class States:
         heading: Direction in which the TCP moves, (n, 3), unit vectors in the base
             frame, where it was read in motion: then nothing is known of its place along
             that direction. NaN where the arm stands still.
+        station: Which place of the tracker a reading was taken from, (n,) integers from
+            0; of a survey in the base frame: which file it stands in.
     """
 
     q: Floats
@@ -45,6 +47,7 @@ class States:
     payload_com: Floats
     order: Floats
     heading: Floats
+    station: NDArray[np.int64]
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -101,7 +104,7 @@ def make_states(
         )
         for name, shape in shapes.items()
     }
-    tool_id = covariates.pop("tool_id", 0)
+    tool_id, station = covariates.pop("tool_id", 0), covariates.pop("station", 0)
     order = covariates.pop("order", np.arange(n))
     if covariates:
         raise TypeError(f"states have no {', '.join(covariates)}")
@@ -111,5 +114,6 @@ def make_states(
         tool=np.broadcast_to(np.zeros(3) if tool is None else tool, (n, 3)),
         tool_id=np.broadcast_to(np.array(tool_id, dtype=np.int64), (n,)),
         order=np.broadcast_to(np.array(order, dtype=float), (n,)),
+        station=np.broadcast_to(np.array(station, dtype=np.int64), (n,)),
         **values,  # type: ignore[arg-type]
     )

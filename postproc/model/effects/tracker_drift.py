@@ -100,7 +100,7 @@ class TrackerDrift(Effect):
             return None
         spread = np.cov(_terms(MOMENTS), bias=True)
         moved = rigid_columns(batch) @ p.reshape(TERMS, 6).T  # (n, 3, terms)
-        return np.einsum("nik,kl,nil->ni", moved, spread, moved)
+        return np.asarray(np.einsum("nik,kl,nil->ni", moved, spread, moved))
 
     def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
