@@ -23,7 +23,7 @@ from postproc.calibration.measurements import (
     read_points,
     read_stations,
 )
-from postproc.calibration.plausibility import check_stops
+from postproc.calibration.plausibility import check_against, check_stops
 from postproc.calibration.references import split_references
 from postproc.calibration.registration import register
 from postproc.calibration.report import DirectionReport
@@ -205,6 +205,7 @@ def diagnose_files(
         tracker, setup = placed.origin, REGISTERED
     if placed is None:
         setup = (*setup, *shifted_files(survey, cell.arm, cell.tracker))
+    check_against(survey, cell.arm, model)
     found = diagnose(
         survey, cell.arm, model, tracker=tracker, setup=setup, seed=asked.seed,
         progress=progress,
