@@ -42,7 +42,9 @@ KNOWING = {
     # The native kernel makes its columns and those of the joints itself.
     "model.variance": {"geometry"},
     # Any survey must determine it, or be refused.
-    "calibration.plausibility": {"geometry"},
+    "calibration.plausibility": {"base_shift", "geometry"},
+    # What the frame of the rows explains is no mistake of them.
+    "calibration.likely_causes": {"base_shift", "placement"},
     # What the methods of the literature train.
     "calibration.published": {"elm", "geometry", "maps"},
     # How the rows were measured decides: frame, probe points, orientations, a slip.

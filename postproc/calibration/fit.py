@@ -15,6 +15,7 @@ from postproc.calibration.measurements import (
     concatenate,
     read_measurements,
 )
+from postproc.calibration.monument_frame import monuments_of
 from postproc.calibration.plausibility import (
     check_orientations,
     check_registered,
@@ -47,7 +48,7 @@ from postproc.model.effects.probe import Probe
 from postproc.model.effects.station_shift import StationShift
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
-from postproc.model.model import Model
+from postproc.model.model import Model, Monument
 from postproc.model.model_file import Method
 from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
@@ -124,11 +125,12 @@ def fit_measurements(
 ) -> Calibration:
     """Fit a model to measurements, see `fit`."""
     tracker, setup = cell.tracker, several_points(survey)
-    placed, points = None, None
+    placed, points, monuments = None, None, monuments_of(survey)
     if frame == "tracker":
         points = stated_points(survey)
         survey, placed = into_base_frame(survey, cell.arm)
         tracker, setup = placed.origin, (Placement.name,)
+        monuments = in_base_frame(monuments, placed)
     survey, reversals = split_reversals(survey, cell.arm)
     check_survey(survey, cell.arm)
     if frame == "base":
@@ -152,7 +154,7 @@ def fit_measurements(
         *file_steps(fitted, survey),
     )
     survey = replace(survey, warnings=told)
-    model = replace(model_of(fitted, survey), registration=placed)
+    model = replace(model_of(fitted, survey), registration=placed, monuments=monuments)
     widths = newer_widths((), model, cell.arm, reversals)
     model = replace(model, flank_widths=widths)
     report = report_fit(fitted, survey, model)
@@ -339,6 +341,19 @@ def into_base_frame(
     check_registered(survey, registered, arm, typical)
     check_stops(survey, arm)
     return registered, found
+
+
+def in_base_frame(
+    monuments: tuple[Monument, ...], placed: Registration
+) -> tuple[Monument, ...]:
+    """Convert fixed points from the frame of the first station to the base frame."""
+    if not monuments:
+        return ()
+    places = placed.to_base(np.array([xyz for _, xyz in monuments])).tolist()
+    return tuple(
+        (name, (x, y, z))
+        for (name, _), (x, y, z) in zip(monuments, places, strict=True)
+    )
 
 
 def unseen_probe(placed: Registration, arm: Arm, states: States) -> tuple[str, ...]:

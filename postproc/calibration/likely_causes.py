@@ -155,6 +155,8 @@ def _explained(before: Floats, after: Floats) -> tuple[float, int, Bools, str] |
         return float(mended.mean()), 0, np.ones(n, dtype=bool), "all"
     if changed.sum() < few or changed.sum() < EXPLAINED * (~good).sum() - 1:
         return None
+    if np.median(before[changed]) < BETTER * np.median(after[changed]):
+        return None
     behind = np.arange(n)
     ahead = np.concatenate([[0], np.cumsum(good)])
     rest = np.concatenate([np.cumsum(mended[::-1])[::-1], [0]])

@@ -18,10 +18,16 @@ from postproc.calibration.likely_causes import (
 )
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
-from postproc.calibration.registration import STOPS, spread_out
+from postproc.calibration.registration import (
+    STOPS,
+    register,
+    spread_out,
+    typical_gap,
+)
 from postproc.calibration.regression import observe
 from postproc.calibration.tool_groups import FEWEST, find_groups
 from postproc.exceptions import MeasurementError
+from postproc.model.combination import Combination
 from postproc.model.effects.base_shift import rigid_motions
 from postproc.model.effects.geometry import Geometry
 from postproc.model.kinematics import Batch
@@ -225,12 +231,35 @@ def check_registered(
     """
     check_rows(survey, arm)
     check_places(survey, arm)
-    for number in range(len(survey.stations)):
-        rows = survey[survey.states.station == number]
-        rows = rows.with_states(rows.states.with_(station=np.zeros(len(rows), int)))
-        _check_cause(rows, find_cause_in_tracker_frame(rows, arm))
+    _check_stations(survey, arm)
     if typical > CLOSE:
         check_tools(registered, arm)
+        problem = f"the registration leaves {typical / MM:.0f} mm"
+        raise MeasurementError(survey.path, problem, cause_in_any_frame(survey, arm))
+
+
+def _check_stations(survey: Measurements, arm: Arm) -> None:
+    """Refuse rows of the tracker's frame that a mistake explains, by station."""
+    for number in range(len(survey.stations)):
+        rows = survey[survey.states.station == number]
+        here = np.zeros(len(rows), dtype=np.int64)
+        rows = rows.with_states(rows.states.with_(station=here))
+        _check_cause(rows, find_cause_in_tracker_frame(rows, arm))
+
+
+def check_own_registration(survey: Measurements, arm: Arm) -> None:
+    """Check rows in the tracker's frame that find their own registration.
+
+    Raises:
+        MeasurementError: With the likely reason and the cure.
+    """
+    _check_stations(survey, arm)
+    nothing = Combination(())
+    placed = register(
+        arm, survey.states, survey.position, nothing, np.zeros(0), survey.stations
+    )
+    typical = typical_gap(placed, arm, survey.states, survey.position)
+    if typical > CLOSE:
         problem = f"the registration leaves {typical / MM:.0f} mm"
         raise MeasurementError(survey.path, problem, cause_in_any_frame(survey, arm))
 

@@ -6,8 +6,6 @@ an effect of the set-up beside the arm's own (`Placement`).
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
 from postproc.arrays import Bools, Floats
@@ -16,7 +14,7 @@ from postproc.model.effects.base_shift import rigid_motions
 from postproc.model.effects.placement import Placement
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, PredictedReading
-from postproc.model.registration import Registration
+from postproc.model.registration import Registration, rigid_fit
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -70,7 +68,7 @@ def register(
         tcp = flange + np.einsum("nij,nj->ni", R, found[which])
         for s, rows in enumerate(own):
             if rows.any():
-                T[s] = _procrustes(position[rows], tcp[rows], weight[rows])
+                T[s] = rigid_fit(position[rows], tcp[rows], weight[rows])
         placed = Registration(T, found, ids, stations)
         measured = placed.to_base(position, states.station)
         gap = measured - tcp
@@ -160,24 +158,44 @@ def typical_gap(
         states: States of the rows.
         position: Measured positions in the tracker frame, (n, 3) [m].
     """
+    if len(states) == 0:
+        return 0.0
     tcp = Batch(arm, registered.on_probes(states)).walk.tcp
     gap = registered.to_base(position, states.station) - tcp
     return float(np.median(np.linalg.norm(gap, axis=1)))
 
 
-def _procrustes(a: Floats, b: Floats, weight: Floats) -> Floats:
-    """Find the rigid transform (4, 4) that takes points a (n, 3) to b best."""
-    from scipy.spatial.transform import Rotation  # slow to load, and for fits alone
+def station_of(
+    placed: Registration,
+    arm: Arm,
+    states: States,
+    position: Floats,
+    names: tuple[str, ...],
+) -> Registration:
+    """Give rows the stations of a survey: by name, else that which leaves least.
 
-    total = weight.sum()
-    ca, cb = weight @ a / total, weight @ b / total
-    with warnings.catch_warnings():  # of points on a line any turn about it will do
-        warnings.simplefilter("ignore", UserWarning)
-        turn, _ = Rotation.align_vectors(b - cb, a - ca, weights=weight)
-    T = np.eye(4)
-    T[:3, :3] = turn.as_matrix()
-    T[:3, 3] = cb - T[:3, :3] @ ca
-    return T
+    Args:
+        placed: The survey's registration.
+        arm: The arm.
+        states: States of the rows, with stations of their own.
+        position: Measured positions in the frame of their station, (n, 3) [m].
+        names: Names of the rows' stations.
+    """
+    chosen = []
+    for number, name in enumerate(names):
+        own = states.station == number
+        here = states[own].with_(station=np.zeros(int(own.sum()), dtype=np.int64))
+        if name in placed.stations:
+            chosen.append(placed.stations.index(name))
+            continue
+        sizes = [
+            typical_gap(placed.at_station(k), arm, here, position[own])
+            for k in range(len(placed.stations) if own.any() else 1)
+        ]
+        chosen.append(int(np.argmin(sizes)))
+    return Registration(
+        placed.transforms[chosen], placed.probes, placed.tool_ids, names
+    )
 
 
 def _robust(gap: Floats) -> Floats:

@@ -23,7 +23,11 @@ from postproc.calibration.measurements import (
     read_points,
     read_stations,
 )
-from postproc.calibration.plausibility import check_against, check_stops
+from postproc.calibration.plausibility import (
+    check_against,
+    check_own_registration,
+    check_stops,
+)
 from postproc.calibration.references import split_references
 from postproc.calibration.registration import register
 from postproc.calibration.report import DirectionReport
@@ -238,6 +242,7 @@ def from_tracker_frame(
         The measurements in the base frame, and where tracker and probes are.
     """
     effects, values, _ = model.compensable()
+    check_own_registration(survey, cell.arm)
     check_stops(survey, cell.arm)
     states = survey.states
     placed = register(

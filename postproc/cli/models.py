@@ -233,11 +233,12 @@ def predict(
     """Add the predicted error of every row; with positions, also the residual."""
     from postproc.calibration.tables import TableFormat
     from postproc.cli import fit
+    from postproc.cli.readings import Readings
 
     with explained():
         check_places([output], [states, cell, model, columns])
         reading = TableFormat(columns, delimiter, decimal, encoding)
-        asked = fit.Readings(None if frame is None else frame.value, refit, after)
+        asked = Readings(None if frame is None else frame.value, refit, after)
         with busy("predict"):
             text, summary = fit.predict_file(states, cell, model, asked, reading)
         write_text("-" if output is None else str(output), text)

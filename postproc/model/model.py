@@ -109,6 +109,7 @@ COMPENSATED = ("arm", "state")
 READING = "reading_spread"  # statistic: see `Fit.reading_spread`
 WORST_STD = "worst_std_mm"  # statistic: largest standard error at a surveyed pose
 UNSURE = "standard error above three times the survey's worst"
+Monument = tuple[str, tuple[float, float, float]]
 Width = tuple[float, float]  # least and largest way from flank to flank [gaps]
 UNTOLD: Width = 1.0, np.inf
 CONFIRMED, NOT_SURE = "confirmed", "not sure"  # what a measured path says of a joint
@@ -156,6 +157,7 @@ class Model:
     history: tuple[dict[str, Any], ...] = ()
     registration: Registration | None = None
     flank_widths: tuple[Width, ...] = ()
+    monuments: tuple[Monument, ...] = ()
 
     @cached_property
     def id(self) -> str:
@@ -343,13 +345,6 @@ class Model:
         beyond += moment_variance(effects, at, values)
         return side_variance(effects, at, values) + np.square(self.spread) + beyond
 
-    @property
-    def clocks(self) -> frozenset[str]:
-        """Name the clocks that effects follow: "time", "order"."""
-        return frozenset(str(getattr(e, "clock", "")) for e in self.effects.effects) - {
-            ""
-        }
-
     def without_clock(self, known: Collection[str]) -> Model:
         """Return it for rows of an unknown moment: what passes with time at its mean.
 
@@ -448,6 +443,10 @@ class Model:
             data["flank_widths"] = [
                 None if width == UNTOLD else list(width) for width in self.flank_widths
             ]
+        if self.monuments:
+            data["monuments"] = [
+                {"name": name, "xyz_m": xyz} for name, xyz in self.monuments
+            ]
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -499,6 +498,7 @@ def load_model(path: str | Path) -> Model:
         history=file.history,
         registration=None if file.registration is None else file.registration.read(),
         flank_widths=tuple(UNTOLD if w is None else w for w in file.flank_widths),
+        monuments=tuple((m.name, m.xyz_m) for m in file.monuments),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id

@@ -97,6 +97,13 @@ class StationSection(ModelSection):
     shift_m: Shift
 
 
+class MonumentSection(ModelSection):
+    """A fixed point that the survey read, base frame [m]."""
+
+    name: str
+    xyz_m: tuple[float, float, float]
+
+
 class RegistrationSection(ModelSection):
     """Where the survey's tracker stood: P_base = R P_tracker + t.
 
@@ -175,6 +182,7 @@ class ModelFile(ModelSection):
     history: tuple[dict[str, Any], ...]
     registration: RegistrationSection | None = None
     flank_widths: Annotated[tuple[WidthSection | None, ...], Field(max_length=6)] = ()
+    monuments: tuple[MonumentSection, ...] = ()
 
 
 def content_id(data: dict[str, Any]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,3 +100,25 @@ class Registration:
             raise KeyError(int(missing[0]))
         which = np.searchsorted(self.tool_ids, states.tool_id)
         return states.with_(tool=self.probes[which])
+
+
+def rigid_fit(a: Floats, b: Floats, weight: Floats | None = None) -> Floats:
+    """Find the rigid transform (4, 4) that takes points a (n, 3) to b best.
+
+    Args:
+        a: Points.
+        b: Where they should lie.
+        weight: Of the points, (n,); None: all alike.
+    """
+    from scipy.spatial.transform import Rotation  # slow to load, and for fits alone
+
+    weight = np.ones(len(a)) if weight is None else weight
+    total = weight.sum()
+    ca, cb = weight @ a / total, weight @ b / total
+    with warnings.catch_warnings():  # of points on a line any turn about it will do
+        warnings.simplefilter("ignore", UserWarning)
+        turn, _ = Rotation.align_vectors(b - cb, a - ca, weights=weight)
+    T = np.eye(4)
+    T[:3, :3] = turn.as_matrix()
+    T[:3, 3] = cb - T[:3, :3] @ ca
+    return T
