@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import chain, combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats
 from postproc.calibration.measurements import Measurements
@@ -27,6 +28,9 @@ EXPLAINED = 0.9  # share of the rows that must agree once the cause is undone
 FEWEST, SOME = 3, 0.02  # rows, and share of them, that are no accident
 ENOUGH_ROWS = 6  # rows that tell a cause
 OFFSET_STEPS = 4
+ROUGH = 0.05  # [m] that rows agree with a tracker found from a few of them
+DRAWN, DRAWS, REFINED = 4, 80, 3
+MOST_PLACING = 200  # rows that place a tracker well enough to find a mistake
 LEAST_OFFSET = np.deg2rad(0.3)  # a smaller one is left to the fit
 NOTHING = Combination(())
 UNKNOWN = "Check units, joint order and signs, the tool and the frame (--frame)"
@@ -161,12 +165,14 @@ def _explained(before: Floats, after: Floats) -> tuple[float, int, Bools, str] |
     ahead = np.concatenate([[0], np.cumsum(good)])
     rest = np.concatenate([np.cumsum(mended[::-1])[::-1], [0]])
     first = int(np.argmax(ahead + rest))
+    first += int(np.argmax(~good[first:])) if first < n else 0
     as_all = float(mended.mean())
     if as_all >= EXPLAINED and as_all > (ahead + rest).max() / n - SOME:
         return as_all, 0, np.ones(n, dtype=bool), "all"
     lead = np.concatenate([[0], np.cumsum(mended)])
     tail = np.concatenate([np.cumsum(good[::-1])[::-1], [0]])
-    last = int(np.argmax(lead + tail))
+    last = n - int(np.argmax((lead + tail)[::-1]))
+    last -= int(np.argmax(~good[:last][::-1])) if last else 0
     for rank, place, rows in (
         (1, "from", behind >= first),
         (2, "until", behind < last),
@@ -298,21 +304,62 @@ def _offset_in_any_frame(survey: Measurements, arm: Arm, joint: int) -> float:
 def find_cause_in_tracker_frame(survey: Measurements, arm: Arm) -> Cause | None:
     """Find the mistake that some rows of one station have, or None.
 
-    The tracker is found from a third of the rows at a time: one of them has no mistake.
+    The tracker is found from the rows that agree with a few of them.
     """
-    found = None
-    for part in np.array_split(np.arange(len(survey)), 3):
-        rows = survey[part]
-        if len(part) < ENOUGH_ROWS:
-            continue
-        placed = register(arm, rows.states, rows.position, NOTHING, np.zeros(0))
-        if typical_gap(placed, arm, rows.states, rows.position) > CLOSE:
+    if len(survey) < ENOUGH_ROWS:
+        return None
+    placed = _place(survey, arm, np.ones(len(survey), dtype=bool))
+    few = max(FEWEST, SOME * len(survey))
+    if (_gap(survey, arm, placed) > CLOSE).sum() < few:
+        return None
+    found: Cause | None = None
+    most = 0
+    for rows in _subsets(len(survey)):
+        used = np.isin(np.arange(len(survey)), rows)
+        for _ in range(REFINED):
+            placed = _place(survey, arm, used)
+            used = _gap(survey, arm, placed) < ROUGH
+            if used.sum() < ENOUGH_ROWS:
+                break
+        good = int((_gap(survey, arm, placed) < CLOSE).sum())
+        if used.sum() < ENOUGH_ROWS or good <= most:
             continue
         states = placed.on_probes(survey.states)
         cause = find_cause(survey.with_states(states), arm, _none, placed)
-        if cause is not None and (found is None or cause.place != "some"):
-            found = cause
+        if cause is not None:
+            found, most = cause, good
+            if good > len(survey) / 2:
+                break
     return found
+
+
+def _subsets(n: int) -> Iterator[NDArray[np.int64]]:
+    """Draw rows of which some hold no mistake: thirds in order, then a few each."""
+    yield from np.array_split(np.arange(n), 3)
+    rng = np.random.default_rng(0)
+    for _ in range(DRAWS):
+        yield rng.choice(n, DRAWN, replace=False)
+
+
+def _place(survey: Measurements, arm: Arm, rows: Bools) -> Registration:
+    """Find the tracker from some rows, at most a few hundred of them."""
+    chosen = np.flatnonzero(rows)
+    some = np.linspace(0, len(chosen) - 1, min(len(chosen), MOST_PLACING))
+    chosen = chosen[some.astype(np.int64)]
+    states, position = survey.states[chosen], survey.position[chosen]
+    placed = register(arm, states, position, NOTHING, np.zeros(0))
+    if len(placed.tool_ids) == len(np.unique(survey.states.tool_id)):
+        return placed
+    every, first = np.unique(survey.states.tool_id, return_index=True)
+    probes = survey.states.tool[first].copy()
+    probes[np.searchsorted(every, placed.tool_ids)] = placed.probes
+    return Registration(placed.transforms, probes, every)
+
+
+def _gap(survey: Measurements, arm: Arm, placed: Registration) -> Floats:
+    """Return what a registration leaves of the nominal arm, (n,) [m]."""
+    tcp = Batch(arm, placed.on_probes(survey.states)).walk.tcp
+    return np.asarray(np.linalg.norm(placed.to_base(survey.position) - tcp, axis=1))
 
 
 def _none(states: States) -> Floats:
@@ -322,9 +369,9 @@ def _none(states: States) -> Floats:
 
 # Directions that are wrong in all rows, against a model that knows the backlash.
 
-NEAR_ONE = 0.25  # by which the share of a wrong direction may miss 1
-CERTAIN = 8.0  # standard errors that it must stand above 0
-LESS = 0.5  # of the squared residuals may be left
+NEAR_ONE = 0.2  # by which the share of a wrong direction may miss 1
+CERTAIN = 6.0  # standard errors that a joint's must stand above 0 to count
+LESS = 0.7  # of the median residual may be left
 
 
 def wrong_directions(survey: Measurements, arm: Arm, model: Model) -> str | None:
@@ -341,26 +388,40 @@ def wrong_directions(survey: Measurements, arm: Arm, model: Model) -> str | None
     states = survey.states
     if survey.inferred.all() or len(states) < ENOUGH_ROWS:
         return None
-    read = survey.position - Batch(arm, states).walk.tcp
     predicted = model.error(arm, states)
-    left = read - predicted
-    best, told = LESS, None
+    read = survey.position - Batch(arm, states).walk.tcp
+    y = _beside_setup(read - predicted, arm, states)
+    best, told = LESS * float(np.median(np.linalg.norm(y, axis=1))), None
     for text, side in _other_directions(states.direction):
-        change = model.error(arm, states.with_(direction=side)) - predicted
-        change = _beside_setup(change, arm, states)
-        y = _beside_setup(left, arm, states)
-        weight = _robust(y - change)
-        energy = float((weight * (change**2).sum(axis=1)).sum())
-        if energy <= 0.0:
-            continue
-        share = float((weight * (change * y).sum(axis=1)).sum()) / energy
-        rest = float((weight * ((y - change) ** 2).sum(axis=1)).sum())
-        whole = float((weight * (y**2).sum(axis=1)).sum())
-        error = np.sqrt(rest / max(3 * len(states) - 10, 1) / energy)
-        if abs(share - 1.0) < NEAR_ONE and share > CERTAIN * error:
-            if rest < best * whole:
-                best, told = rest / whole, text
+        changes = []
+        for j in range(6):
+            one = np.where(np.arange(6) == j, side, states.direction)
+            change = model.error(arm, states.with_(direction=one)) - predicted
+            changes.append(_beside_setup(change, arm, states))
+        columns = np.stack(changes, axis=2)
+        rest = float(np.median(np.linalg.norm(y - columns.sum(axis=2), axis=1)))
+        if rest < best and _all_together(columns, y):
+            best, told = rest, text
     return told
+
+
+def _all_together(columns: Floats, y: Floats) -> bool:
+    """Return True if the directions of all joints that tell are wrong as guessed.
+
+    Args:
+        columns: What a wrong direction of each joint does, (n, 3, 6) [m].
+        y: What is left of the readings, (n, 3) [m].
+    """
+    root = np.sqrt(_robust(y - columns.sum(axis=2)))[:, None]
+    rows, target = (columns * root[:, :, None]).reshape(-1, 6), (y * root).reshape(-1)
+    share = np.linalg.lstsq(rows, target)[0]
+    rest = target - rows @ share
+    variance = float(rest @ rest) / max(len(target) - 12, 1)
+    error = np.sqrt(np.maximum(np.diag(np.linalg.pinv(rows.T @ rows)), 0.0) * variance)
+    shown = (np.linalg.norm(rows, axis=0) > 0) & (CERTAIN * error < 1.0)
+    off = np.abs(share - 1.0)
+    near = off < np.maximum(NEAR_ONE, 4.0 * error)
+    return bool(shown.sum() >= 2 and near[shown].all())
 
 
 def _other_directions(side: Floats) -> Iterator[tuple[str, Floats]]:

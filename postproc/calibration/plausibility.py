@@ -150,9 +150,7 @@ def _check_arm(survey: Measurements, arm: Arm, error: Floats) -> None:
     read = survey.position - batch.walk.tcp
     sizes = []
     for left in (read - error, read):
-        fitted = np.linalg.lstsq(free / scale, left.reshape(-1), rcond=1e-6)[0]
-        rest = (left.reshape(-1) - free / scale @ fitted).reshape(-1, 3)
-        sizes.append(float(np.median(np.linalg.norm(rest, axis=1))))
+        sizes.append(_typical_beside(free / scale, left))
     with_model, nominal = sizes
     if with_model > OTHER_ARM * nominal and with_model > LEAST_OF_ARM:
         raise MeasurementError(
@@ -162,6 +160,23 @@ def _check_arm(survey: Measurements, arm: Arm, error: Floats) -> None:
             "tool and zeros of the joints apart",
             "Are they another arm's? After a crash or a repair, fit a new model",
         )
+
+
+def _typical_beside(columns: Floats, left: Floats) -> float:
+    """Return the median distance that columns (3 n, p) leave of rows (n, 3) [m].
+
+    Robust: the rows that are farthest off count less.
+    """
+    weight, rest = np.ones(len(left)), left
+    for _ in range(5):
+        root = np.repeat(np.sqrt(weight), 3)
+        rows, target = columns * root[:, None], left.reshape(-1) * root
+        fitted = np.linalg.lstsq(rows, target, rcond=1e-6)[0]
+        rest = (left.reshape(-1) - columns @ fitted).reshape(-1, 3)
+        size = np.linalg.norm(rest, axis=1)
+        ratio = size / max(3.0 * float(np.median(size)), 1e-12)
+        weight = 1.0 / np.maximum(ratio, 1.0) ** 2
+    return float(np.median(np.linalg.norm(rest, axis=1)))
 
 
 def check_places(survey: Measurements, arm: Arm) -> None:

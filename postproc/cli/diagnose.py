@@ -29,13 +29,14 @@ from postproc.calibration.plausibility import (
     check_stops,
 )
 from postproc.calibration.references import split_references
-from postproc.calibration.registration import register
+from postproc.calibration.registration import register, station_of
 from postproc.calibration.report import DirectionReport
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.cli.jobs import read_files
 from postproc.compensation.program import Planned, plan_visits, read_program, states_of
 from postproc.exceptions import MeasurementError
 from postproc.model.effects.placement import Placement
+from postproc.model.kinematics import Batch
 from postproc.model.model import Model, load_model
 from postproc.model.registration import Registration
 from postproc.model.statistics import ErrorStatistics
@@ -202,10 +203,13 @@ def diagnose_files(
         program = asked.program
         survey = concatenate([join_program(path, program, cell) for path in data])
     tracker, setup, placed = cell.tracker, several_points(survey), None
+    notes: tuple[str, ...] = ()
     if asked.measured_frame == "uframe":
         survey = from_user_frame(survey, cell)
     elif asked.measured_frame == "tracker":
+        seen = survey
         survey, placed = from_tracker_frame(survey, cell, model)
+        notes = registrations(seen, survey, placed, cell, model)
         tracker, setup = placed.origin, REGISTERED
     if placed is None:
         setup = (*setup, *shifted_files(survey, cell.arm, cell.tracker))
@@ -214,7 +218,12 @@ def diagnose_files(
         survey, cell.arm, model, tracker=tracker, setup=setup, seed=asked.seed,
         progress=progress,
     )  # fmt: skip
-    found = replace(found, model=replace(found.model, registration=placed))
+    seen_fixed = (*found.diagnosis.fixed_points, *notes)
+    found = replace(
+        found,
+        model=replace(found.model, registration=placed),
+        diagnosis=replace(found.diagnosis, fixed_points=seen_fixed),
+    )
     found.model.save(asked.output or extended_path(model_path))
     return found
 
@@ -254,6 +263,50 @@ def from_tracker_frame(
     placed = replace(placed, probes=states.tool[first])
     position = placed.to_base(survey.position, states.station)
     return replace(survey, states=states, position=position), placed
+
+
+def registrations(
+    seen: Measurements,
+    base: Measurements,
+    placed: Registration,
+    cell: Cell,
+    model: Model,
+) -> tuple[str, ...]:
+    """Say what the model leaves in its survey's set-up, and registered by these rows.
+
+    Args:
+        seen: The rows in the tracker's frame.
+        base: The same in the base frame, by a registration of their own.
+        placed: That registration.
+        cell: The cell.
+        model: The model.
+    """
+
+    def left(rows: Measurements) -> float:
+        error = model.error(cell.arm, rows.states)
+        gap = rows.position - Batch(cell.arm, rows.states).walk.tcp - error
+        return float(np.linalg.norm(gap, axis=1).mean()) / MM
+
+    spent = 6 * len(placed.transforms) + 3 * len(placed.probes)
+    free = max(3 * len(seen) - spent, 1)
+    own = left(base) * float(np.sqrt(3 * len(seen) / free))
+    told = (
+        f"registered from its own rows the file is left {own:.4f} mm on average "
+        f"({spent} numbers of {3 * len(seen)} readings counted)"
+    )
+    survey = model.registration
+    if survey is None or np.setdiff1d(seen.states.tool_id, survey.tool_ids).size:
+        return (told,)
+    there = station_of(survey, cell.arm, seen.states, seen.position, seen.stations)
+    station = seen.states.station
+    as_fitted = left(
+        replace(
+            seen,
+            states=there.on_probes(seen.states),
+            position=there.to_base(seen.position, station),
+        )
+    )
+    return (told, f"in the set-up of the model's survey {as_fitted:.4f} mm")
 
 
 def tell(found: Diagnosis) -> str:
