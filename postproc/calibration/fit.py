@@ -382,8 +382,7 @@ def read_surveys(
 ) -> Measurements:
     """Read measurement files as one survey, with what the cell knows of the load."""
     parts = [
-        read_measurements(path, cell.arm, cell.probes, reading=reading)
-        for path in files
+        read_measurements(path, cell.arm, cell.nests, reading=reading) for path in files
     ]
     return carrying_load(replace(concatenate(parts), mounting=cell.mounting), cell)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -24,8 +24,10 @@ from postproc.calibration.tables import (
     JOINTS,
     NUMBER,
     Format,
+    Nests,
     TableFormat,
     TextTable,
+    check_axes,
     in_visit_order,
     read_directions,
     read_foreign,
@@ -126,7 +128,7 @@ class Measurements:
 def read_measurements(
     path: str | Path,
     arm: Arm,
-    tools: Floats | Mapping[int, Floats],
+    tools: Nests,
     *,
     positions: bool = True,
     reading: TableFormat = DETECT,
@@ -137,8 +139,8 @@ def read_measurements(
         path: CSV with the columns of the documentation; rows in visit order, unless a
             column order or time_s tells another.
         arm: The arm, for directions that must be inferred.
-        tools: Probe points in the flange frame, (k, 3) [m] or by `tool_id`. Columns
-            tool_x_mm, tool_y_mm, tool_z_mm override them.
+        tools: Probe points in the flange frame, (k, 3) [m], by `tool_id` or by name.
+            Columns tool_x_mm, tool_y_mm, tool_z_mm override them.
         positions: Whether the file must have measured positions.
         reading: What the user knows of the file.
 
@@ -152,11 +154,12 @@ def read_measurements(
 def from_table(
     table: TextTable,
     arm: Arm,
-    tools: Floats | Mapping[int, Floats],
+    tools: Nests,
     *,
     positions: bool = True,
 ) -> Measurements:
     """Interpret a table with the columns of the documentation."""
+    check_axes(table)
     table.require("id", *JOINTS, *(POSITION if positions else ()))
     table = in_visit_order(table)
     table, references = split_references(table)

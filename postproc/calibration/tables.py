@@ -379,6 +379,7 @@ SIDES = tuple(f"lambda{j}" for j in range(1, 7))
 TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
 ROTATION = ("rx_deg", "ry_deg", "rz_deg")
 JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
+JOINT = re.compile(r"^q\d+_deg$")
 DETOURS = 0.05  # share of other sides from which rows do not follow straight ways
 MOST_RESTARTS = 4  # of a clock in one file: rows that step back more often are sorted
 MANY = 20  # rows that are in order of a column by no accident
@@ -562,34 +563,166 @@ def _of_straight_ways(travel: Floats, side: Floats, straight: Floats) -> Floats:
     return np.where(other, np.nan, travel)
 
 
-def read_tools(
-    table: TextTable, tools: Floats | Mapping[int, Floats]
-) -> tuple[Floats, NDArray[np.int64]]:
-    """Look up every row's tool.
+Nests = Floats | Mapping[int, Floats] | Mapping[str, Floats]
+
+
+def read_tools(table: TextTable, tools: Nests) -> tuple[Floats, NDArray[np.int64]]:
+    """Look up every row's probe point, by a column tool_id or nest.
+
+    Args:
+        table: The rows.
+        tools: Probe points in the flange frame [m]: by number from 0, or by name.
 
     Raises:
-        MeasurementError: A tool_id that no probe point is known for.
+        MeasurementError: A tool_id that no probe point is known for, or that may mean
+            two of them.
     """
-    n = len(table)
-    known = (
-        tools if isinstance(tools, Mapping) else dict(enumerate(np.atleast_2d(tools)))
-    )
-    numbers = table.numbers("tool_id") if table.has("tool_id") else np.zeros(n)
+    named = isinstance(tools, Mapping) and any(isinstance(k, str) for k in tools)
+    column = _nest_column(table)
+    if column and table.has(*TOOL) and _all_numbers(table, column):
+        named = named and set(table.text(column)) <= set(map(str, tools))
+    if column and (named or not _all_numbers(table, column)):
+        return _read_named(table, column, tools if named else {})  # type: ignore[arg-type]
+    if named and not table.has(*TOOL):
+        return _read_named(table, column, tools)  # type: ignore[arg-type]
+    numbers = table.numbers(column) if column else np.zeros(len(table))
     tool_id = np.asarray(np.round(numbers), dtype=np.int64)
     if table.has(*TOOL):
         return table.block(TOOL) * MM, tool_id
-    if min(tool_id, default=0) > 0 and 0 in known and max(tool_id) == len(known):
-        tool_id = tool_id - 1  # numbered from 1
+    known: dict[int, Floats] = (
+        {int(k): v for k, v in tools.items()}
+        if isinstance(tools, Mapping)
+        else dict(enumerate(np.atleast_2d(tools)))
+    )
+    tool_id = _from_zero(table, tool_id, known)
     for i, one in enumerate(tool_id):
         if int(one) not in known:
             raise MeasurementError(
                 table.path,
-                f"tool_id {int(numbers[i])} is not one of the cell's probe points",
+                f"{column} {int(numbers[i])} is not one of the cell's probe points",
                 "Add the point to the cell file, or columns tool_x_mm, tool_y_mm, "
                 "tool_z_mm",
                 line=int(table.line[i]),
             )
     return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
+
+
+def _nest_column(table: TextTable) -> str:
+    """Name the column of probe points, "" without one.
+
+    Raises:
+        MeasurementError: There are two.
+    """
+    found = [name for name in ("nest", "tool_id") if table.has(name)]
+    if len(found) > 1:
+        cure = "They are one: leave one of them out"
+        problem = "has columns nest and tool_id"
+        raise MeasurementError(table.path, problem, cure, line=1)
+    return found[0] if found else ""
+
+
+def _all_numbers(table: TextTable, column: str) -> bool:
+    """Return True if a column holds nothing but numbers."""
+    return all(NUMBER.match(text) for text in table.text(column))
+
+
+def _from_zero(
+    table: TextTable, tool_id: NDArray[np.int64], known: Mapping[int, Floats]
+) -> NDArray[np.int64]:
+    """Count tools from 0, where the file counts them from 1.
+
+    Raises:
+        MeasurementError: Both readings fit the cell's points.
+    """
+    count = len(known)
+    if len(tool_id) == 0 or set(known) != set(range(count)) or tool_id.min() < 1:
+        return tool_id
+    if tool_id.max() == count:
+        return tool_id - 1
+    if tool_id.max() > count:
+        return tool_id
+    ids = np.unique(tool_id)
+
+    def points(numbers: NDArray[np.int64]) -> str:
+        return ", ".join(
+            "(" + ", ".join(f"{v / MM:g}" for v in known[int(k)]) + ")" for k in numbers
+        )
+
+    raise MeasurementError(
+        table.path,
+        f"tool_id {', '.join(map(str, ids))} may count the cell's {count} points from "
+        f"0, which is {points(ids)} mm, or from 1, which is {points(ids - 1)} mm",
+        "Name the points in [survey.points] of the cell and write the names, or add "
+        "columns tool_x_mm, tool_y_mm, tool_z_mm",
+        line=int(table.line[0]),
+    )
+
+
+def _read_named(
+    table: TextTable, column: str, tools: Mapping[str, Floats]
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Look up probe points by name.
+
+    Raises:
+        MeasurementError: A name that the cell does not have, or no column.
+    """
+    names = {name.strip().lower(): k for k, name in enumerate(tools)}
+    listed = ", ".join(tools) or "none"
+    if not column:
+        if len(tools) == 1:
+            texts = list(tools) * len(table)
+        else:
+            cure = f"Add it. The cell's points are {listed}"
+            problem = "has no column nest"
+            raise MeasurementError(table.path, problem, cure, line=1)
+    else:
+        texts = table.text(column)
+    numbers = np.zeros(len(table), dtype=np.int64)
+    for i, text in enumerate(texts):
+        number = names.get(text.lower())
+        if number is None:
+            raise MeasurementError(
+                table.path,
+                f"{column} {text!r} is not one of the cell's probe points: {listed}",
+                "Correct the name, or add the point to [survey.points] in the cell "
+                "file",
+                line=int(table.line[i]),
+            )
+        numbers[i] = number
+    if table.has(*TOOL):
+        return table.block(TOOL) * MM, numbers
+    points = np.array([np.asarray(v, float) for v in tools.values()])
+    return points[numbers], numbers
+
+
+def check_axes(table: TextTable) -> None:
+    """Refuse a table whose joints are not those of an arm of six axes.
+
+    Raises:
+        MeasurementError: Saying how an arm with more or fewer is written.
+    """
+    found = [name for name in table.columns if JOINT.match(name)]
+    in_a_row = all(f"q{k + 1}_deg" in found for k in range(len(found)))
+    if not found or set(found) == set(JOINTS) or not in_a_row:
+        return
+    if len(found) > len(JOINTS):
+        cure = (
+            "Of an arm with seven axes keep one joint locked: write the other six as "
+            "q1_deg .. q6_deg, and the locked angle into the D-H rows of the arm file. "
+            "A track or positioner that stood still is left out"
+        )
+    else:
+        cure = (
+            "Write the axes that the arm lacks as columns of 0, with D-H rows of their "
+            "own in the arm file"
+        )
+    raise MeasurementError(
+        table.path,
+        f"has {len(found)} joint columns ({', '.join(found)}); arms have six, q1_deg "
+        "to q6_deg",
+        cure,
+        line=1,
+    )
 
 
 def read_rotation(table: TextTable) -> Floats | None:
@@ -727,7 +860,7 @@ DETECT = TableFormat()
 #     header = false                                # columns are "1", "2", ..
 
 DEGREES = float(np.rad2deg(1.0))  # per radian
-TEXTS = ("id", "reference", "station")  # columns of ours that hold no numbers
+TEXTS = ("id", "reference", "station", "nest")  # columns of ours that hold no numbers
 MAP_KEYS = ("columns", "file")
 FILE_KEYS = ("delimiter", "decimal", "encoding", "comment", "header")
 

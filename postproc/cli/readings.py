@@ -80,7 +80,7 @@ class ReadRows:
 
 def rows_of(table: TextTable, cell: Cell, positions: bool) -> Measurements:
     """Read rows as a survey's are read, with what the cell knows of the load."""
-    rows = from_table(table, cell.arm, cell.probes, positions=positions)
+    rows = from_table(table, cell.arm, cell.nests, positions=positions)
     return carrying_load(steady(rows), cell)
 
 

@@ -87,7 +87,10 @@ MISTAKES: dict[str, tuple[Spoil, str, str]] = {
         lambda q, p: (q[:, [0, 1, 2, 5, 4, 3]], p),
         "joints 4 and 6 are swapped", "Joints 4 and 6 look swapped",
     ),
-    "offset": (offset(2, 3.0), r"joint 3 is off by \+(2\.9|3\.0)\d deg", "Joint 3 looks off"),
+    "offset": (
+        offset(2, 3.0),
+        r"joint 3 is off by \+(2\.9|3\.0)\d deg", "Joint 3 looks off",
+    ),
 }  # fmt: skip
 PLACES = {
     "from": (slice(25, None), "from row 26 on"),
