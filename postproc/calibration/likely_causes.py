@@ -188,11 +188,13 @@ def _guesses(states: States, position: Floats) -> Iterator[Guess]:
     """List mistakes that rows may have, most frequent first, each undone."""
     q = states.q
     yield Guess(
-        "The positions look like metres: write millimetres (of points: --unit m)", "look like metres",
+        "The positions look like metres: write millimetres (of points: --unit m)",
+        "look like metres",
         "The others are in millimetres: write all of them so", states, position * 1e3,
     )  # fmt: skip
     yield Guess(
-        "The positions look like inches: write millimetres (of points: --unit inch)", "look like inches",
+        "The positions look like inches: write millimetres (of points: --unit inch)",
+        "look like inches",
         "The others are in millimetres: write all of them so", states, position * 25.4,
     )  # fmt: skip
     yield Guess(

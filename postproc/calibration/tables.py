@@ -382,6 +382,7 @@ JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
 JOINT = re.compile(r"^q\d+_deg$")
 DETOURS = 0.05  # share of other sides from which rows do not follow straight ways
 MOST_RESTARTS = 4  # of a clock in one file: rows that step back more often are sorted
+OPPOSED = 60  # directions that are opposite to the rows by no accident
 MANY = 20  # rows that are in order of a column by no accident
 TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 
@@ -542,7 +543,29 @@ def read_directions(
         line = int(table.line[np.argmax(wrong)])
         cure = "lambda is 1 (positive direction), -1, or 0 where not known"
         raise MeasurementError(table.path, "wrong lambda", cure, line=line)
-    return side, travel, np.zeros(len(q), dtype=bool), ()
+    told = _against_the_rows(table, side, arrived.direction)
+    return side, travel, np.zeros(len(q), dtype=bool), told
+
+
+def _against_the_rows(
+    table: TextTable, side: Floats, straight: Floats
+) -> tuple[str, ...]:
+    """Ask about directions that are all opposite to those of straight ways.
+
+    Args:
+        table: The rows.
+        side: Of the file, (n, 6).
+        straight: Inferred from row to row, (n, 6).
+    """
+    both = (side != 0) & (straight != 0)
+    count, opposite = int(both.sum()), int((both & (side != straight)).sum())
+    if count < OPPOSED or opposite < (1.0 - DETOURS) * count:
+        return ()
+    return (
+        f"{table.path}: {opposite} of {count} directions (lambda) are opposite to the "
+        "way from row to row. Right if the arm goes beyond each pose and comes back; "
+        "else lambda has the other sign: it is 1 where a joint came forward",
+    )
 
 
 def _of_straight_ways(travel: Floats, side: Floats, straight: Floats) -> Floats:

@@ -142,6 +142,17 @@ def test_an_order_of_each_file_counts_file_by_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(concatenate([a, b]).states.order, np.arange(N) + 1.0)
 
 
+@pytest.mark.parametrize(("sign", "asked"), [(1.0, False), (-1.0, True)])
+def test_directions_against_all_ways_are_asked_about(
+    tmp_path: Path, right: Measurements, sign: float, asked: bool
+) -> None:
+    side = {
+        f"lambda{j + 1}": sign * right.states.direction[:, j] + 0.0 for j in range(6)
+    }
+    found = read(written(tmp_path / "s.csv", np.arange(N), **side))
+    assert any("opposite to the way" in w for w in found.warnings) == asked
+
+
 # Rows whose moment is unknown.
 
 
