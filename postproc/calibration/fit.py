@@ -134,7 +134,7 @@ def fit_measurements(
     survey, reversals = split_reversals(survey, cell.arm)
     check_survey(survey, cell.arm)
     if frame == "base":
-        setup = (*setup, *shifted_files(survey, cell.arm, cell.tracker))
+        setup = (*setup, *file_shifts(survey, cell.arm, cell.tracker))
     survey = check_orientations(survey, cell.arm)
     told = (*survey.warnings, *lost_without(cell.arm, survey))
     survey = replace(survey, warnings=told)
@@ -256,7 +256,7 @@ def _at(survey: Measurements, order: float) -> str:
     return f"at row {survey.ids[int(np.argmax(survey.states.order >= order))]}"
 
 
-def shifted_files(
+def file_shifts(
     survey: Measurements, arm: Arm, tracker: Floats | None
 ) -> tuple[str, ...]:
     """Name the step between files of the base frame, where there is evidence for it.
@@ -335,7 +335,7 @@ def into_base_frame(
         states=found.on_probes(survey.states),
         position=found.to_base(survey.position, survey.states.station),
         rotation=turned,
-        warnings=(*survey.warnings, *notes, *unseen_probe(found, arm, survey.states)),
+        warnings=(*survey.warnings, *notes, *probe_note(found, arm, survey.states)),
     )
     typical = typical_gap(found, arm, survey.states, survey.position)
     check_registered(survey, registered, arm, typical)
@@ -356,7 +356,7 @@ def in_base_frame(
     )
 
 
-def unseen_probe(placed: Registration, arm: Arm, states: States) -> tuple[str, ...]:
+def probe_note(placed: Registration, arm: Arm, states: States) -> tuple[str, ...]:
     """Say in one sentence what a tool that never turned leaves unknown of its probe."""
     axes = undetermined_axes(placed, arm, states)
     if len(axes) == 0:

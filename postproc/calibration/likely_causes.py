@@ -124,7 +124,7 @@ def find_cause(
     )
     for guess in guesses:
         after = _left(arm, guess.states, in_base(guess.position), error)
-        shown = _explained(before, np.where(np.isnan(after), np.inf, after))
+        shown = _explanation(before, np.where(np.isnan(after), np.inf, after))
         if shown is not None:
             share, rank, rows, place = shown
             found.append((share, rank, Cause(guess, rows, place)))
@@ -141,7 +141,7 @@ def _left(arm: Arm, states: States, position: Floats, error: ErrorOf) -> Floats:
     return np.asarray(np.linalg.norm(position - expected, axis=1))
 
 
-def _explained(before: Floats, after: Floats) -> tuple[float, int, Bools, str] | None:
+def _explanation(before: Floats, after: Floats) -> tuple[float, int, Bools, str] | None:
     """Say which rows a guess explains, if it does: all, from one on, until one, some.
 
     Args:
@@ -261,7 +261,7 @@ def _offset(
     return by
 
 
-# Mistakes of all rows, in whatever frame they are.
+# Mistakes of all rows, in any frame.
 
 
 def cause_in_any_frame(survey: Measurements, arm: Arm) -> str:
@@ -393,7 +393,7 @@ def wrong_directions(survey: Measurements, arm: Arm, model: Model) -> str | None
     predicted = model.error(arm, states)
     read = survey.position - Batch(arm, states).walk.tcp
     y = _beside_setup(read - predicted, arm, states)
-    best, told = LESS * float(np.median(np.linalg.norm(y, axis=1))), None
+    best, text_of_best = LESS * float(np.median(np.linalg.norm(y, axis=1))), None
     for text, side in _other_directions(states.direction):
         changes = []
         for j in range(6):
@@ -403,8 +403,8 @@ def wrong_directions(survey: Measurements, arm: Arm, model: Model) -> str | None
         columns = np.stack(changes, axis=2)
         rest = float(np.median(np.linalg.norm(y - columns.sum(axis=2), axis=1)))
         if rest < best and _all_together(columns, y):
-            best, told = rest, text
-    return told
+            best, text_of_best = rest, text
+    return text_of_best
 
 
 def _all_together(columns: Floats, y: Floats) -> bool:

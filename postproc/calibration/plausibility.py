@@ -20,8 +20,8 @@ from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
 from postproc.calibration.registration import (
     STOPS,
+    covers_a_plane,
     register,
-    spread_out,
     typical_gap,
 )
 from postproc.calibration.regression import observe
@@ -96,7 +96,7 @@ def _no_error(states: States) -> Floats:
 
 
 def _check_cause(survey: Measurements, cause: Cause | None) -> None:
-    """Refuse rows that a mistake explains; one of all rows is told by its distance."""
+    """Refuse rows that a mistake explains; one of all rows is named by its cure."""
     if cause is None:
         return
     if cause.place != "all":
@@ -290,7 +290,7 @@ def check_stops(survey: Measurements, arm: Arm) -> None:
         rows = survey.states.station == number
         of = f" of station {name}" if name else ""
         poses = len(np.unique(np.round(survey.states.q[rows], 4), axis=0))
-        if poses >= STOPS and spread_out(arm, survey.states[rows]):
+        if poses >= STOPS and covers_a_plane(arm, survey.states[rows]):
             continue
         where = ", all about one line," if poses >= STOPS else ""
         raise MeasurementError(

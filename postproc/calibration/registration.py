@@ -140,7 +140,7 @@ def undetermined_axes(placed: Registration, arm: Arm, states: States) -> Floats:
     return np.asarray(axes.T[np.sqrt(np.maximum(size, 0.0)) < TURNED])
 
 
-def spread_out(arm: Arm, states: States) -> bool:
+def covers_a_plane(arm: Arm, states: States) -> bool:
     """Return True if the stops of rows do not lie about one line."""
     tcp = Batch(arm, states).walk.tcp
     size = np.linalg.svd(tcp - tcp.mean(axis=0), compute_uv=False)

@@ -184,7 +184,7 @@ def read_table(
     if len(rows) < 1 + headed:
         raise MeasurementError(path, "has no measurements", EMPTY_CURE)
     body = rows[1:] if headed else rows
-    names = _trimmed(rows[0][1]) if headed else _numbered(body)
+    names = _strip_end(rows[0][1]) if headed else _numbered(body)
     cells, names = _block(path, names, body, rows[0][0], headed)
     line = np.array([i for i, _ in body], dtype=np.int64)
     sign = decimal or _decimal(cells, split)
@@ -252,14 +252,14 @@ def _header_in(comments: Lines, split: str, rows: list[Row]) -> Row | None:
     if not above:
         return None
     number, text = above[-1]
-    cells = _trimmed(_cells_of(text.lstrip().lstrip("#/% "), split))
-    fits = len(cells) == len(_trimmed(rows[0][1])) and len(set(cells)) == len(cells)
+    cells = _strip_end(_cells_of(text.lstrip().lstrip("#/% "), split))
+    fits = len(cells) == len(_strip_end(rows[0][1])) and len(set(cells)) == len(cells)
     return (number, cells) if fits and _is_header(cells) else None
 
 
 def _is_header(cells: list[str]) -> bool:
     """Return True if cells name columns: few numbers, or the columns' own numbers."""
-    cells = _trimmed(cells)
+    cells = _strip_end(cells)
     numbers = sum(bool(NUMBER.match(cell)) for cell in cells)
     counted = [[str(k + first) for k in range(len(cells))] for first in (0, 1)]
     return numbers < FEW_NUMBERS or cells in counted
@@ -320,7 +320,7 @@ def _cells_of(text: str, split: str) -> list[str]:
     return [cell.strip().strip('"').strip() for cell in text.split(split)]
 
 
-def _trimmed(cells: list[str]) -> list[str]:
+def _strip_end(cells: list[str]) -> list[str]:
     """Leave out empty cells at the end."""
     count = len(cells)
     while count and cells[count - 1] == "":
@@ -344,7 +344,7 @@ def _block(
     width = len(names)
     cells = np.full((len(body), width), "", dtype=object)
     for k, (line, row) in enumerate(body):
-        used = _trimmed(row)
+        used = _strip_end(row)
         if len(used) > width:
             what = "the header names" if headed else "the first row has"
             raise MeasurementError(
@@ -369,8 +369,8 @@ def _decimal(cells: NDArray[np.object_], split: str) -> str:
 
 def _numbered(rows: list[Row]) -> list[str]:
     """Name columns by their number, from 1: as many as the first rows have cells."""
-    width = int(np.median([len(_trimmed(cells)) for _, cells in rows]))
-    return [str(k + 1) for k in range(max(width, len(_trimmed(rows[0][1]))))]
+    width = int(np.median([len(_strip_end(cells)) for _, cells in rows]))
+    return [str(k + 1) for k in range(max(width, len(_strip_end(rows[0][1]))))]
 
 
 # Single columns of a measurement file: ids, directions, probe points.

@@ -14,7 +14,7 @@ from postproc.calibration.diagnosis.diagnose import Extension, diagnose
 from postproc.calibration.diagnosis.result import Diagnosis
 from postproc.calibration.diagnosis.search import Progress
 from postproc.calibration.diagnosis.trace import REMAINS, silent
-from postproc.calibration.fit import read_surveys, several_points, shifted_files
+from postproc.calibration.fit import file_shifts, read_surveys, several_points
 from postproc.calibration.measurements import (
     COVARIATES,
     POSITION,
@@ -212,7 +212,7 @@ def diagnose_files(
         notes = registrations(seen, survey, placed, cell, model)
         tracker, setup = placed.origin, REGISTERED
     if placed is None:
-        setup = (*setup, *shifted_files(survey, cell.arm, cell.tracker))
+        setup = (*setup, *file_shifts(survey, cell.arm, cell.tracker))
     check_against(survey, cell.arm, model)
     found = diagnose(
         survey, cell.arm, model, tracker=tracker, setup=setup, seed=asked.seed,

@@ -514,7 +514,7 @@ def predict_readings(
         PostprocError: The set-up is not known, and not to be found from the rows.
     """
     found = read_setup(table, cell, model, readings)
-    rows, read, placed = found.rows, found.read, found.told
+    rows, read, placed = found.rows, found.read, found.note
     predicted = model.predict(cell.arm, rows.states)
     header, parts, told = _told(predicted, model.free_part(cell.arm, rows.states))
     header, parts = [*header, *READINGS], [*parts, read.error, read.std]

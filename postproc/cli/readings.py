@@ -15,8 +15,8 @@ from postproc.calibration.plausibility import (
     check_stops,
 )
 from postproc.calibration.registration import (
+    covers_a_plane,
     predict_registered,
-    spread_out,
     station_of,
 )
 from postproc.calibration.tables import TextTable
@@ -70,12 +70,12 @@ class ReadRows:
     Attributes:
         rows: The rows, at their probe points.
         read: What is read there.
-        told: How they were placed in space and time, lines for a terminal.
+        note: How they were placed in space and time, lines for a terminal.
     """
 
     rows: Measurements
     read: PredictedReading
-    told: str
+    note: str
 
 
 def rows_of(table: TextTable, cell: Cell, positions: bool) -> Measurements:
@@ -95,15 +95,15 @@ def read_setup(
     rows = rows_of(table, cell, positions=readings.refit is not None)
     rows, known = at_moments(rows, table, model, readings.after)
     if readings.refit is not None:
-        return _registered(rows, cell, model)
+        return _own_registration(rows, cell, model)
     clock = clock_missing(model, known, cell, rows.states)
     model = model.without_clock(known)
     read = table.has(*POSITION)
     if readings.frame != "tracker":
-        rows, told = at_monuments(rows, model.monuments) if read else (rows, "")
+        rows, note = at_monuments(rows, model.monuments) if read else (rows, "")
         if read:
             check_against(rows, cell.arm, model)
-        return ReadRows(rows, model.reading(cell.arm, rows.states), told + clock)
+        return ReadRows(rows, model.reading(cell.arm, rows.states), note + clock)
     if not read:
         if model.registration is None:
             problem = "the model holds no registration: it was fitted in the base frame"
@@ -120,31 +120,33 @@ def _of_tracker(rows: Measurements, cell: Cell, model: Model, clock: str) -> Rea
         MeasurementError: They tell too little of where the tracker stood.
     """
     arm, placed = cell.arm, model.registration
-    base, told = at_monuments(rows, model.monuments, whole=True)
-    if told and placed is not None:
+    base, note = at_monuments(rows, model.monuments, whole=True)
+    if note and placed is not None:
         base = replace(base, states=_probes(rows, placed))
-    elif not told:
+    elif not note:
         if placed is None:
-            return _registered(rows, cell, model)
+            return _own_registration(rows, cell, model)
         base = _placed(
             rows, station_of(placed, arm, rows.states, rows.position, rows.stations)
         )
     read = model.reading(arm, base.states)
     left = base.position - Batch(arm, base.states).walk.tcp - read.error
     off = float(np.median(np.linalg.norm(left, axis=1))) if len(left) else 0.0
-    if off > MOVED and not told:
-        found = _registered(rows, cell, model)
+    if off > MOVED and not note:
+        found = _own_registration(rows, cell, model)
         where = (
             f"\nread from another station than the model's survey ({off / MM:.0f} mm "
             "off its registration)"
         )
-        return replace(found, told=where + found.told)
+        return replace(found, note=where + found.note)
     check_against(base, arm, model)
-    placing = told or "\nin the set-up of the model's survey"
-    return ReadRows(base, read, placing + clock + _also_registered(rows, cell, model))
+    placing = note or "\nin the set-up of the model's survey"
+    return ReadRows(
+        base, read, placing + clock + _own_registration_error(rows, cell, model)
+    )
 
 
-def _registered(rows: Measurements, cell: Cell, model: Model) -> ReadRows:
+def _own_registration(rows: Measurements, cell: Cell, model: Model) -> ReadRows:
     """Find the tracker and the probe from the rows themselves.
 
     Raises:
@@ -157,16 +159,16 @@ def _registered(rows: Measurements, cell: Cell, model: Model) -> ReadRows:
         model, arm, rows.states, rows.position, rows.stations
     )
     at = ", ".join(f"{v / MM:.1f}" for v in placed.tracker)
-    told = f"\nregistration refitted: tracker at {at} mm in the base frame"
+    note = f"\nregistration refitted: tracker at {at} mm in the base frame"
     base = _placed(rows, placed)
     spent = 6 * len(placed.transforms) + 3 * len(placed.probes)
-    return ReadRows(base, read, f"{told}, {spent} numbers of {3 * len(rows)} readings")
+    return ReadRows(base, read, f"{note}, {spent} numbers of {3 * len(rows)} readings")
 
 
-def _also_registered(rows: Measurements, cell: Cell, model: Model) -> str:
+def _own_registration_error(rows: Measurements, cell: Cell, model: Model) -> str:
     """Say what is left where the registration is found from the rows themselves."""
     poses = len(np.unique(np.round(rows.states.q, 4), axis=0))
-    if poses < STOPS or not spread_out(cell.arm, rows.states):
+    if poses < STOPS or not covers_a_plane(cell.arm, rows.states):
         return ""
     placed, read = predict_registered(
         model, cell.arm, rows.states, rows.position, rows.stations
