@@ -42,15 +42,22 @@ KNOWING = {
     # The native kernel makes its columns and those of the joints itself.
     "model.variance": {"geometry"},
     # Any survey must determine it, or be refused.
-    "calibration.plausibility": {"geometry"},
+    "calibration.plausibility": {"base_shift", "geometry"},
+    # What the frame of the rows explains is no mistake of them.
+    "calibration.likely_causes": {"base_shift", "placement"},
     # What the methods of the literature train.
     "calibration.published": {"elm", "geometry", "maps"},
     # How the rows were measured decides: frame, probe points, orientations, a slip.
-    "calibration.fit": {"placement", "probe", "tool_shift"},
+    "calibration.fit": {"placement", "probe", "station_shift", "tool_shift"},
     # A fit must leave less than registration alone.
     "calibration.validation": {"placement"},
-    # A registration is what that effect fits.
-    "calibration.registration": {"placement"},
+    # Weight shows by what yields to it.
+    "calibration.weight_direction": {"compliance"},
+    # The given model's zero of a joint holds the mean of what the model lacks.
+    "calibration.diagnosis.refit": {"joint_offset"},
+    "calibration.diagnosis.search": {"joint_offset"},
+    # A registration is what that effect fits, by the rigid motions of a base.
+    "calibration.registration": {"base_shift", "placement"},
     # A tracker that drifts moves fixed points rigidly.
     "calibration.references": {"base_shift", "tracker_drift"},
     "calibration.selection": {"probe_turn", "tool_shift"},

@@ -207,7 +207,7 @@ def mean_error_mm(rows: HeldOutRows) -> float:
 
 
 @dataclass(frozen=True)
-class Compared:
+class PairedErrors:
     """Held-out errors of two models at the same poses.
 
     Attributes:
@@ -221,7 +221,7 @@ class Compared:
     poses: int
 
     @classmethod
-    def of(cls, first: HeldOutRows, second: HeldOutRows) -> Compared:
+    def of(cls, first: HeldOutRows, second: HeldOutRows) -> PairedErrors:
         """Pair the poses."""
         fall = first.by_pose() - second.by_pose()
         spread = float(fall.std(ddof=1)) if len(fall) > 1 else np.inf
@@ -250,6 +250,6 @@ def choose(tried: Sequence[HeldOutRows], usual: int) -> int:
     """
     best = usual
     for k in (*range(usual - 1, -1, -1), *range(usual + 1, len(tried))):
-        if Compared.of(tried[best], tried[k]).better:
+        if PairedErrors.of(tried[best], tried[k]).better:
             best = k
     return best

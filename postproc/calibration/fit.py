@@ -15,15 +15,23 @@ from postproc.calibration.measurements import (
     concatenate,
     read_measurements,
 )
+from postproc.calibration.monument_frame import monuments_of
 from postproc.calibration.plausibility import (
     check_orientations,
     check_registered,
+    check_stops,
     check_survey,
     lost_without,
 )
 from postproc.calibration.published import fit_method, too_wide
-from postproc.calibration.registration import register, typical_gap
-from postproc.calibration.regression import Fit
+from postproc.calibration.registration import (
+    NEAR_FLANGE,
+    NEAR_POINT,
+    register,
+    typical_gap,
+    undetermined_axes,
+)
+from postproc.calibration.regression import NEARLY, Fit, fit_effects
 from postproc.calibration.report import FitReport, report_fit, report_method
 from postproc.calibration.reversals import (
     newer_widths,
@@ -33,13 +41,17 @@ from postproc.calibration.selection import Progress, model_of, silent
 from postproc.calibration.stops import pool_readings
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
-from postproc.calibration.validation import Task, validate_fit
+from postproc.calibration.validation import FitTask, validate_fit
+from postproc.calibration.weighing import ENOUGH
 from postproc.calibration.weight_direction import direction_warning
 from postproc.model.combination import Combination
+from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
+from postproc.model.effects.station_shift import StationShift
 from postproc.model.effects.tool_shift import ToolShift
-from postproc.model.model import Model
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model, Monument
 from postproc.model.model_file import Method
 from postproc.model.noise import angle_step
 from postproc.model.registration import Registration
@@ -137,13 +149,16 @@ def fit_measurements(
     """
     survey = pool_readings(survey)
     tracker, setup = cell.tracker, several_points(survey)
-    placed, points = None, None
+    placed, points, monuments = None, None, monuments_of(survey)
     if frame == "tracker":
         points = stated_points(survey)
         survey, placed = into_base_frame(survey, cell.arm)
-        tracker, setup = placed.tracker, (Placement.name,)
+        tracker, setup = placed.origin, (Placement.name,)
+        monuments = in_base_frame(monuments, placed)
     survey, reversals = split_reversals(survey, cell.arm)
     check_survey(survey, cell.arm)
+    if frame == "base":
+        setup = (*setup, *file_shifts(survey, cell.arm, cell.tracker))
     survey = check_orientations(survey, cell.arm)
     told = (*survey.warnings, *lost_without(cell.arm, survey))
     survey = replace(survey, warnings=told)
@@ -153,7 +168,7 @@ def fit_measurements(
         survey = replace(survey, warnings=told)
         model = replace(model, registration=placed)
         return Calibration(model, report_method(model, survey, cell.arm), survey)
-    task = Task(survey, cell.arm, effects, tracker, setup)
+    task = FitTask(survey, cell.arm, effects, tracker, setup)
     fitted = task.fit(progress=progress)
     validated = None
     if validate:
@@ -162,7 +177,8 @@ def fit_measurements(
         fitted = validated.fit
     progress("report")
     wide = 1.0 if validated is None else validated.widening
-    model = replace(model_of(fitted, survey, wide), registration=placed)
+    model = model_of(fitted, survey, wide)
+    model = replace(model, registration=placed, monuments=monuments)
     told = (
         *survey.warnings,
         *moved_tools(fitted, survey),
@@ -171,6 +187,7 @@ def fit_measurements(
         *_rounding(model, fitted),
         *(() if validated is None else validated.notes),
         *direction_warning(fitted),
+        *file_steps(fitted, survey),
     )
     survey = replace(survey, warnings=told)
     widths = newer_widths((), model, cell.arm, reversals)
@@ -291,6 +308,52 @@ def _at(survey: Measurements, order: float) -> str:
     return f"at row {survey.ids[int(np.argmax(survey.states.order >= order))]}"
 
 
+def file_shifts(
+    survey: Measurements, arm: Arm, tracker: Floats | None
+) -> tuple[str, ...]:
+    """Name the step between files of the base frame, where there is evidence for it.
+
+    Geometry and backlash are fitted to all rows, with and without it.
+
+    Args:
+        survey: The measurements in the base frame, of several files or of one.
+        arm: The arm.
+        tracker: Tracker position in the base frame, (3,) [m], or None.
+    """
+    if not StationShift.may_show(survey.states):
+        return ()
+    batch = Batch(arm, survey.states)
+    origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
+    names = (*BASE_EFFECTS, *several_points(survey))
+    fits = [
+        fit_effects(
+            batch, survey.position, propose(effects, arm, survey.states), origin,
+            until=NEARLY,
+        )
+        for effects in (names, (*names, StationShift.name))
+    ]  # fmt: skip
+    gain = fits[1].log_evidence - fits[0].log_evidence
+    return (StationShift.name,) if gain > ENOUGH else ()
+
+
+def file_steps(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
+    """Tell by how much files of the base frame lie beside the first."""
+    c, told = fitted.combination, []
+    for effect, part in zip(c.effects, c.slices, strict=True):
+        if not isinstance(effect, StationShift):
+            continue
+        moved = np.linalg.norm(fitted.moved(part), axis=1)
+        for s in effect.stations:
+            size = float(moved[survey.states.station == s].mean()) / MM
+            told.append(
+                f"{survey.stations[s]} lies {size:.3f} mm beside {survey.stations[0]}: "
+                "another station of the tracker, or the base has moved. Fitted as "
+                f"station_shift, not compensated; the model is in the base frame of "
+                f"{survey.stations[0]}"
+            )
+    return tuple(told)
+
+
 def several_points(survey: Measurements) -> tuple[str, ...]:
     """Name the effect of a probe plate's nests, where there are several."""
     return (Probe.name,) if len(np.unique(survey.states.tool_id)) > 1 else ()
@@ -305,25 +368,65 @@ def into_base_frame(
         MeasurementError: The positions fit the arm in no frame.
     """
     nothing = Combination(())
-    found = register(arm, survey.states, survey.position, nothing, np.zeros(0))
-    xyz = ", ".join(f"{v / MM:.1f}" for v in found.tracker)
-    notes = [f"tracker at {xyz} mm in the base frame"]
+    found = register(
+        arm, survey.states, survey.position, nothing, np.zeros(0), survey.stations
+    )
+    notes = []
+    for name, T in zip(found.stations, found.transforms, strict=True):
+        xyz = ", ".join(f"{v / MM:.1f}" for v in T[:3, 3])
+        of = f" of {name}" if len(found.stations) > 1 else ""
+        notes.append(f"tracker{of} at {xyz} mm in the base frame")
     for k, name in enumerate(found.tool_ids):
         xyz = ", ".join(f"{v / MM:.2f}" for v in found.probes[k])
         notes.append(f"probe point {name} at {xyz} mm in the flange frame")
     turned = None
     if survey.rotation is not None:
-        turned = found.base_from_tracker[:3, :3] @ survey.rotation
+        turned = found.rotations(survey.states.station) @ survey.rotation
     registered = replace(
         survey,
         states=found.on_probes(survey.states),
-        position=found.to_base(survey.position),
+        position=found.to_base(survey.position, survey.states.station),
         rotation=turned,
-        warnings=(*survey.warnings, *notes),
+        warnings=(*survey.warnings, *notes, *probe_note(found, arm, survey.states)),
     )
     typical = typical_gap(found, arm, survey.states, survey.position)
     check_registered(survey, registered, arm, typical)
+    check_stops(survey, arm)
     return registered, found
+
+
+def in_base_frame(
+    monuments: tuple[Monument, ...], placed: Registration
+) -> tuple[Monument, ...]:
+    """Convert fixed points from the frame of the first station to the base frame."""
+    if not monuments:
+        return ()
+    places = placed.to_base(np.array([xyz for _, xyz in monuments])).tolist()
+    return tuple(
+        (name, (x, y, z))
+        for (name, _), (x, y, z) in zip(monuments, places, strict=True)
+    )
+
+
+def probe_note(placed: Registration, arm: Arm, states: States) -> tuple[str, ...]:
+    """Say in one sentence what a tool that never turned leaves unknown of its probe."""
+    axes = undetermined_axes(placed, arm, states)
+    if len(axes) == 0:
+        return ()
+    how = "never turned" if len(axes) == 3 else "turned about one axis only"
+    where = (
+        ""
+        if len(axes) == 3
+        else " along "
+        + " and ".join("(" + ", ".join(f"{v:.2f}" for v in axis) + ")" for axis in axes)
+    )
+    near = NEAR_POINT if np.abs(states.tool).max() > 0 else NEAR_FLANGE
+    return (
+        f"the tool {how}: where the probe sits{where} in the flange frame is not "
+        f"determined, and taken from the cell (+- {near / MM:.0f} mm); predictions "
+        "hold for poses with the tool turned like this alone. Measure poses with other "
+        "orientations",
+    )
 
 
 def read_surveys(
@@ -331,8 +434,7 @@ def read_surveys(
 ) -> Measurements:
     """Read measurement files as one survey, with what the cell knows of the load."""
     parts = [
-        read_measurements(path, cell.arm, cell.probes, reading=reading)
-        for path in files
+        read_measurements(path, cell.arm, cell.nests, reading=reading) for path in files
     ]
     return carrying_load(replace(concatenate(parts), mounting=cell.mounting), cell)
 

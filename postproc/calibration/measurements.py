@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.references import (
+    ONE_POINT,
     ReferenceRows,
     TrackerMotion,
     join_references,
@@ -23,8 +24,11 @@ from postproc.calibration.tables import (
     JOINTS,
     NUMBER,
     Format,
+    Nests,
     TableFormat,
     TextTable,
+    check_axes,
+    in_visit_order,
     read_directions,
     read_foreign,
     read_headed,
@@ -82,6 +86,8 @@ class Measurements:
         motion: What they say of the tracker, whose drift is taken out of `position`;
             None without them.
         visit: Number of the visit of every row, as the file has it, (n,), or None.
+        stations: Names of the places of the tracker, or of the files, by
+            `states.station`.
     """
 
     path: Path
@@ -98,6 +104,7 @@ class Measurements:
     references: ReferenceRows | None = field(default=None, repr=False)
     motion: TrackerMotion | None = field(default=None, repr=False)
     visit: Ints | None = field(default=None, repr=False)
+    stations: tuple[str, ...] = ("",)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -125,7 +132,7 @@ class Measurements:
 def read_measurements(
     path: str | Path,
     arm: Arm,
-    tools: Floats | Mapping[int, Floats],
+    tools: Nests,
     *,
     positions: bool = True,
     reading: TableFormat = DETECT,
@@ -133,10 +140,11 @@ def read_measurements(
     """Read a measurement file.
 
     Args:
-        path: CSV with the columns of the documentation; rows in visit order.
+        path: CSV with the columns of the documentation; rows in visit order, unless a
+            column order or time_s tells another.
         arm: The arm, for directions that must be inferred.
-        tools: Probe points in the flange frame, (k, 3) [m] or by `tool_id`. Columns
-            tool_x_mm, tool_y_mm, tool_z_mm override them.
+        tools: Probe points in the flange frame, (k, 3) [m], by `tool_id` or by name.
+            Columns tool_x_mm, tool_y_mm, tool_z_mm override them.
         positions: Whether the file must have measured positions.
         reading: What the user knows of the file.
 
@@ -150,12 +158,14 @@ def read_measurements(
 def from_table(
     table: TextTable,
     arm: Arm,
-    tools: Floats | Mapping[int, Floats],
+    tools: Nests,
     *,
     positions: bool = True,
 ) -> Measurements:
     """Interpret a table with the columns of the documentation."""
+    check_axes(table)
     table.require("id", *JOINTS, *(POSITION if positions else ()))
+    table = in_visit_order(table)
     table, references = split_references(table)
     ids = unique_ids(table)
     q = np.deg2rad(table.block(JOINTS))
@@ -165,16 +175,31 @@ def from_table(
         for column, (name, scale) in COVARIATES.items()
         if table.has(column)
     }
+    if table.has("order"):
+        covariates["order"] = table.numbers("order")
+    stations, station = read_stations(table)
     tool, tool_id = read_tools(table, tools)
-    states = make_states(q, side, tool, tool_id=tool_id, travel=travel, **covariates)
+    states = make_states(
+        q, side, tool, tool_id=tool_id, station=station, travel=travel, **covariates
+    )
     read = table.has(*POSITION)
     position = table.block(POSITION) * MM if read else np.full((len(q), 3), np.nan)
     found = Measurements(
         table.path, states, position, ids, table.line, inferred, table.sha256,
         warnings=warnings, rotation=read_rotation(table), references=references,
         visit=read_visits(table),
+        stations=stations,
     )  # fmt: skip
     return drop_lost_beams(found)
+
+
+def read_stations(table: TextTable) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+    """Read the column station: names in the order of visits, and each row's number."""
+    if not table.has("station"):
+        return ("",), np.zeros(len(table), dtype=np.int64)
+    texts = table.text("station")
+    names = tuple(dict.fromkeys(texts)) or ("",)
+    return names, np.array([names.index(t) for t in texts], dtype=np.int64)
 
 
 def drop_lost_beams(measured: Measurements) -> Measurements:
@@ -205,11 +230,37 @@ def _nowhere(position: Floats) -> Bools:
 def concatenate(parts: Sequence[Measurements]) -> Measurements:
     """Put several files one after the other, and take the tracker's own drift out.
 
+    Fixed points that lie apart from file to file were read from another station: each
+    file then has a drift of its own.
+
     Raises:
         MeasurementError: An id appears in two files, or readings of fixed points tell
             nothing.
     """
+    if _moved_between(parts):
+        return replace(_joined([_steadied(p) for p in parts]), motion=None)
     return _steadied(_joined(parts))
+
+
+def _moved_between(parts: Sequence[Measurements]) -> bool:
+    """Return True if a fixed point is elsewhere in another file."""
+    places: dict[str, Floats] = {}
+    for part in parts:
+        fixed = part.references
+        for name, xyz in (
+            () if fixed is None else zip(fixed.name, fixed.position, strict=True)
+        ):
+            if np.linalg.norm(places.setdefault(name, xyz) - xyz) > ONE_POINT:
+                return part is not parts[0]
+    return False
+
+
+def steady(survey: Measurements) -> Measurements:
+    """Take the tracker's drift out of rows, where every fixed point was read twice."""
+    fixed = survey.references
+    if fixed is None or (np.bincount(fixed.which) < 2).any():
+        return survey
+    return _steadied(survey)
 
 
 def _steadied(survey: Measurements) -> Measurements:
@@ -240,21 +291,25 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
                 problem = f"id {name!r} is also in {seen[name]}"
                 raise MeasurementError(part.path, problem, cure, line=int(line))
             seen[name] = part.path
+    names, station = _joined_stations(parts)
     joined = {
         name: np.concatenate([getattr(p.states, name) for p in parts])
         for name in first.states.__dataclass_fields__
-        if name != "order"
+        if name not in ("order", "station")
     }
-    order = np.arange(sum(map(len, parts)), dtype=float)
+    offsets = _offsets(parts)
+    order = np.concatenate(
+        [p.states.order + by for p, by in zip(parts, offsets, strict=True)]
+    )
     rotations = [p.rotation for p in parts if p.rotation is not None]
     visits, last = [], 0
     for part in parts:
         if part.visit is not None and len(part):
             visits.append(last + part.visit)
             last = int(visits[-1].max()) + 1
-    return Measurements(
+    joint = Measurements(
         path=first.path,
-        states=States(order=order, **joined),
+        states=States(order=order, station=station, **joined),
         position=np.concatenate([p.position for p in parts]),
         ids=tuple(i for p in parts for i in p.ids),
         line=np.concatenate([p.line for p in parts]),
@@ -264,8 +319,51 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
         warnings=tuple(w for p in parts for w in p.warnings),
         rotation=np.concatenate(rotations) if len(rotations) == len(parts) else None,
         visit=np.concatenate(visits) if len(visits) == len(parts) else None,
-        references=join_references([(p.references, len(p)) for p in parts]),
+        references=join_references(
+            [(p.references, by) for p, by in zip(parts, offsets, strict=True)]
+        ),
+        stations=names,
     )
+    if (np.diff(order) > 0).all():
+        return joint
+    return joint[np.argsort(order, kind="stable")]
+
+
+def _joined_stations(
+    parts: Sequence[Measurements],
+) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+    """Number the stations of several files: one name is one station.
+
+    A file that names none is a station of its own, by the file's name.
+    """
+    names: list[str] = []
+    numbers = []
+    for k, part in enumerate(parts):
+        own = list(part.stations)
+        if own == [""]:
+            same = [p.path.name for p in parts].count(part.path.name) > 1
+            own = [f"{part.path.name} ({k + 1})" if same else part.path.name]
+        names += [name for name in own if name not in names]
+        index = np.array([names.index(name) for name in own], dtype=np.int64)
+        numbers.append(index[part.states.station])
+    return tuple(names), np.concatenate(numbers)
+
+
+def _offsets(parts: Sequence[Measurements]) -> list[float]:
+    """Say by how much the order of every file moves, where one follows the other.
+
+    Places that no two rows share were numbered through all files.
+    """
+    every = np.concatenate([p.states.order for p in parts])
+    offsets, following = [0.0] * len(parts), -np.inf
+    if len(np.unique(every)) == len(every):
+        return offsets
+    for k, part in enumerate(parts):
+        if len(part):
+            order = part.states.order
+            offsets[k] = max(following - float(order.min()), 0.0) if k else 0.0
+            following = float(order.max()) + offsets[k] + 1.0
+    return offsets
 
 
 # Lists of measured points that carry names but no joint angles.
@@ -275,6 +373,7 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
 # are joined with the program that was measured.
 
 NAMES = ("id", "name", "point", "point name", "point id", "target")
+WHOLE = re.compile(r"^\d+$")
 AXIS = {a: re.compile(rf"^{a}(\s*[\[(]?\s*mm\s*[\])]?|_mm)?$", re.I) for a in "xyz"}
 
 
@@ -286,13 +385,29 @@ def read_points(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
     Raises:
         MeasurementError: No names or coordinates are found.
     """
-    table = read_headed(path, comment="//", **reading.given)
+    if reading.columns is not None:
+        table = read_foreign(path, reading)
+        table.require("id", *POSITION)
+        return table
+    table = read_headed(path, **reading.given)
     if table.has("id", *POSITION):
         return table
     name, axes = _columns(table)
     scaled = {ours: ((axis, reading.mm_per_unit),)
               for ours, axis in zip(POSITION, axes, strict=True)}  # fmt: skip
-    return translate(table, Format({"id": ((name, 1.0),), **scaled}))
+    points = translate(table, Format({"id": ((name, 1.0),), **scaled}))
+    cells = points.cells.copy()
+    cells[:, 0] = [target_of(text) for text in points.text("id")]
+    return replace(points, cells=cells)
+
+
+def target_of(name: str) -> str:
+    """Return the target of a name as SpatialAnalyzer writes it.
+
+    >>> target_of("A::Main::1a")
+    '1a'
+    """
+    return name.rpartition("::")[2].strip() or name
 
 
 def _columns(table: TextTable) -> tuple[str, tuple[str, str, str]]:
@@ -301,12 +416,8 @@ def _columns(table: TextTable) -> tuple[str, tuple[str, str, str]]:
     Raises:
         MeasurementError: They are not there.
     """
-    if table.columns[0] == "1":  # no header: name first, then the first three numbers
-        row = [bool(NUMBER.match(str(cell))) for cell in table.cells[0]]
-        numbers = [k for k, is_number in enumerate(row) if is_number and k > 0][:3]
-        if len(numbers) == 3:
-            x, y, z = (table.columns[k] for k in numbers)
-            return table.columns[0], (x, y, z)
+    if not table.headed:
+        return _places_of(table)
     name = next((c for c in table.columns if c.lower() in NAMES), None)
     axes = [next((c for c in table.columns if AXIS[a].match(c)), None) for a in "xyz"]
     if name is None or None in axes:
@@ -319,3 +430,32 @@ def _columns(table: TextTable) -> tuple[str, tuple[str, str, str]]:
         )
     x, y, z = (str(axis) for axis in axes)
     return name, (x, y, z)
+
+
+def _places_of(table: TextTable) -> tuple[str, tuple[str, str, str]]:
+    """Find name and coordinates by their cells, in a table without a header.
+
+    The coordinates are the first three columns of numbers side by side; the name stands
+    before them, after collection and group where there are any. A column of whole
+    numbers before three others that are none is a name, too.
+
+    Raises:
+        MeasurementError: No name stands before three numbers.
+    """
+    cells = [[str(c) for c in column] for column in table.cells.T]
+    number = [all(NUMBER.match(c) for c in column) for column in cells]
+    whole = [all(WHOLE.match(c) for c in column) for column in cells]
+    starts = [k for k in range(len(cells) - 2) if all(number[k : k + 3])]
+    first = starts[0] if starts else None
+    if first is not None and first + 1 in starts:
+        if first == 0 or (whole[first] and not all(whole[first + 1 : first + 4])):
+            first += 1
+    if not first:
+        raise MeasurementError(
+            table.path,
+            "has no header, and its rows are not a name followed by x, y, z",
+            "Write a header with id, x_mm, y_mm, z_mm",
+            line=int(table.line[0]),
+        )
+    x, y, z = table.columns[first : first + 3]
+    return table.columns[first - 1], (x, y, z)

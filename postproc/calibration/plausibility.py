@@ -2,85 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.calibration.likely_causes import (
+    CLOSE,
+    UNKNOWN,
+    Cause,
+    cause_in_any_frame,
+    find_cause,
+    find_cause_in_tracker_frame,
+    wrong_directions,
+)
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
-from postproc.calibration.registration import register, typical_gap
+from postproc.calibration.registration import (
+    STOPS,
+    covers_a_plane,
+    register,
+    typical_gap,
+)
 from postproc.calibration.regression import observe
-from postproc.calibration.tool_groups import find_groups
+from postproc.calibration.tool_groups import FEWEST, find_groups
 from postproc.exceptions import MeasurementError
 from postproc.model.combination import Combination
+from postproc.model.effects.base_shift import rigid_motions
 from postproc.model.effects.geometry import Geometry
 from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States, make_states
-
-# Which mistake in a measurement file would explain its positions.
-
-CLOSE = 0.01  # [m] a mended survey agrees at least so well
-TRIED = 60  # rows that a guess is tried on
-NOTHING = Combination(())
-
-
-def likely_cure(survey: Measurements, arm: Arm) -> str:
-    """Name the mistake that would explain the positions, if one does."""
-    few = survey[np.unique(np.linspace(0, len(survey) - 1, TRIED).astype(np.int64))]
-    for cure, states, position in _guesses(few.states, few.position):
-        found = register(arm, states, position, NOTHING, np.zeros(0))
-        if typical_gap(found, arm, states, position) < CLOSE:
-            return cure
-    return "Check units, joint order and signs, the tool and the frame (--frame)"
-
-
-def _guesses(states: States, position: Floats) -> Iterator[tuple[str, States, Floats]]:
-    """List mistakes that people make, most frequent first, each undone."""
-    q = states.q
-
-    def turned(angles: Floats) -> States:
-        return states.with_(q=angles)
-
-    yield (
-        "The positions look like the tracker's frame: use --frame tracker",
-        states,
-        (position),
-    )
-    yield "The positions look like metres: write millimetres", states, position * 1e3
-    yield (
-        "The joint angles look like radians: write degrees",
-        turned(np.rad2deg(q)),
-        (position),
-    )
-    for j in range(6):
-        sign = np.where(np.arange(6) == j, -1.0, 1.0)
-        yield (
-            f"Joint {j + 1} looks like it has the other sign",
-            turned(q * sign),
-            (position),
-        )
-    for i, j in combinations(range(6), 2):
-        order = np.arange(6)
-        order[[i, j]] = j, i
-        cure = f"Joints {i + 1} and {j + 1} look swapped: correct the columns"
-        yield cure, turned(q[:, order]), position
-
-
-# Refusing surveys that cannot be what they say, with the likely reason.
 
 FAR = 0.05  # [m] no arm that works is off by more
 APART = 10.0  # rows this many times farther off than the typical one are another kind
 MANY = 0.1  # share of such rows from which the file is at fault, not the rows
 PROBES = 400  # random poses that show what could be determined at best
 ENOUGH = 0.75  # share of the determinable directions that a survey must show
-OTHER_UNIT = 50.0  # no arm's positions differ so much in size
 STILL = 1e-4  # readings move by more of what the poses do, in whatever unit
-SOME = 0.02  # share of rows in another unit that is no accident
+ENOUGH_ROWS_OF_ARM = 12  # that tell an arm from another
+OTHER_ARM = (
+    0.7  # of what the nominal arm leaves: a model that leaves more knows nothing
+)
+LEAST_OF_ARM = 2e-4  # [m] that such a model leaves
 TOOL_APART = 1e-3  # [m] tools that differ by less are told by the fit, not refused
 
 
@@ -92,40 +58,125 @@ def check_survey(survey: Measurements, arm: Arm) -> None:
     """
     check_rows(survey, arm)
     check_places(survey, arm)
-    check_units(survey)
-    check_tools(survey, arm)
     gap = survey.position - Batch(arm, survey.states).walk.tcp
-    size = np.linalg.norm(gap, axis=1)
-    typical = float(np.median(size))
+    _check_cause(survey, find_cause(survey, arm, _no_error))
+    _check_frame(survey, arm, gap, "nominal")
+    check_tools(survey, arm)
+    _check_kinds(survey, arm, gap)
+
+
+def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
+    """Check rows in the base frame against a model: units, frame, arm, directions.
+
+    Raises:
+        MeasurementError: With the likely reason and the cure.
+    """
+
+    def error(states: States) -> Floats:
+        return model.error(arm, states)
+
+    if len(survey) == 0:
+        return
+    gap = survey.position - Batch(arm, survey.states).walk.tcp - error(survey.states)
+    _check_cause(survey, find_cause(survey, arm, error))
+    _check_frame(survey, arm, gap, "predicted")
+    wrong = wrong_directions(survey, arm, model)
+    if wrong is not None:
+        cure = (
+            "Correct the columns (lambda is 1 where a joint came forward, -1 back), or "
+            "fit a new model if the model's survey had them so"
+        )
+        raise MeasurementError(survey.path, wrong, cure)
+    _check_arm(survey, arm, error(survey.states))
+
+
+def _no_error(states: States) -> Floats:
+    """Return no error, (n, 3) [m]."""
+    return np.zeros((len(states), 3))
+
+
+def _check_cause(survey: Measurements, cause: Cause | None) -> None:
+    """Refuse rows that a mistake explains; one of all rows is named by its cure."""
+    if cause is None:
+        return
+    if cause.place != "all":
+        line = int(survey.line[cause.first])
+        problem = cause.problem(survey)
+        raise MeasurementError(survey.path, problem, cause.guess.cure, line=line)
+    problem = "measured positions are not those of the joint angles"
+    raise MeasurementError(survey.path, problem, cause.guess.all_rows)
+
+
+def _check_frame(survey: Measurements, arm: Arm, gap: Floats, what: str) -> None:
+    """Refuse rows that are far off as a whole."""
+    typical = float(np.median(np.linalg.norm(gap, axis=1)))
     if typical > FAR:
-        problem = f"measured and nominal positions differ by {typical / MM:.0f} mm"
-        raise MeasurementError(survey.path, problem, likely_cure(survey, arm))
-    apart = size > max(APART * typical, CLOSE)
+        if what == "nominal":
+            check_tools(survey, arm)
+        problem = f"measured and {what} positions differ by {typical / MM:.0f} mm"
+        enough = len(survey) >= STOPS
+        cure = cause_in_any_frame(survey, arm) if enough else UNKNOWN
+        raise MeasurementError(survey.path, problem, cure)
+
+
+def _check_kinds(survey: Measurements, arm: Arm, gap: Floats) -> None:
+    """Refuse rows of which many are far off, and the others not."""
+    size = np.linalg.norm(gap, axis=1)
+    limit = max(APART * float(np.median(size)), CLOSE)
+    apart = size > limit
     if apart.mean() > MANY:
         line = int(survey.line[np.argmax(apart)])
         problem = (
             f"{int(apart.sum())} of {len(survey)} rows are more than "
-            f"{max(APART * typical, CLOSE) / MM:.0f} mm off, the others are not"
+            f"{limit / MM:.0f} mm off, the others are not"
         )
         cure = "Two tools or two units in one file? Add tool_id, or split the file"
         raise MeasurementError(survey.path, problem, cure, line=line)
 
 
-def check_units(survey: Measurements) -> None:
-    """Refuse rows in metres among rows in millimetres.
+def _check_arm(survey: Measurements, arm: Arm, error: Floats) -> None:
+    """Refuse rows of which a model explains nothing: they are another arm's.
 
-    Raises:
-        MeasurementError: Naming the first such row.
+    Base, tool and zeros of the joints may differ from those of the model's survey: an
+    arm that was mastered or moved since is no other.
     """
-    size = np.linalg.norm(survey.position, axis=1)
-    typical = float(np.median(size))
-    other = (size * OTHER_UNIT < typical) | (size > OTHER_UNIT * typical)
-    if other.mean() > SOME:
-        metres = size < np.sqrt(float(size.max()) * float(size.min()))
-        line = int(survey.line[np.argmax(metres)])
-        problem = f"{int(metres.sum())} of {len(survey)} rows look like metres"
-        cure = "The others are in millimetres: write all of them so"
-        raise MeasurementError(survey.path, problem, cure, line=line)
+    if len(survey) < ENOUGH_ROWS_OF_ARM:
+        return
+    batch = Batch(arm, survey.states)
+    free = np.concatenate(
+        [rigid_motions(batch.walk.tcp), batch.walk.flange, batch.jacobian], axis=2
+    ).reshape(-1, 15)
+    scale = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
+    read = survey.position - batch.walk.tcp
+    sizes = []
+    for left in (read - error, read):
+        sizes.append(_typical_beside(free / scale, left))
+    with_model, nominal = sizes
+    if with_model > OTHER_ARM * nominal and with_model > LEAST_OF_ARM:
+        raise MeasurementError(
+            survey.path,
+            "the model explains nothing of these rows: it leaves "
+            f"{with_model / MM:.2f} mm, the nominal arm {nominal / MM:.2f} mm, base, "
+            "tool and zeros of the joints apart",
+            "Are they another arm's? After a crash or a repair, fit a new model",
+        )
+
+
+def _typical_beside(columns: Floats, left: Floats) -> float:
+    """Return the median distance that columns (3 n, p) leave of rows (n, 3) [m].
+
+    Robust: the rows that are farthest off count less.
+    """
+    weight, rest = np.ones(len(left)), left
+    for _ in range(5):
+        root = np.repeat(np.sqrt(weight), 3)
+        rows, target = columns * root[:, None], left.reshape(-1) * root
+        fitted = np.linalg.lstsq(rows, target, rcond=1e-6)[0]
+        rest = (left.reshape(-1) - columns @ fitted).reshape(-1, 3)
+        size = np.linalg.norm(rest, axis=1)
+        ratio = size / max(3.0 * float(np.median(size)), 1e-12)
+        weight = 1.0 / np.maximum(ratio, 1.0) ** 2
+    return float(np.median(np.linalg.norm(rest, axis=1)))
 
 
 def check_places(survey: Measurements, arm: Arm) -> None:
@@ -156,10 +207,15 @@ def check_tools(survey: Measurements, arm: Arm) -> None:
     X = Geometry.propose(arm, survey.states).columns(batch)
     X = X.reshape(-1, X.shape[2])
     scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
-    fitted = np.linalg.lstsq(X / scale, left.reshape(-1), rcond=1e-6)[0]
+    size = np.linalg.norm(left, axis=1)
+    used = size <= max(APART * float(np.median(size)), CLOSE)
+    if 1.0 - used.mean() > FEWEST:  # they are too many for outliers
+        used[:] = True
+    at = np.repeat(used, 3)
+    fitted = np.linalg.lstsq((X / scale)[at], left.reshape(-1)[at], rcond=1e-6)[0]
     left = left - (X / scale @ fitted).reshape(-1, 3)
     for tool in np.unique(survey.states.tool_id):
-        rows = np.flatnonzero(survey.states.tool_id == tool)
+        rows = np.flatnonzero((survey.states.tool_id == tool) & used)
         found = find_groups(left[rows], batch.walk.flange[rows])
         if found is not None and found.apart > TOOL_APART:
             first = sorted(rows[np.argmax(found.which == k)] for k in found.kinds)
@@ -190,11 +246,60 @@ def check_registered(
     """
     check_rows(survey, arm)
     check_places(survey, arm)
-    check_units(survey)
+    _check_stations(survey, arm)
     if typical > CLOSE:
         check_tools(registered, arm)
         problem = f"the registration leaves {typical / MM:.0f} mm"
-        raise MeasurementError(survey.path, problem, likely_cure(survey, arm))
+        raise MeasurementError(survey.path, problem, cause_in_any_frame(survey, arm))
+
+
+def _check_stations(survey: Measurements, arm: Arm) -> None:
+    """Refuse rows of the tracker's frame that a mistake explains, by station."""
+    for number in range(len(survey.stations)):
+        rows = survey[survey.states.station == number]
+        here = np.zeros(len(rows), dtype=np.int64)
+        rows = rows.with_states(rows.states.with_(station=here))
+        _check_cause(rows, find_cause_in_tracker_frame(rows, arm))
+
+
+def check_own_registration(survey: Measurements, arm: Arm) -> None:
+    """Check rows in the tracker's frame that find their own registration.
+
+    Raises:
+        MeasurementError: With the likely reason and the cure.
+    """
+    _check_stations(survey, arm)
+    nothing = Combination(())
+    placed = register(
+        arm, survey.states, survey.position, nothing, np.zeros(0), survey.stations
+    )
+    typical = typical_gap(placed, arm, survey.states, survey.position)
+    if typical > CLOSE:
+        problem = f"the registration leaves {typical / MM:.0f} mm"
+        raise MeasurementError(survey.path, problem, cause_in_any_frame(survey, arm))
+
+
+def check_stops(survey: Measurements, arm: Arm) -> None:
+    """Check that every station's rows can place the tracker.
+
+    Raises:
+        MeasurementError: Naming a station with fewer than six stops, or one whose
+            stops lie about a line.
+    """
+    for number, name in enumerate(survey.stations):
+        rows = survey.states.station == number
+        of = f" of station {name}" if name else ""
+        poses = len(np.unique(np.round(survey.states.q[rows], 4), axis=0))
+        if poses >= STOPS and covers_a_plane(arm, survey.states[rows]):
+            continue
+        where = ", all about one line," if poses >= STOPS else ""
+        raise MeasurementError(
+            survey.path,
+            f"{int(rows.sum())} rows{of} at {poses} poses{where} do not tell where the "
+            "tracker stands",
+            f"Measure {STOPS} poses or more, spread over the workspace. Files of one "
+            "station say so in a column station",
+        )
 
 
 def check_rows(survey: Measurements, arm: Arm) -> None:

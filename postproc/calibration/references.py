@@ -86,10 +86,12 @@ def split_references(table: TextTable) -> tuple[TextTable, ReferenceRows | None]
     unknown = np.full(len(some), np.nan)
     time = some.numbers("time_s", empty=True) if some.has("time_s") else unknown
     position = some.block(POSITION) * MM
+    between = np.cumsum(~fixed, dtype=float)[fixed] - 0.5
+    order = some.numbers("order") if some.has("order") else between
     rows = ReferenceRows(
         table.path,
         tuple("1" if n in UNNAMED else n for n in names),
-        position, time, np.cumsum(~fixed, dtype=float)[fixed] - 0.5, some.line,
+        position, time, order, some.line,
     )  # fmt: skip
     return arm, rows
 
@@ -117,18 +119,17 @@ def _require_positions(table: TextTable) -> None:
 
 
 def join_references(
-    parts: Sequence[tuple[ReferenceRows | None, int]],
+    parts: Sequence[tuple[ReferenceRows | None, float]],
 ) -> ReferenceRows | None:
     """Put the readings of several files one after the other.
 
     Args:
-        parts: Readings and number of the arm's rows of every file.
+        parts: Readings of every file, and by how much their order moves.
     """
-    found, before = [], 0
-    for rows, count in parts:
+    found = []
+    for rows, offset in parts:
         if rows is not None:
-            found.append(replace(rows, order=rows.order + before))
-        before += count
+            found.append(replace(rows, order=rows.order + offset))
     if not found:
         return None
     return ReferenceRows(

@@ -6,22 +6,26 @@ an effect of the set-up beside the arm's own (`Placement`).
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Bools, Floats
 from postproc.model.combination import Combination
+from postproc.model.effects.base_shift import rigid_motions
 from postproc.model.effects.placement import Placement
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, PredictedReading
-from postproc.model.registration import Registration
+from postproc.model.registration import Registration, rigid_fit
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
-PASSES = 60
+PASSES = 200
 SETTLED = 1e-9  # [m]
 ROBUST = 3.0  # residuals beyond this many typical ones count less
+NEAR_POINT, NEAR_FLANGE = 0.3, 1.0  # [m] prior of a probe: round its point, the flange
+LEAST_GAP = 1e-7  # [m] what a perfect arm leaves
+STOPS = 6  # poses from which a tracker and a probe are found
+SPREAD = 0.05  # [m] that poses spread across the line that fits them best
+TURNED = 0.03  # [rad] rms turn of the tool from which a probe's place shows
 
 
 def register(
@@ -30,22 +34,26 @@ def register(
     position: Floats,
     arm_effects: Combination,
     values: Floats,
+    stations: tuple[str, ...] = ("",),
 ) -> Registration:
-    """Find the tracker and the probe points, the arm's own errors being known.
+    """Find the tracker's stations and the probe points, the arm's errors being known.
 
-    Gauss-Newton on six numbers for the tracker and three per probe point, robust
-    against rows that are no measurements.
+    Gauss-Newton on six numbers for every station and three per probe point, robust
+    against rows that are no measurements. A probe has a normal prior: 0.3 m round the
+    point that the states have, 1 m round the flange where they have none.
 
     Args:
         arm: The arm.
         states: States of the rows; their `tool` is where the search starts.
-        position: Measured positions in the tracker frame, (n, 3) [m].
+        position: Measured positions in the frame of their station, (n, 3) [m].
         arm_effects: Effects of the arm, or none; a tool's own error among them is not
             the probe's, which is found besides.
         values: Their parameters.
+        stations: Names of the tracker's stations, by `states.station`.
     """
     ids, which = np.unique(states.tool_id, return_inverse=True)
-    probes = np.stack([states.tool[which == k].mean(axis=0) for k in range(len(ids))])
+    stated = np.stack([states.tool[which == k].mean(axis=0) for k in range(len(ids))])
+    near = NEAR_POINT if np.abs(stated).max() > 0 else NEAR_FLANGE
     batch = Batch(arm, states)
     at = arm_effects.at(batch, values)
     landed, R = batch.walk.tcp + arm_effects.error_at(at, batch, values), at.walk.flange
@@ -53,23 +61,90 @@ def register(
     per_point = np.zeros((len(states), 3, len(ids), 3))
     per_point[np.arange(len(states)), :, which] = R
     columns = per_point.reshape(len(states), 3, -1)
-    weight = np.ones(len(states))
+    own = [states.station == s for s in range(len(stations))]
+    T = np.tile(np.eye(4), (len(stations), 1, 1))
+    found, weight = stated, np.ones(len(states))
     for _ in range(PASSES):
-        tcp = flange + np.einsum("nij,nj->ni", R, probes[which])
-        T = _procrustes(position, tcp, weight)
-        measured = position @ T[:3, :3].T + T[:3, 3]
+        tcp = flange + np.einsum("nij,nj->ni", R, found[which])
+        for s, rows in enumerate(own):
+            if rows.any():
+                T[s] = rigid_fit(position[rows], tcp[rows], weight[rows])
+        placed = Registration(T, found, ids, stations)
+        measured = placed.to_base(position, states.station)
         gap = measured - tcp
         weight = _robust(gap)
-        turned = np.swapaxes(np.cross(np.eye(3)[None], measured[:, None]), 1, 2)
-        eye = np.tile(np.eye(3), (len(states), 1, 1))
-        A = np.concatenate([columns, -eye, -turned], axis=2)
-        A = (A * np.sqrt(weight)[:, None, None]).reshape(-1, A.shape[2])
-        step = np.linalg.lstsq(A, (gap * np.sqrt(weight)[:, None]).reshape(-1))[0]
-        move = step[: 3 * len(ids)].reshape(-1, 3)
-        probes = probes + move
-        if np.abs(move).max() < SETTLED:
+        step = _step(columns, measured, gap, weight, own, (stated - found) / near, near)
+        found = found + step
+        if np.abs(step).max() < SETTLED:
             break
-    return Registration(T, probes, ids)
+    return Registration(T, found, ids, stations)
+
+
+def _step(
+    columns: Floats,
+    measured: Floats,
+    gap: Floats,
+    weight: Floats,
+    own: list[Bools],
+    off: Floats,
+    near: float,
+) -> Floats:
+    """Move the probe points (k, 3) [m], the stations being free to follow.
+
+    Args:
+        columns: Of the points, (n, 3, 3 k).
+        measured: Positions in the base frame, (n, 3) [m].
+        gap: What they are off by, (n, 3) [m].
+        weight: Of the rows, (n,).
+        own: Rows of every station.
+        off: From the points to the middle of their priors, in standard deviations.
+        near: Standard deviation of the prior [m].
+    """
+    turned = np.swapaxes(np.cross(np.eye(3)[None], measured[:, None]), 1, 2)
+    rigid = np.concatenate([np.tile(-np.eye(3), (len(gap), 1, 1)), -turned], axis=2)
+    placed = [rigid * rows[:, None, None] for rows in own]
+    root = np.sqrt(weight)[:, None]
+    A = np.concatenate([columns, *placed], axis=2) * root[:, :, None]
+    scatter = max(float(np.median(np.linalg.norm(gap, axis=1))), LEAST_GAP)
+    prior = np.zeros((columns.shape[2], A.shape[2]))
+    np.fill_diagonal(prior, scatter / near)
+    rows = np.concatenate([A.reshape(-1, A.shape[2]), prior])
+    target = np.concatenate([(gap * root).reshape(-1), scatter * off.reshape(-1)])
+    step = np.linalg.lstsq(rows, target)[0]
+    return np.asarray(step[: columns.shape[2]].reshape(-1, 3))
+
+
+def undetermined_axes(placed: Registration, arm: Arm, states: States) -> Floats:
+    """Find directions along which no row shows where a probe sits, (m, 3).
+
+    A tool that never turned shows none; one that turned about one axis shows all but
+    that axis. The tracker's place then follows the probe's.
+
+    Args:
+        placed: The registration.
+        arm: The arm.
+        states: States of the rows.
+
+    Returns:
+        Unit vectors in the flange frame.
+    """
+    batch = Batch(arm, placed.on_probes(states))
+    R, left = batch.walk.flange, []
+    for s in range(len(placed.stations)):
+        rows = states.station == s
+        rigid = rigid_motions(batch.walk.tcp[rows]).reshape(-1, 6)
+        own = R[rows].reshape(-1, 3)
+        left.append(own - rigid @ np.linalg.lstsq(rigid, own)[0])
+    shown = np.concatenate(left)
+    size, axes = np.linalg.eigh(shown.T @ shown / max(len(states), 1))
+    return np.asarray(axes.T[np.sqrt(np.maximum(size, 0.0)) < TURNED])
+
+
+def covers_a_plane(arm: Arm, states: States) -> bool:
+    """Return True if the stops of rows do not lie about one line."""
+    tcp = Batch(arm, states).walk.tcp
+    size = np.linalg.svd(tcp - tcp.mean(axis=0), compute_uv=False)
+    return bool(size[1] > SPREAD * np.sqrt(len(tcp)))
 
 
 def typical_gap(
@@ -83,24 +158,44 @@ def typical_gap(
         states: States of the rows.
         position: Measured positions in the tracker frame, (n, 3) [m].
     """
+    if len(states) == 0:
+        return 0.0
     tcp = Batch(arm, registered.on_probes(states)).walk.tcp
-    gap = registered.to_base(position) - tcp
+    gap = registered.to_base(position, states.station) - tcp
     return float(np.median(np.linalg.norm(gap, axis=1)))
 
 
-def _procrustes(a: Floats, b: Floats, weight: Floats) -> Floats:
-    """Find the rigid transform (4, 4) that takes points a (n, 3) to b best."""
-    from scipy.spatial.transform import Rotation  # slow to load, and for fits alone
+def station_of(
+    placed: Registration,
+    arm: Arm,
+    states: States,
+    position: Floats,
+    names: tuple[str, ...],
+) -> Registration:
+    """Give rows the stations of a survey: by name, else that which leaves least.
 
-    total = weight.sum()
-    ca, cb = weight @ a / total, weight @ b / total
-    with warnings.catch_warnings():  # of points on a line any turn about it will do
-        warnings.simplefilter("ignore", UserWarning)
-        turn, _ = Rotation.align_vectors(b - cb, a - ca, weights=weight)
-    T = np.eye(4)
-    T[:3, :3] = turn.as_matrix()
-    T[:3, 3] = cb - T[:3, :3] @ ca
-    return T
+    Args:
+        placed: The survey's registration.
+        arm: The arm.
+        states: States of the rows, with stations of their own.
+        position: Measured positions in the frame of their station, (n, 3) [m].
+        names: Names of the rows' stations.
+    """
+    chosen = []
+    for number, name in enumerate(names):
+        own = states.station == number
+        here = states[own].with_(station=np.zeros(int(own.sum()), dtype=np.int64))
+        if name in placed.stations:
+            chosen.append(placed.stations.index(name))
+            continue
+        sizes = [
+            typical_gap(placed.at_station(k), arm, here, position[own])
+            for k in range(len(placed.stations) if own.any() else 1)
+        ]
+        chosen.append(int(np.argmin(sizes)))
+    return Registration(
+        placed.transforms[chosen], placed.probes, placed.tool_ids, names
+    )
 
 
 def _robust(gap: Floats) -> Floats:
@@ -111,7 +206,11 @@ def _robust(gap: Floats) -> Floats:
 
 
 def predict_registered(
-    model: Model, arm: Arm, states: States, position: Floats
+    model: Model,
+    arm: Arm,
+    states: States,
+    position: Floats,
+    stations: tuple[str, ...] = ("",),
 ) -> tuple[Registration, PredictedReading]:
     """Predict readings of another set-up, which is found from these rows themselves.
 
@@ -123,15 +222,16 @@ def predict_registered(
         arm: The arm.
         states: States of the rows; their `tool` is where the search starts.
         position: Measured positions, any frame that does not move, (n, 3) [m].
+        stations: Names of the tracker's stations, by `states.station`.
 
     Returns:
         The registration, and what is read at its probe points, base frame.
     """
     effects, values, covariance = model.compensable()
-    placed = register(arm, states, position, effects, values)
+    placed = register(arm, states, position, effects, values, stations)
     batch = Batch(arm, placed.on_probes(states))
     at = effects.at(batch, values)
-    own = Placement(tuple(map(int, placed.tool_ids))).columns(at)
+    own = Placement.propose(arm, states).columns(at)
     A = own.reshape(3 * len(batch), -1)
     inverse = np.linalg.pinv(A)
     left = model.untold_variance(effects, at, values)

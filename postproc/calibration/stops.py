@@ -49,8 +49,9 @@ def _commanded_elsewhere(states: States) -> Bools:
     moved = (np.abs(np.diff(states.q, axis=0)) > SAME_POSE).any(axis=1)
     turned = (np.diff(states.direction, axis=0) != 0).any(axis=1)
     loaded = np.diff(np.nan_to_num(states.payload)) != 0
+    seen = np.diff(states.station) != 0
     moving = ~np.isnan(states.heading[1:, 0])
-    return np.asarray(moved | turned | loaded | moving)
+    return np.asarray(moved | turned | loaded | seen | moving)
 
 
 def _long_gaps(time: Floats, begins: Bools) -> Bools:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
-import io
+import itertools
 import re
 import tomllib
 from collections.abc import Mapping
@@ -12,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -29,6 +29,10 @@ from postproc.robot.pose import MM
 MAX_BYTES = 500_000_000
 NUMBER = re.compile(r"^\s*[-+]?\d+([.,]\d+)?([eE][-+]?\d+)?\s*$")
 FEW_NUMBERS = 3  # a first line with as many numbers is no header
+BLANKS = r"\s+"  # the separator of tables in columns
+SEPARATOR = re.compile(r'^\s*"?sep=(.)"?[;,\t]*\s*$', re.I)  # Excel's first line
+COMMENTS = ("#", "//", "%")
+EMPTY_CURE = "Expected a header and one row per measurement"
 DECIMAL_COMMA = re.compile(r"^\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*$")
 
 
@@ -43,6 +47,7 @@ class TextTable:
         line: 1-based line of every row, (n,).
         decimal: "." or ",".
         sha256: Hash of the file's bytes.
+        headed: Whether the file names its columns; else they are 1, 2, ..
     """
 
     path: Path
@@ -51,6 +56,7 @@ class TextTable:
     line: NDArray[np.int64]
     decimal: str
     sha256: str
+    headed: bool = True
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -95,6 +101,15 @@ class TextTable:
             MeasurementError: Naming the missing columns and those that are there.
         """
         missing = [name for name in names if name not in self.columns]
+        if missing and not self.headed:
+            raise MeasurementError(
+                self.path,
+                f"has no header: its columns are 1 to {len(self.columns)}, column "
+                f"{', '.join(missing)} is missing",
+                "Write a header, or name the columns by number in a column map "
+                '(--columns) with lines as q1_deg = "8"',
+                line=int(self.line[0]),
+            )
         if missing:
             raise MeasurementError(
                 self.path,
@@ -128,43 +143,53 @@ def read_table(
     delimiter: str | None = None,
     decimal: str | None = None,
     comment: str | None = None,
-    header: bool = True,
+    header: bool | None = True,
 ) -> TextTable:
     """Read a table; what is not given is detected.
+
+    A line ``sep=;`` names the separator, as Excel writes it. Comment lines, a title
+    above the header, empty rows and empty cells at the ends of rows are no data.
 
     Args:
         path: The file.
         encoding: Name of a Python codec.
         delimiter: Between cells.
         decimal: "." or ",".
-        comment: Lines that begin with it are no data.
-        header: Whether the first line names the columns; else they are 0, 1, ..
+        comment: Lines that begin with it are no data; default: # and // and %.
+        header: Whether the first line names the columns; else they are 1, 2, ..; None:
+            it does unless it holds numbers.
 
     Raises:
         MeasurementError: The file cannot be read, is empty, or its lines differ.
     """
     path = Path(path)
     raw = _read(path)
-    lines = _decode(raw, encoding, path).splitlines()
-    kept = [
+    lines = [
         (i + 1, text)
-        for i, text in enumerate(lines)
-        if text.strip() and not (comment and text.lstrip().startswith(comment))
+        for i, text in enumerate(_decode(raw, encoding, path).splitlines())
+        if text.strip()
     ]
-    if len(kept) < 1 + header:
-        cure = "Expected a header and one row per measurement"
-        raise MeasurementError(path, "has no measurements", cure)
-    split = delimiter or _delimiter(kept[0][1])
-    cells = _cells(path, [text for _, text in kept], split)
-    names = [str(c).strip() for c in cells[0]] if header else _numbered(cells)
-    if len(set(names)) < len(names):
-        twice = next(n for n in names if names.count(n) > 1)
-        raise MeasurementError(path, f"column {twice!r} appears twice", line=kept[0][0])
-    body = cells[1:] if header else cells
-    line = np.array([i for i, _ in kept][int(header) :], dtype=np.int64)
-    sign = decimal or _decimal(body, split)
+    separator = SEPARATOR.match(lines[0][1]) if lines else None
+    if separator is not None:
+        delimiter, lines = delimiter or separator.group(1), lines[1:]
+    lines, comments = _without_comments(lines, comment)
+    if not lines:
+        raise MeasurementError(path, "has no measurements", EMPTY_CURE)
+    split = delimiter or _delimiter([text for _, text in lines])
+    rows = _without_title(_cut(path, lines, split))
+    headed = _is_header(rows[0][1]) if header is None else header
+    names_of_columns = _header_in(comments, split, rows) if not headed else None
+    if header is not False and names_of_columns is not None:
+        rows, headed = [names_of_columns, *rows], True
+    if len(rows) < 1 + headed:
+        raise MeasurementError(path, "has no measurements", EMPTY_CURE)
+    body = rows[1:] if headed else rows
+    names = _strip_end(rows[0][1]) if headed else _numbered(body)
+    cells, names = _block(path, names, body, rows[0][0], headed)
+    line = np.array([i for i, _ in body], dtype=np.int64)
+    sign = decimal or _decimal(cells, split)
     digest = hashlib.sha256(raw).hexdigest()
-    return TextTable(path, tuple(names), body, line, sign, digest)
+    return TextTable(path, tuple(names), cells, line, sign, digest, headed)
 
 
 def read_headed(path: str | Path, **options: Any) -> TextTable:
@@ -173,11 +198,7 @@ def read_headed(path: str | Path, **options: Any) -> TextTable:
     Raises:
         MeasurementError: See `read_table`.
     """
-    table = read_table(path, header=False, **options)
-    numbers = sum(bool(NUMBER.match(str(cell))) for cell in table.cells[0])
-    if numbers >= FEW_NUMBERS and len(table.cells):
-        return table
-    return read_table(path, **options)
+    return read_table(path, **{"header": None, **options})
 
 
 def _read(path: Path) -> bytes:
@@ -208,25 +229,134 @@ def _decode(raw: bytes, encoding: str | None, path: Path) -> str:
     return raw.decode("latin-1")
 
 
-def _delimiter(header: str) -> str:
-    """Take the separator that cuts the header into most cells."""
-    best = max((";", "\t", ","), key=header.count)
-    return best if header.count(best) else r"\s+"
+Lines = list[tuple[int, str]]  # 1-based line and its text
+Row = tuple[int, list[str]]  # 1-based line and its cells
 
 
-def _cells(path: Path, lines: list[str], split: str) -> NDArray[np.object_]:
-    """Cut lines into cells."""
-    try:
-        frame = pd.read_csv(
-            io.StringIO("\n".join(lines)),
-            sep=split, header=None, dtype=str, keep_default_na=False,
-            skipinitialspace=True, engine="python" if len(split) > 1 else "c",
-        )  # fmt: skip
-    except (pd.errors.ParserError, pd.errors.EmptyDataError, ValueError) as exc:
-        problem = f"is not a regular table ({str(exc).strip()})"
-        cure = "Every row needs as many cells as the header"
-        raise MeasurementError(path, problem, cure) from None
-    return np.asarray(frame.to_numpy(dtype=object, na_value=""))
+def _without_comments(lines: Lines, comment: str | None) -> tuple[Lines, Lines]:
+    """Part the rows from comment lines; return both.
+
+    Where most lines begin with the sign, it belongs to the names of the points.
+    """
+    signs = (comment,) if comment else COMMENTS
+    noted = [text.lstrip(' "').startswith(signs) for _, text in lines]
+    if comment is None and 2 * sum(noted) > len(lines) + 4:
+        return lines, []
+    pairs = list(zip(lines, noted, strict=True))
+    return [t for t, is_note in pairs if not is_note], [t for t, note in pairs if note]
+
+
+def _header_in(comments: Lines, split: str, rows: list[Row]) -> Row | None:
+    """Find a header in the last comment above the rows, as numpy.savetxt writes it."""
+    above = [line for line in comments if line[0] < rows[0][0]]
+    if not above:
+        return None
+    number, text = above[-1]
+    cells = _strip_end(_cells_of(text.lstrip().lstrip("#/% "), split))
+    fits = len(cells) == len(_strip_end(rows[0][1])) and len(set(cells)) == len(cells)
+    return (number, cells) if fits and _is_header(cells) else None
+
+
+def _is_header(cells: list[str]) -> bool:
+    """Return True if cells name columns: few numbers, or the columns' own numbers."""
+    cells = _strip_end(cells)
+    numbers = sum(bool(NUMBER.match(cell)) for cell in cells)
+    counted = [[str(k + first) for k in range(len(cells))] for first in (0, 1)]
+    return numbers < FEW_NUMBERS or cells in counted
+
+
+def _without_title(rows: list[Row]) -> list[Row]:
+    """Leave out lines of text above the header, which have fewer cells than rows."""
+    widths = [sum(cell != "" for cell in cells) for _, cells in rows]
+    usual = float(np.median(widths))
+    for k, (_, cells) in enumerate(rows):
+        numbers = sum(bool(NUMBER.match(cell)) for cell in cells)
+        if 2 * widths[k] >= usual or numbers > 1:
+            return rows[k:]
+    return rows
+
+
+def _delimiter(lines: list[str]) -> str:
+    """Take the separator that cuts the first line into most cells."""
+    first = max(lines[:3], key=len)
+    best = max((";", "\t", ","), key=first.count)
+    if best == ",":  # or they are decimal commas between blanks
+        cells = lines[min(1, len(lines) - 1)].split()
+        if sum(bool(DECIMAL_COMMA.match(cell)) for cell in cells) >= FEW_NUMBERS:
+            return BLANKS
+    return best if first.count(best) else BLANKS
+
+
+def _cut(path: Path, lines: Lines, split: str) -> list[Row]:
+    """Cut lines into cells, stripped; rows of empty cells are left out."""
+    if split == BLANKS or len(split) > 1 or sum(t.count('"') for _, t in lines) % 2:
+        rows = [(number, _cells_of(text, split)) for number, text in lines]
+    else:  # a quoted cell may go over several lines
+        reader = csv.reader(
+            (text + "\n" for _, text in lines), delimiter=split, skipinitialspace=True
+        )
+        rows, before = [], 0
+        try:
+            for cells in reader:
+                number = lines[before][0]
+                rows.append((number, [" ".join(c.split()) for c in cells]))
+                before = reader.line_num
+        except csv.Error:
+            problem = "holds a cell of more than 100,000 characters"
+            cure = "Export the measurements as CSV text"
+            raise MeasurementError(path, problem, cure, line=lines[before][0]) from None
+    rows = [row for row in rows if any(row[1])]
+    if not rows:
+        raise MeasurementError(path, "has no measurements", EMPTY_CURE)
+    return rows
+
+
+def _cells_of(text: str, split: str) -> list[str]:
+    """Cut one line into cells."""
+    if split == BLANKS:
+        return [cell.strip('"') for cell in re.findall(r'"[^"]*"|\S+', text)]
+    if len(split) > 1:
+        return [cell.strip().strip('"') for cell in re.split(split, text.strip())]
+    return [cell.strip().strip('"').strip() for cell in text.split(split)]
+
+
+def _strip_end(cells: list[str]) -> list[str]:
+    """Leave out empty cells at the end."""
+    count = len(cells)
+    while count and cells[count - 1] == "":
+        count -= 1
+    return cells[:count]
+
+
+def _block(
+    path: Path, names: list[str], body: list[Row], top: int, headed: bool
+) -> tuple[NDArray[np.object_], list[str]]:
+    """Put rows under the names of their columns; columns without a name are left out.
+
+    Raises:
+        MeasurementError: A row has more cells than there are names, or a name is twice.
+    """
+    twice = next((n for n in names if n and names.count(n) > 1), None)
+    if twice is not None:
+        cure = "Give every column a name of its own"
+        problem = f"column {twice!r} appears twice"
+        raise MeasurementError(path, problem, cure, line=top)
+    width = len(names)
+    cells = np.full((len(body), width), "", dtype=object)
+    for k, (line, row) in enumerate(body):
+        used = _strip_end(row)
+        if len(used) > width:
+            what = "the header names" if headed else "the first row has"
+            raise MeasurementError(
+                path,
+                f"has {len(used)} cells, {what} {width}",
+                "Every row needs as many cells as the header. A decimal comma needs "
+                "another separator (--delimiter), a separator in a cell needs quotes",
+                line=line,
+            )
+        cells[k, : len(used)] = used
+    named = [k for k, name in enumerate(names) if name]
+    return cells[:, named], [names[k] for k in named]
 
 
 def _decimal(cells: NDArray[np.object_], split: str) -> str:
@@ -237,9 +367,10 @@ def _decimal(cells: NDArray[np.object_], split: str) -> str:
     return "," if comma else "."
 
 
-def _numbered(cells: NDArray[np.object_]) -> list[str]:
-    """Name columns by their number, from 1."""
-    return [str(k + 1) for k in range(cells.shape[1])]
+def _numbered(rows: list[Row]) -> list[str]:
+    """Name columns by their number, from 1: as many as the first rows have cells."""
+    width = int(np.median([len(_strip_end(cells)) for _, cells in rows]))
+    return [str(k + 1) for k in range(max(width, len(_strip_end(rows[0][1]))))]
 
 
 # Single columns of a measurement file: ids, directions, probe points.
@@ -248,7 +379,10 @@ SIDES = tuple(f"lambda{j}" for j in range(1, 7))
 TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
 ROTATION = ("rx_deg", "ry_deg", "rz_deg")
 JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
+JOINT = re.compile(r"^q\d+_deg$")
 DETOURS = 0.05  # share of other sides from which rows do not follow straight ways
+MOST_RESTARTS = 4  # of a clock in one file: rows that step back more often are sorted
+OPPOSED = 60  # directions that are opposite to the rows by no accident
 MANY = 20  # rows that are in order of a column by no accident
 TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 
@@ -273,18 +407,132 @@ def unique_ids(table: TextTable) -> tuple[str, ...]:
     return tuple(ids)
 
 
+CLOCKS = ("order", "time_s")  # columns that put rows in the order of visits
+
+
+def in_visit_order(table: TextTable) -> TextTable:
+    """Sort rows by column order, else by time_s, where all of them have it.
+
+    Raises:
+        MeasurementError: Both are there and disagree, or the times of two parts of the
+            file overlap: then the clock began again, and nothing says which came first.
+    """
+    clocks = {name: table.numbers(name, empty=True) for name in _clocks_of(table)}
+    order = clocks.get("order")
+    if order is not None:
+        _check_order(table, order)
+    clocks = {name: c for name, c in clocks.items() if _runs(c)}
+    if len(clocks) == len(CLOCKS):
+        _check_clash(table, **clocks)
+    if not clocks:
+        return table
+    name, passed = next(iter(clocks.items()))
+    if name == "time_s":
+        _check_restart(table, passed)
+    rows = np.argsort(passed, kind="stable")
+    return replace(table, cells=table.cells[rows], line=table.line[rows])
+
+
+def clock_of(table: TextTable) -> str:
+    """Name the column that gives the order of visits, "" where it is that of rows."""
+    for name in _clocks_of(table):
+        if _runs(table.numbers(name, empty=True)):
+            return name
+    return ""
+
+
+def _clocks_of(table: TextTable) -> tuple[str, ...]:
+    """Name the columns of the table that tell the moment of a row."""
+    return tuple(name for name in CLOCKS if table.has(name))
+
+
+def _runs(clock: Floats) -> bool:
+    """Return True if every row has a moment, and not all the same."""
+    return bool(len(clock) > 1 and not np.isnan(clock).any() and np.ptp(clock) > 0)
+
+
+def _check_order(table: TextTable, order: Floats) -> None:
+    """Refuse a column order that puts two rows at one place, or has gaps in it."""
+    lost = np.isnan(order)
+    if lost.any():
+        cure = "Number all rows, those on fixed points too, or leave the column out"
+        line = int(table.line[np.argmax(lost)])
+        raise MeasurementError(table.path, "has no order", cure, line=line)
+    place = np.argsort(order, kind="stable")
+    same = np.flatnonzero(np.diff(order[place]) == 0)
+    if len(same):
+        line, other = table.line[place[same[0] + 1]], table.line[place[same[0]]]
+        raise MeasurementError(
+            table.path,
+            f"order {order[place[same[0]]]:g} is also in line {other}",
+            "Give every row its own place in the order of visits",
+            line=int(line),
+        )
+
+
+def _check_clash(table: TextTable, order: Floats, time_s: Floats) -> None:
+    """Refuse an order that times contradict."""
+    place = np.argsort(order, kind="stable")
+    back = np.flatnonzero(np.diff(time_s[place]) < 0)
+    if len(back):
+        first, second = place[back[0]], place[back[0] + 1]
+        raise MeasurementError(
+            table.path,
+            f"order and time_s disagree: line {table.line[second]} follows line "
+            f"{table.line[first]} by order, but is {np.ptp(time_s[[first, second]]):g} "
+            f"s earlier ({len(back)} such pairs)",
+            "Which of them is the order of visits? Leave the other column out",
+            line=int(table.line[second]),
+        )
+
+
+def _check_restart(table: TextTable, time: Floats) -> None:
+    """Refuse times of a clock that began again within the file.
+
+    Rows that are sorted by another column step back often, rows newest first always;
+    parts that were put together step back once for each, and cover the same times.
+    """
+    forward = time if (np.diff(time) > 0).sum() >= (np.diff(time) < 0).sum() else -time
+    back = np.flatnonzero(np.diff(forward) < 0)
+    if len(back) == 0 or len(back) > MOST_RESTARTS or len(time) < MANY:
+        return
+    ends = [0, *(back + 1).tolist(), len(time)]
+    parts = sorted(
+        (float(forward[a:b].min()), float(forward[a:b].max()))
+        for a, b in itertools.pairwise(ends)
+    )
+    for (_, high), (low, _) in itertools.pairwise(parts):
+        if low < high:
+            raise MeasurementError(
+                table.path,
+                f"time_s goes back in line {table.line[back[0] + 1]}, and rows before "
+                "and after it cover the same times",
+                "Did the clock begin again? Then split the file there. Were rows "
+                "sorted? Then add a column order",
+                line=int(table.line[back[0] + 1]),
+            )
+
+
 def read_directions(
     table: TextTable, arm: Arm, q: Floats
 ) -> tuple[Floats, Floats, Bools, tuple[str, ...]]:
-    """Read the arrival directions and travels, or infer them from the row order."""
+    """Read the arrival directions and travels, or infer them from the order of visits.
+
+    Args:
+        table: Rows in the order of visits.
+        arm: The arm.
+        q: Joint angles, (n, 6) [rad].
+    """
     arrived = arrivals_of_rows(arm, q)
     travel = arrived.travel
     if table.has(*TRAVELS):
         travel = np.deg2rad(table.block(TRAVELS))
     if not table.has(*SIDES):
+        clock = clock_of(table)
+        by, doubt = (clock, "") if clock else ("the order of the rows", _sorted(table))
         warnings = (
-            f"{table.path}: no lambda columns; directions inferred from the order of "
-            f"the rows, as JOINT moves. {_sorted(table)}",
+            f"{table.path}: no lambda columns; directions inferred from {by}, as JOINT "
+            f"moves{doubt}",
         )
         return arrived.direction, travel, np.ones(len(q), dtype=bool), warnings
     side = table.block(SIDES)
@@ -295,7 +543,29 @@ def read_directions(
         line = int(table.line[np.argmax(wrong)])
         cure = "lambda is 1 (positive direction), -1, or 0 where not known"
         raise MeasurementError(table.path, "wrong lambda", cure, line=line)
-    return side, travel, np.zeros(len(q), dtype=bool), ()
+    told = _against_the_rows(table, side, arrived.direction)
+    return side, travel, np.zeros(len(q), dtype=bool), told
+
+
+def _against_the_rows(
+    table: TextTable, side: Floats, straight: Floats
+) -> tuple[str, ...]:
+    """Ask about directions that are all opposite to those of straight ways.
+
+    Args:
+        table: The rows.
+        side: Of the file, (n, 6).
+        straight: Inferred from row to row, (n, 6).
+    """
+    both = (side != 0) & (straight != 0)
+    count, opposite = int(both.sum()), int((both & (side != straight)).sum())
+    if count < OPPOSED or opposite < (1.0 - DETOURS) * count:
+        return ()
+    return (
+        f"{table.path}: {opposite} of {count} directions (lambda) are opposite to the "
+        "way from row to row. Right if the arm goes beyond each pose and comes back; "
+        "else lambda has the other sign: it is 1 where a joint came forward",
+    )
 
 
 def _of_straight_ways(travel: Floats, side: Floats, straight: Floats) -> Floats:
@@ -316,34 +586,166 @@ def _of_straight_ways(travel: Floats, side: Floats, straight: Floats) -> Floats:
     return np.where(other, np.nan, travel)
 
 
-def read_tools(
-    table: TextTable, tools: Floats | Mapping[int, Floats]
-) -> tuple[Floats, NDArray[np.int64]]:
-    """Look up every row's tool.
+Nests = Floats | Mapping[int, Floats] | Mapping[str, Floats]
+
+
+def read_tools(table: TextTable, tools: Nests) -> tuple[Floats, NDArray[np.int64]]:
+    """Look up every row's probe point, by a column tool_id or nest.
+
+    Args:
+        table: The rows.
+        tools: Probe points in the flange frame [m]: by number from 0, or by name.
 
     Raises:
-        MeasurementError: A tool_id that no probe point is known for.
+        MeasurementError: A tool_id that no probe point is known for, or that may mean
+            two of them.
     """
-    n = len(table)
-    known = (
-        tools if isinstance(tools, Mapping) else dict(enumerate(np.atleast_2d(tools)))
-    )
-    numbers = table.numbers("tool_id") if table.has("tool_id") else np.zeros(n)
+    named = isinstance(tools, Mapping) and any(isinstance(k, str) for k in tools)
+    column = _nest_column(table)
+    if column and table.has(*TOOL) and _all_numbers(table, column):
+        named = named and set(table.text(column)) <= set(map(str, tools))
+    if column and (named or not _all_numbers(table, column)):
+        return _read_named(table, column, tools if named else {})  # type: ignore[arg-type]
+    if named and not table.has(*TOOL):
+        return _read_named(table, column, tools)  # type: ignore[arg-type]
+    numbers = table.numbers(column) if column else np.zeros(len(table))
     tool_id = np.asarray(np.round(numbers), dtype=np.int64)
     if table.has(*TOOL):
         return table.block(TOOL) * MM, tool_id
-    if min(tool_id, default=0) > 0 and 0 in known and max(tool_id) == len(known):
-        tool_id = tool_id - 1  # numbered from 1
+    known: dict[int, Floats] = (
+        {int(k): v for k, v in tools.items()}
+        if isinstance(tools, Mapping)
+        else dict(enumerate(np.atleast_2d(tools)))
+    )
+    tool_id = _from_zero(table, tool_id, known)
     for i, one in enumerate(tool_id):
         if int(one) not in known:
             raise MeasurementError(
                 table.path,
-                f"tool_id {int(numbers[i])} is not one of the cell's probe points",
+                f"{column} {int(numbers[i])} is not one of the cell's probe points",
                 "Add the point to the cell file, or columns tool_x_mm, tool_y_mm, "
                 "tool_z_mm",
                 line=int(table.line[i]),
             )
     return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
+
+
+def _nest_column(table: TextTable) -> str:
+    """Name the column of probe points, "" without one.
+
+    Raises:
+        MeasurementError: There are two.
+    """
+    found = [name for name in ("nest", "tool_id") if table.has(name)]
+    if len(found) > 1:
+        cure = "They are one: leave one of them out"
+        problem = "has columns nest and tool_id"
+        raise MeasurementError(table.path, problem, cure, line=1)
+    return found[0] if found else ""
+
+
+def _all_numbers(table: TextTable, column: str) -> bool:
+    """Return True if a column holds nothing but numbers."""
+    return all(NUMBER.match(text) for text in table.text(column))
+
+
+def _from_zero(
+    table: TextTable, tool_id: NDArray[np.int64], known: Mapping[int, Floats]
+) -> NDArray[np.int64]:
+    """Count tools from 0, where the file counts them from 1.
+
+    Raises:
+        MeasurementError: Both readings fit the cell's points.
+    """
+    count = len(known)
+    if len(tool_id) == 0 or set(known) != set(range(count)) or tool_id.min() < 1:
+        return tool_id
+    if tool_id.max() == count:
+        return tool_id - 1
+    if tool_id.max() > count:
+        return tool_id
+    ids = np.unique(tool_id)
+
+    def points(numbers: NDArray[np.int64]) -> str:
+        return ", ".join(
+            "(" + ", ".join(f"{v / MM:g}" for v in known[int(k)]) + ")" for k in numbers
+        )
+
+    raise MeasurementError(
+        table.path,
+        f"tool_id {', '.join(map(str, ids))} may count the cell's {count} points from "
+        f"0, which is {points(ids)} mm, or from 1, which is {points(ids - 1)} mm",
+        "Name the points in [survey.points] of the cell and write the names, or add "
+        "columns tool_x_mm, tool_y_mm, tool_z_mm",
+        line=int(table.line[0]),
+    )
+
+
+def _read_named(
+    table: TextTable, column: str, tools: Mapping[str, Floats]
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Look up probe points by name.
+
+    Raises:
+        MeasurementError: A name that the cell does not have, or no column.
+    """
+    names = {name.strip().lower(): k for k, name in enumerate(tools)}
+    listed = ", ".join(tools) or "none"
+    if not column:
+        if len(tools) == 1:
+            texts = list(tools) * len(table)
+        else:
+            cure = f"Add it. The cell's points are {listed}"
+            problem = "has no column nest"
+            raise MeasurementError(table.path, problem, cure, line=1)
+    else:
+        texts = table.text(column)
+    numbers = np.zeros(len(table), dtype=np.int64)
+    for i, text in enumerate(texts):
+        number = names.get(text.lower())
+        if number is None:
+            raise MeasurementError(
+                table.path,
+                f"{column} {text!r} is not one of the cell's probe points: {listed}",
+                "Correct the name, or add the point to [survey.points] in the cell "
+                "file",
+                line=int(table.line[i]),
+            )
+        numbers[i] = number
+    if table.has(*TOOL):
+        return table.block(TOOL) * MM, numbers
+    points = np.array([np.asarray(v, float) for v in tools.values()])
+    return points[numbers], numbers
+
+
+def check_axes(table: TextTable) -> None:
+    """Refuse a table whose joints are not those of an arm of six axes.
+
+    Raises:
+        MeasurementError: Saying how an arm with more or fewer is written.
+    """
+    found = [name for name in table.columns if JOINT.match(name)]
+    in_a_row = all(f"q{k + 1}_deg" in found for k in range(len(found)))
+    if not found or set(found) == set(JOINTS) or not in_a_row:
+        return
+    if len(found) > len(JOINTS):
+        cure = (
+            "Of an arm with seven axes keep one joint locked: write the other six as "
+            "q1_deg .. q6_deg, and the locked angle into the D-H rows of the arm file. "
+            "A track or positioner that stood still is left out"
+        )
+    else:
+        cure = (
+            "Write the axes that the arm lacks as columns of 0, with D-H rows of their "
+            "own in the arm file"
+        )
+    raise MeasurementError(
+        table.path,
+        f"has {len(found)} joint columns ({', '.join(found)}); arms have six, q1_deg "
+        "to q6_deg",
+        cure,
+        line=1,
+    )
 
 
 def read_rotation(table: TextTable) -> Floats | None:
@@ -366,12 +768,14 @@ def _sorted(table: TextTable) -> str:
     """Say whether the rows still are in the order in which they were measured."""
     for name in (*JOINTS, "x_mm", "y_mm", "z_mm"):
         step = np.diff(table.numbers(name)) if table.has(name) else np.zeros(0)
-        if len(step) > MANY and ((step >= 0).all() or (step <= 0).all()):
+        one_way = (step >= 0).all() or (step <= 0).all()
+        if len(step) > MANY and one_way and step.any():
             return (
-                f"The rows are sorted by {name}: the order of visits is lost, and "
-                "backlash with it. Use the file as it was measured"
+                f". The rows are sorted by {name}: the order of visits is lost, and "
+                "backlash with it. Use the file as it was measured, or add a column "
+                "time_s or order"
             )
-    return "Wrong if the rows were sorted"
+    return ". Wrong if the rows were sorted: a column time_s or order tells"
 
 
 # The table that RoboDK's calibration project saves (SaveTable): 18 columns.
@@ -424,7 +828,7 @@ def from_robodk(table: TextTable) -> TextTable:
 # How to read a measurement file, where what is detected would be wrong.
 
 UNITS = {"mm": 1.0, "m": 1000.0, "inch": 25.4}  # mm per unit
-NAMED = {"tab": "\t", "space": r"\s+", "comma": ",", "semicolon": ";"}
+NAMED = {"tab": "\t", "space": BLANKS, "comma": ",", "semicolon": ";"}
 
 
 @dataclass(frozen=True)
@@ -484,11 +888,12 @@ DETECT = TableFormat()
 #     decimal = ","
 #     encoding = "latin-1"
 #     comment = "//"
+#     header = false                                # columns are "1", "2", ..
 
 DEGREES = float(np.rad2deg(1.0))  # per radian
-TEXTS = ("id", "reference")  # columns of ours that hold no numbers
+TEXTS = ("id", "reference", "station", "nest")  # columns of ours that hold no numbers
 MAP_KEYS = ("columns", "file")
-FILE_KEYS = ("delimiter", "decimal", "encoding", "comment")
+FILE_KEYS = ("delimiter", "decimal", "encoding", "comment", "header")
 
 
 @dataclass(frozen=True)
@@ -501,7 +906,7 @@ class Format:
     """
 
     columns: Mapping[str, tuple[tuple[str, float], ...]]
-    reading: Mapping[str, str] = field(default_factory=dict)
+    reading: Mapping[str, Any] = field(default_factory=dict)
 
     def fits(self, table: TextTable) -> bool:
         """Tell whether a table has all columns of the format."""
@@ -546,7 +951,7 @@ def read_foreign(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
         form = reading.columns
         if not isinstance(form, Format):
             form = read_column_map(form)
-        table = read_table(path, **{**form.reading, **reading.given})  # type: ignore[arg-type]
+        table = read_headed(path, **{**form.reading, **reading.given})
         table.require(*form.sources)
         return translate(table, form)
     table = read_headed(path, **reading.given)
@@ -617,6 +1022,12 @@ def column_map(path: str | Path, data: Mapping[str, Any]) -> Format:
     if not columns:
         cure = 'Write [columns] with lines as q1_deg = "A1"'
         raise MeasurementError(path, "maps no column", cure, place="$.columns")
+    if not isinstance(reading.get("header", True), bool):
+        place = "$.file.header"
+        raise MeasurementError(path, "not true or false", "Correct it", place=place)
+    named = reading.get("delimiter")
+    if isinstance(named, str):
+        reading = {**reading, "delimiter": NAMED.get(named, named)}
     return Format(columns, reading)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.cross_validation import (
     PARTS,
-    Compared,
     HeldOutError,
     HeldOutRows,
+    PairedErrors,
     choose,
     held_out,
     held_out_linearly,
@@ -63,7 +63,7 @@ WITH_LAWS = Rung("effects with a law", None)
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class FitTask:
     """A survey that is to be fitted.
 
     Attributes:
@@ -130,7 +130,7 @@ class Validated:
     rejected: str = ""
 
 
-def validate_fit(task: Task, fitted: Fit) -> Validated:
+def validate_fit(task: FitTask, fitted: Fit) -> Validated:
     """Find what a fit leaves at new poses; take simpler effects that leave less.
 
     Args:
@@ -154,7 +154,7 @@ def validate_fit(task: Task, fitted: Fit) -> Validated:
 
 
 def _choose(
-    task: Task, effects: tuple[Effect, ...], part: Ints, used: Bools
+    task: FitTask, effects: tuple[Effect, ...], part: Ints, used: Bools
 ) -> tuple[Rung, HeldOutRows, tuple[str, ...]]:
     """Choose the effects that leave new poses least.
 
@@ -185,14 +185,14 @@ def _choose(
     return rung, rows, (note,)
 
 
-def _conclude(task: Task, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Validated:
+def _conclude(task: FitTask, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Validated:
     """Put figures together, and compare with a set-up without errors of the arm."""
     survey = task.survey
     model = model_of(fitted, survey)
     region = held_out_linearly(fitted, model, regions_of(survey))
     error = summarise(rows, mean_error_mm(region), chosen)
     plain = task.errors(SET_UP, rows.part, rows.used)
-    if Compared.of(plain, rows).better or mean_error_mm(plain) < FLOOR / MM:
+    if PairedErrors.of(plain, rows).better or mean_error_mm(plain) < FLOOR / MM:
         return Validated(fitted, error, rows.widening)
     why = (
         f"new poses are left {error.error.mean_mm:.4f} mm with this model and "

@@ -14,22 +14,29 @@ from postproc.calibration.diagnosis.diagnose import Extension, diagnose
 from postproc.calibration.diagnosis.result import Diagnosis
 from postproc.calibration.diagnosis.search import Progress
 from postproc.calibration.diagnosis.trace import REMAINS, silent
-from postproc.calibration.fit import read_surveys, several_points
+from postproc.calibration.fit import file_shifts, read_surveys, several_points
 from postproc.calibration.measurements import (
     COVARIATES,
     POSITION,
     Measurements,
     concatenate,
     read_points,
+    read_stations,
+)
+from postproc.calibration.plausibility import (
+    check_against,
+    check_own_registration,
+    check_stops,
 )
 from postproc.calibration.references import split_references
-from postproc.calibration.registration import register
+from postproc.calibration.registration import register, station_of
 from postproc.calibration.report import DirectionReport
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.cli.jobs import read_files
 from postproc.compensation.program import Planned, plan_visits, read_program, states_of
 from postproc.exceptions import MeasurementError
 from postproc.model.effects.placement import Placement
+from postproc.model.kinematics import Batch
 from postproc.model.model import Model, load_model
 from postproc.model.registration import Registration
 from postproc.model.statistics import ErrorStatistics
@@ -77,9 +84,11 @@ def join_program(
     if len(lost):
         row = order[lost[0]]
         raise _unplanned(data, ids[row], int(table.line[row]), planned, int(rows[row]))
+    stations, station = read_stations(table)
     return Measurements(
         path=table.path,
-        states=states.with_(**recorded),
+        states=states.with_(**recorded, station=station[order]),
+        stations=stations,
         position=table.block(POSITION)[order] * MM,
         ids=tuple(ids[k] for k in order),
         line=table.line[order],
@@ -194,16 +203,27 @@ def diagnose_files(
         program = asked.program
         survey = concatenate([join_program(path, program, cell) for path in data])
     tracker, setup, placed = cell.tracker, several_points(survey), None
+    notes: tuple[str, ...] = ()
     if asked.measured_frame == "uframe":
         survey = from_user_frame(survey, cell)
     elif asked.measured_frame == "tracker":
+        seen = survey
         survey, placed = from_tracker_frame(survey, cell, model)
-        tracker, setup = placed.tracker, REGISTERED
+        notes = registrations(seen, survey, placed, cell, model)
+        tracker, setup = placed.origin, REGISTERED
+    if placed is None:
+        setup = (*setup, *file_shifts(survey, cell.arm, cell.tracker))
+    check_against(survey, cell.arm, model)
     found = diagnose(
         survey, cell.arm, model, tracker=tracker, setup=setup, seed=asked.seed,
         progress=progress,
     )  # fmt: skip
-    found = replace(found, model=replace(found.model, registration=placed))
+    seen_fixed = (*found.diagnosis.fixed_points, *notes)
+    found = replace(
+        found,
+        model=replace(found.model, registration=placed),
+        diagnosis=replace(found.diagnosis, fixed_points=seen_fixed),
+    )
     if found.diagnosis.verdict != "rejected":
         found.model.save(asked.output or extended_path(model_path))
     return found
@@ -232,14 +252,62 @@ def from_tracker_frame(
         The measurements in the base frame, and where tracker and probes are.
     """
     effects, values, _ = model.compensable()
-    placed = register(cell.arm, survey.states, survey.position, effects, values)
+    check_own_registration(survey, cell.arm)
+    check_stops(survey, cell.arm)
     states = survey.states
+    placed = register(
+        cell.arm, states, survey.position, effects, values, survey.stations
+    )
     _, first, which = np.unique(states.tool_id, return_index=True, return_inverse=True)
     if any(isinstance(e, Placement) for e in model.effects.effects):
         states = states.with_(tool=placed.probes[which])
     placed = replace(placed, probes=states.tool[first])
-    position = placed.to_base(survey.position)
+    position = placed.to_base(survey.position, states.station)
     return replace(survey, states=states, position=position), placed
+
+
+def registrations(
+    seen: Measurements,
+    base: Measurements,
+    placed: Registration,
+    cell: Cell,
+    model: Model,
+) -> tuple[str, ...]:
+    """Say what the model leaves in its survey's set-up, and registered by these rows.
+
+    Args:
+        seen: The rows in the tracker's frame.
+        base: The same in the base frame, by a registration of their own.
+        placed: That registration.
+        cell: The cell.
+        model: The model.
+    """
+
+    def left(rows: Measurements) -> float:
+        error = model.error(cell.arm, rows.states)
+        gap = rows.position - Batch(cell.arm, rows.states).walk.tcp - error
+        return float(np.linalg.norm(gap, axis=1).mean()) / MM
+
+    spent = 6 * len(placed.transforms) + 3 * len(placed.probes)
+    free = max(3 * len(seen) - spent, 1)
+    own = left(base) * float(np.sqrt(3 * len(seen) / free))
+    told = (
+        f"registered from its own rows the file is left {own:.4f} mm on average "
+        f"({spent} numbers of {3 * len(seen)} readings counted)"
+    )
+    survey = model.registration
+    if survey is None or np.setdiff1d(seen.states.tool_id, survey.tool_ids).size:
+        return (told,)
+    there = station_of(survey, cell.arm, seen.states, seen.position, seen.stations)
+    station = seen.states.station
+    as_fitted = left(
+        replace(
+            seen,
+            states=there.on_probes(seen.states),
+            position=there.to_base(seen.position, station),
+        )
+    )
+    return (told, f"in the set-up of the model's survey {as_fitted:.4f} mm")
 
 
 def tell(found: Diagnosis) -> str:

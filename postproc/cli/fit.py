@@ -16,14 +16,13 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.calibration.fit import (
     Calibration,
-    carrying_load,
     fit,
     fit_measurements,
     into_base_frame,
     read_surveys,
 )
-from postproc.calibration.measurements import Measurements, concatenate, from_table
-from postproc.calibration.plausibility import check_survey
+from postproc.calibration.measurements import Measurements, concatenate
+from postproc.calibration.plausibility import check_against, check_survey
 from postproc.calibration.published import (
     VOLUME_DEG,
     Comparison,
@@ -34,22 +33,20 @@ from postproc.calibration.published import (
     random_split,
     span_of,
 )
-from postproc.calibration.registration import predict_registered
 from postproc.calibration.report import FitReport, Found, FreeForms
 from postproc.calibration.reversals import split_reversals
 from postproc.calibration.tables import DETECT, TableFormat, read_foreign
 from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program, tell_directions
-from postproc.exceptions import MeasurementError, PostprocError
+from postproc.cli.readings import Readings, read_setup, rows_of
+from postproc.exceptions import PostprocError
 from postproc.files import write_all
 from postproc.model.model import (
     FreePart,
     Model,
-    PredictedReading,
     Prediction,
     load_model,
 )
-from postproc.model.registration import Registration
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.terminal import Column, table_text
 from postproc.robot.cell import Cell, load_cell
@@ -425,9 +422,10 @@ def _trial(train: Measurements, test: Measurements, cell: Cell, frame: str) -> T
     if frame != "tracker":
         return Trial(train, test, cell.tracker)
     train, found = into_base_frame(train, cell.arm)
-    states, position = found.on_probes(test.states), found.to_base(test.position)
+    states = found.on_probes(test.states)
+    position = found.to_base(test.position, states.station)
     test = replace(test, states=states, position=position)
-    return Trial(train, test, found.tracker)
+    return Trial(train, test, found.origin)
 
 
 def comparison_json(found: Comparison) -> str:
@@ -451,30 +449,6 @@ def tell_comparison(found: Comparison) -> str:
     if max(found.span_deg) > VOLUME_DEG:
         told += f"; the ELMs follow about {VOLUME_DEG:.0f}"
     return f"{table_text(COMPARED, rows)}\n{found.split}\n{told}"
-
-
-@dataclass(frozen=True)
-class Readings:
-    """What is asked of the readings of a survey's set-up.
-
-    Attributes:
-        frame: Frame of the measured positions, "base" or "tracker"; None where only
-            the error of the arm is asked for.
-        refit: What of the set-up is found from the rows themselves: "registration",
-            or None where the set-up is that of the model's survey.
-    """
-
-    frame: str | None = None
-    refit: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.refit not in (None, "registration"):
-            raise PostprocError(f"--refit {self.refit!r}: write registration")
-
-    @property
-    def asked(self) -> bool:
-        """Whether readings are predicted."""
-        return self.frame is not None or self.refit is not None
 
 
 def predict_file(
@@ -509,7 +483,9 @@ def predict_file(
 
 def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
     """Add predicted errors to the rows of a table; lost beams get empty cells."""
-    measured = _rows(table, cell, positions=False)
+    measured = rows_of(table, cell, positions=False)
+    if table.has(*POSITION):
+        check_against(measured, cell.arm, model)
     predicted = model.predict(cell.arm, measured.states)
     header, parts, told = _told(predicted, model.free_part(cell.arm, measured.states))
     summary = _inside(predicted) + told + _warming(table, model)
@@ -544,7 +520,8 @@ def predict_readings(
     Raises:
         PostprocError: The set-up is not known, and not to be found from the rows.
     """
-    rows, read, placed = read_setup(table, cell, model, readings)
+    found = read_setup(table, cell, model, readings)
+    rows, read, placed = found.rows, found.read, found.note
     predicted = model.predict(cell.arm, rows.states)
     header, parts, told = _told(predicted, model.free_part(cell.arm, rows.states))
     header, parts = [*header, *READINGS], [*parts, read.error, read.std]
@@ -558,51 +535,6 @@ def predict_readings(
         summary += f"\n95 % intervals of a reading hold {held:.1%} of {left.size} "
         summary += "coordinates" + _apart(left, read.std)
     return written(table, rows, header, parts, predicted), summary
-
-
-def read_setup(
-    table: Cells, cell: Cell, model: Model, readings: Readings
-) -> tuple[Measurements, PredictedReading, str]:
-    """Read rows in the base frame with what their set-up would read, and tell of it.
-
-    Raises:
-        PostprocError: The set-up is not known, and not to be found from the rows.
-    """
-    found = readings.refit is not None
-    rows = _rows(table, cell, positions=found)
-    if found:
-        placed, read = predict_registered(model, cell.arm, rows.states, rows.position)
-        at = ", ".join(f"{v / MM:.1f}" for v in placed.tracker)
-        told = f"\nregistration refitted: tracker at {at} mm in the base frame"
-        return _placed(rows, placed, table.path), read, told
-    if readings.frame == "tracker":
-        if model.registration is None:
-            problem = "the model holds no registration: it was fitted in the base frame"
-            cure = "Find it from these rows: --refit registration"
-            raise MeasurementError(table.path, problem, cure)
-        rows = _placed(rows, model.registration, table.path)
-    return rows, model.reading(cell.arm, rows.states), ""
-
-
-def _rows(table: Cells, cell: Cell, positions: bool) -> Measurements:
-    """Read rows as a survey's are read, with what the cell knows of the load."""
-    rows = from_table(table, cell.arm, cell.probes, positions=positions)
-    return carrying_load(rows, cell)
-
-
-def _placed(rows: Measurements, placed: Registration, path: Path) -> Measurements:
-    """Put rows in the tracker's frame into the base frame, at the probe points.
-
-    Raises:
-        MeasurementError: A probe point that the registration does not know.
-    """
-    try:
-        states = placed.on_probes(rows.states)
-    except KeyError as exc:
-        problem = f"tool_id {exc} is no probe point of the model's survey"
-        cure = "Find it from these rows: --refit registration"
-        raise MeasurementError(path, problem, cure) from None
-    return replace(rows, states=states, position=placed.to_base(rows.position))
 
 
 def _apart(left: Floats, std: Floats) -> str:

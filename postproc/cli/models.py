@@ -223,6 +223,10 @@ def predict(
         str | None,
         typer.Option("--refit", help="registration: find the set-up from these rows."),
     ] = None,
+    after: Annotated[
+        bool,
+        typer.Option("--after", help="Take drifts as they were at the survey's end."),
+    ] = False,
     columns: ColumnsOption = None,
     delimiter: DelimiterOption = None,
     decimal: DecimalOption = None,
@@ -231,11 +235,12 @@ def predict(
     """Add the predicted error of every row; with positions, also the residual."""
     from postproc.calibration.tables import TableFormat
     from postproc.cli import fit
+    from postproc.cli.readings import Readings
 
     with explained():
         check_places([output], [states, cell, model, columns])
         reading = TableFormat(columns, delimiter, decimal, encoding)
-        asked = fit.Readings(None if frame is None else frame.value, refit)
+        asked = Readings(None if frame is None else frame.value, refit, after)
         with busy("predict"):
             text, summary = fit.predict_file(states, cell, model, asked, reading)
         write_text("-" if output is None else str(output), text)

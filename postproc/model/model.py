@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from collections.abc import Collection
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ from postproc.model.ranges import Ranges
 from postproc.model.registration import Registration
 from postproc.model.variance import (
     beyond_variance,
+    moment_variance,
     parameter_variance,
     side_variance,
 )
@@ -107,6 +109,7 @@ COMPENSATED = ("arm", "state")
 READING = "reading_spread"  # statistic: see `Fit.reading_spread`
 WORST_STD = "worst_std_mm"  # statistic: largest standard error at a surveyed pose
 UNSURE = "standard error above three times the survey's worst"
+Monument = tuple[str, tuple[float, float, float]]
 Width = tuple[float, float]  # least and largest way from flank to flank [gaps]
 Direction = tuple[float, float, float]
 TILTED = 1.0  # [deg] by which a cell may say that weight pulls another way
@@ -158,6 +161,7 @@ class Model:
     registration: Registration | None = None
     flank_widths: tuple[Width, ...] = ()
     weight: Direction = FLOOR
+    monuments: tuple[Monument, ...] = ()
 
     @cached_property
     def id(self) -> str:
@@ -350,7 +354,17 @@ class Model:
         beyond = beyond_variance(effects, at, prior_std)
         if self.noise.pose_joint or self.noise.pose:
             beyond = beyond + self.noise.pose_variance(at.jacobian)
+        beyond += moment_variance(effects, at, values)
         return side_variance(effects, at, values) + np.square(self.spread) + beyond
+
+    def without_clock(self, known: Collection[str]) -> Model:
+        """Return it for rows of an unknown moment: what passes with time at its mean.
+
+        Args:
+            known: Clocks that the rows have, of "time" and "order".
+        """
+        effects = tuple(e.without_clock(known) for e in self.effects.effects)
+        return replace(self, effects=Combination(effects))
 
     def reading(self, arm: Arm, states: States) -> PredictedReading:
         """Predict what the survey's own set-up reads, and how sure one reading is.
@@ -448,13 +462,17 @@ class Model:
         }
         if self.registration is not None:
             kept = RegistrationSection.of(self.registration)
-            data["registration"] = kept.model_dump()
+            data["registration"] = kept.content()
         if self.flank_widths:
             data["flank_widths"] = [
                 None if width == UNTOLD else list(width) for width in self.flank_widths
             ]
         if self.weight != FLOOR:
             data["weight"] = list(self.weight)
+        if self.monuments:
+            data["monuments"] = [
+                {"name": name, "xyz_m": xyz} for name, xyz in self.monuments
+            ]
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -507,6 +525,7 @@ def load_model(path: str | Path) -> Model:
         registration=None if file.registration is None else file.registration.read(),
         flank_widths=tuple(UNTOLD if w is None else w for w in file.flank_widths),
         weight=file.weight,
+        monuments=tuple((m.name, m.xyz_m) for m in file.monuments),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id

@@ -90,31 +90,78 @@ class ProbeSection(ModelSection):
     xyz_m: Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 
 
-class RegistrationSection(ModelSection):
-    """Where the survey's tracker stood: P_base = R P_tracker + t."""
+Rotation = Annotated[tuple[float, ...], Field(min_length=9, max_length=9)]
+Shift = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 
-    rotation: Annotated[tuple[float, ...], Field(min_length=9, max_length=9)]
-    shift_m: Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
+
+class StationSection(ModelSection):
+    """One place of the tracker: P_base = R P_tracker + t."""
+
+    name: str
+    rotation: Rotation
+    shift_m: Shift
+
+
+class MonumentSection(ModelSection):
+    """A fixed point that the survey read, base frame [m]."""
+
+    name: str
+    xyz_m: tuple[float, float, float]
+
+
+class RegistrationSection(ModelSection):
+    """Where the survey's tracker stood: P_base = R P_tracker + t.
+
+    Attributes:
+        rotation, shift_m: Of the first station, row by row.
+        probes: The probe points.
+        station: Name of the first station.
+        further: The other stations.
+    """
+
+    rotation: Rotation
+    shift_m: Shift
     probes: tuple[ProbeSection, ...]
+    station: str = ""
+    further: tuple[StationSection, ...] = ()
 
     @classmethod
     def of(cls, found: Registration) -> RegistrationSection:
         """Write a registration, row by row."""
-        T = found.base_from_tracker
-        rotation, shift = T[:3, :3].reshape(-1).tolist(), T[:3, 3].tolist()
+        stations = [
+            StationSection(
+                name=name,
+                rotation=tuple(T[:3, :3].reshape(-1).tolist()),
+                shift_m=tuple(T[:3, 3].tolist()),
+            )
+            for name, T in zip(found.stations, found.transforms, strict=True)
+        ]
         points = zip(found.tool_ids.tolist(), found.probes.tolist(), strict=True)
         probes = tuple(ProbeSection(tool_id=k, xyz_m=tuple(xyz)) for k, xyz in points)
-        return cls(rotation=tuple(rotation), shift_m=tuple(shift), probes=probes)
+        first, *further = stations
+        return cls(
+            rotation=first.rotation, shift_m=first.shift_m, probes=probes,
+            station=first.name, further=tuple(further),
+        )  # fmt: skip
+
+    def content(self) -> dict[str, Any]:
+        """Return what a file holds: keys of several stations only where they are."""
+        return self.model_dump(exclude_defaults=True)
 
     def read(self) -> Registration:
         """Make the registration."""
-        T = np.eye(4)
-        T[:3, :3] = np.reshape(self.rotation, (3, 3))
-        T[:3, 3] = self.shift_m
+        first = StationSection(
+            name=self.station, rotation=self.rotation, shift_m=self.shift_m
+        )
+        stations = (first, *self.further)
+        T = np.tile(np.eye(4), (len(stations), 1, 1))
+        for k, each in enumerate(stations):
+            T[k, :3, :3] = np.reshape(each.rotation, (3, 3))
+            T[k, :3, 3] = each.shift_m
         points = sorted(self.probes, key=lambda p: p.tool_id)
         probes = np.array([p.xyz_m for p in points]).reshape(-1, 3)
         ids = np.array([p.tool_id for p in points], dtype=np.int64)
-        return Registration(T, probes, ids)
+        return Registration(T, probes, ids, tuple(s.name for s in stations))
 
 
 WidthSection = tuple[PositiveFloat, PositiveFloat]
@@ -141,6 +188,7 @@ class ModelFile(ModelSection):
     registration: RegistrationSection | None = None
     flank_widths: Annotated[tuple[WidthSection | None, ...], Field(max_length=6)] = ()
     weight: tuple[float, float, float] = FLOOR
+    monuments: tuple[MonumentSection, ...] = ()
 
 
 def content_id(data: dict[str, Any]) -> str:

@@ -289,7 +289,7 @@ class PoseBlock:
 
 
 @dataclass(frozen=True)
-class Readings:
+class ReadingScatter:
     """Scatter of repeated readings round their means: the tracker's alone.
 
     Attributes:
@@ -332,7 +332,7 @@ class Whitener:
     unseen: Floats
     origin: tuple[float, float, float] | None
     blocks: tuple[PoseBlock, ...] = ()
-    readings: Readings = field(default_factory=Readings)
+    readings: ReadingScatter = field(default_factory=ReadingScatter)
     estimated: tuple[str, ...] = ("tracker", "joint")
 
     @classmethod
@@ -504,15 +504,15 @@ class Whitener:
         return np.clip(begin, low, high), low, high
 
 
-def _scatter_of_readings(states: States, shape: Floats) -> Readings:
+def _scatter_of_readings(states: States, shape: Floats) -> ReadingScatter:
     """Sum the scatter of readings over the tracker's variances, (n,) [m^2]."""
     more = states.readings > 1.0
     if not more.any():
-        return Readings()
+        return ReadingScatter()
     freedom = 3.0 * (states.readings[more] - 1.0)
     square = float((states.scatter[more] / shape[more]).sum())
     log_shape = float((freedom * np.log(shape[more])).sum())
-    return Readings(square, float(freedom.sum()), log_shape)
+    return ReadingScatter(square, float(freedom.sum()), log_shape)
 
 
 def _estimable(states: States, groups: Sequence[Ints]) -> tuple[str, ...]:
@@ -736,7 +736,7 @@ class _BlockCost:
 class _ReadingCost:
     """Of repeated readings."""
 
-    readings: Readings
+    readings: ReadingScatter
     kinds: Sequence[str]
 
     def value(self, sizes: Floats) -> float:

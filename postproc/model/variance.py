@@ -80,3 +80,13 @@ def beyond_variance(effects: Combination, at: Batch, prior_std: Floats) -> Float
         if turned is not None and turned.any():
             out += np.einsum("nij,nj->ni", at.jacobian**2, turned)
     return out
+
+
+def moment_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
+    """Variance that an unknown moment of the survey gives, (n, 3) [m^2]."""
+    out = np.zeros((len(at), 3))
+    for effect, part in zip(effects.effects, effects.slices, strict=True):
+        spread = effect.moment_variance(at, values[part])
+        if spread is not None:
+            out += spread
+    return out

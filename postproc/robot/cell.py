@@ -145,9 +145,15 @@ class SurveySection(Strict):
 
     A 6D probe also has an orientation there; without it, the flange's own orientation
     cannot be told from the probe's.
+
+    Attributes:
+        points_mm: The points, tool_id 0, 1, ..
+        points: The points by name, instead.
+        euler_zyz_deg: Orientation of a 6D probe.
     """
 
-    points_mm: Annotated[list[Triple], Field(min_length=1)]
+    points_mm: list[Triple] = Field(default_factory=list)
+    points: dict[str, Triple] = Field(default_factory=dict)
     euler_zyz_deg: Triple | None = None
 
 
@@ -263,7 +269,8 @@ class Cell:
         temperature: [deg C], NaN where not declared.
         tracker: Tracker position in the base frame, (3,) [m], or None.
         probes: Probe points of a survey in the flange frame, (k, 3) [m]; the tool's TCP
-            where the cell lists none. Row i belongs to tool_id i + 1.
+            where the cell lists none. Row i belongs to tool_id i.
+        probe_names: Names of the probe points, () where the cell numbers them.
         mounting: Orientation of a 6D probe in the flange frame, (3, 3), or None.
         aux: Kind of every declared auxiliary axis.
         limits: Guards, in the units of their names.
@@ -306,6 +313,14 @@ class Cell:
     constant: tuple[str, ...] = ()
     strict_calls: bool = False
     taught_sides: Mapping[tuple[float, ...], Floats] = field(default_factory=dict)
+    probe_names: tuple[str, ...] = ()
+
+    @property
+    def nests(self) -> Floats | Mapping[str, Floats]:
+        """Return the probe points by name, or as numbered, (k, 3) [m]."""
+        if not self.probe_names:
+            return self.probes
+        return dict(zip(self.probe_names, self.probes, strict=True))
 
 
 def _frame(section: FrameSection | None) -> Frame:
@@ -342,7 +357,8 @@ def load_cell(path: str | Path) -> Cell:
         payload_com=np.array(NO_ANGLES if payload is None else payload.com_mm) * MM,
         temperature=file.environment.temperature_c if file.environment else np.nan,
         tracker=None if tracker is None else np.array(tracker.xyz_mm) * MM,
-        probes=_probes(file),
+        probes=_probes(path, file),
+        probe_names=() if file.survey is None else tuple(file.survey.points),
         mounting=_mounting(file),
         aux=_aux(file, path),
         limits=file.limits,
@@ -420,11 +436,23 @@ def _angles(
     return joints
 
 
-def _probes(file: CellFile) -> Floats:
-    """Convert the survey's probe points; the default is the tool's TCP."""
-    if file.survey is not None:
-        return np.array(file.survey.points_mm) * MM
-    return _frame(file.tool).pose[None, :3, 3]
+def _probes(path: Path, file: CellFile) -> Floats:
+    """Convert the survey's probe points; the default is the tool's TCP.
+
+    Raises:
+        CellError: They are given twice, or not at all.
+    """
+    if file.survey is None:
+        return _frame(file.tool).pose[None, :3, 3]
+    numbered, named = file.survey.points_mm, list(file.survey.points.values())
+    if bool(numbered) == bool(named):
+        problem = "has points_mm and points" if named else "has no points"
+        cure = (
+            "Write points_mm = [[x, y, z], ..], or [survey.points] with lines as "
+            "left = [x, y, z]"
+        )
+        raise CellError(path, problem, cure, place="$.survey")
+    return np.array(numbered or named) * MM
 
 
 def _mounting(file: CellFile) -> Floats | None:

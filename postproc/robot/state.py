@@ -33,6 +33,8 @@ class States:
             that direction. NaN where the arm stands still.
         readings: Number of readings that a row's position is the mean of, (n,).
         scatter: Sum of their squared distances from it, (n,) [m^2].
+        station: Which place of the tracker a reading was taken from, (n,) integers from
+            0; of a survey in the base frame: which file it stands in.
     """
 
     q: Floats
@@ -49,6 +51,7 @@ class States:
     heading: Floats
     readings: Floats
     scatter: Floats
+    station: NDArray[np.int64]
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -105,10 +108,10 @@ def make_states(
         )
         for name, shape in shapes.items()
     }
+    tool_id, station = covariates.pop("tool_id", 0), covariates.pop("station", 0)
     for name, value in (("readings", 1.0), ("scatter", 0.0)):
         given = np.array(covariates.pop(name, value), dtype=float)
         values[name] = np.broadcast_to(given, (n,))
-    tool_id = covariates.pop("tool_id", 0)
     order = covariates.pop("order", np.arange(n))
     if covariates:
         raise TypeError(f"states have no {', '.join(covariates)}")
@@ -118,5 +121,6 @@ def make_states(
         tool=np.broadcast_to(np.zeros(3) if tool is None else tool, (n, 3)),
         tool_id=np.broadcast_to(np.array(tool_id, dtype=np.int64), (n,)),
         order=np.broadcast_to(np.array(order, dtype=float), (n,)),
+        station=np.broadcast_to(np.array(station, dtype=np.int64), (n,)),
         **values,  # type: ignore[arg-type]
     )

@@ -142,7 +142,7 @@ def test_predict_reads_in_the_tracker_s_frame(tmp_path) -> None:
         assert 92.3 < share < 97.7, told.stderr
 
 
-def test_a_model_without_registration_says_so(tmp_path) -> None:
+def test_a_model_without_registration_finds_it_or_says_so(tmp_path) -> None:
     rows = readings("base")
     written(rows, tmp_path / "rows.csv")
     setup = tmp_path / "cell.toml"
@@ -152,6 +152,14 @@ def test_a_model_without_registration_says_so(tmp_path) -> None:
     cli("fit", tmp_path / "rows.csv", *both, "-o", model, "--effects", "geometry")
     ask = ("predict", tmp_path / "rows.csv", *both, "--model", model)
     told = cli(*ask, "--frame", "tracker")
+    assert told.exit_code == 0 and "registration refitted" in told.stderr
+    lines = (tmp_path / "rows.csv").read_text().splitlines()
+    bare = [",".join(line.split(",")[:-3]) for line in lines]
+    (tmp_path / "bare.csv").write_text("\n".join(bare) + "\n")
+    told = cli("predict", tmp_path / "bare.csv", *ask[2:], "--frame", "tracker")
     assert told.exit_code == 2 and "--refit registration" in told.stderr
+    (tmp_path / "few.csv").write_text("\n".join(lines[:5]) + "\n")
+    told = cli("predict", tmp_path / "few.csv", *ask[2:], "--frame", "tracker")
+    assert told.exit_code == 2 and "Measure 6 poses or more" in told.stderr
     told = cli(*ask, "--refit", "everything")
     assert told.exit_code == 2 and "write registration" in told.stderr

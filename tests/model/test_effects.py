@@ -32,7 +32,9 @@ from postproc.model.variance import beyond_variance
 from tests.calibration.simulator import COUPLED, NJ, PLATE, covariates, random_states
 
 RNG = np.random.default_rng(5)
-STATES = covariates(random_states(40, RNG, PLATE), RNG)
+STATES = covariates(random_states(40, RNG, PLATE), RNG).with_(
+    station=np.repeat([0, 1], 20)
+)
 
 
 def variants() -> list[Effect]:
@@ -146,8 +148,8 @@ def test_origins_say_what_may_be_compensated() -> None:
     origin = {e.name: e.belongs_to() for e in propose(KNOWN, COUPLED, STATES)}
     del origin["curve"]
     assert {n for n, o in origin.items() if o == "setup"} == {
-        "base_shift", "tool_shift", "joint_step", "tracker_drift", "azimuth",
-        "refraction", "probe", "probe_turn", "registration",
+        "base_shift", "station_shift", "tool_shift", "joint_step", "tracker_drift",
+        "azimuth", "refraction", "probe", "probe_turn", "registration",
     }  # fmt: skip
     assert {n for n, o in origin.items() if o == "state"} == {"payload", "thermal"}
     curve = BY_NAME["curve"]

@@ -37,6 +37,7 @@ PLACES = {
     "windup": "windup.Windup",
     "lag": "lag.Lag",
     "base_shift": "base_shift.BaseShift",
+    "station_shift": "station_shift.StationShift",
     "tool_shift": "tool_shift.ToolShift",
     "joint_step": "joint_step.JointStep",
     "joint_offset": "joint_offset.JointOffset",

@@ -221,6 +221,23 @@ class Effect(ABC):
         """Name the state that predictions are for, where it passes with time alone."""
         return ""
 
+    def without_clock(self, known: Collection[str]) -> Effect:
+        """Return it as it counts for rows whose moment is unknown: at its mean.
+
+        Args:
+            known: Clocks that the rows have, of "time" and "order".
+        """
+        return self
+
+    def moment_variance(self, batch: Batch, p: Floats) -> Floats | None:
+        """Give the variance that an unknown moment brings, (n, 3) [m^2], None for 0.
+
+        Args:
+            batch: The states.
+            p: Its parameters.
+        """
+        return None
+
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the p parameters, in the order of the columns."""

@@ -29,16 +29,21 @@ class Placement(Effect):
 
     Attributes:
         tools: The `tool_id` of the probe points.
+        stations: The places of the tracker, each with its own shift and turn.
     """
 
     name: ClassVar[str] = "registration"
 
     tools: tuple[int, ...] = (0,)
+    stations: tuple[int, ...] = (0,)
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Placement:
-        """List the survey's probe points."""
-        return cls(tuple(int(t) for t in np.unique(states.tool_id)))
+        """List the survey's probe points and stations."""
+        return cls(
+            tuple(int(t) for t in np.unique(states.tool_id)),
+            tuple(int(s) for s in np.unique(states.station)) or (0,),
+        )
 
     def belongs_to(self) -> Origin:
         """Say that it is the set-up's."""
@@ -46,8 +51,11 @@ class Placement(Effect):
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name shift and turn of the tracker, then the shift of every point."""
-        out = [Parameter(f"tracker_{a}", "m", SHIFT, "tracker") for a in "xyz"]
-        out += [Parameter(f"tracker_r{a}", "rad", TURN, "tracker") for a in "xyz"]
+        out = []
+        for number in range(len(self.stations)):
+            of = f"tracker{number + 1}" if number else "tracker"
+            out += [Parameter(f"{of}_{a}", "m", SHIFT, "tracker") for a in "xyz"]
+            out += [Parameter(f"{of}_r{a}", "rad", TURN, "tracker") for a in "xyz"]
         out += [
             Parameter(f"probe{t}_{a}", "m", SHIFT, "probe")
             for t in self.tools
@@ -57,15 +65,24 @@ class Placement(Effect):
 
     def points(self, part: slice) -> slice:
         """Say which of its columns are the probe points', point by point."""
-        return slice(part.start + 6, part.stop)
+        return slice(part.start + 6 * len(self.stations), part.stop)
 
     def columns(self, batch: Batch) -> Floats:
-        """Differentiate the measured position, (n, 3, 6 + 3 k)."""
+        """Differentiate the measured position, (n, 3, 6 s + 3 k)."""
         flange, which = batch.walk.flange, batch.states.tool_id
         points = [flange * (which == t)[:, None, None] for t in self.tools]
-        return np.concatenate([rigid_columns(batch), *points], axis=2)
+        placed = self._by_station(batch, rigid_columns(batch))
+        return np.concatenate([*placed, *points], axis=2)
 
     def rotation_columns(self, batch: Batch) -> Floats:
-        """Differentiate the measured orientation, (n, 3, 6 + 3 k)."""
+        """Differentiate the measured orientation, (n, 3, 6 s + 3 k)."""
         still = np.zeros((len(batch), 3, 3 * len(self.tools)))
-        return np.concatenate([rigid_rotations(batch), still], axis=2)
+        placed = self._by_station(batch, rigid_rotations(batch))
+        return np.concatenate([*placed, still], axis=2)
+
+    def _by_station(self, batch: Batch, moved: Floats) -> list[Floats]:
+        """Give motions (n, 3, 6) to the rows of every station; one has all rows."""
+        if len(self.stations) == 1:
+            return [moved]
+        at = batch.states.station
+        return [moved * (at == s)[:, None, None] for s in self.stations]

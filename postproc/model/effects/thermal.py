@@ -64,7 +64,7 @@ class Thermal(Effect):
     reference: float = 20.0
     time_constant: float = 3600.0
     start: float = 0.0
-    clock: Literal["time", "order"] = "time"
+    clock: Literal["time", "order", "unknown"] = "time"
     told: bool = False
     level: float = 0.0
 
@@ -101,7 +101,9 @@ class Thermal(Effect):
     @classmethod
     def _warming(cls, lengths: tuple[str, ...], states: States, part: float) -> Self:
         """Warm up in time over a part of the campaign, in rows where none is known."""
-        clock: Literal["time", "order"] = "time" if varies(states.time) else "order"
+        clock: Literal["time", "order", "unknown"] = (
+            "time" if varies(states.time) else "order"
+        )
         passed = getattr(states, clock)
         span = max(float(np.ptp(passed)), 1.0) if len(passed) else 1.0
         start = float(passed.min()) if len(passed) else 0.0
@@ -158,6 +160,18 @@ class Thermal(Effect):
         level = -float(warmth.max() if told else warmth.mean())
         return replace(self, told=told, level=level)
 
+    def without_clock(self, known: Collection[str]) -> Self:
+        """Take the state that it refers to where the rows lack its clock."""
+        if self.clock in known or self.belongs_to() != "setup":
+            return self
+        return replace(self, clock="unknown")
+
+    def moment_variance(self, batch: Batch, p: Floats) -> Floats | None:
+        """Spread it between cold and warm, (n, 3) [m^2], where it is the survey's."""
+        if self.clock != "unknown":
+            return None
+        return np.square(self._grown(batch) @ p) / 12.0  # uniform between 0 and 1
+
     def belongs_to(self) -> Origin:
         """Say that it is of the state: the cell declares the temperature.
 
@@ -197,6 +211,8 @@ class Thermal(Effect):
         """Return temperature above the reference [K], or share of the warm-up, (n,)."""
         if self.form == "temperature":
             return np.nan_to_num(batch.states.temperature - self.reference)
+        if self.clock == "unknown":
+            return np.zeros(len(batch))
         passed: Floats = getattr(batch.states, self.clock)
         since = np.maximum(passed - self.start, 0.0)
         warm = self.level - np.exp(-since / self.time_constant)
@@ -204,10 +220,13 @@ class Thermal(Effect):
 
     def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
+        return self._grown(batch) * self.warmth(batch)[:, None, None]
+
+    def _grown(self, batch: Batch) -> Floats:
+        """Differentiate the TCP position by whole growth, (n, 3, p)."""
         each = np.stack([self._length(batch, name) for name in self.lengths], axis=2)
         every = each.sum(axis=2, keepdims=True)
-        warmth = self.warmth(batch)[:, None, None]
-        return np.concatenate([every, each], axis=2) * warmth
+        return np.concatenate([every, each], axis=2)
 
     def _length(self, batch: Batch, name: str) -> Floats:
         """Differentiate the TCP position by the growth of one length, (n, 3) [m]."""

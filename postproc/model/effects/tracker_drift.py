@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -25,6 +26,7 @@ from postproc.robot.state import States
 
 SHIFT, TURN = 3e-5, 1e-5  # [m], [rad]
 TERMS = 3
+Clock = Literal["time", "order", "unknown"]
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,8 @@ class TrackerDrift(Effect):
     Attributes:
         start: When the tracker was registered, [s] or rows.
         duration: Length of the campaign, [s] or rows.
-        clock: "time", or "order" where no time was recorded.
+        clock: "time", or "order" where no time was recorded; "unknown" of rows whose
+            moment is: then the motion is its mean over the campaign.
     """
 
     name: ClassVar[str] = "tracker_drift"
@@ -47,14 +50,12 @@ class TrackerDrift(Effect):
 
     start: float = 0.0
     duration: float = 1.0
-    clock: Literal["time", "order"] = "time"
+    clock: Clock = "time"
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """Take the recorded time, or else the visit order."""
-        clock: Literal["time", "order"] = (
-            "order" if np.isnan(states.time).any() else "time"
-        )
+        clock: Clock = "order" if np.isnan(states.time).any() else "time"
         passed = getattr(states, clock)
         if len(passed) == 0:
             return cls()
@@ -73,8 +74,9 @@ class TrackerDrift(Effect):
     def refers_to(self) -> str:
         """Name the start, when the tracker was registered."""
         return (
-            "the tracker as it stood at the first row. If it is the arm that passes, "
-            "rows on fixed points (column reference) tell"
+            "the tracker as it stood at the first row, readings without a clock for "
+            "its mean over the survey. If it is the arm that passes, rows on fixed "
+            "points (column reference) tell"
         )
 
     def parameters(self) -> tuple[Parameter, ...]:
@@ -88,23 +90,50 @@ class TrackerDrift(Effect):
                 out.append(Parameter(f"r{a}_{term + 1}", "rad", TURN * part, "drift"))
         return tuple(out)
 
+    def without_clock(self, known: Collection[str]) -> Self:
+        """Take its mean over the campaign where the rows lack its clock."""
+        return self if self.clock in known else replace(self, clock="unknown")
+
+    def moment_variance(self, batch: Batch, p: Floats) -> Floats | None:
+        """Sum the spread of its terms over the campaign, (n, 3) [m^2]."""
+        if self.clock != "unknown":
+            return None
+        spread = np.cov(_terms(MOMENTS), bias=True)
+        moved = rigid_columns(batch) @ p.reshape(TERMS, 6).T  # (n, 3, terms)
+        return np.asarray(np.einsum("nik,kl,nil->ni", moved, spread, moved))
+
     def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
-        return self.in_time(getattr(batch.states, self.clock), rigid_columns(batch))
+        return self.in_time(self._passed(batch), rigid_columns(batch))
 
     def rotation_columns(self, batch: Batch) -> Floats:
         """Differentiate the tool's rotation, (n, 3, p)."""
-        return self.in_time(getattr(batch.states, self.clock), rigid_rotations(batch))
+        return self.in_time(self._passed(batch), rigid_rotations(batch))
+
+    def _passed(self, batch: Batch) -> Floats:
+        """Return what the clock shows, (n,) [s] or rows, NaN where it is unknown."""
+        if self.clock == "unknown":
+            return np.full(len(batch), np.nan)
+        passed: Floats = getattr(batch.states, self.clock)
+        return passed
 
     def in_time(self, passed: Floats, moved: Floats) -> Floats:
         """Multiply six motions (n, 3, 6) by every term, (n, 3, p).
 
         Args:
-            passed: What the clock shows, (n,) [s] or rows.
+            passed: What the clock shows, (n,) [s] or rows; NaN: the mean.
             moved: The motions.
         """
-        u = (passed - self.start) / self.duration
-        u = np.clip(np.nan_to_num(u), 0.0, 1.0)
-        bow = 4.0 * u * (1.0 - u)
-        terms = (u, bow, bow * (1.0 - 2.0 * u) * 1.5)
+        u = np.clip((passed - self.start) / self.duration, 0.0, 1.0)
+        mean = _terms(MOMENTS).mean(axis=1)
+        terms = np.where(np.isnan(u), mean[:, None], _terms(u))
         return np.concatenate([moved * t[:, None, None] for t in terms], axis=2)
+
+
+MOMENTS = np.linspace(0.0, 1.0, 101)  # of a campaign, as shares of it
+
+
+def _terms(u: Floats) -> Floats:
+    """Evaluate the terms of the motion at shares u (n,) of the campaign, (3, n)."""
+    bow = 4.0 * u * (1.0 - u)
+    return np.stack([u, bow, bow * (1.0 - 2.0 * u) * 1.5])

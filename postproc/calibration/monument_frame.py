@@ -1,0 +1,84 @@
+"""The frame of later rows, by fixed points that the model's survey had read, too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.references import APART
+from postproc.model.model import Monument
+from postproc.model.registration import rigid_fit
+from postproc.robot.pose import MM
+
+WHOLE = 3  # fixed points, not on a line, that tell all of a place
+
+
+def monuments_of(survey: Measurements) -> tuple[Monument, ...]:
+    """Say where fixed points stand, in the frame of the survey's first station.
+
+    Args:
+        survey: Rows whose readings of fixed points hold no drift.
+    """
+    fixed = survey.references
+    if fixed is None or len(survey.stations) > 1:
+        return ()
+    names = sorted(set(fixed.name))
+    places = [_place_of(survey, name) for name in names]
+    return tuple(
+        (name, (float(x), float(y), float(z)))
+        for name, (x, y, z) in zip(names, places, strict=True)
+    )
+
+
+def _place_of(survey: Measurements, name: str) -> Floats:
+    """Return where a fixed point was read, the tracker's drift apart, (3,) [m]."""
+    rows, motion = survey.references, survey.motion
+    assert rows is not None
+    position = rows.position
+    if motion is not None:
+        passed = rows.time if motion.drift.clock == "time" else rows.order
+        position = position - motion.moved(passed, position)
+    own = [n == name for n in rows.name]
+    return np.asarray(position[own].mean(axis=0))
+
+
+def at_monuments(
+    rows: Measurements, monuments: Sequence[Monument], whole: bool = False
+) -> tuple[Measurements, str]:
+    """Move rows so that fixed points lie where the model's survey had them.
+
+    Three points that lie apart tell shift and turn, fewer a shift.
+
+    Args:
+        rows: The rows, with their readings of fixed points.
+        monuments: Where these are, base frame [m].
+        whole: Whether nothing less than shift and turn will do.
+
+    Returns:
+        The rows, moved, and how, a line for a terminal; "" where they were not.
+    """
+    fixed, there = rows.references, dict(monuments)
+    names = sorted(set(fixed.name if fixed is not None else ()) & set(there))
+    if fixed is None or not names:
+        return rows, ""
+    seen = np.stack([_place_of(rows, name) for name in names])
+    known = np.array([there[name] for name in names])
+    size = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
+    turns = len(names) >= WHOLE and size[1] > APART
+    if whole and not turns:
+        return rows, ""
+    T = rigid_fit(seen, known) if turns else np.eye(4)
+    T[:3, 3] = known.mean(axis=0) - T[:3, :3] @ seen.mean(axis=0)
+    moved = rows.position @ T[:3, :3].T + T[:3, 3]
+    off = np.linalg.norm(known - seen @ T[:3, :3].T - T[:3, 3], axis=1).max() / MM
+    by = float(np.linalg.norm(moved - rows.position, axis=1).mean()) / MM
+    what = "shift and turn" if turns else "shift"
+    count = f"{len(names)} fixed points" if len(names) > 1 else "a fixed point"
+    return replace(rows, position=moved), (
+        f"\nregistered by {count} of the survey ({what}, {by:.3f} mm on average); "
+        f"{off:.3f} mm remain there"
+    )
