@@ -16,6 +16,7 @@
 # make intervals   coverage of a reading's intervals on two real arms: docs/intervals.md
 # make detection   outliers, wrong directions and nests that a fit finds: docs/detection.md
 # make languages   where arms land that run one job in every language: docs/languages.md
+# make campaigns    repeats, nests, rounds, rounded angles: fits of 200 drawn campaigns, docs/campaigns.md
 # make undeclared  undeclared effects traced on virtual arms, 1,880 of them: docs/undeclared.md
 # make paths       predicted and true path accuracy on virtual arms: docs/paths.md
 # make real DATA=folder [FITS=1]   real arms, rows that nothing has seen; FITS leaves out diagnoses: docs/real-arms.md
@@ -35,7 +36,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy intervals detection undeclared paths blind real chaos fuzz docs clean
-.PHONY: languages plant-bench generated growth awkward native golden pictures lock wheel
+.PHONY: campaigns languages plant-bench generated growth awkward native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
 help:
@@ -86,6 +87,9 @@ detection: $(STAMP)
 
 languages: $(STAMP)
 	@$(PYTHON_BIN) -m tests.language.true_error
+
+campaigns: $(STAMP)
+	@$(PYTHON_BIN) -m tests.campaigns --count $(or $(COUNT),200) --jobs $(or $(JOBS),2)
 
 undeclared: $(STAMP)
 	@$(PYTHON_BIN) -m tests.undeclared --seeds $(or $(SEEDS),60) --none $(or $(NONE),200)

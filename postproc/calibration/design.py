@@ -18,8 +18,8 @@ from postproc.arrays import Floats, Ints
 from postproc.model.combination import Combination
 from postproc.model.effects.effect import Effect, JointEffect
 from postproc.model.kinematics import Batch
-from postproc.model.noise import RowBlocks
 from postproc.model.splines import Splines
+from postproc.model.whitening import RowBlocks
 
 Features = tuple[
     tuple[Floats, Floats],

@@ -11,11 +11,13 @@ from scipy.linalg import qr, solve_triangular
 from postproc.arrays import Floats, Ints
 from postproc.calibration.design import DesignMatrix
 from postproc.calibration.evidence import Normal, Posterior, maximise, widened
+from postproc.calibration.noise_estimate import estimate_noise
 from postproc.calibration.orientations import RowWeights, Turns, judge, student_weights
 from postproc.model.combination import Combination
 from postproc.model.effects.effect import Effect
 from postproc.model.kinematics import Batch
-from postproc.model.noise import Noise, Whitener, Whitening, poses_of
+from postproc.model.noise import Noise, poses_of
+from postproc.model.whitening import Whitener, Whitening
 
 # What a fit has found, with all that tests of further effects need.
 
@@ -321,8 +323,7 @@ def _weighed(state: Fit, heavy: bool) -> Fit:
     else:
         rows = judge(distance, residual, batch.states.q, batch.jacobian, state.pose)
     spread = design.variance(state.covariance)
-    noise = state.whitener.estimate(
-        turned**2 + spread, rows.weight, state.noise,
+    noise = estimate_noise(state.whitener, turned**2 + spread, rows.weight, state.noise,
         [_products(design, turned, block.rows, state.covariance)
          for block in state.whitener.blocks],
     )  # fmt: skip

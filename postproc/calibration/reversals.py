@@ -17,8 +17,8 @@ from postproc.arrays import Floats, Ints
 from postproc.calibration.measurements import Measurements
 from postproc.model.kinematics import Batch
 from postproc.model.model import CONFIRMED, UNTOLD, Model, Width
-from postproc.model.noise import Whitener
 from postproc.model.play import half_widths, on_the_way, verdict_at_stops
+from postproc.model.whitening import Whitener
 from postproc.robot.arm import Arm
 
 STILL = 1e-6  # [rad] a drive that is said to stand

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from postproc.calibration.design import DesignMatrix
+from postproc.calibration.noise_estimate import estimate_noise
 from postproc.model.combination import Combination
 from postproc.model.effects import propose
 from postproc.model.kinematics import Batch
-from postproc.model.noise import Noise, RowBlocks, Whitener, angle_step, poses_of
+from postproc.model.noise import Noise, angle_step, poses_of
+from postproc.model.whitening import RowBlocks, Whitener
 from postproc.robot.state import States
 from tests.calibration.simulator import NJ, PLATE, random_states
 
@@ -95,7 +97,9 @@ def test_scatter_of_reading_stop_and_pose_is_told_apart() -> None:
         turned = whitener.rotate(error)
         products = [_products(turned, block.rows) for block in whitener.blocks]
         ones = np.ones(len(states))
-        found.append(whitener.estimate(turned**2, ones, Noise(1.0, 1e-6), products))
+        found.append(
+            estimate_noise(whitener, turned**2, ones, Noise(1.0, 1e-6), products)
+        )
     kinds = ("tracker", "joint", "stop", "pose_joint", "pose")
     mean = {k: np.mean([getattr(f, k) for f in found]) for k in kinds}
     assert mean == pytest.approx({k: getattr(NOISE, k) for k in kinds}, rel=0.05)

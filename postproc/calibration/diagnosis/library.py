@@ -15,7 +15,7 @@ from postproc.calibration.regression import Fit
 from postproc.model.effects import EFFECTS
 from postproc.model.effects.effect import Candidate
 from postproc.model.kinematics import Batch
-from postproc.model.noise import Whitener, Whitening
+from postproc.model.whitening import Whitener, Whitening
 
 # The present model taken out of the residual and of every candidate, once.
 #
