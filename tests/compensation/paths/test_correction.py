@@ -514,7 +514,9 @@ def test_the_virtual_arm_lands_nearer_where_it_comes_anew(drilled: Path) -> None
     assert len(rows) >= 10
     once, anew = landing(drilled, "once"), landing(drilled, "anew")
     assert anew[rows].mean() < 0.75 * once[rows].mean()
-    assert anew[rows].max() < 0.6 * once[rows].max()
+    worst = [np.quantile(size[rows], 0.9) for size in (once, anew)]
+    assert worst[1] < 0.55 * worst[0]
+    assert anew[rows].max() < 0.65 * once[rows].max()
     others = np.setdiff1d(np.arange(len(once)), rows)
     assert (anew[others] < once[others] + 0.01).all()
     codes = [[d["code"] for d in told(drilled, name)["diagnostics"]]
