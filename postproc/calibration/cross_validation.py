@@ -238,18 +238,14 @@ class PairedErrors:
         return float(student.isf(LEVEL, max(self.poses - 1, 1))) * self.std_error
 
 
-def choose(tried: Sequence[HeldOutRows], usual: int) -> int:
-    """Choose between models by what they leave of held-out poses.
-
-    A more complex model than the usual one must leave less beyond doubt, and so must a
-    simpler one.
+def choose(tried: Sequence[HeldOutRows]) -> int:
+    """Choose the simplest model that no other beats beyond what chance does.
 
     Args:
         tried: Held-out errors of models, the simplest first.
-        usual: Number of the usual one.
     """
-    best = usual
-    for k in (*range(usual - 1, -1, -1), *range(usual + 1, len(tried))):
+    best = 0
+    for k in range(1, len(tried)):
         if PairedErrors.of(tried[best], tried[k]).better:
             best = k
     return best

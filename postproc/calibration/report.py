@@ -11,6 +11,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats
 from postproc.calibration.cross_validation import HeldOutError
 from postproc.calibration.directions import judge_directions
+from postproc.calibration.expected_noise import ENOUGH_REPEATS, repeated_approaches
 from postproc.calibration.measurements import DroppedRow, Measurements
 from postproc.calibration.regression import Fit, Unseen, observe
 from postproc.calibration.reversals import tell_widths
@@ -144,6 +145,8 @@ class FitReport:
         before, after: Measured errors, and what the fit leaves of them.
         tracker_mm: Estimated standard deviation of the tracker, typical, per axis.
         repeatability_mm: Estimated scatter of arrivals, typical, per axis.
+        pose_mm: Estimated error of a pose that no effect describes, per axis.
+        split: How far stops and poses could be told apart, in words.
         effective: Effective number of parameters.
         warnings: What else to know.
         orientation_mrad: Estimated scatter of orientations about each axis, or None.
@@ -174,6 +177,8 @@ class FitReport:
     flanks: str = ""
     held_out: HeldOutError | None = None
     rejected: str = ""
+    pose_mm: float = 0.0
+    split: str = ""
 
 
 def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
@@ -192,7 +197,8 @@ def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
     ):
         own = float(shares[part].sum())
         effects[effect.name] = effects.get(effect.name, 0.0) + own
-    arrival = np.sqrt(fit.noise.arrival_variance(fit.batch.jacobian).mean())
+    jacobian = fit.batch.jacobian
+    arrival = np.sqrt(fit.noise.arrival_variance(jacobian).mean())
     tracker = fit.noise.tracker_std(survey.position).mean()
     return FitReport(
         parameters=_table(fit, shares),
@@ -212,7 +218,19 @@ def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
         directions=report_directions(fit, survey),
         free=FreeForms.of(model.free_part(fit.batch.arm, fit.batch.states[used])),
         flanks=tell_widths(model.flank_widths),
+        pose_mm=float(np.sqrt(model.noise.pose_variance(jacobian).mean()) / MM),
+        split=_split(fit),
     )
+
+
+def _split(fit: Fit) -> str:
+    """Describe which parts of the scatter the rows could tell apart."""
+    stops = np.unique(fit.batch.states.order)
+    repeated = repeated_approaches(fit.batch.states)
+    if repeated >= ENOUGH_REPEATS:
+        return f"by {repeated} repeated approaches"
+    rows = f"{len(stops)} stops at {fit.poses} poses"
+    return f"one sum with arrivals, split by the data sheet: {rows}, none twice alike"
 
 
 def report_method(model: Model, survey: Measurements, arm: Arm) -> FitReport:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from postproc.calibration.diagnosis.search import with_effects
 from postproc.calibration.diagnosis.waves import waves_of
 from postproc.calibration.directions import mend_directions
 from postproc.calibration.elsewhere import widening
+from postproc.calibration.expected_noise import expected_noise
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
 from postproc.calibration.references import TrackerMotion, ruled_out
@@ -28,7 +28,6 @@ from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
 from postproc.model.model import COMPENSATED, READING, WORST_STD, Model, weight_of
-from postproc.model.noise import Noise, angle_step, poses_of
 from postproc.model.ranges import Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
@@ -375,53 +374,6 @@ def _peak_of_others(fitted: Fit, before: Fit) -> float:
         if effect is not was
     ]
     return min(moved, default=0.0)
-
-
-ENOUGH_REPEATS = 5  # that tell scatter of arrivals from errors of a pose
-ISO_RP = 3.615  # RP of ISO 9283 over the standard deviation per axis, round scatter
-
-
-def expected_noise(fitted: Fit) -> Noise:
-    """Return the noise of other poses than those of a fit.
-
-    Rounded joint angles are an error of the file: it is taken off the scatter of
-    poses, as far as rounding can be the cause. Where hardly any pose was approached
-    twice in the same way, scatter of arrivals and what no effect describes are one sum:
-    what exceeds the repeatability of the data sheet is taken to be an error of the
-    pose, which a mean over arrivals has as well.
-    """
-    noise, states = fitted.noise, fitted.batch.states
-    limit = angle_step(states.q) ** 2 / 12.0
-    of_pose = "pose" in fitted.whitener.estimated
-    rounding = min((noise.pose_joint if of_pose else noise.joint) ** 2, limit)
-    if of_pose:
-        noise = replace(noise, pose_joint=_less(noise.pose_joint, rounding))
-    else:
-        noise = replace(noise, joint=_less(noise.joint, rounding))
-    noise = replace(noise, rounding=float(np.sqrt(rounding)))
-    if repeated_approaches(states) >= ENOUGH_REPEATS:
-        return noise
-    sheet = fitted.batch.arm.repeatability / ISO_RP
-    total = float(noise.arrival_variance(fitted.design.jacobian).mean())
-    share = max(0.0, 1.0 - sheet**2 / max(total, 1e-300))
-    joint, shift = share * noise.joint**2, share * noise.stop**2
-    return replace(
-        noise, joint=_less(noise.joint, joint), stop=_less(noise.stop, shift),
-        pose_joint=float(np.hypot(noise.pose_joint, joint**0.5)),
-        pose=float(np.hypot(noise.pose, shift**0.5)),
-    )  # fmt: skip
-
-
-def repeated_approaches(states: States) -> int:
-    """Count the stops beyond the first at a pose that is approached in one way."""
-    key = np.column_stack([poses_of(states), states.direction, states.order])
-    stops = np.unique(key, axis=0)
-    return len(stops) - len(np.unique(stops[:, :-1], axis=0))
-
-
-def _less(std: float, variance: float) -> float:
-    """Take a variance off a standard deviation."""
-    return float(np.sqrt(max(0.0, std**2 - variance)))
 
 
 def model_of(fitted: Fit, survey: Measurements, wide: float = 1.0) -> Model:

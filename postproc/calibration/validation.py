@@ -24,6 +24,8 @@ from postproc.calibration.cross_validation import (
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
 from postproc.calibration.selection import Progress, fit_survey, model_of, silent
+from postproc.calibration.weighing import ENOUGH, worth
+from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.placement import Placement
 from postproc.model.model import Model
@@ -34,6 +36,7 @@ from postproc.robot.pose import MM
 FEW_POSES = 300  # at the most: effects are chosen again without each part
 FEWEST_POSES = 6  # that a part of the rows can be predicted from
 SEED = 0
+DETERMINED = 0.5  # effective parameters a coordinate, from which on rows are few
 FLOOR = 2e-5  # [m] an arm that is as good as its drawing
 
 
@@ -59,6 +62,7 @@ DEFAULT = "the effects that the survey gives evidence for"
 
 SIMPLER = Rung("geometry", ("geometry",))
 USUAL = Rung("geometry,backlash", ("geometry", "backlash"))
+REFINED = Rung("geometry,backlash,backlash_profile", (*BASE_EFFECTS,))
 WITH_LAWS = Rung("effects with a law", None)
 
 
@@ -171,9 +175,9 @@ def _choose(
     if task.effects is not None:
         return asked, task.errors(asked, part, used), ()
     laws = (WITH_LAWS,) if any(e.free for e in effects) else ()
-    rungs = (SIMPLER, USUAL, *laws, asked)
+    rungs = (*_plain_rungs(task, part, used), *laws, asked)
     tried = [task.errors(rung, part, used) for rung in rungs]
-    number = choose(tried, rungs.index(USUAL))
+    number = choose(tried)
     rung, rows = rungs[number], tried[number]
     if rung == asked:
         return rung, rows, ()
@@ -183,6 +187,25 @@ def _choose(
         f"{rung.name})"
     )
     return rung, rows, (note,)
+
+
+def _plain_rungs(task: FitTask, part: Ints, used: Bools) -> tuple[Rung, ...]:
+    """Return what more effects must beat, and what is simpler than that.
+
+    Where backlash is worth it by its evidence, it varies with the angle: priors keep
+    that small where rows say little. Fewer effects are tried where the rows hardly
+    determine these.
+    """
+    refined = task.fit(REFINED)
+    plain = tuple(
+        e for e in refined.combination.effects
+        if e.name in (*(USUAL.effects or ()), *task.setup)
+    )  # fmt: skip
+    usual = REFINED if worth(refined, plain) > ENOUGH else USUAL
+    independent = 3 * len(np.unique(task.survey.states.order[used]))
+    if refined.effective < DETERMINED * independent:
+        return (usual,)
+    return SIMPLER, usual
 
 
 def _conclude(task: FitTask, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Validated:

@@ -35,6 +35,7 @@ from postproc.calibration.published import (
 )
 from postproc.calibration.report import FitReport, Found, FreeForms
 from postproc.calibration.reversals import split_reversals
+from postproc.calibration.stops import pool_readings
 from postproc.calibration.tables import DETECT, TableFormat, read_foreign
 from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program, tell_directions
@@ -71,6 +72,7 @@ FOUND = (
 )
 MOST, FEW = 20, 8  # findings, and rows, that a short report lists
 ROWS = 10**6  # directions that a long report lists
+SHOWN_MM = 0.0005  # of poses: less is not listed
 ENOUGH = 3.0  # nats from which a finding is listed: 20 to 1
 COMPARED = (
     Column("method", "left"),
@@ -314,6 +316,11 @@ def _tell_scatter(report: FitReport) -> list[str]:
             f"tracker {report.tracker_mm:.4f} mm, repeatability "
             f"{report.repeatability_mm:.4f} mm per axis (estimated)"
         )
+    if report.pose_mm > SHOWN_MM:
+        lines.append(
+            f"errors of poses that no effect describes {report.pose_mm:.4f} mm per "
+            f"axis (estimated; {report.split})"
+        )
     if report.orientation_mrad is not None:
         lines.append(f"orientation {report.orientation_mrad:.4f} mrad (estimated)")
     lines.append(f"measured error  {_tell(report.before)}")
@@ -372,7 +379,7 @@ class Held:
             PostprocError: A file cannot be used, or there are not as many rows.
         """
         if self.files:
-            test = read_surveys(self.files, cell, reading)
+            test = pool_readings(read_surveys(self.files, cell, reading))
             names = ", ".join(path.name for path in self.files)
             return [(survey, test)], (
                 f"{len(survey)} rows to fit, {len(test)} of {names} to test"
@@ -408,7 +415,8 @@ def compare_files(
         PostprocError: A file cannot be used.
     """
     cell = load_cell(cell_path)
-    survey, _ = split_reversals(read_surveys(data, cell, reading), cell.arm)
+    pooled = pool_readings(read_surveys(data, cell, reading))
+    survey, _ = split_reversals(pooled, cell.arm)
     pairs, said = held.pairs(survey, cell, reading)
     trials = [_trial(train, test, cell, frame) for train, test in pairs]
     for trial in trials:

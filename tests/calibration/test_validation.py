@@ -15,8 +15,9 @@ from postproc.calibration.cross_validation import (
     parts_of,
     summarise,
 )
+from postproc.calibration.expected_noise import expected_noise
 from postproc.calibration.fit import fit_measurements
-from postproc.calibration.selection import expected_noise, model_of
+from postproc.calibration.selection import model_of
 from postproc.calibration.validation import ASKED, FitTask, Rung
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import random_arm, random_states, survey_of
@@ -42,17 +43,16 @@ def noise(seed: int, size: float = 1e-5, n: int = 300) -> np.ndarray:
 def test_a_model_that_is_better_by_chance_is_not_chosen() -> None:
     """Of 200 pairs that are equally good at most 4 % of the others are taken."""
     taken = [
-        choose([rows_of(noise(2 * k)), rows_of(noise(2 * k + 1))], 0)
-        for k in range(200)
+        choose([rows_of(noise(2 * k)), rows_of(noise(2 * k + 1))]) for k in range(200)
     ]
     assert sum(taken) <= 8
 
 
-def test_a_better_model_is_chosen_on_either_side_of_the_usual_one() -> None:
+def test_a_model_that_leaves_less_is_chosen_and_the_simpler_of_two_alike() -> None:
     usual, better = rows_of(noise(1, 1.5e-5)), rows_of(noise(2))
-    assert choose([usual, better], 0) == 1
-    assert choose([better, usual], 1) == 0
-    assert choose([rows_of(noise(3, 2e-5)), usual, better], 1) == 2
+    assert choose([usual, better]) == 1
+    assert choose([better, usual]) == 0
+    assert choose([rows_of(noise(3, 2e-5)), better, better]) == 1
 
 
 def test_errors_are_paired_by_pose() -> None:
