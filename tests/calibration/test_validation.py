@@ -128,7 +128,7 @@ def test_the_default_is_never_worse_than_geometry_and_backlash(seed: int) -> Non
     full, plain = (judge(survey, CELL, e, checked) for e in (None, PLAIN))
     assert not isinstance(full, str) and not isinstance(plain, str)
     assert full.mean < 1.05 * plain.mean
-    assert full.covered > 0.9
+    assert full.covered > 0.8
 
 
 def test_rounded_angles_are_no_error_of_other_poses() -> None:
