@@ -28,6 +28,7 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
 
     A stop is a run of rows with equal commanded angles, directions and payload, in
     which, if there is a clock, no gap is as long as the arm needs to leave and return.
+    Readings of two tracker stations are of two stops.
 
     Args:
         states: The rows.
@@ -36,7 +37,9 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
     if len(states) == 0:
         return np.zeros(0, dtype=np.int64)
     if visit is not None:
-        key = np.column_stack([visit, poses_of(states), states.direction])
+        key = np.column_stack(
+            [visit, poses_of(states), states.direction, states.station]
+        )
         _, label = np.unique(key, axis=0, return_inverse=True)
         return _in_order(label.reshape(-1))
     begins = _commanded_elsewhere(states)

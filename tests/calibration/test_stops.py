@@ -77,6 +77,14 @@ def test_a_visit_column_decides() -> None:
     assert stops_of(states, np.array([1, 2, 1, 2])).tolist() == [0, 1, 0, 2]
 
 
+def test_stations_that_read_one_visit_are_not_averaged() -> None:
+    """Two trackers read every stop, each in a frame of its own."""
+    states = random_states(2, np.random.default_rng(5))[np.array([0, 0, 1, 1])]
+    states = states.with_(station=np.array([0, 1, 0, 1]))
+    assert stops_of(states).tolist() == [0, 1, 2, 3]
+    assert stops_of(states, np.array([1, 1, 2, 2])).tolist() == [0, 1, 2, 3]
+
+
 def test_a_reading_that_disagrees_with_its_stop_is_listed() -> None:
     _, survey = repeated(20, 4)
     position = np.array(survey.position)
