@@ -20,7 +20,7 @@ AWAY = (
 SAME_POINT = 1e-7  # [m] probe points that are one
 FALSE_ALARMS = 0.01  # readings that are dropped per survey of good ones
 FEWEST = 3  # readings of one stop of which one may disagree with the others
-NORMAL = 1.4826  # standard deviation over the median absolute deviation
+FINEST = 3e-6  # [m] least scatter of readings, which are written with few decimals
 
 
 def stops_of(states: States, visit: Ints | None = None) -> Ints:
@@ -143,10 +143,10 @@ def _without_strays(survey: Measurements, stop: Ints) -> tuple[Measurements, Int
     if not enough.any():
         return survey, stop
     off = survey.position - _medians(survey.position, label)
-    std = NORMAL * float(np.median(np.abs(off[enough])))
-    limit = float(np.sqrt(chi2.isf(FALSE_ALARMS / len(survey), 3)))
     size = np.linalg.norm(off, axis=1)
-    stray = enough & (size > 2.0 * limit * std) & (size > SAME_POINT)
+    usual = float(np.median(size[enough]) / np.sqrt(chi2.median(3)))
+    limit = float(np.sqrt(chi2.isf(FALSE_ALARMS / len(survey), 3)))
+    stray = enough & (size > 2.0 * limit * max(usual, FINEST))
     if not stray.any():
         return survey, stop
     gone = tuple(

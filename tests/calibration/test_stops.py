@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements
@@ -92,6 +93,16 @@ def test_a_reading_that_disagrees_with_its_stop_is_listed() -> None:
     found = pool_readings(replace(survey, position=position))
     assert [d.id for d in found.dropped] == [survey.ids[41]]
     assert "0.295 mm from" in found.dropped[0].why and found.states.readings[10] == 3.0
+
+
+@pytest.mark.parametrize("tracker", [2e-6, 4e-6, 1e-5])
+def test_readings_with_two_decimals_do_not_disagree(tracker: float) -> None:
+    """In steps of 0.01 mm most readings of a stop are equal in a coordinate."""
+    _, survey = repeated(60, 3)
+    read = np.repeat(survey.position[::3], 3, axis=0)
+    read += tracker * np.random.default_rng(1).standard_normal(read.shape)
+    found = pool_readings(replace(survey, position=np.round(read, 5)))
+    assert not found.dropped and len(found) == 60
 
 
 def test_repeated_readings_are_worth_no_more_than_their_mean() -> None:
