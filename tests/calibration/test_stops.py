@@ -95,6 +95,21 @@ def test_a_reading_that_disagrees_with_its_stop_is_listed() -> None:
     assert "0.295 mm from" in found.dropped[0].why and found.states.readings[10] == 3.0
 
 
+def test_of_two_readings_that_disagree_the_fit_finds_the_wrong_one() -> None:
+    """Their mean would be off by half, and count as scatter of the tracker."""
+    _, survey = repeated(60, 2)
+    position = np.array(survey.position)
+    position[41] += [1e-3, 0.0, 0.0]
+    wrong = replace(survey, position=position)
+    assert len(pool_readings(survey)) == 60 and len(pool_readings(wrong)) == 61
+    good, found = (
+        fit_measurements(rows, CELL, effects=("geometry", "backlash"), validate=False)
+        for rows in (survey, wrong)
+    )
+    assert [d.id for d in found.report.dropped] == [survey.ids[41]]
+    assert abs(found.model.noise.tracker / good.model.noise.tracker - 1.0) < 0.1
+
+
 @pytest.mark.parametrize("tracker", [2e-6, 4e-6, 1e-5])
 def test_readings_with_two_decimals_do_not_disagree(tracker: float) -> None:
     """In steps of 0.01 mm most readings of a stop are equal in a coordinate."""
