@@ -35,6 +35,7 @@ from postproc.calibration.published import (
 )
 from postproc.calibration.report import FitReport, Found, FreeForms
 from postproc.calibration.reversals import split_reversals
+from postproc.calibration.stops import pool_readings
 from postproc.calibration.tables import DETECT, TableFormat, read_foreign
 from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program, tell_directions
@@ -47,6 +48,7 @@ from postproc.model.model import (
     Prediction,
     load_model,
 )
+from postproc.model.noise import poses_of
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.terminal import Column, table_text
 from postproc.robot.cell import Cell, load_cell
@@ -372,13 +374,13 @@ class Held:
             PostprocError: A file cannot be used, or there are not as many rows.
         """
         if self.files:
-            test = read_surveys(self.files, cell, reading)
+            test = pool_readings(read_surveys(self.files, cell, reading))
             names = ", ".join(path.name for path in self.files)
             return [(survey, test)], (
                 f"{len(survey)} rows to fit, {len(test)} of {names} to test"
             )
         if not self.blocks:
-            train, held = random_split(len(survey), self.seed)
+            train, held = random_split(poses_of(survey.states), self.seed)
             pairs = [(survey[train], survey[held])]
             return pairs, random_said(train, held, self.seed)
         if not 2 <= self.blocks <= len(survey) // 2:
@@ -408,7 +410,8 @@ def compare_files(
         PostprocError: A file cannot be used.
     """
     cell = load_cell(cell_path)
-    survey, _ = split_reversals(read_surveys(data, cell, reading), cell.arm)
+    survey = pool_readings(read_surveys(data, cell, reading))
+    survey, _ = split_reversals(survey, cell.arm)
     pairs, said = held.pairs(survey, cell, reading)
     trials = [_trial(train, test, cell, frame) for train, test in pairs]
     for trial in trials:
