@@ -32,19 +32,20 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
 
     Args:
         states: The rows.
-        visit: Number of the visit of every row where the file has it, (n,).
+        visit: Number of the visit of every row, (n,), -1 where it is not known.
     """
     if len(states) == 0:
         return np.zeros(0, dtype=np.int64)
-    if visit is not None:
-        key = np.column_stack(
-            [visit, poses_of(states), states.direction, states.station]
-        )
-        _, label = np.unique(key, axis=0, return_inverse=True)
-        return _in_order(label.reshape(-1))
     begins = _commanded_elsewhere(states)
     begins |= _long_gaps(states.time, begins)
-    return np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)
+    run = np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)
+    if visit is None:
+        return run
+    known = visit >= 0
+    parts = known, np.where(known, visit, run), poses_of(states), states.station
+    key = np.column_stack([*parts, states.direction])
+    _, label = np.unique(key, axis=0, return_inverse=True)
+    return _in_order(label.reshape(-1))
 
 
 def _commanded_elsewhere(states: States) -> Bools:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from postproc.calibration.fit import fit_measurements
-from postproc.calibration.measurements import Measurements
+from postproc.calibration.measurements import Measurements, concatenate
 from postproc.calibration.stops import pool_readings, stops_of
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import PLATE, random_arm, random_states, survey_of
@@ -76,6 +77,23 @@ def test_a_clock_tells_whether_the_arm_can_have_left() -> None:
 def test_a_visit_column_decides() -> None:
     states = random_states(2, np.random.default_rng(4))[np.array([0, 0, 0, 1])]
     assert stops_of(states, np.array([1, 2, 1, 2])).tolist() == [0, 1, 0, 2]
+
+
+def test_rows_without_a_visit_follow_the_rule() -> None:
+    states = random_states(2, np.random.default_rng(4))[np.array([0, 1, 0, 0, 1, 0])]
+    visit = np.array([7, 7, 7, -1, -1, -1])
+    assert stops_of(states, visit).tolist() == [0, 1, 0, 2, 3, 4]
+
+
+def test_a_file_without_visits_leaves_those_of_another_file() -> None:
+    states = random_states(2, np.random.default_rng(4))[np.array([0, 1, 0])]
+    states = states.with_(order=np.arange(3.0))
+    one = replace(survey_of(states, np.zeros((3, 3))), visit=np.array([0, 1, 0]))
+    other = replace(survey_of(states, np.zeros((3, 3))), ids=("a", "b", "c"))
+    other = replace(other, path=Path("other.csv"))
+    both = concatenate([one, other, replace(one, path=Path("c"), ids=("d", "e", "f"))])
+    assert both.visit is not None
+    assert both.visit.tolist() == [0, 1, 0, -1, -1, -1, 2, 3, 2]
 
 
 def test_stations_that_read_one_visit_are_not_averaged() -> None:
