@@ -11,6 +11,7 @@ import pytest
 from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements, concatenate
 from postproc.calibration.stops import pool_readings, stops_of
+from postproc.model.noise import poses_of
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import PLATE, random_arm, random_states, survey_of
 
@@ -159,3 +160,21 @@ def test_repeated_readings_are_worth_no_more_than_their_mean() -> None:
     (many, stated), (mean, alone) = left(survey), left(once)
     assert many < 1.1 * mean
     assert stated > 0.8 * alone
+
+
+def test_angles_that_were_read_back_are_of_one_pose() -> None:
+    """They differ in the last digit: on both sides of any step that rounds them."""
+    rng = np.random.default_rng(6)
+    states = random_states(50, rng)[np.repeat(np.arange(50), 6)]
+    jitter = np.deg2rad(1e-4) * rng.choice([-1, 0, 1], states.q.shape)
+    nest = np.tile([0, 0, 1, 1, 2, 2], 50)
+    read = states.with_(
+        q=states.q + jitter, tool=PLATE[nest], tool_id=nest, order=np.arange(300.0)
+    )
+    pose = poses_of(read).reshape(50, 6)
+    assert (pose == pose[:, :1]).all() and len(np.unique(pose)) == 50
+    visit = np.repeat(np.arange(50), 6)
+    assert (stops_of(read, visit) == visit).all()
+    assert (stops_of(read) == visit).all()
+    moving = read.with_(heading=np.tile([1.0, 0.0, 0.0], (300, 1)))
+    assert len(np.unique(poses_of(moving))) == 300
