@@ -13,7 +13,7 @@ from postproc.arrays import Floats, Ints
 from postproc.robot.state import States
 
 TRACKER_FIXED, TRACKER_RANGE = 1e-5, 5e-6  # [m], [m/m] a laser tracker's data sheet
-SAME_POSE = 1e-5  # [rad] joint angles that are one pose
+SAME_POSE = 6e-5  # [rad] joint angles that are one pose, read back to 0.001 deg
 
 
 @dataclass(frozen=True)

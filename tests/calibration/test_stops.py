@@ -162,11 +162,12 @@ def test_repeated_readings_are_worth_no_more_than_their_mean() -> None:
     assert stated > 0.8 * alone
 
 
-def test_angles_that_were_read_back_are_of_one_pose() -> None:
+@pytest.mark.parametrize("digit", [1e-4, 1e-3])
+def test_angles_that_were_read_back_are_of_one_pose(digit: float) -> None:
     """They differ in the last digit: on both sides of any step that rounds them."""
     rng = np.random.default_rng(6)
     states = random_states(50, rng)[np.repeat(np.arange(50), 6)]
-    jitter = np.deg2rad(1e-4) * rng.choice([-1, 0, 1], states.q.shape)
+    jitter = np.deg2rad(digit) * rng.choice([-1, 0, 1], states.q.shape)
     nest = np.tile([0, 0, 1, 1, 2, 2], 50)
     read = states.with_(
         q=states.q + jitter, tool=PLATE[nest], tool_id=nest, order=np.arange(300.0)
@@ -178,3 +179,12 @@ def test_angles_that_were_read_back_are_of_one_pose() -> None:
     assert (stops_of(read) == visit).all()
     moving = read.with_(heading=np.tile([1.0, 0.0, 0.0], (300, 1)))
     assert len(np.unique(poses_of(moving))) == 300
+
+
+def test_steps_of_a_reversal_are_poses_of_their_own() -> None:
+    """A survey turns drives back in steps of 1e-4 rad and more."""
+    states = random_states(1, np.random.default_rng(8))[np.zeros(6, dtype=np.int64)]
+    q = states.q + 1e-4 * np.arange(6)[:, None] * np.eye(6)[2]
+    there = states.with_(q=q, order=np.arange(6.0))
+    assert len(np.unique(poses_of(there))) == 6
+    assert stops_of(there).tolist() == [0, 1, 2, 3, 4, 5]
