@@ -11,6 +11,7 @@ import pytest
 from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements, concatenate
 from postproc.calibration.stops import pool_readings, stops_of
+from postproc.exceptions import MeasurementError
 from postproc.model.noise import poses_of
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import PLATE, random_arm, random_states, survey_of
@@ -188,3 +189,9 @@ def test_steps_of_a_reversal_are_poses_of_their_own() -> None:
     there = states.with_(q=q, order=np.arange(6.0))
     assert len(np.unique(poses_of(there))) == 6
     assert stops_of(there).tolist() == [0, 1, 2, 3, 4, 5]
+
+
+def test_a_refusal_counts_rows_as_the_file_has_them() -> None:
+    _, survey = repeated(1, 30)
+    with pytest.raises(MeasurementError, match="30 rows at 1 poses"):
+        fit_measurements(survey, CELL)
