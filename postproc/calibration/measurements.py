@@ -85,7 +85,8 @@ class Measurements:
         references: Readings of fixed points between the rows, or None.
         motion: What they say of the tracker, whose drift is taken out of `position`;
             None without them.
-        visit: Number of the visit of every row, as the file has it, (n,), or None.
+        visit: Number of the visit of every row, as the file has it, (n,), -1 where it
+            does not; or None.
         stations: Names of the places of the tracker, or of the files, by
             `states.station`.
     """
@@ -302,11 +303,6 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
         [p.states.order + by for p, by in zip(parts, offsets, strict=True)]
     )
     rotations = [p.rotation for p in parts if p.rotation is not None]
-    visits, last = [], 0
-    for part in parts:
-        if part.visit is not None and len(part):
-            visits.append(last + part.visit)
-            last = int(visits[-1].max()) + 1
     joint = Measurements(
         path=first.path,
         states=States(order=order, station=station, **joined),
@@ -318,7 +314,7 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
         dropped=tuple(d for p in parts for d in p.dropped),
         warnings=tuple(w for p in parts for w in p.warnings),
         rotation=np.concatenate(rotations) if len(rotations) == len(parts) else None,
-        visit=np.concatenate(visits) if len(visits) == len(parts) else None,
+        visit=_joined_visits(parts),
         references=join_references(
             [(p.references, by) for p, by in zip(parts, offsets, strict=True)]
         ),
@@ -327,6 +323,18 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
     if (np.diff(order) > 0).all():
         return joint
     return joint[np.argsort(order, kind="stable")]
+
+
+def _joined_visits(parts: Sequence[Measurements]) -> Ints | None:
+    """Number the visits of several files, (n,): no two files share one."""
+    if all(part.visit is None for part in parts):
+        return None
+    visits, following = [], 0
+    for part in parts:
+        own = np.full(len(part), -1) if part.visit is None else part.visit
+        visits.append(np.where(own < 0, -1, following + own))
+        following = max(following, int(visits[-1].max(initial=-1)) + 1)
+    return np.concatenate(visits)
 
 
 def _joined_stations(

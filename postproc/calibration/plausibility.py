@@ -312,9 +312,10 @@ def check_rows(survey: Measurements, arm: Arm) -> None:
     seen = _rank(arm, survey.states) if len(survey) else 0
     if seen < ENOUGH * possible:
         poses = len(np.unique(np.round(survey.states.q, 4), axis=0))
+        rows = int(survey.states.readings.sum())
         raise MeasurementError(
             survey.path,
-            f"{len(survey)} rows at {poses} poses determine {seen} of {possible} "
+            f"{rows} rows at {poses} poses determine {seen} of {possible} "
             "directions of the geometry",
             "Measure more poses, spread over the workspace, all joints moving",
         )

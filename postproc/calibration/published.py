@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
+from postproc.calibration.diagnosis.held_out import whole_poses
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import fit_effects
 from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.stops import pool_readings
 from postproc.model.combination import Combination
 from postproc.model.effects import elm, maps
 from postproc.model.effects.effect import Effect
@@ -21,7 +23,7 @@ from postproc.model.effects.maps import Interpolation
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, weight_of
 from postproc.model.model_file import Method
-from postproc.model.noise import Noise
+from postproc.model.noise import Noise, poses_of
 from postproc.model.ranges import Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
@@ -119,8 +121,9 @@ def _spread(
     """Root mean square per axis of what cross-validation leaves [m]."""
     n = len(batch)
     fold = np.random.default_rng(seed).permutation(np.arange(n) % min(FOLDS, n))
+    fold = whole_poses(fold, poses_of(batch.states))
     left = np.zeros((n, 3))
-    for k in range(min(FOLDS, n)):
+    for k in np.unique(fold):
         inside = np.flatnonzero(fold != k)
         outside = np.flatnonzero(fold == k)
         if len(inside) == 0:
@@ -219,11 +222,21 @@ class Comparison:
     span_deg: tuple[float, ...]
 
 
-def random_split(n: int, seed: int, share: float = TRAIN_SHARE) -> tuple[Rows, Rows]:
-    """Split n rows at random into training and test rows, each in visit order."""
-    order = np.random.default_rng(seed).permutation(n)
-    cut = round(share * n)
-    return np.sort(order[:cut]), np.sort(order[cut:])
+def random_split(
+    pose: Rows, seed: int, share: float = TRAIN_SHARE
+) -> tuple[Rows, Rows]:
+    """Split rows at random into training and test rows, each in visit order.
+
+    Args:
+        pose: Number of the pose of every row, (n,): no pose is in both.
+        seed: Of the random draw.
+        share: Of the rows that are training rows, about.
+    """
+    order = np.random.default_rng(seed).permutation(len(pose))
+    test = np.zeros(len(pose), dtype=np.int64)
+    test[order[round(share * len(pose)) :]] = 1
+    test = whole_poses(test, pose)
+    return np.flatnonzero(test == 0), np.flatnonzero(test == 1)
 
 
 @dataclass(frozen=True)
@@ -257,7 +270,8 @@ def compare(
         tracker: Tracker position in the base frame, (3,) [m], or None.
         seed: Of the split and of the random layers.
     """
-    train, test = random_split(len(survey), seed)
+    survey = pool_readings(survey)
+    train, test = random_split(poses_of(survey.states), seed)
     trial = Trial(survey[train], survey[test], tracker)
     rows = compare_in([trial], arm, seed)
     return Comparison(rows, random_said(train, test, seed), span_of(survey.states))

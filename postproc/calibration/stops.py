@@ -20,7 +20,7 @@ AWAY = (
 SAME_POINT = 1e-7  # [m] probe points that are one
 FALSE_ALARMS = 0.01  # readings that are dropped per survey of good ones
 FEWEST = 3  # readings of one stop of which one may disagree with the others
-NORMAL = 1.4826  # standard deviation over the median absolute deviation
+FINEST = 3e-6  # [m] least scatter of readings, which are written with few decimals
 
 
 def stops_of(states: States, visit: Ints | None = None) -> Ints:
@@ -28,20 +28,24 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
 
     A stop is a run of rows with equal commanded angles, directions and payload, in
     which, if there is a clock, no gap is as long as the arm needs to leave and return.
+    Readings of two tracker stations are of two stops.
 
     Args:
         states: The rows.
-        visit: Number of the visit of every row where the file has it, (n,).
+        visit: Number of the visit of every row, (n,), -1 where it is not known.
     """
     if len(states) == 0:
         return np.zeros(0, dtype=np.int64)
-    if visit is not None:
-        key = np.column_stack([visit, poses_of(states), states.direction])
-        _, label = np.unique(key, axis=0, return_inverse=True)
-        return _in_order(label.reshape(-1))
     begins = _commanded_elsewhere(states)
     begins |= _long_gaps(states.time, begins)
-    return np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)
+    run = np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)
+    if visit is None:
+        return run
+    known = visit >= 0
+    parts = known, np.where(known, visit, run), poses_of(states), states.station
+    key = np.column_stack([*parts, states.direction])
+    _, label = np.unique(key, axis=0, return_inverse=True)
+    return _in_order(label.reshape(-1))
 
 
 def _commanded_elsewhere(states: States) -> Bools:
@@ -66,7 +70,8 @@ def _long_gaps(time: Floats, begins: Bools) -> Bools:
 def pool_readings(survey: Measurements) -> Measurements:
     """Average the readings of every stop and nest into one row.
 
-    A reading that disagrees with all others of its stop is dropped and listed.
+    A reading that disagrees with all others of its stop is dropped and listed. Two
+    readings that disagree stay two rows: which one is wrong, the fit decides.
 
     Args:
         survey: Rows in visit order.
@@ -79,9 +84,7 @@ def pool_readings(survey: Measurements) -> Measurements:
     stop = stops_of(survey.states, survey.visit)
     if len(np.unique(stop)) == len(survey):
         return survey
-    survey, stop = _without_strays(survey, stop)
-    _, label = np.unique(_row_keys(survey.states, stop), axis=0, return_inverse=True)
-    label = _in_order(label.reshape(-1))
+    survey, stop, label = _without_strays(survey, stop)
     first = np.unique(label, return_index=True)[1]
     count = np.bincount(label).astype(float)
     mean = means(survey.position, label)
@@ -129,23 +132,25 @@ def _mean_rotations(rotation: Floats, label: Ints) -> Floats:
     return np.asarray(u @ vt)
 
 
-def _without_strays(survey: Measurements, stop: Ints) -> tuple[Measurements, Ints]:
+def _without_strays(
+    survey: Measurements, stop: Ints
+) -> tuple[Measurements, Ints, Ints]:
     """Drop readings that disagree with the others of their stop, list them.
 
     The scatter is that of all stops with enough readings: most of these are good.
+
+    Returns:
+        The rows that stay, their stops, and which of them are averaged: a label.
     """
     _, label = np.unique(_row_keys(survey.states, stop), axis=0, return_inverse=True)
     label = label.reshape(-1)
-    enough = np.bincount(label)[label] >= FEWEST
-    if not enough.any():
-        return survey, stop
+    several = np.bincount(label)[label]
     off = survey.position - _medians(survey.position, label)
-    std = NORMAL * float(np.median(np.abs(off[enough])))
-    limit = float(np.sqrt(chi2.isf(FALSE_ALARMS / len(survey), 3)))
     size = np.linalg.norm(off, axis=1)
-    stray = enough & (size > 2.0 * limit * std) & (size > SAME_POINT)
-    if not stray.any():
-        return survey, stop
+    far = np.zeros(len(survey), dtype=bool)
+    for some in (several >= FEWEST, several == 2):
+        far |= some & (size > _limit(size[some], len(survey)))
+    stray = far & (several >= FEWEST)
     gone = tuple(
         DroppedRow(
             survey.ids[i], int(survey.line[i]),
@@ -153,7 +158,22 @@ def _without_strays(survey: Measurements, stop: Ints) -> tuple[Measurements, Int
         )
         for i in np.flatnonzero(stray)
     )  # fmt: skip
-    return replace(survey[~stray], dropped=survey.dropped + gone), stop[~stray]
+    apart = np.where(far, len(label) + np.arange(len(label)), label)
+    kept = replace(survey[~stray], dropped=survey.dropped + gone)
+    return kept, stop[~stray], _in_order(apart[~stray])
+
+
+def _limit(size: Floats, count: int) -> float:
+    """Return the deviation from a median that no good reading of a survey has [m].
+
+    Args:
+        size: Deviations of readings that scatter alike, (n,) [m].
+        count: Number of all readings.
+    """
+    if not len(size):
+        return np.inf
+    usual = float(np.median(size) / np.sqrt(chi2.median(3)))
+    return 2.0 * float(np.sqrt(chi2.isf(FALSE_ALARMS / count, 3))) * max(usual, FINEST)
 
 
 def _medians(values: Floats, label: Ints) -> Floats:

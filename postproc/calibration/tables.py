@@ -757,11 +757,16 @@ def read_rotation(table: TextTable) -> Floats | None:
 
 
 def read_visits(table: TextTable) -> NDArray[np.int64] | None:
-    """Number the visits by their names in the column `visit`, (n,), None without it."""
+    """Number the visits by their names in the column `visit`, (n,), None without it.
+
+    A row whose cell is empty has number -1: its visit is not known.
+    """
     if not table.has("visit"):
         return None
-    _, number = np.unique(table.text("visit"), return_inverse=True)
-    return np.asarray(number.reshape(-1), dtype=np.int64)
+    names = table.text("visit")
+    _, number = np.unique(names, return_inverse=True)
+    known = np.array([name != "" for name in names])
+    return np.asarray(np.where(known, number.reshape(-1), -1), dtype=np.int64)
 
 
 def _sorted(table: TextTable) -> str:

@@ -48,6 +48,7 @@ from postproc.model.model import (
     Prediction,
     load_model,
 )
+from postproc.model.noise import poses_of
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.terminal import Column, table_text
 from postproc.robot.cell import Cell, load_cell
@@ -385,7 +386,7 @@ class Held:
                 f"{len(survey)} rows to fit, {len(test)} of {names} to test"
             )
         if not self.blocks:
-            train, held = random_split(len(survey), self.seed)
+            train, held = random_split(poses_of(survey.states), self.seed)
             pairs = [(survey[train], survey[held])]
             return pairs, random_said(train, held, self.seed)
         if not 2 <= self.blocks <= len(survey) // 2:
@@ -415,8 +416,8 @@ def compare_files(
         PostprocError: A file cannot be used.
     """
     cell = load_cell(cell_path)
-    pooled = pool_readings(read_surveys(data, cell, reading))
-    survey, _ = split_reversals(pooled, cell.arm)
+    survey = pool_readings(read_surveys(data, cell, reading))
+    survey, _ = split_reversals(survey, cell.arm)
     pairs, said = held.pairs(survey, cell, reading)
     trials = [_trial(train, test, cell, frame) for train, test in pairs]
     for trial in trials:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from postproc.arrays import Floats, Ints
 from postproc.robot.state import States
 
 TRACKER_FIXED, TRACKER_RANGE = 1e-5, 5e-6  # [m], [m/m] a laser tracker's data sheet
-SAME_POSE = 1e-5  # [rad] joint angles that are one pose
+SAME_POSE = 6e-5  # [rad] joint angles that are one pose, read back to 0.001 deg
 
 
 @dataclass(frozen=True)
@@ -100,13 +103,23 @@ def tracker_shape(
 def poses_of(states: States) -> Ints:
     """Number the commanded poses, (n,): rows of one pose have equal joint angles.
 
-    A row that was read in motion is a pose of its own.
+    Angles that were read back differ in their last digit, and count as equal. A row
+    that was read in motion is a pose of its own.
     """
     moving = ~np.isnan(states.heading[:, 0])
     payload = np.nan_to_num(states.payload)[:, None]
     own = np.where(moving, np.arange(1, len(states) + 1), 0)[:, None]
     key = np.concatenate([np.round(states.q / SAME_POSE), payload, own], axis=1)
-    _, label = np.unique(key, axis=0, return_inverse=True)
+    cells, first, label = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    near = cKDTree(states.q[first]).query_pairs(
+        SAME_POSE, np.inf, output_type="ndarray"
+    )
+    near = near[(cells[near[:, 0], 6:] == cells[near[:, 1], 6:]).all(axis=1)]
+    if len(near):  # readings of one pose on both sides of a step of the rounding
+        pair, count = (near[:, 0], near[:, 1]), len(cells)
+        graph = coo_array((np.ones(len(near)), pair), shape=(count, count))
+        joined = connected_components(graph, directed=False)[1]
+        return np.asarray(joined[label.reshape(-1)], dtype=np.int64)
     return np.asarray(label.reshape(-1), dtype=np.int64)
 
 

@@ -29,6 +29,7 @@ from postproc.model.kinematics import Batch
 from postproc.model.noise import Noise, groups_of, poses_of, tracker_shape
 from postproc.robot.state import States
 
+ENOUGH_RETURNS = 5  # to a pose, that part scatter of stops from errors of a pose
 UNSEEN = 1.0  # [m] as good as not measured
 NO_POSE = 0.05  # share of the variance below which poses scatter no more than stops
 KINDS = ("tracker", "joint", "stop", "pose_joint", "pose")
@@ -358,16 +359,14 @@ def _scatter_of_readings(states: States, shape: Floats) -> ReadingScatter:
 
 def _estimable(states: States, groups: Sequence[Ints]) -> tuple[str, ...]:
     """Name the components that rows can tell apart."""
-    order = states.order
-    repeated = bool((states.readings > 1.0).any())
-    nests = rounds = False
+    repeated, returns = bool((states.readings > 1.0).any()), 0
+    nests = False
     for rows in groups:
-        stops = order[rows]
-        rounds |= bool((stops != stops[:, :1]).any())
-        in_stop = (np.diff(np.sort(stops, axis=1), axis=1) == 0.0).any()
-        nests |= bool(in_stop)
+        same_stop = np.diff(np.sort(states.order[rows], axis=1), axis=1) == 0.0
+        returns += int((~same_stop).sum())
+        nests |= bool(same_stop.any())
     out = KINDS[:3] if repeated or nests else KINDS[:2]
-    return (*out, *KINDS[3:]) if rounds else out
+    return (*out, *KINDS[3:]) if returns >= ENOUGH_RETURNS else out
 
 
 def _several_in_stop(block: PoseBlock) -> PoseBlock:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -101,8 +102,31 @@ def test_the_comparison_has_the_five_rows_and_ours() -> None:
     mean = {r.method: r.mean_mm for r in found.rows}
     assert mean["full"] < 0.5 * min(v for k, v in mean.items() if k != "full")
     assert "100 rows to fit, 50 to test" in found.split
-    train, test = random_split(9, 0)
+    train, test = random_split(np.arange(9), 0)
     assert sorted([*train, *test]) == list(range(9)) and len(train) == 6
+
+
+def test_a_comparison_tests_poses_that_no_method_has_seen() -> None:
+    """A map that has read a pose predicts its next reading, and no other pose."""
+    _, _, once = survey(60)
+    rng = np.random.default_rng(3)
+    thrice = once[np.repeat(np.arange(60), 3)]
+    read = thrice.position + 1e-5 * rng.standard_normal(thrice.position.shape)
+    found = compare(replace(thrice, position=read), NJ, seed=1)
+    assert "40 rows to fit, 20 to test" in found.split
+    usual = {r.method: r.min_mm for r in compare(once, NJ, seed=1).rows}
+    least = {r.method: r.min_mm for r in found.rows}
+    assert least["interpolation"] > 0.5 * usual["interpolation"]
+    train, test = random_split(np.tile(np.arange(60), 3), 0)
+    assert not set(train % 60) & set(test % 60) and len(train) + len(test) == 180
+
+
+def test_cross_validation_holds_out_whole_poses() -> None:
+    """Two rounds of the same poses: the other round of a pose is no other pose."""
+    _, _, once = survey(60)
+    twice = once[np.tile(np.arange(60), 2)]
+    alone, both = (fit_method("kriging", r, NJ, 0).spread for r in (once, twice))
+    assert np.linalg.norm(both) > 0.7 * np.linalg.norm(alone)
 
 
 def test_a_layer_ignores_joints_that_never_moved() -> None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
 
 from postproc.calibration.fit import fit_measurements
-from postproc.calibration.measurements import Measurements
+from postproc.calibration.measurements import Measurements, concatenate
 from postproc.calibration.stops import pool_readings, stops_of
+from postproc.exceptions import MeasurementError
+from postproc.model.noise import poses_of
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import PLATE, random_arm, random_states, survey_of
 
@@ -77,6 +81,31 @@ def test_a_visit_column_decides() -> None:
     assert stops_of(states, np.array([1, 2, 1, 2])).tolist() == [0, 1, 0, 2]
 
 
+def test_rows_without_a_visit_follow_the_rule() -> None:
+    states = random_states(2, np.random.default_rng(4))[np.array([0, 1, 0, 0, 1, 0])]
+    visit = np.array([7, 7, 7, -1, -1, -1])
+    assert stops_of(states, visit).tolist() == [0, 1, 0, 2, 3, 4]
+
+
+def test_a_file_without_visits_leaves_those_of_another_file() -> None:
+    states = random_states(2, np.random.default_rng(4))[np.array([0, 1, 0])]
+    states = states.with_(order=np.arange(3.0))
+    one = replace(survey_of(states, np.zeros((3, 3))), visit=np.array([0, 1, 0]))
+    other = replace(survey_of(states, np.zeros((3, 3))), ids=("a", "b", "c"))
+    other = replace(other, path=Path("other.csv"))
+    both = concatenate([one, other, replace(one, path=Path("c"), ids=("d", "e", "f"))])
+    assert both.visit is not None
+    assert both.visit.tolist() == [0, 1, 0, -1, -1, -1, 2, 3, 2]
+
+
+def test_stations_that_read_one_visit_are_not_averaged() -> None:
+    """Two trackers read every stop, each in a frame of its own."""
+    states = random_states(2, np.random.default_rng(5))[np.array([0, 0, 1, 1])]
+    states = states.with_(station=np.array([0, 1, 0, 1]))
+    assert stops_of(states).tolist() == [0, 1, 2, 3]
+    assert stops_of(states, np.array([1, 1, 2, 2])).tolist() == [0, 1, 2, 3]
+
+
 def test_a_reading_that_disagrees_with_its_stop_is_listed() -> None:
     _, survey = repeated(20, 4)
     position = np.array(survey.position)
@@ -84,6 +113,31 @@ def test_a_reading_that_disagrees_with_its_stop_is_listed() -> None:
     found = pool_readings(replace(survey, position=position))
     assert [d.id for d in found.dropped] == [survey.ids[41]]
     assert "0.295 mm from" in found.dropped[0].why and found.states.readings[10] == 3.0
+
+
+def test_of_two_readings_that_disagree_the_fit_finds_the_wrong_one() -> None:
+    """Their mean would be off by half, and count as scatter of the tracker."""
+    _, survey = repeated(60, 2)
+    position = np.array(survey.position)
+    position[41] += [1e-3, 0.0, 0.0]
+    wrong = replace(survey, position=position)
+    assert len(pool_readings(survey)) == 60 and len(pool_readings(wrong)) == 61
+    good, found = (
+        fit_measurements(rows, CELL, effects=("geometry", "backlash"), validate=False)
+        for rows in (survey, wrong)
+    )
+    assert [d.id for d in found.report.dropped] == [survey.ids[41]]
+    assert abs(found.model.noise.tracker / good.model.noise.tracker - 1.0) < 0.1
+
+
+@pytest.mark.parametrize("tracker", [2e-6, 4e-6, 1e-5])
+def test_readings_with_two_decimals_do_not_disagree(tracker: float) -> None:
+    """In steps of 0.01 mm most readings of a stop are equal in a coordinate."""
+    _, survey = repeated(60, 3)
+    read = np.repeat(survey.position[::3], 3, axis=0)
+    read += tracker * np.random.default_rng(1).standard_normal(read.shape)
+    found = pool_readings(replace(survey, position=np.round(read, 5)))
+    assert not found.dropped and len(found) == 60
 
 
 def test_repeated_readings_are_worth_no_more_than_their_mean() -> None:
@@ -107,3 +161,37 @@ def test_repeated_readings_are_worth_no_more_than_their_mean() -> None:
     (many, stated), (mean, alone) = left(survey), left(once)
     assert many < 1.1 * mean
     assert stated > 0.8 * alone
+
+
+@pytest.mark.parametrize("digit", [1e-4, 1e-3])
+def test_angles_that_were_read_back_are_of_one_pose(digit: float) -> None:
+    """They differ in the last digit: on both sides of any step that rounds them."""
+    rng = np.random.default_rng(6)
+    states = random_states(50, rng)[np.repeat(np.arange(50), 6)]
+    jitter = np.deg2rad(digit) * rng.choice([-1, 0, 1], states.q.shape)
+    nest = np.tile([0, 0, 1, 1, 2, 2], 50)
+    read = states.with_(
+        q=states.q + jitter, tool=PLATE[nest], tool_id=nest, order=np.arange(300.0)
+    )
+    pose = poses_of(read).reshape(50, 6)
+    assert (pose == pose[:, :1]).all() and len(np.unique(pose)) == 50
+    visit = np.repeat(np.arange(50), 6)
+    assert (stops_of(read, visit) == visit).all()
+    assert (stops_of(read) == visit).all()
+    moving = read.with_(heading=np.tile([1.0, 0.0, 0.0], (300, 1)))
+    assert len(np.unique(poses_of(moving))) == 300
+
+
+def test_steps_of_a_reversal_are_poses_of_their_own() -> None:
+    """A survey turns drives back in steps of 1e-4 rad and more."""
+    states = random_states(1, np.random.default_rng(8))[np.zeros(6, dtype=np.int64)]
+    q = states.q + 1e-4 * np.arange(6)[:, None] * np.eye(6)[2]
+    there = states.with_(q=q, order=np.arange(6.0))
+    assert len(np.unique(poses_of(there))) == 6
+    assert stops_of(there).tolist() == [0, 1, 2, 3, 4, 5]
+
+
+def test_a_refusal_counts_rows_as_the_file_has_them() -> None:
+    _, survey = repeated(1, 30)
+    with pytest.raises(MeasurementError, match="30 rows at 1 poses"):
+        fit_measurements(survey, CELL)

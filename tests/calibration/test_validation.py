@@ -142,3 +142,20 @@ def test_rounded_angles_are_no_error_of_other_poses() -> None:
     expected = expected_noise(fitted)
     assert expected.pose_joint < 0.7 * step
     assert expected.rounding == pytest.approx(step, rel=0.2)
+
+
+def test_one_pause_within_a_stop_leaves_the_stated_errors() -> None:
+    """A single return to a pose cannot part scatter of stops from errors of a pose."""
+    rng = np.random.default_rng(4)
+    arm = random_arm(rng)
+    habit = Habit(40, 2, 1, 1, 1, 5, 5e-6, 1e-5, 2e-5, clock=True)
+    survey, (states, _) = measure(arm, habit, rng), unseen(arm, rng)
+    time = np.array(survey.states.time)
+    time[41:] += 3600.0
+    paused = survey.with_states(survey.states.with_(time=time))
+    usual, late = (
+        fit_measurements(rows, CELL, effects=PLAIN, validate=False).model
+        for rows in (survey, paused)
+    )
+    stated = [m.predict(arm.arm, states).std_model.mean() for m in (usual, late)]
+    assert stated[1] == pytest.approx(stated[0], rel=0.05)

@@ -196,3 +196,11 @@ def test_a_warm_up_of_the_survey_is_its_mean_and_the_arms_stays() -> None:
     assert spread is not None and spread.max() > 0
     arms = replace(warming, clock="time", told=True)
     assert arms.without_clock([]) is arms
+
+
+def test_an_empty_cell_is_no_visit(tmp_path: Path) -> None:
+    path = written(tmp_path / "some.csv", np.arange(3), visit=np.array([4, 5, 4]))
+    assert read(path).visit.tolist() == [0, 1, 0]  # type: ignore[union-attr]
+    path.write_text(path.read_text().replace(",5\n", ",\n"))
+    visit = read(path).visit
+    assert visit is not None and visit[1] == -1 and visit[0] == visit[2] >= 0

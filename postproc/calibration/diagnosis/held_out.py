@@ -16,7 +16,7 @@ from postproc.calibration.evidence import inverted
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import Candidate
 from postproc.model.kinematics import Batch
-from postproc.model.noise import SAME_POSE, Noise
+from postproc.model.noise import Noise, poses_of
 
 # Whether a candidate predicts rows that did not fit it.
 #
@@ -115,7 +115,7 @@ def held_out_gain(fit: Fit, number: int, candidate: Candidate) -> Gain:
         number: Place of the effect in the fit.
         candidate: The candidate that the effect was.
     """
-    fold = whole_poses(deal(candidate.driver(fit.batch), FOLDS, seed=0), fit.pose)
+    fold = deal(candidate.driver(fit.batch), FOLDS, seed=0)
     return gain_in(fit, number, Folds.of_fit(fit, fold))
 
 
@@ -171,7 +171,11 @@ class Folds:
 
     @classmethod
     def of_fit(cls, fit: Fit, fold: NDArray[np.int64]) -> Folds:
-        """Cut the rows of a fit into folds; its noise and prior scales are kept."""
+        """Cut the rows of a fit into folds; its noise and prior scales are kept.
+
+        All rows of a pose are in one fold.
+        """
+        fold = whole_poses(fold, fit.pose)
         return cls.of(fit.whitened, fit.prior_std, fit.target, fold)
 
     def errors(self, without: slice = slice(0)) -> tuple[Floats, Floats]:
@@ -278,9 +282,7 @@ def noise_floor(fit: Fit, tracker_known: bool) -> NoiseFloor:
 def repeats(batch: Batch) -> list[NDArray[np.int64]]:
     """Group the rows that went to one pose in the same way."""
     s = batch.states
-    key = np.column_stack(
-        [np.round(s.q / SAME_POSE), s.direction, s.tool_id, np.nan_to_num(s.payload)]
-    )
+    key = np.column_stack([poses_of(s), s.direction, s.tool_id])
     _, label = np.unique(key, axis=0, return_inverse=True)
     return _several(label)
 
@@ -288,7 +290,7 @@ def repeats(batch: Batch) -> list[NDArray[np.int64]]:
 def sides(batch: Batch) -> list[list[NDArray[np.int64]]]:
     """Group the rows of one pose by the side that they came from, if several."""
     s = batch.states
-    pose = np.column_stack([np.round(s.q / SAME_POSE), s.tool_id])
+    pose = np.column_stack([poses_of(s), s.tool_id])
     _, label = np.unique(pose, axis=0, return_inverse=True)
     out = []
     for rows in _several(label):
