@@ -56,7 +56,7 @@ class HeldOutRows:
     @property
     def widening(self) -> float:
         """Factor on the stated standard deviations by what held-out rows show."""
-        return _birge_ratio((self.error / self.std)[self.used])
+        return self._birge_ratio(self.used)
 
     @property
     def covered(self) -> float:
@@ -67,10 +67,25 @@ class HeldOutRows:
         ratio, hits = self.error / self.std, []
         for k in np.unique(self.part):
             others = self.used & (self.part != k)
-            wide = _birge_ratio(ratio[others])
+            wide = self._birge_ratio(others)
             own = np.abs(ratio[self.used & (self.part == k)])
             hits.append(own < WITHIN * wide)
         return float(np.concatenate(hits).mean())
+
+    def _birge_ratio(self, rows: Bools) -> float:
+        """Return the factor by which errors of rows exceed their standard deviations.
+
+        The root of the mean squared ratio, at least 1 (R. T. Birge, Phys. Rev. 40,
+        1932), strays counting as far; 1 where as much is reached by chance, with three
+        independent coordinates a pose.
+        """
+        ratio = np.minimum(np.abs(self.error / self.std)[rows], STRAY)
+        poses = len(np.unique(self.pose[rows]))
+        if poses == 0:
+            return 1.0
+        square = float((ratio**2).mean())
+        chance = 1.0 + SURE * float(np.sqrt(2.0 / (3.0 * poses)))
+        return float(np.sqrt(square)) if square > chance else 1.0
 
     def by_pose(self) -> Floats:
         """Average the length of what is left over every pose, (poses,) [m]."""
@@ -107,19 +122,6 @@ class HeldOutError:
             f"{self.regions_mm:.4f} mm; intervals hold {self.covered:.0%} "
             f"({self.error.n} held-out rows, {how})"
         )
-
-
-def _birge_ratio(ratio: Floats) -> float:
-    """Return the factor by which errors (n, 3) exceed their standard deviations.
-
-    The root of the mean squared ratio, at least 1 (R. T. Birge, Phys. Rev. 40, 1932),
-    strays counting as far; 1 where as many rows exceed it by chance.
-    """
-    if ratio.size == 0:
-        return 1.0
-    square = float(np.minimum(ratio**2, STRAY**2).mean())
-    chance = 1.0 + SURE * float(np.sqrt(2.0 / ratio.size))
-    return float(np.sqrt(square)) if square > chance else 1.0
 
 
 def parts_of(pose: Ints, seed: int, parts: int = PARTS) -> Ints:

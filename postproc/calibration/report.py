@@ -146,6 +146,8 @@ class FitReport:
         tracker_mm: Estimated standard deviation of the tracker, typical, per axis.
         repeatability_mm: Estimated scatter of arrivals, typical, per axis.
         pose_mm: Estimated error of a pose that no effect describes, per axis.
+        repeated: Where the repeatability comes from: "estimated", or the data sheet at
+            the most, where nothing was approached twice in one way.
         split: How far stops and poses could be told apart, in words.
         effective: Effective number of parameters.
         warnings: What else to know.
@@ -179,6 +181,7 @@ class FitReport:
     rejected: str = ""
     pose_mm: float = 0.0
     split: str = ""
+    repeated: str = "estimated"
 
 
 def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
@@ -198,7 +201,7 @@ def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
         own = float(shares[part].sum())
         effects[effect.name] = effects.get(effect.name, 0.0) + own
     jacobian = fit.batch.jacobian
-    arrival = np.sqrt(fit.noise.arrival_variance(jacobian).mean())
+    arrival = np.sqrt(model.noise.arrival_variance(jacobian).mean())
     tracker = fit.noise.tracker_std(survey.position).mean()
     return FitReport(
         parameters=_table(fit, shares),
@@ -220,7 +223,15 @@ def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
         flanks=tell_widths(model.flank_widths),
         pose_mm=float(np.sqrt(model.noise.pose_variance(jacobian).mean()) / MM),
         split=_split(fit),
+        repeated=_repeated(fit),
     )
+
+
+def _repeated(fit: Fit) -> str:
+    """Say where the repeatability of a fit comes from."""
+    if repeated_approaches(fit.batch.states) >= ENOUGH_REPEATS:
+        return "estimated"
+    return "estimated, at most the data sheet's: no approach was repeated"
 
 
 def _split(fit: Fit) -> str:

@@ -14,9 +14,8 @@ from postproc.model.noise import SAME_POSE, poses_of
 from postproc.robot.pose import MM
 from postproc.robot.state import States
 
-AWAY = (
-    2.0  # times the usual time between two stops in which an arm can leave and return
-)
+AWAY = 2.0  # times the usual time between stops, in which an arm leaves and returns
+AVERAGED = "readings of one probe point at a stop are averaged"
 SAME_POINT = 1e-7  # [m] probe points that are one
 FALSE_ALARMS = 0.01  # readings that are dropped per survey of good ones
 FEWEST = 3  # readings of one stop of which one may disagree with the others
@@ -100,10 +99,7 @@ def pool_readings(survey: Measurements) -> Measurements:
     rotation = survey.rotation
     if rotation is not None:
         rotation = _mean_rotations(rotation, label)
-    note = (
-        f"{len(survey)} readings at {len(begins)} stops: readings of one probe point "
-        "at a stop are averaged"
-    )
+    note = f"{len(survey)} readings at {len(begins)} stops: {AVERAGED}"
     return replace(
         pooled, states=states, position=mean, rotation=rotation,
         warnings=(*survey.warnings, note),

@@ -37,6 +37,7 @@ FEW_POSES = 300  # at the most: effects are chosen again without each part
 FEWEST_POSES = 6  # that a part of the rows can be predicted from
 SEED = 0
 DETERMINED = 0.5  # effective parameters a coordinate, from which on rows are few
+GOOD = 2.0  # times the repeatability: errors of an arm that needs no model
 FLOOR = 2e-5  # [m] an arm that is as good as its drawing
 
 
@@ -217,9 +218,11 @@ def _conclude(task: FitTask, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Va
     plain = task.errors(SET_UP, rows.part, rows.used)
     if PairedErrors.of(plain, rows).better or mean_error_mm(plain) < FLOOR / MM:
         return Validated(fitted, error, rows.widening)
+    cause = "The rows are those of another arm, program or frame, or there are too few"
+    if mean_error_mm(plain) * MM < GOOD * task.arm.repeatability:
+        cause = "The arm is as good as its drawing, as far as these rows show"
     why = (
         f"new poses are left {error.error.mean_mm:.4f} mm with this model and "
-        f"{mean_error_mm(plain):.4f} mm with {SET_UP.name}. The rows are those of "
-        "another arm, program or frame, or there are too few"
+        f"{mean_error_mm(plain):.4f} mm with {SET_UP.name}. {cause}"
     )
     return Validated(fitted, error, rows.widening, rejected=why)

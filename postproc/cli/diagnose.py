@@ -326,7 +326,7 @@ def tell(found: Diagnosis) -> str:
     ]
     if found.vap_mm is not None:
         lines.append(f"vAP {found.vap_mm[0]:.4f} -> {found.vap_mm[1]:.4f} mm")
-    lines += [*found.fixed_points, *filter(None, [found.flanks])]
+    lines += [*found.notes, *found.fixed_points, *filter(None, [found.flanks])]
     if found.set_anew is not None:
         lines.append(found.set_anew.tell())
     lines += [

@@ -315,7 +315,7 @@ def _tell_scatter(report: FitReport) -> list[str]:
     if report.tracker_mm or report.repeatability_mm:
         lines.append(
             f"tracker {report.tracker_mm:.4f} mm, repeatability "
-            f"{report.repeatability_mm:.4f} mm per axis (estimated)"
+            f"{report.repeatability_mm:.4f} mm per axis ({report.repeated})"
         )
     if report.pose_mm > SHOWN_MM:
         lines.append(

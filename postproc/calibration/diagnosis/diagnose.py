@@ -56,7 +56,7 @@ from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.report import report_directions, weighed_down
 from postproc.calibration.reversals import newer_widths, split_reversals, tell_widths
 from postproc.calibration.selection import model_of, told_apart
-from postproc.calibration.stops import pool_readings
+from postproc.calibration.stops import AVERAGED, pool_readings
 from postproc.model.combination import Combination
 from postproc.model.covariate import JOINTS
 from postproc.model.kinematics import Batch
@@ -302,10 +302,11 @@ def _conclude(
         places=_places(found),
         next_measurements=poses,
         why_next=why,
-        dropped=weighed_down(found.fit, survey),
+        dropped=survey.dropped + weighed_down(found.fit, survey),
         directions=report_directions(found.fit, survey),
         not_excluded=not_excluded(found.fit.batch),
         fixed_points=() if survey.motion is None else survey.motion.tell(),
+        notes=tuple(w for w in survey.warnings if w.endswith(AVERAGED)),
         set_anew=SetAnew.of(found.fit),
         explained=_explained(held_out, floor) if traced.findings else None,
     )

@@ -125,6 +125,7 @@ class Diagnosis:
         fixed_points: What readings of fixed points say of the tracker, in words.
         flanks: What reversals among the rows tell of the flanks of the joints.
         set_anew: Where base and tool are now, None where they are as they were.
+        notes: How rows were read, in words.
         explained: Part of the squared held-out error above the noise floor that the
             additions explain; None where nothing was added.
     """
@@ -149,6 +150,7 @@ class Diagnosis:
     flanks: str = ""
     set_anew: SetAnew | None = None
     explained: float | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def named(self) -> float | None:
@@ -221,6 +223,7 @@ class Diagnosis:
             "not_excluded": list(self.not_excluded),
             "fixed_points": list(self.fixed_points),
             "flanks_at_stops": self.flanks,
+            "notes": list(self.notes),
             "set_anew": None if self.set_anew is None else self.set_anew.to_dict(),
         }
 
