@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from postproc.arrays import Floats, Ints
 from postproc.robot.state import States
@@ -106,6 +103,10 @@ def poses_of(states: States) -> Ints:
     Angles that were read back differ in their last digit, and count as equal. A row
     that was read in motion is a pose of its own.
     """
+    from scipy.sparse import coo_array  # slow to load, and for fits alone
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     moving = ~np.isnan(states.heading[:, 0])
     payload = np.nan_to_num(states.payload)[:, None]
     own = np.where(moving, np.arange(1, len(states) + 1), 0)[:, None]
