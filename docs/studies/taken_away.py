@@ -83,9 +83,11 @@ def trial(
     )  # fmt: skip
 
 
-def lines(data: DataSet, seeds: int) -> Iterator[str]:
+def lines(data: DataSet, seeds: int, only: list[str] | None) -> Iterator[str]:
     """Write a line for every series, kind and seed."""
-    for series in data.series:
+    for series in only or data.series:
+        if series not in data.series:
+            continue
         for kind in KINDS:
             for seed in range(seeds):
                 before, after, whole, story = trial(data, series, kind, seed)
@@ -100,12 +102,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--series", nargs="+", help="names of series; all without it")
     asked = parser.parse_args()
     print("| rows | taken away | before mm | after mm | whole fit mm | story |")
     print("|---|---|---|---|---|---|")
     for path, base in descriptions(asked.data):
         data = read_set(path, base)
-        for line in () if data is None else lines(data, asked.seeds):
+        for line in () if data is None else lines(data, asked.seeds, asked.series):
             print(line, flush=True)
 
 
