@@ -16,7 +16,7 @@ from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import DirectionReport
 from postproc.model.covariate import covariate, unit
-from postproc.model.effects import EFFECTS
+from postproc.model.effects import BY_NAME, EFFECTS
 from postproc.model.effects.effect import Candidate, Effect
 from postproc.model.kinematics import Batch
 from postproc.model.statistics import ErrorStatistics
@@ -63,6 +63,11 @@ class Finding:
     settings: dict[str, Any]
     held_out_gain: tuple[float, float]
     impossible: tuple[str, ...] = ()
+
+    @property
+    def lawful(self) -> bool:
+        """Whether it is a cause with a law, and no function that may have any shape."""
+        return not (self.nameless or BY_NAME[self.effect].free)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the finding as plain data."""
@@ -158,7 +163,7 @@ class Diagnosis:
         total = sum(f.share for f in self.findings)
         if self.explained is None or total <= 0.0:
             return self.explained
-        share = sum(f.share for f in self.findings if not f.nameless)
+        share = sum(f.share for f in self.findings if f.lawful)
         return self.explained * share / total
 
     @property
@@ -180,8 +185,12 @@ class Diagnosis:
             )
         if self.named is None:
             return f"nothing was added: {remains}"
-        causes = "; ".join(_causes(self.findings)) or "none"
-        return f"{self.named:.0%} of the error is named: {causes}; {remains}"
+        named = "; ".join(_causes([f for f in self.findings if f.lawful])) or "nothing"
+        text = f"{self.named:.0%} of the error is named: {named}; "
+        if shapes := _causes([f for f in self.findings if not f.lawful]):
+            share = (self.explained or 0.0) - self.named
+            text += f"{share:.0%} has a shape and no law: {'; '.join(shapes)}; "
+        return text + remains
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON report."""
@@ -229,11 +238,10 @@ class Diagnosis:
 
 
 def _causes(findings: Sequence[Finding]) -> list[str]:
-    """List the causes that have names, each with its joints."""
+    """List causes, each with its joints."""
     joints: dict[str, list[int]] = {}
     for f in findings:
-        if not f.nameless:
-            joints.setdefault(f.effect, []).extend([f.joint] if f.joint else [])
+        joints.setdefault(f.effect, []).extend([f.joint] if f.joint else [])
     out = []
     for effect, own in joints.items():
         places = ", ".join(map(str, sorted(set(own))))
