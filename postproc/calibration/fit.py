@@ -34,6 +34,7 @@ from postproc.calibration.registration import (
 from postproc.calibration.regression import NEARLY, Fit, fit_effects
 from postproc.calibration.report import FitReport, report_fit, report_method
 from postproc.calibration.reversals import (
+    Reversals,
     newer_widths,
     split_reversals,
 )
@@ -41,7 +42,7 @@ from postproc.calibration.selection import Progress, model_of, silent
 from postproc.calibration.stops import pool_readings
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
-from postproc.calibration.validation import FitTask, validate_fit
+from postproc.calibration.validation import FitTask, Validated, validate_fit
 from postproc.calibration.weighing import ENOUGH
 from postproc.calibration.weight_direction import direction_warning
 from postproc.model.combination import Combination
@@ -147,6 +148,48 @@ def fit_measurements(
         validate: Whether poses are held out, to find what new ones will be left, and to
             take simpler effects where those leave less. It takes several fits.
     """
+    rows = _prepare(survey, cell, frame)
+    if method != "full":
+        return _published(rows, cell.arm, method, seed)
+    task = FitTask(rows.survey, cell.arm, effects, rows.tracker, rows.setup)
+    fitted = task.fit(progress=progress)
+    found = Validated(fitted, None)
+    if validate:
+        progress("predict poses that are held out")
+        found = validate_fit(task, fitted)
+    progress("report")
+    return _conclude(rows, found, cell.arm)
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedRows:
+    """A survey that is ready to be fitted.
+
+    Attributes:
+        survey: One row a stop and probe point, base frame.
+        tracker: Tracker position in the base frame, (3,) [m], or None.
+        setup: Names of effects of the set-up, fitted besides.
+        placed: Registration of rows in the tracker's frame, or None.
+        points: Where the cell has the nests, flange frame, (k, 3) [m], or None.
+        monuments: Fixed points, in the base frame as far as it is known.
+        reversals: Steps behind reversals, taken out of the survey.
+    """
+
+    survey: Measurements
+    tracker: Floats | None
+    setup: tuple[str, ...]
+    placed: Registration | None
+    points: Floats | None
+    monuments: tuple[Monument, ...]
+    reversals: Reversals | None
+
+
+def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
+    """Average readings, register rows in the tracker's frame, and check them.
+
+    Raises:
+        MeasurementError: The rows cannot be those of this arm, or of any.
+    """
     survey = pool_readings(survey)
     tracker, setup = cell.tracker, several_points(survey)
     placed, points, monuments = None, None, monuments_of(survey)
@@ -160,41 +203,41 @@ def fit_measurements(
     if frame == "base":
         setup = (*setup, *file_shifts(survey, cell.arm, cell.tracker))
     survey = check_orientations(survey, cell.arm)
-    told = (*survey.warnings, *lost_without(cell.arm, survey))
-    survey = replace(survey, warnings=told)
-    if method != "full":
-        model = fit_method(method, survey, cell.arm, seed)
-        told = (*survey.warnings, *too_wide(model, survey, cell.arm))
-        survey = replace(survey, warnings=told)
-        model = replace(model, registration=placed)
-        return Calibration(model, report_method(model, survey, cell.arm), survey)
-    task = FitTask(survey, cell.arm, effects, tracker, setup)
-    fitted = task.fit(progress=progress)
-    validated = None
-    if validate:
-        progress("predict poses that are held out")
-        validated = validate_fit(task, fitted)
-        fitted = validated.fit
-    progress("report")
-    wide = 1.0 if validated is None else validated.widening
-    model = model_of(fitted, survey, wide)
-    model = replace(model, registration=placed, monuments=monuments)
-    told = (
+    notes = (*survey.warnings, *lost_without(cell.arm, survey))
+    survey = replace(survey, warnings=notes)
+    return PreparedRows(survey, tracker, setup, placed, points, monuments, reversals)
+
+
+def _published(rows: PreparedRows, arm: Arm, method: Method, seed: int) -> Calibration:
+    """Fit a method of the literature."""
+    survey = rows.survey
+    model = fit_method(method, survey, arm, seed)
+    notes = (*survey.warnings, *too_wide(model, survey, arm))
+    survey = replace(survey, warnings=notes)
+    model = replace(model, registration=rows.placed)
+    return Calibration(model, report_method(model, survey, arm), survey)
+
+
+def _conclude(rows: PreparedRows, found: Validated, arm: Arm) -> Calibration:
+    """Make the model of a fit and its report."""
+    fitted, survey = found.fit, rows.survey
+    model = model_of(fitted, survey, found.widening)
+    model = replace(model, registration=rows.placed, monuments=rows.monuments)
+    widths = newer_widths((), model, arm, rows.reversals)
+    model = replace(model, flank_widths=widths)
+    notes = (
         *survey.warnings,
         *moved_tools(fitted, survey),
         *drifts(fitted),
-        *wrong_nests(fitted, points),
+        *wrong_nests(fitted, rows.points),
         *_rounding(model, fitted),
-        *(() if validated is None else validated.notes),
+        *found.notes,
         *direction_warning(fitted),
         *file_steps(fitted, survey),
     )
-    survey = replace(survey, warnings=told)
-    widths = newer_widths((), model, cell.arm, reversals)
-    model = replace(model, flank_widths=widths)
+    survey = replace(survey, warnings=notes)
     report = report_fit(fitted, survey, model)
-    if validated is not None:
-        report = replace(report, held_out=validated.error, rejected=validated.rejected)
+    report = replace(report, held_out=found.error, rejected=found.rejected)
     return Calibration(model, report, survey.with_states(fitted.batch.states))
 
 
