@@ -24,7 +24,7 @@ from postproc.calibration.cross_validation import (
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
 from postproc.calibration.selection import Progress, fit_survey, model_of, silent
-from postproc.calibration.weighing import ENOUGH, worth
+from postproc.calibration.weighing import SURE, worth
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.placement import Placement
@@ -202,7 +202,7 @@ def _plain_rungs(task: FitTask, part: Ints, used: Bools) -> tuple[Rung, ...]:
         e for e in refined.combination.effects
         if e.name in (*(USUAL.effects or ()), *task.setup)
     )  # fmt: skip
-    usual = REFINED if worth(refined, plain) > ENOUGH else USUAL
+    usual = REFINED if worth(refined, plain) > SURE else USUAL
     independent = 3 * len(np.unique(task.survey.states.order[used]))
     if refined.effective < DETERMINED * independent:
         return (usual,)
