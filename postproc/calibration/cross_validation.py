@@ -38,7 +38,7 @@ class HeldOutRows:
     """Errors of rows that no fit has seen.
 
     Attributes:
-        error: What is left, (n, 3) [m].
+        error: Reading minus prediction, (n, 3) [m].
         std: Stated standard deviation of a reading, (n, 3) [m].
         part: Part of every row, (n,): what predicted it has seen no other row of it.
         used: Rows that are measurements of the arm, (n,).
@@ -88,7 +88,7 @@ class HeldOutRows:
         return float(np.sqrt(square)) if square > chance else 1.0
 
     def by_pose(self) -> Floats:
-        """Average the length of what is left over every pose, (poses,) [m]."""
+        """Average the length of the error over every pose, (poses,) [m]."""
         size = np.linalg.norm(self.error, axis=1)[self.used]
         _, label = np.unique(self.pose[self.used], return_inverse=True)
         label = label.reshape(-1)
@@ -166,12 +166,11 @@ def held_out(
     return HeldOutRows(error, std, part, used, poses_of(survey.states), tracker)
 
 
-def held_out_linearly(fit: Fit, model: Model, part: Ints) -> HeldOutRows:
+def held_out_linearly(fit: Fit, part: Ints) -> HeldOutRows:
     """Predict every part by the others, effects and prior scales as in a fit.
 
     Args:
         fit: A fit of all rows, linearised where it ended.
-        model: What it became.
         part: Part of every row, whole poses, (n,).
     """
     folds = Folds.of_fit(fit, part)
@@ -184,7 +183,7 @@ def held_out_linearly(fit: Fit, model: Model, part: Ints) -> HeldOutRows:
         design = fit.design[rows]
         error[rows] = fit.residual[rows] + design.times(fit.values - values)
         known = design.variance(covariance)
-        std[rows] = model.reading_spread * np.sqrt(known + noise[rows])
+        std[rows] = fit.reading_spread * np.sqrt(known + noise[rows])
     return HeldOutRows(error, std, part, fit.rows.weight > 0, fit.pose, tracker)
 
 
@@ -204,7 +203,7 @@ def summarise(rows: HeldOutRows, regions_mm: float, chosen: bool) -> HeldOutErro
 
 
 def mean_error_mm(rows: HeldOutRows) -> float:
-    """Average the lengths of what is left of the rows that count [mm]."""
+    """Average the lengths of the errors of the rows that count [mm]."""
     return float(np.linalg.norm(rows.error[rows.used], axis=1).mean()) / MM
 
 

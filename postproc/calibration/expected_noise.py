@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from postproc.calibration.diagnosis.held_out import ISO_RP
 from postproc.calibration.regression import Fit
 from postproc.model.noise import Noise, angle_step, poses_of
 from postproc.robot.state import States
 
 ENOUGH_REPEATS = 5  # that tell scatter of arrivals from errors of a pose
-ISO_RP = 3.615  # RP of ISO 9283 over the standard deviation per axis, round scatter
 
 
 def expected_noise(fitted: Fit) -> Noise:

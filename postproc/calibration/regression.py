@@ -186,7 +186,7 @@ class Fit:
 #
 # One pass linearises the arm at the present parameters (Gauss-Newton), solves the
 # Bayesian linear regression with prior scales by marginal likelihood, re-estimates the
-# # components of the noise and re-weighs the rows; passes repeat until nothing moves. A
+# components of the noise and re-weighs the rows; passes repeat until nothing moves. A
 # step so long that the arm is not linear along it tells nothing of noise and rows: they
 # wait until the arm is linearised where it led.
 

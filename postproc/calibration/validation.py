@@ -29,7 +29,6 @@ from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.placement import Placement
 from postproc.model.model import Model
-from postproc.model.noise import poses_of
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 
@@ -142,14 +141,14 @@ def validate_fit(task: FitTask, fitted: Fit) -> Validated:
         task: What was fitted.
         fitted: The fit.
     """
-    survey, used = task.survey, fitted.rows.weight > 0
-    poses = len(np.unique(poses_of(survey.states[used])))
+    used = fitted.rows.weight > 0
+    poses = len(np.unique(fitted.pose[used]))
     if poses < FEWEST_POSES + PARTS:
         note = f"{poses} poses are too few to hold some out: the model is not checked"
         return Validated(fitted, None, notes=(note,))
-    part = parts_of(poses_of(survey.states), SEED)
+    part = parts_of(fitted.pose, SEED)
     if poses > FEW_POSES:
-        rows = held_out_linearly(fitted, model_of(fitted, survey), part)
+        rows = held_out_linearly(fitted, part)
         return _conclude(task, fitted, rows, chosen=False)
     effects = fitted.combination.effects
     rung, rows, notes = _choose(task, effects, part, used)
@@ -176,7 +175,7 @@ def _choose(
     if task.effects is not None:
         return asked, task.errors(asked, part, used), ()
     laws = (WITH_LAWS,) if any(e.free for e in effects) else ()
-    rungs = (*_plain_rungs(task, part, used), *laws, asked)
+    rungs = (*_plain_rungs(task, used), *laws, asked)
     tried = [task.errors(rung, part, used) for rung in rungs]
     number = choose(tried)
     rung, rows = rungs[number], tried[number]
@@ -190,7 +189,7 @@ def _choose(
     return rung, rows, (note,)
 
 
-def _plain_rungs(task: FitTask, part: Ints, used: Bools) -> tuple[Rung, ...]:
+def _plain_rungs(task: FitTask, used: Bools) -> tuple[Rung, ...]:
     """Return what more effects must beat, and what is simpler than that.
 
     Where backlash is worth it by its evidence, it varies with the angle: priors keep
@@ -211,9 +210,7 @@ def _plain_rungs(task: FitTask, part: Ints, used: Bools) -> tuple[Rung, ...]:
 
 def _conclude(task: FitTask, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Validated:
     """Put figures together, and compare with a set-up without errors of the arm."""
-    survey = task.survey
-    model = model_of(fitted, survey)
-    region = held_out_linearly(fitted, model, regions_of(survey))
+    region = held_out_linearly(fitted, regions_of(task.survey))
     error = summarise(rows, mean_error_mm(region), chosen)
     plain = task.errors(SET_UP, rows.part, rows.used)
     if PairedErrors.of(plain, rows).better or mean_error_mm(plain) < FLOOR / MM:

@@ -17,7 +17,6 @@ from postproc.calibration.cross_validation import (
 )
 from postproc.calibration.expected_noise import expected_noise
 from postproc.calibration.fit import fit_measurements
-from postproc.calibration.selection import model_of
 from postproc.calibration.validation import ASKED, FitTask, Rung
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import random_arm, random_states, survey_of
@@ -94,7 +93,7 @@ def test_parts_predicted_linearly_are_near_to_fits_without_them() -> None:
     task = FitTask(survey, CELL.arm, PLAIN, None)
     fitted = task.fit()
     part = parts_of(np.arange(80), 0)
-    linear = held_out_linearly(fitted, model_of(fitted, survey), part)
+    linear = held_out_linearly(fitted, part)
     exact = task.errors(Rung(ASKED, PLAIN), part, np.ones(80, dtype=bool))
     gap = np.linalg.norm(linear.error - exact.error, axis=1)
     assert np.median(gap) < 0.15 * np.median(np.linalg.norm(exact.error, axis=1))

@@ -315,7 +315,7 @@ def _conclude(
 def _judge(traced: Investigation, held_out: HeldOut, floor: NoiseFloor) -> Verdict:
     """Decide on the verdict by what held-out rows are left.
 
-    Structure in what is left is "unexplained" only where what is left exceeds the noise
+    Structure in the residual is "unexplained" only where the residual exceeds the noise
     floor clearly, as far as that is known otherwise than from the same rows.
     """
     if held_out.worse:
