@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
@@ -13,20 +13,13 @@ from postproc.model.effects.compliance import (
     AXES,
     LOADED,
     UNSURE_PAYLOAD,
+    WeightEffect,
     loads,
-    moments,
-    softness_of,
 )
 from postproc.model.effects.effect import (
-    Candidate,
-    Effect,
     Parameter,
-    Unasked,
-    alternatives,
 )
 from postproc.model.kinematics import Batch
-from postproc.robot.arm import Arm
-from postproc.robot.state import States
 
 BENDING = (2, 3, 4, 5, 6)  # joint 1 stands on the base: that is `base_tilt`
 ACROSS = "xy"  # axes of the frame before a joint, which turns about its z
@@ -35,7 +28,7 @@ LEAST = 5.0  # nats that it must be worth besides: it has many columns
 
 
 @dataclass(frozen=True)
-class Bending(Effect):
+class Bending(WeightEffect):
     """All behind a joint turns across its axis by the moment of weight / stiffness.
 
     What stands behind the origin of D-H frame k - 1 turns about x and y of this frame,
@@ -51,12 +44,9 @@ class Bending(Effect):
     """
 
     name: ClassVar[str] = "bending"
-    driven_by: ClassVar[str] = "torque"
-    unasked: ClassVar[Unasked | None] = "weighed"
 
     joints: tuple[int, ...] = BENDING
     moments: tuple[tuple[tuple[int, float], ...], ...] = ((),) * 5
-    payload: bool = False
     softness: tuple[float, ...] = (1e-7,) * 5
 
     @classmethod
@@ -75,37 +65,7 @@ class Bending(Effect):
         load = np.hypot(*across)
         least = LOADED * float(load.max(initial=0.0))
         joints = tuple(j for j in BENDING if load[j - 1] > max(least, 1e-9))
-        carried = bool(np.nan_to_num(batch.states.payload).any())
-        return cls(
-            joints,
-            tuple(moments(batch.arm, j) for j in joints),
-            carried,
-            tuple(softness_of(float(load[j - 1])) for j in joints),
-        )
-
-    @classmethod
-    def propose(cls, arm: Arm, states: States) -> Self:
-        """Let the arm bend behind all joints that weight loads across their axes."""
-        return cls.on(Batch(arm, states))
-
-    @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
-        """Try the arm behind every joint."""
-        return [
-            c
-            for effect in cls.on(batch).pieces()
-            for j in effect.joints
-            for c in alternatives([(effect, f"torque {j}")], j)
-        ]
-
-    def pieces(self) -> tuple[Self, ...]:
-        """Return the effect behind each joint alone."""
-        return tuple(
-            replace(self, joints=(j,), moments=(links,), softness=(scale,))
-            for j, links, scale in zip(
-                self.joints, self.moments, self.softness, strict=True
-            )
-        )
+        return cls.of_joints(batch, joints, load)
 
     def least_evidence(self) -> float:
         """Ask more of it than of a joint that yields."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -11,6 +12,7 @@ from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
     Candidate,
+    Effect,
     JointEffect,
     Parameter,
     Unasked,
@@ -82,20 +84,16 @@ def softness_of(load: float) -> float:
 
 
 @dataclass(frozen=True)
-class Compliance(JointEffect):
-    """Joint error torque / stiffness, with link moments that the data may correct.
-
-    The torque is that of the nominal links and of the declared payload. Torque is
-    linear in the links' first moments, so their deviations are columns too.
+class WeightEffect(Effect):
+    """What joints yield by under weight, each kept or dropped by itself.
 
     Attributes:
         joints: Joints that yield.
         moments: Per joint, (link, standard deviation of its first moment [kg m]).
         payload: Whether the payload's centre of mass is to be corrected too.
-        softness: Prior scale of each joint [rad/(N m)]; none: `SCALE`.
+        softness: Prior softness of each joint [rad/(N m)]; `SCALE` where there is none.
     """
 
-    name: ClassVar[str] = "compliance"
     driven_by: ClassVar[str] = "torque"
     unasked: ClassVar[Unasked | None] = "weighed"
 
@@ -105,19 +103,23 @@ class Compliance(JointEffect):
     softness: tuple[float, ...] = ()
 
     @classmethod
+    @abstractmethod
     def on(cls, batch: Batch) -> Self:
         """Make the effect of all joints whose load varies over the states."""
-        total, unit = batch.loads.total, batch.loads.basis
-        load = loads(batch, total, unit.reshape(len(batch), 6, 6, 4)[..., 1:])
-        least = LOADED * float(load.max(initial=0.0))
-        joints = tuple(j for j in JOINTS if load[j - 1] > max(least, 1e-9))
-        if not joints:
-            joints = YIELDING
-        carried = bool(np.nan_to_num(batch.states.payload).any())
+
+    @classmethod
+    def of_joints(cls, batch: Batch, joints: tuple[int, ...], load: Floats) -> Self:
+        """Make the effect of some joints.
+
+        Args:
+            batch: The states.
+            joints: The joints.
+            load: By how much the load of each of the 6 varies, (6,) [N m].
+        """
         return cls(
             joints,
             tuple(moments(batch.arm, j) for j in joints),
-            carried,
+            bool(np.nan_to_num(batch.states.payload).any()),
             tuple(softness_of(float(load[j - 1])) for j in joints),
         )
 
@@ -143,6 +145,28 @@ class Compliance(JointEffect):
             replace(self, joints=(j,), moments=(links,), softness=(scale,))
             for j, links, scale in zip(self.joints, self.moments, scales, strict=True)
         )
+
+
+@dataclass(frozen=True)
+class Compliance(WeightEffect, JointEffect):
+    """Joint error torque / stiffness, with link moments that the data may correct.
+
+    The torque is that of the nominal links and of the declared payload. Torque is
+    linear in the links' first moments, so their deviations are columns too.
+    """
+
+    name: ClassVar[str] = "compliance"
+
+    @classmethod
+    def on(cls, batch: Batch) -> Self:
+        """Make the effect of all joints whose load varies over the states."""
+        total, unit = batch.loads.total, batch.loads.basis
+        load = loads(batch, total, unit.reshape(len(batch), 6, 6, 4)[..., 1:])
+        least = LOADED * float(load.max(initial=0.0))
+        joints = tuple(j for j in JOINTS if load[j - 1] > max(least, 1e-9))
+        if not joints:
+            joints = YIELDING
+        return cls.of_joints(batch, joints, load)
 
     def least_evidence(self) -> float:
         """Ask more of joints that carry little weight on most arms."""
