@@ -28,11 +28,11 @@ from postproc.simulation.kinematics import (
 from postproc.simulation.laws import (
     AS_BUILT,
     DEFAULT,
-    KINDS,
     Draw,
     Law,
     Planted,
     backlash,
+    kind_of,
     parse_effects,
 )
 from postproc.simulation.reference import USUAL_TRACKER, reference_arrivals
@@ -172,7 +172,7 @@ class _Planter:
         if item.name == "backlash":
             law = backlash(draw)
             return self.sized(law, item.peak_mm or self.peak_mm(law))
-        kind = KINDS[item.name]
+        kind = kind_of(item.name)
         law = kind.draw(draw).scaled(SMALL, 0.0)
         usual = np.exp(rng.uniform(np.log(kind.low_mm), np.log(kind.high_mm)))
         return self.sized(law, item.peak_mm or float(usual))

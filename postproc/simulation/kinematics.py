@@ -119,23 +119,21 @@ class Chain:
             np.matmul(out[:, i], links[:, i], out=out[:, i + 1])
         return out
 
-    def flange(self, q: Floats, leans: Floats | None = None) -> Floats:
+    def flange(self, q: Floats, twists: Floats | None = None) -> Floats:
         """Return the flange poses (n, 4, 4) in the arm base [m].
 
         Args:
             q: Controller joint angles, (n, 6) [rad].
-            leans: By what the arm is bent before every joint turns, about x and y of
-                the frame there, (n, 6, 2) [rad].
+            twists: By what all behind the frame before every joint moves, in that
+                frame, (n, 6, 6) [m, rad].
         """
-        if leans is None:
+        if twists is None:
             return np.asarray(self.frames(q)[:, 6])
         links = self.links(np.asarray(q, dtype=float))
-        about = np.concatenate([leans, np.zeros_like(leans[..., :1])], axis=2)
-        bent = exponential(about)
-        placed = np.broadcast_to(np.eye(4), (len(links), 4, 4)).copy()
+        moved = small_motion(twists)
+        placed = np.broadcast_to(np.eye(4), (len(links), 4, 4))
         for i in range(6):
-            placed[:, :3, :3] = placed[:, :3, :3] @ bent[:, i]
-            placed = placed @ links[:, i]
+            placed = placed @ moved[:, i] @ links[:, i]
         return placed
 
     def bent(self, growth: Floats) -> Chain:

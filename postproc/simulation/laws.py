@@ -11,6 +11,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
+from postproc.simulation.cell import TEXT, Cell
 from postproc.simulation.kinematics import (
     LinkMasses,
     bending_moment,
@@ -18,7 +19,11 @@ from postproc.simulation.kinematics import (
     payload_torque,
     total_torque,
 )
-from postproc.simulation.reference import DURATION, WORKING_RANGE
+from postproc.simulation.reference import (
+    DURATION,
+    WORKING_RANGE,
+    reference_arrivals,
+)
 from postproc.simulation.state import REST_TEMPERATURE, VirtualArrivals
 
 # A physical law of the virtual arm: what one imperfection does on every arrival.
@@ -27,10 +32,10 @@ Shape = Callable[[VirtualArrivals], Floats]
 
 
 class Where(Enum):
-    """What a law changes: six numbers an arrival, twelve of `LEANS`."""
+    """What a law changes: six numbers an arrival, six a joint of `LINKS`."""
 
     JOINTS = "joints"  # joint angles [rad]
-    LEANS = "leans"  # about x and y of the frame before every joint [rad]
+    LINKS = "links"  # twists of all behind the frame before every joint [m, rad]
     LENGTHS = "lengths"  # relative growth of every link
     BASE = "base"  # twist of the arm on its foundation [m, rad]
     TOOL = "tool"  # twist of the tool on the flange [m, rad]
@@ -48,7 +53,7 @@ class Law:
         source: The joint, or the coupled drive, that drives a joint's error, from 1,
             or 0.
         parameters: The law's own numbers, SI units, for the record.
-        shape: (n,) arrivals -> (n, 6) or (n, 12) per unit of `scale`.
+        shape: (n,) arrivals -> (n, 6) or (n, 36) per unit of `scale`.
         scale: Size of the law.
         peak_mm: Largest TCP displacement over the reference campaign.
     """
@@ -110,9 +115,9 @@ def on_joint(joint: int, values: Floats) -> Floats:
 
 
 def total(laws: Sequence[Law], where: Where, arrivals: VirtualArrivals) -> Floats:
-    """Sum the changes (n, 6) or (n, 12) of all laws that act at one place."""
+    """Sum the changes (n, 6) or (n, 36) of all laws that act at one place."""
     parts = [law(arrivals) for law in laws if law.where is where]
-    width = 12 if where is Where.LEANS else 6
+    width = 36 if where is Where.LINKS else 6
     return np.asarray(sum(parts, np.zeros((len(arrivals), width))))
 
 
@@ -154,11 +159,13 @@ def bending(draw: Draw) -> Law:
         moment = bending_moment(
             draw.body, arrivals.q, arrivals.payload, arrivals.payload_com
         )
-        return np.reshape(moment / KILO * softness, (len(arrivals), 12))
+        twists = np.zeros((len(arrivals), 6, 6))
+        twists[:, :, 3:5] = moment / KILO * softness
+        return twists.reshape(-1, 36)
 
     parameters = {f"softness_{a}": float(softness[joint - 1, k])
                   for k, a in enumerate("xy")}  # fmt: skip
-    return Law("bending", Where.LEANS, (joint,), 0, parameters, shape)
+    return Law("bending", Where.LINKS, (joint,), 0, parameters, shape)
 
 
 def payload(draw: Draw) -> Law:
@@ -576,6 +583,27 @@ def tracker_drift(draw: Draw) -> Law:
     return Law("tracker_drift", Where.TRACKER, (), 0, {"phase": phase}, shape)
 
 
+# Any other small motion of a link: a cell of the table of all of them.
+
+USUAL_CELL = 0.05, 0.5  # [mm]
+
+
+def cell(draw: Draw, text: str) -> Law:
+    """A link, the base or the tool moves a little by what the text says."""
+    asked = Cell.parse(text)
+    drive = asked.drawn(draw.rng, draw.body, reference_arrivals(draw.rows))
+    place, link = asked.place, asked.link
+
+    def shape(arrivals: VirtualArrivals) -> Floats:
+        twists = np.zeros((len(arrivals), 6, 6))
+        twists[:, max(link - 1, 0), place] = drive(arrivals)
+        return twists.reshape(-1, 36) if link else twists[:, 0]
+
+    whole = {"base": Where.BASE, "tool": Where.TOOL}
+    where = whole.get(asked.body, Where.LINKS)
+    return Law(text, where, (link,) if link else (), 0, {}, shape)
+
+
 # All imperfections by name, and the text that asks for them.
 
 DEFAULT = ("geometry", "tool", "backlash")
@@ -625,12 +653,19 @@ KINDS = {
 NAMES = (*DEFAULT, *KINDS)
 
 
+def kind_of(name: str) -> LawKind:
+    """Find how a law is drawn: one by name, or a cell by its text."""
+    if " by " in name:
+        return LawKind(lambda draw: cell(draw, name), *USUAL_CELL)
+    return KINDS[name]
+
+
 @dataclass(frozen=True)
 class Planted:
     """One imperfection asked for.
 
     Attributes:
-        name: One of `NAMES`.
+        name: One of `NAMES`, or the text of a cell.
         joint: From 1, or 0: drawn.
         peak_mm: Largest displacement of the TCP, or 0: drawn from the usual sizes.
     """
@@ -643,7 +678,8 @@ class Planted:
 def parse_effects(text: str | Sequence[str | Planted]) -> tuple[Planted, ...]:
     """Read a list of effects: ``name``, ``name@joint``, ``name=mm``, ``name@joint=mm``.
 
-    ``all`` stands for every name.
+    ``all`` stands for every name. Any other motion is asked for by its `cell` and the
+    size in mm, ``rotation:link3:x by temperature linear 0.02``.
 
     >>> parse_effects("geometry,compliance@2=0.4")[1]
     Planted(name='compliance', joint=2, peak_mm=0.4)
@@ -664,10 +700,23 @@ def parse_effects(text: str | Sequence[str | Planted]) -> tuple[Planted, ...]:
 
 
 def _read(item: str) -> Planted:
+    if " by " in item:
+        return _read_cell(item)
     match = re.fullmatch(r"(\w+)(?:@([1-6]))?(?:=([0-9.]+(?:e-?\d+)?))?", item)
     if match is None or match[1] not in NAMES:
         raise PostprocError(
             f"the virtual arm has no effect '{item}'. Write name, name@joint, name=mm "
-            f"or name@joint=mm with one of: {', '.join(NAMES)}"
+            f"or name@joint=mm with one of: {', '.join(NAMES)}; or any motion of a "
+            "link, for instance rotation:link3:x by temperature linear 0.02"
         )
     return Planted(match[1], int(match[2] or 0), float(match[3] or 0.0))
+
+
+def _read_cell(item: str) -> Planted:
+    """Read a cell, the size in mm behind it where there is one."""
+    if TEXT.fullmatch(item):
+        return Planted(str(Cell.parse(item)))
+    text, _, size = item.replace("=", " ").rpartition(" ")
+    if re.fullmatch(r"\d+\.?\d*|\.\d+", size) is None:
+        text = item  # refused as it stands
+    return Planted(str(Cell.parse(text)), 0, float(size))
