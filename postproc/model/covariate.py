@@ -8,7 +8,9 @@ from postproc.arrays import Floats
 from postproc.model.kinematics import Batch
 from postproc.robot.state import States
 
-JOINT_KINDS = ("joint", "drive", "lambda", "before", "travel", "loop", "torque")
+JOINT_KINDS = (
+    "joint", "drive", "lambda", "before", "travel", "way", "loop", "torque",
+)  # fmt: skip
 SHORTEST = 1e-4  # [rad] of a way whose logarithm is taken
 TILTING = "tilting"
 PLAIN = ("speed", "payload", "temperature", "time", "order")
@@ -26,8 +28,10 @@ def covariate(batch: Batch, name: str) -> Floats:
 
     Names are ``joint 5`` (its angle [rad]), ``drive 5`` (that of its coupled drive
     [rad]), ``lambda 5`` (its direction), ``before 5`` (its direction at the visit
-    before), ``travel 5`` (since its last reversal [log rad]), ``loop 5`` (between its
+    before), ``way 5`` (since its last reversal [rad]), ``travel 5`` (its logarithm),
+    ``loop 5`` (between its
     last two reversals [log rad]), ``torque 5`` (of gravity about it [N m]),
+    ``moment 5x`` (of gravity across it, about x of the frame before it [N m]),
     ``tilting`` (moment of all weight about the base's origin [N m]),
     ``speed``, ``payload``, ``temperature``, ``time`` and ``order`` (SI units).
 
@@ -38,6 +42,10 @@ def covariate(batch: Batch, name: str) -> Floats:
     if name == TILTING:
         about_x, about_y, about_z = batch.loads.tilting.T
         return np.asarray(np.hypot(np.hypot(about_x, about_y), about_z))
+    if kind == "moment" and number[:1] in set("123456") and number[1:] in ("x", "y"):
+        return np.asarray(
+            batch.loads.bending[:, int(number[0]) - 1, "xy".index(number[1])]
+        )
     if kind in PLAIN and not number:
         return np.asarray(getattr(batch.states, kind), dtype=float)
     if kind in JOINT_KINDS and number in set("123456"):
@@ -46,6 +54,8 @@ def covariate(batch: Batch, name: str) -> Floats:
             return np.asarray(batch.states.q[:, j])
         if kind == "drive":
             return np.asarray(batch.states.q @ batch.arm.coupling[j])
+        if kind == "way":
+            return np.asarray(batch.states.travel[:, j])
         if kind == "travel":
             return np.log(np.maximum(batch.states.travel[:, j], SHORTEST))
         if kind == "lambda":
@@ -63,7 +73,9 @@ def unit(name: str) -> str:
     kind = name.partition(" ")[0]
     return {
         "joint": "rad", "drive": "rad", "lambda": "1", "before": "1",
-        "travel": "log rad", "loop": "log rad", "torque": "N m", TILTING: "N m",
+        "way": "rad",
+        "travel": "log rad", "loop": "log rad", "torque": "N m", "moment": "N m",
+        TILTING: "N m",
         "speed": "m/s",
         "payload": "kg", "temperature": "deg C", "time": "s", "order": "rows",
     }[kind]  # fmt: skip

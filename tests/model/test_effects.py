@@ -63,8 +63,8 @@ def variants() -> list[Effect]:
     out += [
         BY_NAME["curve"](direction=d, source=s, lower=(low,), upper=(high,))
         for d, s, low, high in (
-            ("base z", ("time",), 0.0, 400.0),
-            ("tool x", ("order",), 0.0, 40.0),
+            ("base shift z", ("time",), 0.0, 400.0),
+            ("tool shift x", ("order",), 0.0, 40.0),
             ("joint 2", ("torque 2",), -4e3, 4e3),
         )
     ]
@@ -156,9 +156,9 @@ def test_origins_say_what_may_be_compensated() -> None:
     assert curve(source=("order",)).belongs_to() == "setup"
     assert curve(source=("joint 3", "temperature")).belongs_to() == "state"
     assert curve(source=("joint 3",)).belongs_to() == "arm"
-    assert curve(direction="tool z", source=("joint 3",)).belongs_to() == "arm"
+    assert curve(direction="tool shift z", source=("joint 3",)).belongs_to() == "arm"
     # Along the base's axes it may be the tracker that errs.
-    assert curve(direction="base z", source=("joint 3",)).belongs_to() == "setup"
+    assert curve(direction="base shift z", source=("joint 3",)).belongs_to() == "setup"
     # Programs run warm; only the rows of a survey are early in their order.
     by_order = BY_NAME["thermal"](form="time", clock="order")
     assert by_order.belongs_to() == "setup"

@@ -24,6 +24,7 @@ class Azimuth(Sighting):
     """Angle error a sin(azimuth) + b cos(azimuth) about the tracker's vertical axis."""
 
     name: ClassVar[str] = "azimuth"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (("base turn", "joint"),)
 
     @classmethod
     def sighted(

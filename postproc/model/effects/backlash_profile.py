@@ -12,13 +12,16 @@ from postproc import _native
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
+    ANY,
     FAR,
     Candidate,
+    Cells,
     JointEffect,
     Parameter,
     Unasked,
     alternatives,
     fade_turns,
+    own_cells,
 )
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
@@ -49,6 +52,11 @@ class BacklashProfile(JointEffect):
     constant: bool = False
     lower: tuple[float, ...] = (-FAR,) * 6
     upper: tuple[float, ...] = (FAR,) * 6
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return own_cells("lambda {j} x joint {j}", *ANY)
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:

@@ -43,6 +43,7 @@ class BaseTilt(Effect):
     """
 
     name: ClassVar[str] = "base_tilt"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (("base turn", "moment"),)
     sought: ClassVar[Sought | None] = "always"
     driven_by: ClassVar[str] = "torque"
 

@@ -17,6 +17,7 @@ from postproc.model.effects.compliance import (
     loads,
 )
 from postproc.model.effects.effect import (
+    Cells,
     Parameter,
 )
 from postproc.model.kinematics import Batch
@@ -48,6 +49,15 @@ class Bending(WeightEffect):
     joints: tuple[int, ...] = BENDING
     moments: tuple[tuple[tuple[int, float], ...], ...] = ((),) * 5
     softness: tuple[float, ...] = (1e-7,) * 5
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return tuple(
+            (f"link {j} turn {a}", f"moment {j}{a}", "linear")
+            for j in BENDING
+            for a in ACROSS
+        )
 
     @classmethod
     def on(cls, batch: Batch) -> Self:

@@ -12,11 +12,13 @@ from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
     Candidate,
+    Cells,
     Effect,
     JointEffect,
     Parameter,
     Unasked,
     alternatives,
+    own_cells,
 )
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
@@ -156,6 +158,11 @@ class Compliance(WeightEffect, JointEffect):
     """
 
     name: ClassVar[str] = "compliance"
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return own_cells("torque {j}", "linear")
 
     @classmethod
     def on(cls, batch: Batch) -> Self:

@@ -42,6 +42,7 @@ class Counterbalance(JointEffect):
     """
 
     name: ClassVar[str] = "counterbalance"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "joint"),)
     unasked: ClassVar[Unasked | None] = "weighed"
 
     ratio: float = 0.4

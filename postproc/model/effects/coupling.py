@@ -10,6 +10,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.effects.effect import (
     Candidate,
+    Cells,
     JointEffect,
     Parameter,
     Unasked,
@@ -34,6 +35,11 @@ class Coupling(JointEffect):
     unasked: ClassVar[Unasked | None] = "weighed"
 
     pairs: tuple[tuple[int, int], ...] = HOLLOW_WRIST
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return tuple((f"joint {j}", f"joint {k}", "linear") for j, k in TRIED)
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:

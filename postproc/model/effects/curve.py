@@ -10,26 +10,20 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from postproc.arrays import Floats
-from postproc.model.covariate import JOINTS, PLAIN, carrying, covariate, varies
-from postproc.model.effects.effect import (
-    FREE,
-    Candidate,
-    Effect,
-    Family,
-    Origin,
-    Parameter,
-    fade,
-)
+from postproc.model.carrier import carrier
+from postproc.model.covariate import JOINTS, covariate
+from postproc.model.effects.cell import CarriedEffect
+from postproc.model.effects.effect import FREE, Candidate, Family, Parameter, fade
 from postproc.model.kinematics import Batch
 
-TURN, SHIFT = 1e-4, 1e-4  # [rad], [m]
 TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 8, 3, 5
+HELD = ("temperature", "payload", "speed", "torque", "moment", "travel", "way")
 ANGLES = tuple(f"joint {j}" for j in JOINTS)
-FRAMES = tuple(f"{frame} {axis}" for frame in ("base", "tool") for axis in "xyz")
+FRAMES = tuple(f"{part} shift {axis}" for part in ("base", "tool") for axis in "xyz")
 
 
 @dataclass(frozen=True)
-class Curve(Effect):
+class Curve(CarriedEffect):
     """Error along one direction, a penalised curve of one or two covariates.
 
     The curve is a sum of Legendre polynomials over the covariate's range, whose prior
@@ -38,11 +32,11 @@ class Curve(Effect):
     whole.
 
     Attributes:
-        direction: "joint 3" turns joint 3; "base x" and "tool x" shift the TCP along
-            an axis.
+        direction: The carrier that moves, see `carrier`.
         source: Names of one or two covariates.
-        lower, upper: Their ranges; outside, the curve fades to zero.
-        signed: Whether it is multiplied by the joint's arrival direction.
+        lower, upper: Their ranges; outside, the curve of an angle fades to zero, and
+            one of a load, a temperature or a speed keeps its last value.
+        factor: Covariate that it is multiplied with, an arrival direction say, or "".
         whole: Whether functions of each of two covariates alone belong to it.
     """
 
@@ -50,58 +44,32 @@ class Curve(Effect):
     nameless: ClassVar[bool] = True
     free: ClassVar[bool] = True
 
-    direction: str = "joint 1"
     source: tuple[str, ...] = ("joint 1",)
     lower: tuple[float, ...] = (-np.pi,)
     upper: tuple[float, ...] = (np.pi,)
-    signed: bool = False
+    factor: str = ""
     whole: bool = False
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
-        """Try every covariate and pair of joints, along every joint and frame axis."""
-        passing = [name for name in PLAIN if varies(covariate(batch, name))]
-        if "time" in passing and "order" in passing:
-            passing.remove("order")  # they tell the same
+        """Try pairs of joints, and what was before, at every joint.
+
+        Curves of one covariate are cells of the table of causes, of any carrier.
+        """
+        pairs = list(combinations(ANGLES, 2))
         out = []
         for j in JOINTS:
-            out += cls._plain_of_joint(batch, j, passing)
-            out += cls._signed_of_joint(batch, j, passing)
-            pairs = combinations(ANGLES, 2)
             out += [cls._candidate(batch, f"joint {j}", pair) for pair in pairs]
-        for axis in FRAMES:
-            out += [
-                cls._candidate(batch, axis, (name,)) for name in (*passing, *ANGLES)
-            ]
+            out += cls._by_what_was_before(batch, j)
         return out
 
     @classmethod
-    def _plain_of_joint(
-        cls, batch: Batch, joint: int, passing: list[str]
-    ) -> list[Candidate]:
-        """Turn a joint whatever side it comes from."""
-        torques = [f"torque {k}" for k in carrying(batch)]
-        alone = [name for name in ANGLES if name != f"joint {joint}"]
-        return [
-            cls._candidate(batch, f"joint {joint}", (name,))
-            for name in (*alone, *passing, *torques)
-        ]
-
-    @classmethod
-    def _signed_of_joint(
-        cls, batch: Batch, joint: int, passing: list[str]
-    ) -> list[Candidate]:
-        """Turn a joint this way or that with its side, or with what was before."""
+    def _by_what_was_before(cls, batch: Batch, joint: int) -> list[Candidate]:
+        """Turn a joint by its last two reversals, or its side at the visit before."""
         where, out = f"joint {joint}", []
-        names = ["speed"] if "speed" in passing else []
-        names += [f"torque {joint}"] if joint in carrying(batch) else []
-        if varies(covariate(batch, f"travel {joint}")):
-            names.append(f"travel {joint}")
-            both = (f"travel {joint}", f"loop {joint}")  # the last two reversals
-            if not np.isnan(covariate(batch, both[1])).all():
-                out.append(cls._candidate(batch, where, both, signed=True, whole=True))
-        names += [name for name in ANGLES if name != where]
-        out += [cls._candidate(batch, where, (name,), signed=True) for name in names]
+        both = (f"travel {joint}", f"loop {joint}")
+        if all(not np.isnan(covariate(batch, name)).all() for name in both):
+            out.append(cls._candidate(batch, where, both, signed=True, whole=True))
         before = (f"before {joint}",)
         known = covariate(batch, before[0])
         if len(np.unique(known[~np.isnan(known)])) > 1:
@@ -120,13 +88,13 @@ class Curve(Effect):
         whole: bool = False,
     ) -> Candidate:
         """Make the candidate of some covariates in one direction."""
-        effect = cls.over(batch, direction, source, signed, whole)
-        kind, _, which = direction.partition(" ")
-        joint = int(which) if kind == "joint" else None
+        moved = carrier(direction)
+        factor = f"lambda {moved.link}" if signed else ""
+        effect = cls.over(batch, direction, source, factor, whole)
         driver = " x ".join(source)
         label = f"lambda x {driver}" if signed else driver
-        along = direction if joint is None else None
-        family = Family(cls.name, joint, label, FREE, along)
+        along = direction if moved.joint is None else None
+        family = Family(cls.name, moved.joint, label, FREE, along)
         return Candidate(family, effect, driver, 0.0)
 
     @classmethod
@@ -135,31 +103,22 @@ class Curve(Effect):
         batch: Batch,
         direction: str,
         source: tuple[str, ...],
-        signed: bool,
+        factor: str,
         whole: bool,
     ) -> Self:
         """Make the curve over the surveyed ranges of its covariates."""
         values = [covariate(batch, name) for name in source]
         lower = tuple(float(np.nanmin(v)) for v in values)
         upper = tuple(float(np.nanmax(v)) for v in values)
-        return cls(direction, source, lower, upper, signed, whole)
+        return cls(direction, source, lower, upper, factor, whole)
 
-    def belongs_to(self) -> Origin:
-        """Follow the covariate: what only a survey has is never compensated.
+    def covariates(self) -> tuple[str, ...]:
+        """Name the sources and the factor."""
+        return (*self.source, self.factor) if self.factor else self.source
 
-        Nor is what lives along an axis of the base: the tracker stands in that frame,
-        and nobody knows whether the arm or the tracker errs.
-        """
-        passes = any(name in ("time", "order") for name in self.source)
-        if passes or self.direction.startswith("base"):
-            return "setup"
-        states = any(name in ("temperature", "payload") for name in self.source)
-        return "state" if states else "arm"
-
-    def requires(self) -> tuple[str, ...]:
-        """Need the covariates that a program does not tell."""
-        told = ("temperature", "payload", "speed")
-        return tuple(name for name in self.source if name in told)
+    def sentence(self, p: Floats, covariance: Floats) -> str:
+        """Say place and drivers."""
+        return f"{self.carrier.sentence()} by {self.driver()}, a curve"
 
     def _orders(self) -> list[tuple[int, ...]]:
         """List the degrees of every term."""
@@ -170,17 +129,15 @@ class Curve(Effect):
         pairs = product(range(TERMS_OF_WHOLE + 1), repeat=2)
         return [k for k in pairs if 0 < sum(k) <= TERMS_OF_WHOLE]
 
-    def parameters(self) -> tuple[Parameter, ...]:
+    def law_parameters(self) -> tuple[Parameter, ...]:
         """Name the terms by their degrees."""
-        kind, _, which = self.direction.partition(" ")
-        turns = kind == "joint"
-        scale, unit = (TURN, "rad") if turns else (SHIFT, "m")
+        si, scale = self.own_unit()
         what = f"{self.direction} by {' x '.join(self.source)}"
-        what += " signed" if self.signed else ""
+        what += f" times {self.factor}" if self.factor else ""
         return tuple(
             Parameter(
-                f"{what} {'.'.join(map(str, k))}", unit,
-                scale / sum(i * i for i in k), what, int(which) if turns else None,
+                f"{what} {'.'.join(map(str, k))}", si,
+                scale / sum(i * i for i in k), what, self.carrier.joint,
             )
             for k in self._orders()
         )  # fmt: skip
@@ -192,50 +149,16 @@ class Curve(Effect):
         for k, name in enumerate(self.source):
             low, high = self.lower[k], self.upper[k]
             x = covariate(batch, name)
-            inside *= np.nan_to_num(fade(x, np.array(low), np.array(high)))
+            if not name.startswith(HELD):
+                inside *= np.nan_to_num(fade(x, np.array(low), np.array(high)))
             u = np.clip((np.nan_to_num(x) - low) / max(high - low, 1e-12), 0, 1)
             terms = legvander(2.0 * u - 1.0, int(order[:, k].max()))
             value *= terms[:, order[:, k]]
         return np.asarray(value * inside[:, None])
 
-    def has_mean(self) -> bool:
-        """Return True for a curve of a joint's error."""
-        return self.only_joint() is not None
-
-    def only_joint(self) -> int | None:
-        """Tell from the direction."""
-        kind, _, which = self.direction.partition(" ")
-        return int(which) - 1 if kind == "joint" else None
-
-    def turning(self, batch: Batch) -> Floats:
-        """Evaluate the terms, with the joint's arrival direction if signed, (n, p)."""
-        shape, joint = self.shape(batch), self.only_joint()
-        if self.signed and joint is not None:
-            shape *= batch.states.direction[:, joint, None]
+    def law_values(self, batch: Batch) -> Floats:
+        """Evaluate the terms, with the factor if there is one, (n, p)."""
+        shape = self.shape(batch)
+        if self.factor:
+            shape *= np.nan_to_num(covariate(batch, self.factor))[:, None]
         return shape
-
-    def columns(self, batch: Batch) -> Floats:
-        """Differentiate the TCP position, (n, 3, p)."""
-        return self._along(batch, self._axis(batch))
-
-    def rotation_columns(self, batch: Batch) -> Floats | None:
-        """Differentiate the tool's rotation, (n, 3, p)."""
-        kind, _, which = self.direction.partition(" ")
-        if kind != "joint":
-            return None
-        return self._along(batch, batch.angular[:, :, int(which) - 1])
-
-    def _along(self, batch: Batch, axis: Floats) -> Floats:
-        """Multiply a direction per unit (n, 3) by the terms, (n, 3, p)."""
-        columns: Floats = axis[:, :, None] * self.turning(batch)[:, None, :]
-        return columns
-
-    def _axis(self, batch: Batch) -> Floats:
-        """Return the direction's displacement per unit, (n, 3)."""
-        kind, _, which = self.direction.partition(" ")
-        if kind == "joint":
-            return np.asarray(batch.jacobian[:, :, int(which) - 1])
-        k = "xyz".index(which)
-        if kind == "tool":
-            return np.asarray(batch.walk.flange[:, :, k])
-        return np.tile(np.eye(3)[k], (len(batch), 1))

@@ -176,6 +176,7 @@ class DriveBacklash(DriveEffect):
     """
 
     name: ClassVar[str] = "drive_backlash"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "lambda"),)
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "lambda"
     variation_of: ClassVar[str | None] = "backlash"
@@ -212,6 +213,7 @@ class DriveTransmission(DriveEffect):
     """
 
     name: ClassVar[str] = "drive_transmission"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "joint"),)
 
     waves: tuple[tuple[int, float], ...] = ()
 
@@ -282,6 +284,7 @@ class DriveLoad(DriveEffect):
     """
 
     name: ClassVar[str] = "drive_load"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "torque"),)
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "torque"
     unasked: ClassVar[Unasked | None] = None

@@ -26,6 +26,10 @@ Origin = Literal["arm", "state", "setup"]
 Unasked = Literal["always", "weighed", "last", "seen"]
 Sought = Literal["always", "alone", "rival"]
 
+Cells = tuple[tuple[str, str, str], ...]  # carrier, driver and law of each
+CELL = "cell"  # what has no name but its place, its driver and its law
+ANY = ("linear", "step", "saturating", "curve", "harmonic")
+
 FAR = 1e3  # [rad] a joint angle that no arm reaches: no range is known
 
 
@@ -70,6 +74,8 @@ class Effect(ABC):
             "always", or "alone", where no free form holds a part of it; "rival" where
             it only must not be taken for another: whose step it is nobody knows.
         variation_of: Name of the plainer effect that a search takes first.
+        acts: What it moves and what drives that, in the words of the table of causes,
+            where it is more than `cells`, several of them at once say.
         nameless: True where finding it says no more than that something is there.
         free: True for a function that may have any shape: what no law predicts.
         everywhere: True for what is the same at all poses, unseen ones too.
@@ -83,6 +89,7 @@ class Effect(ABC):
     unasked: ClassVar[Unasked | None] = None
     sought: ClassVar[Sought | None] = None
     variation_of: ClassVar[str | None] = None
+    acts: ClassVar[tuple[tuple[str, str], ...]] = ()
     nameless: ClassVar[bool] = False
     free: ClassVar[bool] = False
     everywhere: ClassVar[bool] = False
@@ -127,6 +134,11 @@ class Effect(ABC):
             batch: The surveyed states, for ranges and for what was recorded.
         """
         return []
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """List the cells of the table of causes that it is: carrier, driver and law."""
+        return ()
 
     @classmethod
     def sighted(
@@ -322,6 +334,15 @@ class Effect(ABC):
         """List the settings that are not linear: value and unit, as people use them."""
         return {}
 
+    def sentence(self, p: Floats, covariance: Floats) -> str:
+        """Say place, driver, law and size of what has no name, "" of what has one.
+
+        Args:
+            p: Its parameters, (p,).
+            covariance: Of them, (p, p).
+        """
+        return ""
+
     def amplitude(self, p: Floats, covariance: Floats) -> tuple[float, float] | None:
         """Return the size of a wave and its standard error [rad], None without one.
 
@@ -402,6 +423,21 @@ class JointEffect(Effect):
         return [(acts_on[c], c) for c in columns]
 
 
+def own_cells(driver: str, *laws: str) -> Cells:
+    """Name cells of every joint, each driven by what is its own.
+
+    >>> own_cells("torque {j}", "linear")[1]
+    ('joint 2', 'torque 2', 'linear')
+
+    Args:
+        driver: The driver, ``{j}`` for the number of the joint.
+        laws: The laws.
+    """
+    return tuple(
+        (f"joint {j}", driver.format(j=j), law) for j in range(1, 7) for law in laws
+    )
+
+
 # What a search may try of an effect.
 
 NAMED, FREE = 0, 1
@@ -427,6 +463,9 @@ class Family:
     along: str | None = None
 
     def __str__(self) -> str:
+        if self.effect == CELL:
+            by = "" if self.driver is None else f" by {self.driver}"
+            return f"{self.along or f'joint {self.joint}'}{by}"
         where = "" if self.joint is None else f" of joint {self.joint}"
         by = "" if self.driver is None else f" by {self.driver}"
         along = "" if self.along is None else f" along {self.along}"

@@ -36,6 +36,14 @@ class Geometry(Effect):
     """
 
     name: ClassVar[str] = "geometry"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (
+        ("link turn", "constant"),
+        ("link shift", "constant"),
+        ("base turn", "constant"),
+        ("base shift", "constant"),
+        ("tool shift", "constant"),
+        ("joint", "constant"),
+    )
     unasked: ClassVar[Unasked | None] = "always"
 
     beta: tuple[int, ...] = (2, 6)

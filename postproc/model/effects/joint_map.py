@@ -12,11 +12,13 @@ from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
     FREE,
     Candidate,
+    Cells,
     Effect,
     JointEffect,
     Parameter,
     Unasked,
     alternatives,
+    own_cells,
 )
 from postproc.model.effects.joint_spline import LONG_SURVEY
 from postproc.model.kinematics import Batch
@@ -50,6 +52,11 @@ class JointMap(JointEffect):
 
     bumps: tuple[tuple[int, float], ...] = ()
     width: float = 0.1
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return own_cells("joint {j}", "curve", "step", "saturating")
 
     @classmethod
     def over(cls, joint: int, low: float, high: float, knots: int) -> Self:

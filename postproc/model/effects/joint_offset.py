@@ -34,6 +34,7 @@ class JointOffset(JointEffect):
     """
 
     name: ClassVar[str] = "joint_offset"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "constant"),)
     everywhere: ClassVar[bool] = True
 
     joints: tuple[int, ...] = JOINTS

@@ -48,6 +48,7 @@ class JointSpline(JointEffect):
     """
 
     name: ClassVar[str] = "joint_spline"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "joint"),)
     unasked: ClassVar[Unasked | None] = "last"
     free: ClassVar[bool] = True
 

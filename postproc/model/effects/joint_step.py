@@ -11,10 +11,12 @@ from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
     Candidate,
+    Cells,
     JointEffect,
     Parameter,
     Sought,
     alternatives,
+    own_cells,
 )
 from postproc.model.effects.step import CampaignStep, moments
 from postproc.model.kinematics import Batch
@@ -37,6 +39,11 @@ class JointStep(CampaignStep, JointEffect):
     sought: ClassVar[Sought | None] = "always"
 
     joints: tuple[int, ...] = JOINTS
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return (*own_cells("order", "step"), *own_cells("time", "step"))
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:

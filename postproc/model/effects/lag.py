@@ -11,10 +11,12 @@ from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS, varies
 from postproc.model.effects.effect import (
     Candidate,
+    Cells,
     JointEffect,
     Parameter,
     Unasked,
     alternatives,
+    own_cells,
 )
 from postproc.model.kinematics import Batch
 
@@ -35,6 +37,11 @@ class Lag(JointEffect):
     unasked: ClassVar[Unasked | None] = "weighed"
 
     joints: tuple[int, ...] = JOINTS
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return own_cells("lambda {j} x speed", "linear")
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:

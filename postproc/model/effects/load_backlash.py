@@ -10,12 +10,15 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.covariate import carrying
 from postproc.model.effects.effect import (
+    ANY,
     Candidate,
+    Cells,
     Effect,
     JointEffect,
     Parameter,
     Unasked,
     alternatives,
+    own_cells,
 )
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
@@ -52,6 +55,11 @@ class LoadBacklash(JointEffect):
     joints: tuple[int, ...] = (2, 3, 5)
     form: Literal["load", "signed", "gravity_side"] = "load"
     t0: float = 1000.0
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return own_cells("lambda {j} x torque {j}", *ANY)
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:

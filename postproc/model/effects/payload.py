@@ -36,6 +36,7 @@ class Payload(JointEffect):
     """
 
     name: ClassVar[str] = "payload"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "payload"),)
     driven_by: ClassVar[str] = "payload"
     unasked: ClassVar[Unasked | None] = "weighed"
 

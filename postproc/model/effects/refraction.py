@@ -30,6 +30,7 @@ class Refraction(Sighting):
     """
 
     name: ClassVar[str] = "refraction"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (("base turn", "joint"),)
 
     form: Literal["bend", "stretch"] = "bend"
     reference: float = 20.0

@@ -9,10 +9,12 @@ from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
     Candidate,
+    Cells,
     JointEffect,
     Parameter,
     Unasked,
     alternatives,
+    own_cells,
 )
 from postproc.model.kinematics import Batch
 
@@ -31,6 +33,11 @@ class Scale(JointEffect):
     unasked: ClassVar[Unasked | None] = "weighed"
 
     joints: tuple[int, ...] = JOINTS
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return own_cells("joint {j}", "linear")
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:

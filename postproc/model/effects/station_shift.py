@@ -30,6 +30,10 @@ class StationShift(Effect):
     """
 
     name: ClassVar[str] = "station_shift"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (
+        ("base turn", "time"),
+        ("base shift", "time"),
+    )
 
     stations: tuple[int, ...] = (1,)
 

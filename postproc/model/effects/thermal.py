@@ -55,6 +55,10 @@ class Thermal(Effect):
     """
 
     name: ClassVar[str] = "thermal"
+    acts: ClassVar[tuple[tuple[str, str], ...]] = (
+        ("link shift", "temperature"),
+        ("link shift", "time"),
+    )
     sought: ClassVar[Sought | None] = "always"
     driven_by: ClassVar[str] = "temperature"
     unasked: ClassVar[Unasked | None] = "weighed"

@@ -8,7 +8,13 @@ from typing import ClassVar
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Candidate, Parameter, Sought, alternatives
+from postproc.model.effects.effect import (
+    Candidate,
+    Cells,
+    Parameter,
+    Sought,
+    alternatives,
+)
 from postproc.model.effects.step import CampaignStep, moments
 from postproc.model.kinematics import Batch
 
@@ -28,6 +34,16 @@ class ToolShift(CampaignStep):
     sought: ClassVar[Sought | None] = "rival"
 
     turns: bool = False
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return tuple(
+            (f"tool {motion} {a}", clock, "step")
+            for motion in ("shift", "turn")
+            for a in "xyz"
+            for clock in ("order", "time")
+        )
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:

@@ -12,6 +12,7 @@ from postproc.arrays import Floats
 from postproc.model.effects.base_shift import AXES, rigid_columns, rigid_rotations
 from postproc.model.effects.effect import (
     Candidate,
+    Cells,
     Effect,
     Origin,
     Parameter,
@@ -51,6 +52,17 @@ class TrackerDrift(Effect):
     start: float = 0.0
     duration: float = 1.0
     clock: Clock = "time"
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return tuple(
+            (f"base {motion} {a}", clock, law)
+            for motion in ("shift", "turn")
+            for a in "xyz"
+            for clock in ("order", "time")
+            for law in ("linear", "curve")
+        )
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:

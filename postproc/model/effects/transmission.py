@@ -12,12 +12,14 @@ from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
     NAMED,
     Candidate,
+    Cells,
     Effect,
     Family,
     JointEffect,
     Parameter,
     Sought,
     Unasked,
+    own_cells,
 )
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
@@ -48,6 +50,11 @@ class Transmission(JointEffect):
     waves: tuple[tuple[int, float], ...] = tuple(
         (j, float(k)) for j in range(1, 7) for k in (1, 2)
     )
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return own_cells("joint {j}", "harmonic")
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:

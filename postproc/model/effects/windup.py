@@ -10,12 +10,15 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS, loops, varies
 from postproc.model.effects.effect import (
+    ANY,
     Candidate,
+    Cells,
     Effect,
     JointEffect,
     Parameter,
     Unasked,
     alternatives,
+    own_cells,
 )
 from postproc.model.kinematics import Batch
 
@@ -51,6 +54,11 @@ class Windup(JointEffect):
     joints: tuple[int, ...] = JOINTS
     d0: float = 0.05
     form: Literal["friction", "dahl", "elastic"] = "friction"
+
+    @classmethod
+    def cells(cls) -> Cells:
+        """Name the cells of the table of causes that it is."""
+        return own_cells("lambda {j} x way {j}", *ANY)
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:

@@ -1,0 +1,269 @@
+"""Cell: any small motion of a part by any law of what drives it."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.carrier import Carrier, carrier
+from postproc.model.covariate import covariate, unit
+from postproc.model.effects.effect import CELL, Effect, Origin, Parameter
+from postproc.model.kinematics import Batch
+
+TURN, SHIFT = 1e-4, 1e-4  # [rad], [m] prior size of a motion
+ANEW = 3e-4  # [rad], [m] by which a part may sit otherwise than a model has it
+PASSING = ("time", "order")
+OF_STATE = ("temperature", "payload", "speed")
+ARMS_OWN = ("torque", "moment", "lambda", "way", "payload", "speed")
+
+
+@dataclass(frozen=True)
+class CarriedEffect(Effect):
+    """One carrier, moved by functions of covariates.
+
+    Attributes:
+        direction: The carrier, see `carrier`.
+        loose: Whether its mean is fitted too: beside a given model, whose geometry
+            holds what the mean was when that was made.
+    """
+
+    direction: str = "joint 1"
+    loose: bool = field(default=False, kw_only=True)
+
+    @property
+    def carrier(self) -> Carrier:
+        """What moves."""
+        return carrier(self.direction)
+
+    @abstractmethod
+    def covariates(self) -> tuple[str, ...]:
+        """Name all covariates that it depends on."""
+
+    @abstractmethod
+    def law_parameters(self) -> tuple[Parameter, ...]:
+        """Name the unknowns of its law."""
+
+    @abstractmethod
+    def law_values(self, batch: Batch) -> Floats:
+        """Evaluate by how much each of them moves the carrier, (n, p)."""
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name the unknowns of its law, and its mean where that is fitted too."""
+        own = self.law_parameters()
+        if not self.loose:
+            return own
+        group = f"{own[0].group} mean"
+        si = self.own_unit()[0]
+        return (*own, Parameter(group, si, ANEW, group, self.carrier.joint))
+
+    def turning(self, batch: Batch) -> Floats:
+        """Evaluate by how much each column moves the carrier, (n, p)."""
+        values = self.law_values(batch)
+        if not self.loose:
+            return values
+        return np.concatenate([values, np.ones((len(values), 1))], axis=1)
+
+    def belongs_to(self) -> Origin:
+        """Follow the covariates: what only a survey has is never compensated.
+
+        Nor is what moves the base by anything that a tracker may follow too: it stands
+        in that frame, and nobody knows which of the two moves. What the arm's load or
+        direction drives is the arm's.
+        """
+        kinds = {name.partition(" ")[0] for name in self.covariates()}
+        if not kinds.isdisjoint(PASSING):
+            return "setup"
+        if self.carrier.part == "base" and kinds.isdisjoint(ARMS_OWN):
+            return "setup"
+        return "arm" if kinds.isdisjoint(("temperature", "payload")) else "state"
+
+    def requires(self) -> tuple[str, ...]:
+        """Need the covariates that a program does not tell."""
+        return tuple(name for name in self.covariates() if name in OF_STATE)
+
+    def has_mean(self) -> bool:
+        """Return True for a joint's error."""
+        return self.carrier.joint is not None
+
+    def only_joint(self) -> int | None:
+        """Tell from the carrier."""
+        joint = self.carrier.joint
+        return None if joint is None else joint - 1
+
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the TCP position, (n, 3, p)."""
+        return self._along(self.carrier.moved(batch), batch)
+
+    def rotation_columns(self, batch: Batch) -> Floats | None:
+        """Differentiate the tool's rotation, (n, 3, p)."""
+        turned = self.carrier.turned(batch)
+        return None if turned is None else self._along(turned, batch)
+
+    def _along(self, axis: Floats, batch: Batch) -> Floats:
+        """Multiply a direction per unit (n, 3) by what moves it, (n, 3, p)."""
+        columns: Floats = axis[:, :, None] * self.turning(batch)[:, None, :]
+        return columns
+
+    def direction_slopes(self, batch: Batch, p: Floats) -> Floats | None:
+        """Give the position error per unit of the direction that drives it."""
+        sides = [n for n in self.covariates() if n.startswith("lambda")]
+        if len(sides) != 1:
+            return None
+        ones = np.ones_like(batch.states.q)
+        there, back = (self.displacement(batch.arriving(s), p) for s in (ones, -ones))
+        slopes = np.zeros((len(batch), 3, 6))
+        slopes[:, :, int(sides[0][-1]) - 1] = (there - back) / 2
+        return slopes
+
+    def driver(self) -> str:
+        """Name all covariates, those before the last as its factors."""
+        return " x ".join(reversed(self.covariates()))
+
+    def own_unit(self) -> tuple[str, float]:
+        """Return the unit of its motion, and its prior size."""
+        turns = self.carrier.motion == "turn"
+        return ("rad", TURN) if turns else ("m", SHIFT)
+
+
+@dataclass(frozen=True)
+class Cell(CarriedEffect):
+    """A carrier moves by a law of one covariate, perhaps times another one.
+
+    "linear": k (x - middle) / half; "harmonic n": a cos(n x) + b sin(n x); "step":
+    k sign(x - middle); "saturating": k tanh((x - middle) / half); "constant": k.
+
+    Attributes:
+        source: The covariate x.
+        factor: Covariate that it is multiplied with, or "".
+        law: As above.
+        middle, half: Middle and half of the surveyed range of x; of a step where it
+            is, of a saturating law where and over which way it bends.
+        size: Largest value of the factor in the survey.
+    """
+
+    name: ClassVar[str] = CELL
+
+    source: str = "joint 1"
+    factor: str = ""
+    law: str = "linear"
+    middle: float = 0.0
+    half: float = 1.0
+    size: float = 1.0
+
+    def covariates(self) -> tuple[str, ...]:
+        """Name the source and the factor."""
+        own = () if self.law == "constant" else (self.source,)
+        return (*own, self.factor) if self.factor else own
+
+    def law_parameters(self) -> tuple[Parameter, ...]:
+        """Name the size, of a harmonic those of cosine and sine."""
+        si, scale = self.own_unit()
+        what, joint = self.what(), self.carrier.joint
+        names = (f"{what} cos", f"{what} sin") if self.order else (what,)
+        return tuple(Parameter(n, si, scale, what, joint) for n in names)
+
+    def what(self) -> str:
+        """Say place, driver and law."""
+        by = f"{self.factor} x {self.source}" if self.factor else self.source
+        return f"{self.direction} by {by} {self.law}"
+
+    @property
+    def order(self) -> int:
+        """Waves per radian of a harmonic, 0 of other laws."""
+        kind, _, order = self.law.partition(" ")
+        return int(order) if kind == "harmonic" else 0
+
+    def law_values(self, batch: Batch) -> Floats:
+        """Evaluate the law, (n, 1), of a harmonic (n, 2)."""
+        value = self._law(np.nan_to_num(covariate(batch, self.source)))
+        if self.factor:
+            value = value * np.nan_to_num(covariate(batch, self.factor))[:, None]
+            value /= self.size
+        return value
+
+    def _law(self, x: Floats) -> Floats:
+        """Evaluate it at values of its covariate."""
+        if self.order:
+            turned = self.order * x
+            return np.stack([np.cos(turned), np.sin(turned)], axis=1)
+        away = (x - self.middle) / self.half
+        laws = {
+            "linear": away,
+            "step": np.sign(away),
+            "saturating": np.tanh(away),
+            "constant": np.ones_like(x),
+        }
+        return laws[self.law][:, None]
+
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Move the place of a step or a bend, in parts of the range, and its width."""
+        if self.law not in PLACED:
+            return []
+        x = covariate(batch, self.source)
+        step = float(np.ptp(x)) / (STEPS + 1)
+        moved = [replace(self, middle=self.middle + float(o) * step) for o in offsets]
+        if self.law == "step":
+            return [*moved]
+        return [
+            *moved,
+            *(replace(self, half=self.half * 2 ** float(o)) for o in offsets),
+        ]
+
+    def amplitude(self, p: Floats, covariance: Floats) -> tuple[float, float] | None:
+        """Return the size of a harmonic that turns, None of others."""
+        return self._wave(p, covariance) if self.carrier.motion == "turn" else None
+
+    def sentence(self, p: Floats, covariance: Floats) -> str:
+        """Say it with its size, "link 3 turns about the x of its frame by .."."""
+        told = self.carrier.sentence()
+        if self.covariates():
+            told += f" by {self.driver()}"
+        shown, factor = SHOWN[self.own_unit()[0]]
+        wave = self._wave(p, covariance)
+        if wave is not None:
+            size, error = wave[0] * factor, wave[1] * factor
+            return f"{told}, a wave of order {self.order} of " + _size(
+                size, error, shown
+            )
+        size, error = float(p[0]) * factor, float(covariance[0, 0]) ** 0.5 * factor
+        if self.law in PLACED:
+            at = f"{self.middle:.3g} {unit(self.source)}"
+            return f"{told}, {PLACED[self.law]} at {at} of " + _size(
+                2 * size, 2 * error, shown
+            )
+        if self.law == "linear":
+            per = self.half * self.size
+            shown += f"/{unit(self.source)}" if unit(self.source) != "1" else ""
+            size, error = size / per, error / per
+        return f"{told}, {_size(size, error, shown)}"
+
+    def _wave(self, p: Floats, covariance: Floats) -> tuple[float, float] | None:
+        """Return amplitude and standard error of a harmonic, None of other laws."""
+        if not self.order:
+            return None
+        size = float(np.hypot(*p[:2]))
+        along = p[:2] / max(size, 1e-300)
+        return size, max(float(along @ covariance[:2, :2] @ along), 0.0) ** 0.5
+
+    def nonlinear(self) -> dict[str, tuple[float, str]]:
+        """Tell where a step is, and per how much of the covariate a size is."""
+        what = unit(self.source)
+        if self.law in PLACED:
+            return {f"{self.law} at": (self.middle, what)}
+        return {"per": (self.half, what)} if self.law == "linear" else {}
+
+
+PLACED = {"step": "a step", "saturating": "a bend"}  # laws of one place
+SHOWN = {"rad": ("urad", 1e6), "m": ("um", 1e6)}  # units people read
+
+
+def _size(value: float, error: float, unit_: str) -> str:
+    """Write a size with its standard error."""
+    return f"{value:.3g} +- {error:.2g} {unit_}"
+
+
+STEPS = 7  # places of a step that are tried over a covariate's range
