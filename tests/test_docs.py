@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "tools"))
 
 import architecture  # noqa: E402
+import causes  # noqa: E402
 from sessions import BLOCK, PAGES, normal, run_page, steps_of  # noqa: E402
 
 from tests.report.html.browser import complaints, open_browser, requests  # noqa: E402
@@ -149,3 +150,9 @@ def test_a_block_begins_with_a_command():
     with pytest.raises(ValueError, match="begins with output"):
         steps_of("output\n$ a\n")
     assert BLOCK.findall("```text\n$ a\n```\n") == []
+
+
+def test_the_table_of_causes_is_that_of_the_effects():
+    page = causes.PAGE.read_text(encoding="utf-8")
+    assert causes.BEGIN in page
+    assert causes.written(page) == page, "run python docs/tools/causes.py"

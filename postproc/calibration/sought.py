@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from postproc.calibration.diagnosis.library import Library, Projection
-from postproc.calibration.diagnosis.score import bootstrap, leftovers
+from postproc.calibration.diagnosis.score import leftovers
 from postproc.calibration.diagnosis.search import search, with_effects
+from postproc.calibration.diagnosis.table import Causes
 from postproc.calibration.regression import Fit
 from postproc.calibration.weighing import SURE, keep_needed, worth
 from postproc.model.effects import EFFECTS
@@ -58,8 +59,8 @@ def _searched(fitted: Fit, now: tuple[str, ...], without: Collection[str]) -> Fi
     base = fitted if steady == kept else with_effects(fitted, steady)
     sought = [k for k in EFFECTS if k.sought in now and k.may_be_sought(states)]
     other = {k.name for k in EFFECTS if k not in sought}
-    library = Library.of(base, other.union(without))
-    if not library.shelves:
+    causes = Causes(Library.of(base, other.union(without)))
+    if not causes.library.shelves:
         return fitted
-    null = bootstrap(Projection.of(base), library, seed=0)
-    return search(base, library, null, lambda *_: None).fit
+    null = causes.null(Projection.of(base), seed=0)
+    return search(base, causes, null, lambda *_: None).fit

@@ -35,6 +35,7 @@ from postproc.calibration.tables import DETECT, TableFormat
 from postproc.cli.jobs import read_files
 from postproc.compensation.program import Planned, plan_visits, read_program, states_of
 from postproc.exceptions import MeasurementError
+from postproc.model.effects.effect import CELL
 from postproc.model.effects.placement import Placement
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, load_model
@@ -379,8 +380,12 @@ def _numbers(found: Diagnosis) -> range:
 def _finding_row(found: Diagnosis, number: int) -> tuple[str, ...]:
     f = found.findings[number]
     others = ", ".join(
-        effect + (f" {joint}" if joint else "") for effect, joint in f.confusable_with
+        effect + (f" {joint}" if joint else "")
+        for effect, joint in f.confusable_with
+        if effect != CELL
     )
+    cells = ", ".join(str(r) for r in f.rivals if r.effect == CELL)
+    others = "; ".join(filter(None, (others, cells)))
     return (
         f.effect, str(f.joint or ""), f.source or "", f"{f.p_value:.1e}",
         f"{f.share:.0%}", f"{f.peak_mm:.3f}", others,
@@ -396,6 +401,10 @@ def _constants(found: Diagnosis, number: int) -> str:
         if abs(value) > 2 * error
     ]
     told = f"{f.effect}: " + (", ".join(clear[:8]) or "no parameter stands out")
+    if f.told:
+        told = (
+            f"{f.told}, {f.peak_mm:.2g} mm at the tool at most; no name in the library"
+        )
     doubts = [f"IMPOSSIBLE: {text}" for text in f.impossible]
     if f.of_setup and not f.nameless:
         doubts.append("of the set-up: not compensated")

@@ -138,8 +138,8 @@ def hold_out(
         if len(out) == 0:
             continue
         less = _fit_of(base, inside)
-        library = found.library.at_rows(inside)
-        more = investigate(less, library, found.null, lambda *_: None).fit
+        causes = found.causes.at_rows(inside)
+        more = investigate(less, causes, found.null, lambda *_: None).fit
         rows.append(out)
         before.append(
             left_by(less, base, out, told) if given is None else np.asarray(given[out])
@@ -346,7 +346,7 @@ def _places(found: Search) -> tuple[ResidualPlace, ...]:
         at = family.along or family.effect
         direction = at if family.joint is None else f"joint {family.joint}"
         driver = family.driver or score.best.source
-        p_value = found.null.p_value(score.evidence)
+        p_value = found.null.p_of(score)
         out.append(ResidualPlace(direction, driver, score.evidence, p_value))
     return tuple(out)
 
@@ -491,7 +491,7 @@ def _candidates(found: Extension) -> list[dict[str, Any]]:
             "effect": s.family.effect,
             "joint": s.family.joint,
             "source": s.best.source,
-            "p_value": search.null.p_value(s.evidence),
+            "p_value": search.null.p_of(s),
             "evidence_nats": round(s.evidence, 3),
         }
         for s in scores

@@ -39,9 +39,7 @@ def _describe(
     part = fit.combination.slices[found.place(number)]
     moved = np.linalg.norm(fit.moved(part), axis=1)
     confusable = [(s.family.effect, s.family.joint) for s in standing.confusable]
-    tied = [
-        name for name in effect.tied(fit.batch) if name not in found.library.without
-    ]
+    tied = [name for name in effect.tied(fit.batch) if name not in found.causes.without]
     named = {name for name, _ in confusable}
     confusable += [(name, None) for name in tied if name not in named]
     return Finding(
@@ -59,6 +57,9 @@ def _describe(
         settings=effect.settings(),
         held_out_gain=(addition.gain.mean, addition.gain.std_error),
         impossible=impossible(fit, _own(fit, part)),
+        family=family,
+        told=effect.sentence(fit.values[part], fit.covariance[part, part]),
+        rivals=tuple(s.family for s in standing.confusable),
     )
 
 

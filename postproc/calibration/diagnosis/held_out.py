@@ -27,6 +27,7 @@ from postproc.model.noise import Noise, poses_of
 
 FOLDS = 10
 RUN = 4  # rows of a run
+FARTHEST = 100.0  # squared error of a row that counts, in noise variances
 REGIONS = 6  # of joint space
 LEAST_SPREAD = 1e-3  # [rad] of a joint that has moved
 
@@ -91,9 +92,14 @@ class Gain:
 
     @classmethod
     def between(cls, before: Floats, after: Floats, fit: Fit) -> Self:
-        """Compare two sets of held-out errors (n, 3) of a fit's rows that count."""
+        """Compare two sets of held-out errors (n, 3) of a fit's rows that count.
+
+        A row that is beyond the others along what drives a curve, at its very end, is
+        predicted anyhow: no row counts for more than `FARTHEST`.
+        """
         used = fit.rows.weight > 0
-        fall = (before**2 - after**2).sum(axis=1)[used]
+        square = (np.minimum((e**2).sum(axis=1), FARTHEST) for e in (before, after))
+        fall = np.subtract(*square)[used]
         _, pose = np.unique(fit.pose[used], return_inverse=True)
         by_pose = np.bincount(pose.reshape(-1), fall)
         mean = float(fall.mean())

@@ -17,7 +17,7 @@ from postproc.calibration.regression import Fit
 from postproc.calibration.report import DirectionReport
 from postproc.model.covariate import covariate, unit
 from postproc.model.effects import BY_NAME, EFFECTS
-from postproc.model.effects.effect import Candidate, Effect
+from postproc.model.effects.effect import Candidate, Effect, Family
 from postproc.model.kinematics import Batch
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.pose import MM
@@ -47,6 +47,9 @@ class Finding:
         held_out_gain: Fall of the squared held-out error per row, in noise variances,
             and its standard error.
         impossible: Values of it that physics forbids, in words.
+        family: What it is called: of a cell without a name its place and driver.
+        rivals: The same of those that explain the same within a few nats.
+        told: Place, driver, law and size of what has no name.
     """
 
     effect: str
@@ -63,6 +66,9 @@ class Finding:
     settings: dict[str, Any]
     held_out_gain: tuple[float, float]
     impossible: tuple[str, ...] = ()
+    family: Family | None = None
+    rivals: tuple[Family, ...] = ()
+    told: str = ""
 
     @property
     def lawful(self) -> bool:
@@ -83,6 +89,8 @@ class Finding:
                 {"effect": effect, "joint": joint}
                 for effect, joint in self.confusable_with
             ],
+            "told": self.told,
+            "group": [str(family) for family in self.rivals],
             "kept": True,
             "of_setup": self.of_setup,
             "impossible": list(self.impossible),
@@ -240,14 +248,17 @@ class Diagnosis:
 def _causes(findings: Sequence[Finding]) -> list[str]:
     """List causes, each with its joints."""
     joints: dict[str, list[int]] = {}
+    nameless = [str(f.family) for f in findings if f.told and f.family is not None]
     for f in findings:
+        if f.told:
+            continue
         joints.setdefault(f.effect, []).extend([f.joint] if f.joint else [])
     out = []
     for effect, own in joints.items():
         places = ", ".join(map(str, sorted(set(own))))
         of = "" if not own else f" of joint{'s' * (len(set(own)) > 1)} {places}"
         out.append(effect + of)
-    return out
+    return out + nameless
 
 
 def statistics(spread: ErrorStatistics) -> dict[str, float]:

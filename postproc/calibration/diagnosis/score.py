@@ -10,11 +10,10 @@ from scipy.stats import f as fisher
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.library import (
-    Library,
     Projection,
     ReducedCandidates,
 )
-from postproc.model.effects.effect import Candidate, Family
+from postproc.model.effects.effect import CELL, Candidate, Family
 
 # How strongly a candidate's block of columns is called for.
 #
@@ -28,7 +27,7 @@ from postproc.model.effects.effect import Candidate, Family
 # that eigenbasis, N the number of rows. It charges for columns, so that a spline does
 # not beat a sine that fits as well.
 
-SIGNALS = np.exp(np.linspace(-1.0, 14.0, 31))  # s^2 g that are tried
+SIGNALS = np.exp(np.linspace(-1.0, 14.0, 16))  # s^2 g that are tried
 SMALL = 1e-9  # Gram eigenvalues below this share of the largest are no direction
 NOTHING_LEFT = 1e-2  # Gram of a block that the model takes up altogether
 
@@ -43,16 +42,35 @@ def log_evidence(blocks: ReducedCandidates, square: Floats, rows: int) -> Floats
     """
     gain, along2 = blocks.gain, blocks.along**2
     largest = np.maximum(gain.max(axis=1, keepdims=True), 1e-300)
-    best = np.zeros(along2.shape[::2])
-    for signal in SIGNALS:
-        s2 = signal / largest
-        shrunk = 1.0 + s2 * gain
-        cost = 0.5 * np.log(shrunk).sum(axis=1)
-        taken = np.einsum("ck,ckd->cd", s2 / shrunk, along2)
-        left = np.maximum(1.0 - taken / square, 1e-12)
-        np.maximum(best, -0.5 * rows * np.log(left) - cost[:, None], out=best)
+    if gain.shape[1] == 1:
+        best = _of_one_column(along2[:, 0] / (largest * square), rows)
+    else:
+        best = np.zeros(along2.shape[::2])
+        for signal in SIGNALS:
+            s2 = signal / largest
+            shrunk = 1.0 + s2 * gain
+            cost = 0.5 * np.log(shrunk).sum(axis=1)
+            taken = np.einsum("ck,ckd->cd", s2 / shrunk, along2)
+            left = np.maximum(1.0 - taken / square, 1e-12)
+            np.maximum(best, -0.5 * rows * np.log(left) - cost[:, None], out=best)
     best[largest[:, 0] < NOTHING_LEFT] = 0.0
     return best
+
+
+def _of_one_column(share: Floats, rows: int) -> Floats:
+    """Compute the evidence of single columns at its best prior scale [nats].
+
+    With u = s^2 g / (1 + s^2 g) it is 1/2 log(1 - u) - N/2 log(1 - r u), largest at
+    u = (N r - 1) / (r (N - 1)).
+
+    Args:
+        share: r = a^2 / (g |z|^2), what each explains of every draw.
+        rows: Number of scalar rows N.
+    """
+    r = np.clip(share, 1e-300, 1.0 - 1e-12)
+    u = np.clip((rows * r - 1.0) / (r * (rows - 1.0)), 0.0, 1.0 - 1e-12)
+    evidence: Floats = 0.5 * np.log1p(-u) - 0.5 * rows * np.log1p(-r * u)
+    return evidence
 
 
 def explained(blocks: ReducedCandidates) -> tuple[Floats, Floats]:
@@ -160,9 +178,22 @@ class Null:
     Attributes:
         maxima: Sorted maxima of the draws, (draws,): evidence of a family of the whole
             library [nats], or what is asked of rows without a family in mind.
+        cells: The same of the cells of the table of causes that have no name.
     """
 
     maxima: Floats
+    cells: Null | None = None
+
+    def p_of(self, score: Score) -> float:
+        """Give the probability that noise alone makes such a score anywhere.
+
+        Beside names, cells without one have a threshold of their own; either may be
+        reached.
+        """
+        if self.cells is None:
+            return self.p_value(score.evidence)
+        own = self.cells if score.family.effect == CELL else self
+        return min(2.0 * own.p_value(score.evidence), 1.0)
 
     @property
     def _tail(self) -> tuple[float, float]:
@@ -190,8 +221,8 @@ class Null:
         return start + scale * float(np.log(TAIL / level))
 
 
-def bootstrap(projection: Projection, library: Library, seed: int) -> Null:
-    """Draw from the current model and score the whole library against each draw.
+def draws(projection: Projection, seed: int) -> Floats:
+    """Draw from the current model, (3 n, draws).
 
     The filter turns draws from the model into plain noise, so no draw needs a fit.
     """
@@ -199,9 +230,7 @@ def bootstrap(projection: Projection, library: Library, seed: int) -> Null:
     used = np.repeat(projection.fit.rows.weight > 0, 3)
     rows = rng.standard_normal((len(projection.rest), BOOTSTRAP_DRAWS))
     rows *= used[:, None]
-    reduced = library.reduce(projection, rows)
-    square = np.einsum("rd,rd->d", rows, rows)
-    return Null(np.sort(family_maxima(reduced, square, projection.rows)))
+    return rows
 
 
 # Whether anything is left: tests that ask for no particular effect.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,12 +13,24 @@ from postproc.calibration.diagnosis.held_out import (
     held_out_gain,
     regions,
 )
-from postproc.calibration.diagnosis.library import Library, Projection, reduce_some
+from postproc.calibration.diagnosis.library import Projection, reduce_some
+from postproc.calibration.diagnosis.refit import Revision
 from postproc.calibration.diagnosis.score import Null, Score, rank
+from postproc.calibration.diagnosis.table import Causes, holds_mean
 from postproc.calibration.regression import Fit, beside, fit_effects
+from postproc.model.carrier import Carrier, carrier
 from postproc.model.covariate import JOINTS
-from postproc.model.effects.effect import FREE, NAMED, Candidate, Effect, Family
+from postproc.model.effects.cell import Cell
+from postproc.model.effects.effect import (
+    CELL,
+    FREE,
+    NAMED,
+    Candidate,
+    Effect,
+    Family,
+)
 from postproc.model.effects.joint_offset import JointOffset
+from postproc.model.effects.step import CampaignStep
 
 # Finer settings around a candidate that a grid found.
 
@@ -64,9 +76,9 @@ def _plainer(projection: Projection, score: Score) -> Score:
     return _instead(projection, score, replace(score.best, effect=plain), HARDLY)
 
 
-def readable(projection: Projection, score: Score, library: Library) -> Score:
+def readable(projection: Projection, score: Score, causes: Causes) -> Score:
     """Take what follows what a job can read, unless the other is clearly ahead."""
-    form = score.best.effect.readable(projection.at, library.without)
+    form = score.best.effect.readable(projection.at, causes.without)
     if form is None:
         return score
     effect, source = form
@@ -88,38 +100,81 @@ def _instead(
 
 # Which candidate to take: families ranked, names before free forms.
 
+SAME = 0.5  # nats within which two carriers move alike
+LAWFUL = 0.03  # the same share for a law without a name
 CLEARLY = (8.0, 0.1)  # nats, and share of the name's evidence, that a free form
 #                       must be ahead by
 LOOKED_AT = 4  # families whose settings are refined before the best is taken
 
 
-def ranking(projection: Projection, library: Library) -> list[Score]:
+def ranking(projection: Projection, causes: Causes) -> list[Score]:
     """Score the library, the settings of the leading families refined.
 
     Where a given model is revised, a law of a joint is scored beside the zero of this
     joint, which holds the law's mean: it must explain more than a joint that was
     mastered again.
     """
-    views = {None: projection} | {j: opened(projection, j) for j in JOINTS}
+    views = Views(projection)
     scores = []
-    for joint, view in views.items():
-        some = library.of_mean(joint)
+    for joint in (None, *JOINTS):
+        some = causes.library.of_mean(joint)
         if some.shelves:
+            view = views.of_joint(joint)
             square = float(view.rest @ view.rest)
             reduced = some.reduce(view, view.rest[:, None])
             known = frozenset(view.names)
             scores += rank(reduced, square, view.rows, without=known)
+    if causes.table is not None:
+        scores += causes.table.scores(views.of_carrier)
+        scores += causes.table.moved_since(projection)
     scores.sort(key=lambda s: -s.evidence)
     leading: list[Score] = []
     for tier in (NAMED, FREE):
         leading += [s for s in scores if s.family.tier == tier][:LOOKED_AT]
     refined = []
     for score in leading:
-        effect, joint = score.best.effect, score.family.joint
-        view = views[joint if effect.has_mean() else None]
-        refined.append(readable(view, refine(view, score), library))
+        view = views.of(score.family, score.best.effect)
+        refined.append(readable(view, refine(view, score), causes))
     rest = [s for s in scores if s not in leading]
     return sorted([*refined, *rest], key=lambda s: -s.evidence)
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """A fit, seen with what holds the mean of what a candidate moves.
+
+    Attributes:
+        projection: The fit.
+        made: Those that were asked for.
+    """
+
+    projection: Projection
+    made: dict[int | str, Projection] = field(default_factory=dict)
+
+    def of_joint(self, joint: int | None) -> Projection:
+        """See it with the zero of a joint, from 1, open."""
+        if joint is None:
+            return self.projection
+        if joint not in self.made:
+            self.made[joint] = opened(self.projection, joint)
+        return self.made[joint]
+
+    def of_carrier(self, carrier: Carrier) -> Projection:
+        """See it with a constant motion of a carrier open, where a model is given."""
+        if carrier.joint is not None:
+            return self.of_joint(carrier.joint)
+        effects = self.projection.fit.combination.effects
+        if not effects or not isinstance(effects[0], Revision):
+            return self.projection
+        if str(carrier) not in self.made:
+            self.made[str(carrier)] = loosened(self.projection, carrier)
+        return self.made[str(carrier)]
+
+    def of(self, family: Family, effect: Effect) -> Projection:
+        """See it as a candidate is seen."""
+        if family.along is not None:
+            return self.of_carrier(carrier(family.along))
+        return self.of_joint(family.joint if effect.has_mean() else None)
 
 
 def opened(projection: Projection, joint: int) -> Projection:
@@ -138,6 +193,17 @@ def opened(projection: Projection, joint: int) -> Projection:
     return Projection.leaving(laid, np.array(out, dtype=np.int64))
 
 
+def loosened(projection: Projection, moved: Carrier) -> Projection:
+    """Return a filter that takes a constant motion of a carrier out of the rows too."""
+    if holds_mean(projection, moved):
+        return projection
+    fit, still = projection.fit, Cell(str(moved), law="constant")
+    laid = beside(fit, (*fit.combination.effects, still))
+    left = {n for n in fit.combination.names if n not in projection.names}
+    out = [k for k, n in enumerate(laid.combination.names) if n in left]
+    return Projection.leaving(laid, np.array(out, dtype=np.int64))
+
+
 def choose(scores: list[Score]) -> Score:
     """Take the best name, unless a free form is clearly ahead of it.
 
@@ -147,9 +213,44 @@ def choose(scores: list[Score]) -> Score:
     names = [s for s in scores if s.family.tier == NAMED]
     name = max(names, key=lambda s: s.evidence - s.best.effect.least_evidence())
     free = next((s for s in scores if s.family.tier == FREE), name)
-    if free.evidence - name.evidence > ahead(name.evidence):
-        return _law(free, names) or free
+    if free.evidence - name.evidence > needed(name, free):
+        return _law(free, names) or plainest(free, scores)
     return _forerunner(name, scores)
+
+
+def needed(name: Score, free: Score) -> float:
+    """Return by how much a free form must be ahead of a name [nats].
+
+    A law with one or two numbers is no freer than a name: it must be ahead for sure. A
+    step happens at one row: what varies smoothly and explains the rows as well, does.
+    """
+    effect = free.best.effect
+    if not isinstance(effect, Cell):
+        return ahead(name.evidence)
+    if isinstance(name.best.effect, CampaignStep) and effect.law != "step":
+        return 0.0
+    return max(CLEARLY[0], LAWFUL * name.evidence)
+
+
+def plainest(best: Score, scores: list[Score]) -> Score:
+    """Take the plainest of the cells that explain as much as the best one.
+
+    What a job can read comes before what passes with time, few numbers before many, and
+    of those that are the same a joint before a link.
+    """
+    if best.family.effect != CELL:
+        return best
+    same = [
+        s for s in scores
+        if s.family.effect == CELL and s.evidence > best.evidence - NEAR
+    ]  # fmt: skip
+
+    def order(s: Score) -> tuple[bool, int, float]:
+        set_up = s.best.effect.belongs_to() == "setup"
+        ahead = s.evidence + (SAME if s.family.joint else 0.0)
+        return set_up, s.best.width, -ahead
+
+    return min(same, key=order)
 
 
 def _law(free: Score, names: list[Score]) -> Score | None:
@@ -224,29 +325,35 @@ CHAIN = 3  # names that together may stand for a free form
 
 
 def names_instead(
-    fit: Fit, library: Library, null: Null, level: float, scores: list[Score]
+    fit: Fit, causes: Causes, null: Null, level: float, scores: list[Score]
 ) -> Score | None:
     """Find the name to take before a free form, or None where names do not do.
 
     Args:
         fit: The fit that lacks something.
-        library: All candidates.
+        causes: All candidates.
         null: Distribution of the largest evidence when there is nothing.
         level: Largest p-value of a name that is tried.
         scores: The ranking under the fit; its first is the free form.
     """
     free, first = scores[0], None
+    alone = extend(fit, free.best).log_evidence if _of_one_cause(free) else -np.inf
     for _ in range(CHAIN):
         name = _best_name(scores, free.family.joint)
-        if name is None or null.p_value(name.evidence) > level:
+        if name is None or null.p_of(name) > level:
             return None
         first = first or name
         fit = extend(fit, name.best)
-        scores = ranking(Projection.of(fit), library)
+        scores = ranking(Projection.of(fit), causes)
         left = next((s.evidence for s in scores if s.family == free.family), 0.0)
         if left < ahead(free.evidence):
-            return first
+            return first if fit.log_evidence > alone else None
     return None
+
+
+def _of_one_cause(score: Score) -> bool:
+    """Tell whether it is one cause: several names must explain more than it."""
+    return score.family.effect == CELL
 
 
 def _best_name(scores: list[Score], joint: int | None) -> Score | None:
@@ -266,6 +373,7 @@ BETTER = 1.0  # nats that replace one family by another
 NEAR = 3.0  # nats within which two causes are told together: odds of 20 to 1
 CERTAIN = 3.0  # standard errors by which one must predict other regions better
 MOST_OTHERS = 2  # that are told, and asked
+MOST_CELLS = 5  # the same of a cell without a name
 RECENT = 2  # additions looked at again after each further one
 
 Progress = Callable[[str, float], None]  # what is done, and how far everything is
@@ -298,7 +406,8 @@ class Search:
     Attributes:
         base: Fit of the model that was given.
         fit: Fit with all additions.
-        library: All candidates.
+        causes: All candidates.
+        near: Names, and the cells that were among the best so far.
         additions: In the order of addition; they are the last effects of `fit`.
         null: Distribution of the largest evidence when there is nothing.
         refused: The candidate that the search stopped at, if there was one.
@@ -309,7 +418,8 @@ class Search:
 
     base: Fit
     fit: Fit
-    library: Library
+    causes: Causes
+    near: Causes
     additions: tuple[Addition, ...]
     null: Null
     refused: Addition | None
@@ -320,7 +430,7 @@ class Search:
         """Rank the library by what a fit lacks, if that is not known already."""
         if self.ranked is not None and self.ranked[0] is fit:
             return self.ranked[1]
-        return ranking(Projection.of(fit), self.library)
+        return ranking(Projection.of(fit), self.near)
 
     def place(self, number: int) -> int:
         """Return the place of an addition among the effects of the fit."""
@@ -328,16 +438,16 @@ class Search:
         return count - len(self.additions) + number
 
 
-def search(base: Fit, library: Library, null: Null, progress: Progress) -> Search:
+def search(base: Fit, causes: Causes, null: Null, progress: Progress) -> Search:
     """Search for effects that a fit lacks.
 
     Args:
         base: The fit.
-        library: All candidates.
+        causes: All candidates.
         null: Distribution of the largest evidence under the fit.
         progress: Told what is being done.
     """
-    found = Search(base, base, library, (), null, None)
+    found = Search(base, base, causes, causes, (), null, None)
     for number in range(MOST):
         progress(f"looking for effect {number + 1}", 0.1 + 0.4 * number / MOST)
         grown = _grow(found)
@@ -352,10 +462,12 @@ def search(base: Fit, library: Library, null: Null, progress: Progress) -> Searc
 
 def _grow(found: Search) -> Search:
     """Add the best candidate, or say which one was refused."""
+    near = found.causes.narrowed(Views(Projection.of(found.fit)).of_carrier, found.near)
+    found = replace(found, near=near)
     scores = found.ranking_under(found.fit)
     found = replace(found, ranked=(found.fit, scores))
     best = _best(found, scores)
-    p_value = found.null.p_value(best.evidence)
+    p_value = found.null.p_of(best)
     if p_value > LEVEL or best.p_value > ALONE:
         return replace(found, refused=None)
     fit = extend(found.fit, best.best)
@@ -372,7 +484,7 @@ def _best(found: Search, scores: list[Score]) -> Score:
     if best.family.tier == NAMED:
         return best
     rivals = [best, *(s for s in scores if s != best)]
-    name = names_instead(found.fit, found.library, found.null, LEVEL, rivals)
+    name = names_instead(found.fit, found.near, found.null, LEVEL, rivals)
     return name or best
 
 
@@ -396,9 +508,9 @@ def _again(found: Search, number: int, elsewhere: bool) -> Search:
     """Keep an addition, replace it by what now fits better, or drop it."""
     place = found.place(number)
     old = found.additions[number].candidate
-    scores = ranking(Projection.of(found.fit, without=place), found.library)
+    scores = ranking(Projection.of(found.fit, without=place), found.near)
     best = choose(scores)
-    if found.null.p_value(best.evidence) > LEVEL:
+    if found.null.p_of(best) > LEVEL:
         return _drop(found, number)
     if best.family.tier == FREE and old.family.tier == NAMED:
         best = _best(_drop(found, number), scores)
@@ -461,7 +573,7 @@ def put_instead(found: Search, number: int, best: Score) -> Search:
     if not gain.sure:
         return found
     additions = list(found.additions)
-    additions[number] = Addition(best, found.null.p_value(best.evidence), gain)
+    additions[number] = Addition(best, found.null.p_of(best), gain)
     return replace(found, fit=fit, additions=tuple(additions))
 
 
@@ -508,7 +620,7 @@ def stand(found: Search, number: int) -> JudgedAddition:
     """Judge one addition of a search against all that could take its place."""
     own = found.additions[number].candidate
     projection = Projection.of(found.fit, without=found.place(number))
-    scores = ranking(projection, found.library)
+    scores = ranking(projection, found.near)
     here = next((s for s in scores if s.family == own.family), None)
     if number >= len(found.additions) - found.waves:
         square = float(projection.rest @ projection.rest)
@@ -516,14 +628,29 @@ def stand(found: Search, number: int) -> JudgedAddition:
     if here is None:
         here = found.additions[number].score
     rivals = []
-    names = {(own.family.effect, own.family.joint)}
+    names = {_name(own.family)}
     for s in scores:
-        name = (s.family.effect, s.family.joint)
+        name = _name(s.family)
         if s.evidence >= here.evidence - _within(own, s.best) and name not in names:
             rivals.append(s)
             names.add(name)
-    p_value = found.null.p_value(here.evidence)
-    return JudgedAddition(here.evidence, p_value, tuple(rivals[:MOST_OTHERS]))
+    p_value = found.null.p_of(here)
+    return JudgedAddition(here.evidence, p_value, _told(own.family, rivals))
+
+
+def _told(own: Family, rivals: Sequence[Score]) -> tuple[Score, ...]:
+    """Choose those that are told: names first, and more cells with a cell."""
+    cells = [s for s in rivals if s.family.effect == CELL]
+    others = [s for s in rivals if s.family.effect != CELL][:MOST_OTHERS]
+    most = MOST_CELLS - len(others) if own.effect == CELL else MOST_OTHERS
+    return (*others, *cells[:most])
+
+
+def _name(family: Family) -> tuple[str | int | None, ...]:
+    """Return what a person tells a cause by: of a cell its place and what drives it."""
+    if family.effect == CELL:
+        return family.joint, family.along, family.driver
+    return family.effect, family.joint
 
 
 def _within(own: Candidate, other: Candidate) -> float:

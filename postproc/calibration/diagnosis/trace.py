@@ -9,9 +9,9 @@ import numpy as np
 from scipy.stats import norm
 
 from postproc.calibration.diagnosis.findings import describe
-from postproc.calibration.diagnosis.library import Library, Projection
+from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.result import Finding, Verdict
-from postproc.calibration.diagnosis.score import Leftover, Null, bootstrap, leftovers
+from postproc.calibration.diagnosis.score import Leftover, Null, leftovers
 from postproc.calibration.diagnosis.search import (
     LEVEL,
     JudgedAddition,
@@ -22,6 +22,7 @@ from postproc.calibration.diagnosis.search import (
     search,
     stand,
 )
+from postproc.calibration.diagnosis.table import Causes
 from postproc.calibration.diagnosis.waves import name_waves
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import FREE, JointEffect
@@ -32,9 +33,9 @@ UNSTEADY = 1e-4  # level at which scatter that follows a law takes its name away
 STANDS_IN = 0.9  # share of the name's evidence that a free form must have
 
 
-def investigate(base: Fit, library: Library, null: Null, progress: Progress) -> Search:
+def investigate(base: Fit, causes: Causes, null: Null, progress: Progress) -> Search:
     """Search for what a fit lacks, take back names that do not hold, name waves."""
-    return name_waves(withdraw(search(base, library, null, progress)))
+    return name_waves(withdraw(search(base, causes, null, progress)))
 
 
 def withdraw(found: Search) -> Search:
@@ -51,7 +52,7 @@ def withdraw(found: Search) -> Search:
         without = Projection.of(found.fit, without=place)
         if incomplete(without, effect, place) > UNSTEADY:
             continue
-        scores = ranking(without, found.library)
+        scores = ranking(without, found.near)
         free = [s for s in scores if s.family.tier == FREE]
         same = [s for s in free if s.family.joint == family.joint]
         if same and same[0].evidence > STANDS_IN * addition.score.evidence:
@@ -136,10 +137,10 @@ def trace(
         without: Names of effects that are known not to be there.
     """
     progress("candidates", 0.0)
-    library = Library.of(base, without)
-    progress("threshold of the whole library", 0.05)
-    null = bootstrap(Projection.of(base), library, seed)
-    found = investigate(base, library, null, progress)
+    causes = Causes.of(base, without)
+    progress("thresholds", 0.05)
+    null = causes.null(Projection.of(base), seed)
+    found = investigate(base, causes, null, progress)
     progress("groups that cannot be told apart", 0.5)
     standings = tuple(stand(found, k) for k in range(len(found.additions)))
     progress("what is left", 0.55)

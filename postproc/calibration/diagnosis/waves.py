@@ -75,7 +75,7 @@ def _with(found: Search, scores: Sequence[Score]) -> Search:
     fit = with_effects(found.fit, [*effects, *(s.best.effect for s in scores)])
     gains = [held_out_gain(fit, len(effects) + k, s.best) for k, s in enumerate(scores)]
     kept = [
-        Addition(s, found.null.p_value(s.evidence), gain)
+        Addition(s, found.null.p_of(s), gain)
         for s, gain in zip(scores, gains, strict=True)
         if gain.sure
     ]

@@ -10,8 +10,9 @@ import pytest
 from postproc.calibration.diagnosis import search
 from postproc.calibration.diagnosis.held_out import RUN, Gain, deal, held_out_gain
 from postproc.calibration.diagnosis.library import Library, Projection
-from postproc.calibration.diagnosis.score import Leftover, Null, Score, bootstrap
+from postproc.calibration.diagnosis.score import Leftover, Null, Score
 from postproc.calibration.diagnosis.search import NEAR, Search, choose, ranking, stand
+from postproc.calibration.diagnosis.table import Causes
 from postproc.calibration.diagnosis.trace import Investigation, silent
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects.effect import FREE, NAMED, Candidate, Family
@@ -34,9 +35,9 @@ def two() -> Campaign:
 @pytest.fixture(scope="module")
 def found(two: Campaign) -> Search:
     base = two.base_fit()
-    library = Library.of(base)
-    null = bootstrap(Projection.of(base), library, seed=0)
-    return search.search(base, library, null, silent)
+    causes = Causes(Library.of(base))
+    null = causes.null(Projection.of(base), seed=0)
+    return search.search(base, causes, null, silent)
 
 
 def test_everything_is_refitted_after_each_addition(
@@ -63,7 +64,7 @@ def test_nothing_is_added_whose_gain_is_within_its_standard_error(
     found: Search, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(search, "held_out_gain", lambda *_: Gain(0.1, 0.11))
-    nothing = search.search(found.base, found.library, found.null, silent)
+    nothing = search.search(found.base, found.causes, found.null, silent)
     assert nothing.additions == ()
     assert nothing.fit is found.base
     assert nothing.refused is not None
@@ -95,12 +96,13 @@ def test_one_threshold_holds_for_the_whole_library_with_grids_and_steps() -> Non
     library = Library.of(base)
     kinds = {c.family.effect for s in library.shelves for c in s.candidates}
     assert {"tool_shift", "base_shift", "transmission", "thermal", "curve"} <= kinds
-    null = bootstrap(Projection.of(base), library, seed=0)
+    causes = Causes(library)
+    null = causes.null(Projection.of(base), seed=0)
     limit, draws = null.threshold(0.1), 30
     above = 0
     for seed in range(draws):
         drawn = parametric_draw(base, seed)
-        above += ranking(Projection.of(drawn), library)[0].evidence > limit
+        above += ranking(Projection.of(drawn), causes)[0].evidence > limit
     assert above <= 8  # Binomial(30, 0.1): 8 or fewer in 99.8 % of all runs
 
 
@@ -165,7 +167,7 @@ def test_two_names_stand_for_the_free_form_that_one_cannot_reach(
             for e in left
         )
         monkeypatch.setattr(search, "ranking", lambda *_: next(rankings))
-        return search.names_instead(found.base, found.library, null, 0.01, start)
+        return search.names_instead(found.base, found.causes, null, 0.01, start)
 
     assert after(28.0, 3.0) is first
     assert after(60.0, 55.0, 50.0) is None

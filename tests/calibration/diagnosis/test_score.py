@@ -18,13 +18,13 @@ from postproc.calibration.diagnosis.score import (
     SIGNALS,
     Null,
     Score,
-    bootstrap,
     explained,
     leftovers,
     log_evidence,
     rank,
     score_p_value,
 )
+from postproc.calibration.diagnosis.table import Causes
 from postproc.model.effects.effect import NAMED, Candidate, Family
 from postproc.model.effects.scale import Scale
 from tests.calibration.planted import campaign, plain_design
@@ -145,8 +145,8 @@ def test_library_gives_the_same_blocks_for_kept_and_for_new_columns(
 
 def test_null_tells_how_often_noise_gets_so_far(base: Projection) -> None:
     library = Library.of(base.fit)
-    null = bootstrap(base, library, seed=0)
-    fresh = bootstrap(base, library, seed=1).maxima
+    null = Causes(library).null(base, seed=0)
+    fresh = Causes(library).null(base, seed=1).maxima
     for level in (0.2, 0.1, 0.05):
         assert np.mean(fresh > null.threshold(level)) == pytest.approx(level, abs=0.05)
     p = [null.p_value(e) for e in np.linspace(0, 40, 81)]

@@ -74,7 +74,7 @@ def test_of_names_alike_the_one_that_predicts_other_regions_is_taken(
     effects = [a.candidate.family.effect for a in traced.additions]
     number = effects.index("compliance")
     added, place = traced.additions[number], traced.place(number)
-    scores = ranking(Projection.of(traced.fit, without=place), traced.library)
+    scores = ranking(Projection.of(traced.fit, without=place), traced.causes)
     joint = added.candidate.family.joint
     told = [
         replace(s, evidence=added.score.evidence)
@@ -97,7 +97,7 @@ def test_nothing_is_asked_of_visits_before_where_all_are_missing() -> None:
     fit = fit_effects(Batch(ARM, lost), c.position, base, tuple(TRACKER))
     traced = trace(fit, seed=0)
     assert [f.effect for f in traced.findings] == ["joint_step"]
-    tried = [x for s in traced.search.library.shelves for x in s.candidates]
+    tried = [x for s in traced.search.causes.library.shelves for x in s.candidates]
     assert not any("before" in x.source for x in tried)
 
 

@@ -11,6 +11,7 @@ from postproc.calibration.diagnosis import score, waves
 from postproc.calibration.diagnosis.library import Library, Projection
 from postproc.calibration.diagnosis.score import Null
 from postproc.calibration.diagnosis.search import Search
+from postproc.calibration.diagnosis.table import Causes
 from postproc.calibration.diagnosis.waves import (
     GATHERED,
     Along,
@@ -30,6 +31,7 @@ JOINT = 4
 ORDERS = (9.5, 23.0)
 MRAD = 0.15
 SIGNALS = np.exp(np.linspace(0.0, 10.0, 6))
+NOTHING = Causes(Library(()))
 NULL = Null(np.sort(5.0 + np.random.default_rng(0).exponential(1.0, 300)))
 
 
@@ -55,7 +57,7 @@ def mapped(seed: int, orders: tuple[float, ...], rows: int) -> Fit:
 
 def searched(fit: Fit) -> Search:
     """Name the waves in the maps of a fit."""
-    return name_waves(Search(fit, fit, Library(()), (), NULL, None))
+    return name_waves(Search(fit, fit, NOTHING, NOTHING, (), NULL, None))
 
 
 def test_waves_beside_a_worn_spot_are_named_with_order_and_size() -> None:

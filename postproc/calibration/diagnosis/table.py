@@ -1,0 +1,479 @@
+"""The table of causes: every part that may move, by everything that may drive it.
+
+Named effects are cells of it that somebody has thought of. The others are searched all
+the same: for one driver and law the columns of all carriers are the carrier's own
+direction times one function of the rows, so that functions are evaluated once, and
+scored in blocks.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+from postproc.calibration.diagnosis.library import (
+    JointAxes,
+    Library,
+    Projection,
+    View,
+    reduce_columns,
+    reduce_some,
+)
+from postproc.calibration.diagnosis.refit import Revision
+from postproc.calibration.diagnosis.score import (
+    Null,
+    Score,
+    draws,
+    family_maxima,
+    log_evidence,
+    rank,
+)
+from postproc.calibration.regression import Fit
+from postproc.model.carrier import Carrier, every_carrier
+from postproc.model.covariate import (
+    JOINTS,
+    PLAIN,
+    covariate,
+    varies,
+    varies_enough,
+)
+from postproc.model.effects import EFFECTS
+from postproc.model.effects.cell import PASSING, STEPS, Cell
+from postproc.model.effects.curve import Curve
+from postproc.model.effects.effect import CELL, FREE, Candidate, Family
+from postproc.model.kinematics import Batch
+
+ORDERS = 8  # waves per turn of an angle's harmonics that are tried
+PLAINER = 3.0  # nats that a law may be behind one with more columns: odds of 20 to 1
+FEW_VALUES = 5  # of a driver: what lies between them shows no bend
+NARROW = 60  # families that a search weighs once it has seen all
+TOLD = 10  # families whose scores are told
+LEAST_MOMENT = 1.0  # [N m] by which a load varies that may bend anything
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A function of the rows, as an effect of the first joint.
+
+    Attributes:
+        effect: The effect, of any carrier.
+        log_prior: Log of its share of what its driver may do.
+    """
+
+    effect: Cell | Curve
+    log_prior: float
+
+    @cached_property
+    def cell(self) -> tuple[str, str]:
+        """Name its driver and its law, a harmonic without its order."""
+        law = "curve" if isinstance(self.effect, Curve) else self.effect.law
+        return self.driver, law.partition(" ")[0]
+
+    @cached_property
+    def columns(self) -> int:
+        """Count its columns."""
+        return len(self.effect.parameters())
+
+    @cached_property
+    def driver(self) -> str:
+        """Name what drives it, the factor first."""
+        source = self.effect.source
+        source = source if isinstance(source, str) else source[0]
+        factor = self.effect.factor
+        return f"{factor} x {source}" if factor else source
+
+    def on(self, carrier: Carrier, loose: bool) -> Candidate:
+        """Make the candidate that a carrier moves by it.
+
+        Args:
+            carrier: The carrier.
+            loose: Whether a model is given that may have its mean otherwise.
+        """
+        along = None if carrier.joint is not None else str(carrier)
+        family = Family(CELL, carrier.joint, self.driver, FREE, along)
+        more = loose and carrier.joint is None
+        effect = replace(self.effect, direction=str(carrier), loose=more)
+        return Candidate(family, effect, self.driver, self.log_prior)
+
+
+@dataclass(frozen=True, eq=False)
+class Laws:
+    """Laws of one factor.
+
+    Attributes:
+        drivers: Names of what drives them, (d,).
+        widths: Laws of one number of columns k: the laws (c), their functions over
+            prior scales, (c, k, n), and which of the drivers each has, (c,).
+    """
+
+    drivers: tuple[str, ...]
+    widths: tuple[tuple[tuple[Law, ...], Floats, Ints], ...]
+
+    @classmethod
+    def of(cls, batch: Batch, drivers: Sequence[str], factor: str) -> Laws:
+        """Evaluate all laws of some drivers, multiplied by a factor if there is one."""
+        alike: dict[int, list[tuple[Law, Floats, int]]] = defaultdict(list)
+        for k, driver in enumerate(drivers):
+            for law in _laws_of(batch, driver, factor):
+                values = _scaled(law.effect, batch)
+                alike[values.shape[0]].append((law, values, k))
+        widths = []
+        for _, some in sorted(alike.items()):
+            laws = tuple(law for law, _, _ in some)
+            values = np.stack([v for _, v, _ in some])
+            widths.append((laws, values, np.array([which for _, _, which in some])))
+        names = (f"{factor} x {d}" if factor else d for d in drivers)
+        return cls(tuple(names), tuple(widths))
+
+    def some(self, drivers: Ints) -> Laws:
+        """Return the laws of some of the drivers, by their numbers."""
+        widths = []
+        for laws, values, which in self.widths:
+            kept = np.flatnonzero(np.isin(which, drivers))
+            if len(kept):
+                own = tuple(laws[k] for k in kept)
+                widths.append((own, values[kept], which[kept]))
+        return replace(self, widths=tuple(widths))
+
+    def at_rows(self, rows: Ints) -> Laws:
+        """Return them at some of the rows."""
+        widths = tuple((law, v[:, :, rows], which) for law, v, which in self.widths)
+        return replace(self, widths=widths)
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """All cells that rows can show and that have no name.
+
+    Attributes:
+        revised: Whether rows revise a given model, which may have means otherwise.
+        laws: Laws by the factor that multiplies them, "" without one.
+        named: (driver, law) of cells that named effects are, by carrier.
+        only: Numbers of the drivers that are tried, by carrier and factor; None: all.
+    """
+
+    revised: bool
+    laws: dict[str, Laws]
+    named: dict[str, frozenset[tuple[str, str]]]
+    only: dict[tuple[Carrier, str], Ints] | None = None
+
+    @classmethod
+    def of(cls, fit: Fit, without: Collection[str] = ()) -> Table:
+        """List what may drive anything in the rows of a fit.
+
+        Args:
+            fit: The fit.
+            without: Names of effects that are known not to be there.
+        """
+        batch = fit.combination.at(fit.batch, fit.values)
+        drivers = _drivers(batch)
+        if "tracker_drift" in without:
+            drivers = [d for d in drivers if d not in PASSING]
+        factors = [f"lambda {j}" for j in JOINTS if f"lambda {j}" in drivers]
+        factors += [f"torque {j}" for j in JOINTS if f"torque {j}" in drivers]
+        laws = {"": Laws.of(batch, drivers, "")}
+        for factor in factors:
+            other = [d for d in drivers if _may_multiply(factor, d)]
+            laws[factor] = Laws.of(batch, other, factor)
+        named: dict[str, set[tuple[str, str]]] = defaultdict(set)
+        for kind in EFFECTS:
+            for carrier, *cell in kind.cells():
+                named[carrier].add((cell[0], cell[1]))
+        revised = isinstance((*fit.combination.effects, None)[0], Revision)
+        return cls(revised, laws, {k: frozenset(cells) for k, cells in named.items()})
+
+    def at_rows(self, rows: Ints) -> Table:
+        """Return the table of some of the rows."""
+        return replace(self, laws={f: x.at_rows(rows) for f, x in self.laws.items()})
+
+    def scores(self, view_of: Callable[[Carrier], Projection]) -> list[Score]:
+        """Score all cells and return the best, settings as in the table.
+
+        Args:
+            view_of: Gives the fit as it is seen along a carrier, with what holds the
+                mean of its motion.
+        """
+        found = self._scan(view_of)[:TOLD]
+        return [self._score(view_of, *best) for best in found]
+
+    def narrowed(
+        self, view_of: Callable[[Carrier], Projection], before: Table
+    ) -> Table:
+        """Return the table of the best families alone, and of those of another one.
+
+        A search goes through the whole table where it looks for a further effect. What
+        it weighs then is one of the best.
+
+        Args:
+            view_of: As in `scores`.
+            before: A narrowed table, or this one.
+        """
+        only = dict(before.only or {})
+        for _, carrier, factor, k, *_ in self._scan(view_of)[:NARROW]:
+            kept = only.get((carrier, factor), np.zeros(0, dtype=np.int64))
+            only[carrier, factor] = np.union1d(kept, [k])
+        return replace(self, only=only)
+
+    def _scan(
+        self, view_of: Callable[[Carrier], Projection]
+    ) -> list[tuple[float, Carrier, str, int, Laws, list[Floats]]]:
+        """Score the families, a carrier and a driver each, the best first."""
+        found = []
+        for carrier in self._carriers():
+            view = view_of(carrier)
+            square = np.array([view.rest @ view.rest])
+            scored = self._evidence(view, carrier, view.twice, square)
+            for factor, laws, each in scored:
+                whole = _by_driver(laws, [e[:, 0] for e in each])
+                for k in np.flatnonzero(whole > 0.0):
+                    found.append((float(whole[k]), carrier, factor, int(k), laws, each))
+        return sorted(found, key=lambda x: -x[0])
+
+    def _carriers(self) -> tuple[Carrier, ...]:
+        """List the carriers that are tried."""
+        if self.only is None:
+            return every_carrier()
+        own = {carrier for carrier, _ in self.only}
+        return tuple(c for c in every_carrier() if c in own)
+
+    def moved_since(self, projection: Projection) -> list[Score]:
+        """Score parts that have moved once since a given model was made."""
+        if not self.revised:
+            return []
+        still = [
+            Candidate(Family(CELL, None, None, FREE, str(c)), cell, "joint 1", 0.0)
+            for c in every_carrier()
+            if c.part == "link"
+            for cell in [Cell(str(c), law="constant")]
+        ]
+        square = float(projection.rest @ projection.rest)
+        known = frozenset(projection.names)
+        reduced = reduce_some(projection, still)
+        return rank(reduced, square, projection.rows, without=known)
+
+    def _score(
+        self,
+        view_of: Callable[[Carrier], Projection],
+        evidence: float,
+        carrier: Carrier,
+        factor: str,
+        k: int,
+        laws: Laws,
+        each: Sequence[Floats],
+    ) -> Score:
+        """Put the best law of one driver on one carrier into a score."""
+        own = [
+            (float(e[i, 0]), law)
+            for e, (some, _, which) in zip(each, laws.widths, strict=True)
+            for i, law in enumerate(some)
+            if which[i] == k
+        ]
+        least = max(e for e, _ in own) - PLAINER
+        _, best = min(
+            (x for x in own if x[0] >= least), key=lambda x: (x[1].columns, -x[0])
+        )
+        view = view_of(carrier)
+        candidate = best.on(carrier, self.revised and not holds_mean(view, carrier))
+        square = float(view.rest @ view.rest)
+        score = rank(reduce_some(view, [candidate]), square, view.rows)[0]
+        return replace(score, evidence=evidence)
+
+    def maxima(self, projection: Projection, rows: Floats, square: Floats) -> Floats:
+        """Return the largest evidence of any cell for every draw, (draws,).
+
+        Args:
+            projection: The fit.
+            rows: Draws, (3 n, draws), filtered once.
+            square: |z|^2 of every draw, (draws,).
+        """
+        twice = projection.filter(rows)
+        best = np.zeros(rows.shape[1])
+        for carrier in every_carrier():
+            scored = self._evidence(projection, carrier, twice, square)
+            for _, laws, each in scored:
+                np.maximum(best, _by_driver(laws, each).max(axis=0), out=best)
+        return best
+
+    def _evidence(
+        self, view: Projection, carrier: Carrier, rows: Floats, square: Floats
+    ) -> Iterator[tuple[str, Laws, list[Floats]]]:
+        """Score all laws of a carrier against rows filtered twice, (3 n, draws).
+
+        Yields:
+            A factor, its laws, and by width their evidence and share, (c, draws).
+        """
+        axes = JointAxes.of(view.fit, carrier.moved(view.at))
+        along = View(axes.size, axes.along(view.taken), axes.along(rows))
+        own = min(carrier.link, len(JOINTS))
+        for factor in ("", f"lambda {own}", f"torque {own}"):
+            laws, each = self._tried(carrier, factor), []
+            for some, values, _ in laws.widths:
+                reduced = reduce_columns(along, (), axes.size.apply(values))
+                evidence = log_evidence(reduced, square, view.rows)
+                evidence += self._shares(carrier, some)[:, None]
+                each.append(evidence)
+            if each:
+                yield factor, laws, each
+
+    def _tried(self, carrier: Carrier, factor: str) -> Laws:
+        """Return the laws of a factor that are tried on a carrier."""
+        laws = self.laws.get(factor, Laws((), ()))
+        if self.only is None:
+            return laws
+        none = np.zeros(0, dtype=np.int64)
+        return laws.some(self.only.get((carrier, factor), none))
+
+    def _shares(self, carrier: Carrier, laws: Sequence[Law]) -> Floats:
+        """Return log shares of laws on a carrier, (c,); -inf of those with a name."""
+        named = self.named.get(str(carrier), frozenset())
+        return np.array(
+            [-np.inf if law.cell in named else law.log_prior for law in laws]
+        )
+
+
+def holds_mean(projection: Projection, carrier: Carrier) -> bool:
+    """Tell whether a filter takes out a constant motion of a carrier for a cell."""
+    begins = tuple(f"{kind}.{carrier} by " for kind in (Cell.name, Curve.name))
+    mean = [n for n in projection.names if n.endswith((" mean", " constant"))]
+    return any(n.startswith(begins) for n in mean)
+
+
+def _by_driver(laws: Laws, each: Sequence[Floats]) -> Floats:
+    """Sum the evidence of all laws of each driver, (d,) or (d, draws) [nats]."""
+    total = np.full((len(laws.drivers), *each[0].shape[1:]), -np.inf)
+    for evidence, (_, _, which) in zip(each, laws.widths, strict=True):
+        np.logaddexp.at(total, which, evidence)
+    return total
+
+
+# What may drive, and how.
+
+
+def _drivers(batch: Batch) -> list[str]:
+    """Name what varies over the rows and may drive a motion."""
+    names = [f"{kind} {j}" for kind in ("joint", "lambda", "way") for j in JOINTS]
+    names += [f"torque {j}" for j in JOINTS]
+    names += [f"moment {j}{a}" for j in JOINTS[1:] for a in "xy"]
+    names += PLAIN
+    if varies(covariate(batch, "time")):
+        names.remove("order")  # they tell the same
+    return [n for n in names if _varies(batch, n)]
+
+
+def _varies(batch: Batch, name: str) -> bool:
+    """Tell whether a driver varies enough to show."""
+    x = covariate(batch, name)
+    if name.startswith(("torque", "moment")):
+        return varies(x) and float(np.ptp(x)) > LEAST_MOMENT
+    return varies(x) and varies_enough(batch.states, name.partition(" ")[0])
+
+
+def _may_multiply(factor: str, driver: str) -> bool:
+    """Tell whether a factor times a driver is a cause of its own."""
+    kind = driver.partition(" ")[0]
+    if factor.startswith("lambda"):
+        return kind not in ("lambda", *PASSING)
+    return kind in ("joint", "temperature", "way")
+
+
+def _laws_of(batch: Batch, driver: str, factor: str) -> list[Law]:
+    """List the laws that a driver may act by, each kind with the same share."""
+    x = covariate(batch, driver)
+    low, high = float(x.min()), float(x.max())
+    middle, half = (low + high) / 2, (high - low) / 2
+    size = float(np.abs(covariate(batch, factor)).max()) if factor else 1.0
+
+    def cell(law: str, at: float = middle, over: float = half) -> Cell:
+        return Cell("joint 1", driver, factor, law, at, over, size)
+
+    kinds: list[list[Cell | Curve]] = [[cell("linear")]]
+    if not driver.startswith("lambda"):
+        places = low + (high - low) * np.arange(1, STEPS + 1) / (STEPS + 1)
+        kinds.append([cell("step", float(at)) for at in places])
+        if len(np.unique(x)) > FEW_VALUES:
+            bends = product((-0.4, 0.0, 0.4), (0.15, 0.3, 0.6))
+            kinds.append(
+                [cell("saturating", middle + a * half, w * half) for a, w in bends]
+            )
+        kinds.append([Curve("joint 1", (driver,), (low,), (high,), factor)])
+    if driver.startswith("joint"):
+        kinds.append([cell(f"harmonic {n}") for n in range(1, ORDERS + 1)])
+    return [
+        Law(effect, -float(np.log(len(kinds) * len(kind))))
+        for kind in kinds
+        for effect in kind
+    ]
+
+
+def _scaled(effect: Cell | Curve, batch: Batch) -> Floats:
+    """Evaluate the functions of an effect over their relative prior scales, (k, n)."""
+    scale = np.array([p.scale for p in effect.parameters()])
+    values: Floats = (effect.turning(batch) * (scale / scale.max())).T
+    return values
+
+
+# Everything that is searched: what has a name, and the rest of the table.
+
+DRAWS = 100  # of which the largest evidence of the table is taken
+
+
+@dataclass(frozen=True, eq=False)
+class Causes:
+    """All candidates.
+
+    Attributes:
+        library: Effects with names, and free forms.
+        table: All other cells; None where names alone are sought.
+    """
+
+    library: Library
+    table: Table | None = None
+
+    @classmethod
+    def of(cls, fit: Fit, without: Collection[str] = ()) -> Causes:
+        """List all candidates that a fit's rows can show.
+
+        Args:
+            fit: The fit.
+            without: Names of effects that are known not to be there.
+        """
+        return cls(Library.of(fit, without), Table.of(fit, without))
+
+    @property
+    def without(self) -> frozenset[str]:
+        """Names of effects that are known not to be there."""
+        return self.library.without
+
+    def narrowed(
+        self, view_of: Callable[[Carrier], Projection], before: Causes
+    ) -> Causes:
+        """Keep the best families of the table alone, see `Table.narrowed`."""
+        if self.table is None or before.table is None:
+            return self
+        return replace(self, table=self.table.narrowed(view_of, before.table))
+
+    def at_rows(self, rows: Ints) -> Causes:
+        """Return the candidates for some of the rows."""
+        table = None if self.table is None else self.table.at_rows(rows)
+        return Causes(self.library.at_rows(rows), table)
+
+    def null(self, projection: Projection, seed: int) -> Null:
+        """Draw from the current model and score everything against each draw.
+
+        Names and cells have a threshold each, as names are few and cells many.
+        """
+        rows = draws(projection, seed)
+        square = np.einsum("rd,rd->d", rows, rows)
+        reduced = self.library.reduce(projection, rows)
+        names = np.sort(family_maxima(reduced, square, projection.rows))
+        if self.table is None:
+            return Null(names)
+        some = rows[:, :DRAWS]
+        cells = self.table.maxima(projection, some, square[:DRAWS])
+        return Null(names, Null(np.sort(cells)))
