@@ -380,9 +380,7 @@ def _numbers(found: Diagnosis) -> range:
 def _finding_row(found: Diagnosis, number: int) -> tuple[str, ...]:
     f = found.findings[number]
     others = ", ".join(
-        effect + (f" {joint}" if joint else "")
-        for effect, joint in f.confusable_with
-        if effect != CELL
+        effect + (f" {joint}" if joint else "") for effect, joint in f.confusable_with
     )
     cells = ", ".join(str(r) for r in f.rivals if r.effect == CELL)
     others = "; ".join(filter(None, (others, cells)))
@@ -402,9 +400,7 @@ def _constants(found: Diagnosis, number: int) -> str:
     ]
     told = f"{f.effect}: " + (", ".join(clear[:8]) or "no parameter stands out")
     if f.told:
-        told = (
-            f"{f.told}, {f.peak_mm:.2g} mm at the tool at most; no name in the library"
-        )
+        told = f"{f.told}, {f.peak_mm:.2g} mm at the tool; no name in the library"
     doubts = [f"IMPOSSIBLE: {text}" for text in f.impossible]
     if f.of_setup and not f.nameless:
         doubts.append("of the set-up: not compensated")

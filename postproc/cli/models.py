@@ -110,7 +110,11 @@ def simulate(
     ] = None,
     seed: SeedOption = 1,
     effects: Annotated[
-        str | None, typer.Option("--effects", help="Further effects, comma separated.")
+        str | None,
+        typer.Option(
+            "--effects",
+            help="Further effects, comma separated; any motion of a part by its text.",
+        ),
     ] = None,
     wanted: Annotated[
         Path | None,

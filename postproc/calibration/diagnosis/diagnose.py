@@ -485,7 +485,8 @@ def _seen(shown: Profile) -> Mapping[str, Any]:
 def _candidates(found: Extension) -> list[dict[str, Any]]:
     """List what the residual of the given model calls for."""
     search = found.search
-    scores = search.ranking_under(search.base)[:LISTED]
+    scores = search.ranking_under(search.base)
+    scores = sorted(scores, key=lambda s: (search.null.p_of(s), -s.evidence))[:LISTED]
     return [
         {
             "effect": s.family.effect,

@@ -11,7 +11,7 @@ from postproc.calibration.diagnosis.result import Finding
 from postproc.calibration.diagnosis.search import Addition, JudgedAddition, Search
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import SHOWN_UNITS, impossible
-from postproc.model.effects.effect import Effect
+from postproc.model.effects.effect import CELL, Effect
 from postproc.robot.pose import MM
 
 
@@ -38,7 +38,8 @@ def _describe(
     effect = fit.combination.effects[found.place(number)]
     part = fit.combination.slices[found.place(number)]
     moved = np.linalg.norm(fit.moved(part), axis=1)
-    confusable = [(s.family.effect, s.family.joint) for s in standing.confusable]
+    rivals = tuple(s.family for s in standing.confusable)
+    confusable = [(r.effect, r.joint) for r in rivals if r.effect != CELL]
     tied = [name for name in effect.tied(fit.batch) if name not in found.causes.without]
     named = {name for name, _ in confusable}
     confusable += [(name, None) for name in tied if name not in named]
@@ -47,7 +48,7 @@ def _describe(
         joint=family.joint,
         nameless=effect.nameless,
         of_setup=effect.belongs_to() == "setup",
-        source=addition.candidate.source,
+        source=family.driver if family.effect == CELL else addition.candidate.source,
         p_value=standing.p_value,
         evidence=standing.evidence,
         share=share,
@@ -59,7 +60,7 @@ def _describe(
         impossible=impossible(fit, _own(fit, part)),
         family=family,
         told=effect.sentence(fit.values[part], fit.covariance[part, part]),
-        rivals=tuple(s.family for s in standing.confusable),
+        rivals=rivals,
     )
 
 

@@ -42,13 +42,13 @@ class Finding:
         share: Part of the residual's variance that it explains.
         peak_mm: Largest displacement over the rows.
         parameters: Value, standard error and unit by name, units people use.
-        confusable_with: (effect, joint) that explain the same within a few nats.
+        confusable_with: Names (effect, joint) that explain the same within a few nats.
         settings: What is not linear: order, row, time constant and the like.
         held_out_gain: Fall of the squared held-out error per row, in noise variances,
             and its standard error.
         impossible: Values of it that physics forbids, in words.
         family: What it is called: of a cell without a name its place and driver.
-        rivals: The same of those that explain the same within a few nats.
+        rivals: The same of all that explain the same, those without a name too.
         told: Place, driver, law and size of what has no name.
     """
 

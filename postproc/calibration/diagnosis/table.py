@@ -52,6 +52,7 @@ from postproc.model.kinematics import Batch
 ORDERS = 8  # waves per turn of an angle's harmonics that are tried
 PLAINER = 3.0  # nats that a law may be behind one with more columns: odds of 20 to 1
 FEW_VALUES = 5  # of a driver: what lies between them shows no bend
+LIKELY = 0.25  # part of all families that are looked at closely
 NARROW = 60  # families that a search weighs once it has seen all
 TOLD = 10  # families whose scores are told
 LEAST_MOMENT = 1.0  # [N m] by which a load varies that may bend anything
@@ -130,6 +131,21 @@ class Laws:
             widths.append((laws, values, np.array([which for _, _, which in some])))
         names = (f"{factor} x {d}" if factor else d for d in drivers)
         return cls(tuple(names), tuple(widths))
+
+    def along(self, axes: JointAxes, rest: Floats) -> Floats:
+        """Ask how much of a residual the columns of each driver have at most, (d,).
+
+        Args:
+            axes: A carrier's.
+            rest: The residual along them, filtered twice, (n,).
+        """
+        most = np.zeros(len(self.drivers))
+        for _, values, which in self.widths:
+            white = axes.size.apply(values)
+            size = np.maximum(np.einsum("ckn,ckn->ck", white, white), 1e-300)
+            share = ((white @ rest) ** 2 / size).max(axis=1)
+            np.maximum.at(most, which, share)
+        return most
 
     def some(self, drivers: Ints) -> Laws:
         """Return the laws of some of the drivers, by their numbers."""
@@ -215,10 +231,30 @@ class Table:
             before: A narrowed table, or this one.
         """
         only = dict(before.only or {})
-        for _, carrier, factor, k, *_ in self._scan(view_of)[:NARROW]:
+        best = self._likely(view_of)._scan(view_of)[:NARROW]
+        for _, carrier, factor, k, *_ in best:
             kept = only.get((carrier, factor), np.zeros(0, dtype=np.int64))
             only[carrier, factor] = np.union1d(kept, [k])
         return replace(self, only=only)
+
+    def _likely(self, view_of: Callable[[Carrier], Projection]) -> Table:
+        """Return the table of the families that what is left goes along with most.
+
+        What the model takes up of a column is not asked for: it is never more than a
+        column has, so that what it leaves of one explains at least as much.
+        """
+        asked: list[tuple[Carrier, str, Floats]] = []
+        for carrier in every_carrier():
+            view = view_of(carrier)
+            axes = JointAxes.of(view.fit, carrier.moved(view.at))
+            rest = axes.along(view.twice)[:, 0]
+            for factor in _factors(carrier):
+                if factor in self.laws:
+                    along = self.laws[factor].along(axes, rest)
+                    asked.append((carrier, factor, along))
+        least = np.quantile(np.concatenate([x for *_, x in asked]), 1.0 - LIKELY)
+        kept = {(c, f): np.flatnonzero(x >= least) for c, f, x in asked}
+        return replace(self, only={at: k for at, k in kept.items() if len(k)})
 
     def _scan(
         self, view_of: Callable[[Carrier], Projection]
@@ -310,8 +346,7 @@ class Table:
         """
         axes = JointAxes.of(view.fit, carrier.moved(view.at))
         along = View(axes.size, axes.along(view.taken), axes.along(rows))
-        own = min(carrier.link, len(JOINTS))
-        for factor in ("", f"lambda {own}", f"torque {own}"):
+        for factor in _factors(carrier):
             laws, each = self._tried(carrier, factor), []
             for some, values, _ in laws.widths:
                 reduced = reduce_columns(along, (), axes.size.apply(values))
@@ -342,6 +377,12 @@ def holds_mean(projection: Projection, carrier: Carrier) -> bool:
     begins = tuple(f"{kind}.{carrier} by " for kind in (Cell.name, Curve.name))
     mean = [n for n in projection.names if n.endswith((" mean", " constant"))]
     return any(n.startswith(begins) for n in mean)
+
+
+def _factors(carrier: Carrier) -> tuple[str, str, str]:
+    """Name what may multiply a cause at a carrier: what is its own joint's."""
+    own = min(carrier.link, len(JOINTS))
+    return "", f"lambda {own}", f"torque {own}"
 
 
 def _by_driver(laws: Laws, each: Sequence[Floats]) -> Floats:

@@ -25,6 +25,7 @@ from postproc.calibration.diagnosis.score import (
     score_p_value,
 )
 from postproc.calibration.diagnosis.table import Causes
+from postproc.model.carrier import every_carrier
 from postproc.model.effects.effect import NAMED, Candidate, Family
 from postproc.model.effects.scale import Scale
 from tests.calibration.planted import campaign, plain_design
@@ -180,19 +181,21 @@ def test_held_out_errors_come_from_the_other_rows() -> None:
     assert less.reshape(-1)[out] == pytest.approx(y[out] - B[out] @ p)
 
 
-def test_library_asks_joints_and_axes_about_every_covariate(base: Projection) -> None:
-    candidates = [c for s in Library.of(base.fit).shelves for c in s.candidates]
-    asked: dict[str, set[str]] = {}
-    for c in candidates:
-        place = getattr(c.effect, "direction", f"joint {c.family.joint}")
-        asked.setdefault(place, set()).add(c.source)
+def test_every_part_is_asked_about_every_covariate(base: Projection) -> None:
+    causes = Causes.of(base.fit)
+    candidates = [c for s in causes.library.shelves for c in s.candidates]
+    assert causes.table is not None
+    drivers = set(causes.table.laws[""].drivers)
     joints = {f"joint {j}" for j in range(1, 7)}
     passing = {"speed", "payload", "temperature", "time"}
     for j in range(1, 7):
-        own = {f"lambda {j}", f"before {j}", f"travel {j}", "torque 2", "torque 3"}
-        assert joints | passing | own <= asked[f"joint {j}"], j
-    for axis in (f"{frame} {k}" for frame in ("base", "tool") for k in "xyz"):
-        assert joints | passing <= asked[axis], axis
+        own = {f"lambda {j}", f"way {j}", "torque 2", "torque 3", "moment 5x"}
+        assert joints | passing | own <= drivers, j
+        before = {c.source for c in candidates if c.family.joint == j}
+        assert {f"before {j}", f"travel {j} x loop {j}"} <= before
+        signed = causes.table.laws[f"lambda {j}"].drivers
+        assert {f"lambda {j} x joint {k}" for k in range(1, 7)} <= set(signed)
+    assert causes.table._carriers() == every_carrier()
     steps = [c for c in candidates if c.family.effect in ("tool_shift", "base_shift")]
     assert {c.source for c in steps} == {"order"}
     rows = sorted({c.effect.settings()["row"] for c in steps})
