@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from postproc.language.flow import HeadedRows, RoutineFlow
+from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
 from postproc.language.machine import (
     NOWHERE,
@@ -14,10 +14,20 @@ from postproc.language.machine import (
     TaskMachine,
 )
 from postproc.language.rapid import syntax as said
+from postproc.language.rapid.error_paths import ErrorExit, ErrorHandlers, exits_of
+from postproc.language.rapid.errors import (
+    EXIT_CYCLE,
+    PATH_ERRORS,
+    Numbers,
+    clauses_of,
+    common,
+    key_of,
+    may_raise,
+    numbers_of,
+)
 from postproc.language.rapid.modes import (
     AT_START,
     HARMLESS,
-    UNKNOWN_SHIFT,
     Modes,
     changed_modes,
 )
@@ -31,6 +41,7 @@ from postproc.language.rapid.task import RapidTask, functions_in, inside
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
+PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (
     said.FileHeader, said.DataDeclaration, said.ConnectTrap, said.Assignment,
@@ -47,11 +58,15 @@ class RapidMachine(TaskMachine):
         task: Its modules.
         goals: Reads destinations, tools, work objects and zones.
         ends: What holds where the main routine ends.
+        restarts: What holds where a cycle ends before that.
     """
 
     task: RapidTask = field(kw_only=True)
     goals: Goals = field(kw_only=True)
     ends: list[Modes] = field(default_factory=list)
+    restarts: list[Modes] = field(default_factory=list)
+    _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
+    _exits: dict[CallContext, tuple[ErrorExit, ...]] = field(default_factory=dict)
     _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
 
     @classmethod
@@ -83,18 +98,18 @@ class RapidMachine(TaskMachine):
             self.follow_all()
 
     def _next_cycle(self, here: Arrived) -> Arrived:
-        """Say how main begins once more: what displaces or blocks at its end may hold.
+        """Return how main begins again: with the modes that hold where a cycle ends.
 
         What an unknown call leaves unknown there does not count:
         it would leave whole programs.
         """
         modes, displaced = here.modes, "pdispon" in self.task.called
         for end in self.ends:
-            joined = modes.joined(end)
-            modes = replace(modes, blocked=joined.blocked)
-            if end.shift != UNKNOWN_SHIFT or displaced:
-                modes = replace(modes, shift=joined.shift)
-        return replace(here, modes=modes)
+            modes = modes.continued(end, ("shift", "blocked"), displaced)
+        for end in self.restarts:
+            modes = modes.continued(end, modes.names(), displaced)
+        origins = here.origins | (NOWHERE if self.restarts else frozenset())
+        return Arrived(origins, modes)
 
     def _procedures(self) -> list[tuple[int, str, HeadedRows]]:
         routines = (one for found in self.task.routines.values() for one in found)
@@ -132,7 +147,7 @@ class RapidMachine(TaskMachine):
 
     def at_call(self, context: CallContext, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
-        if self._any_moves(context.scope, context.flow.handlers):
+        if self._handlers_of(context).moves:
             here = replace(
                 here,
                 modes=replace(here.modes, blocked=here.modes.blocked | {_HANDLER}),
@@ -140,26 +155,83 @@ class RapidMachine(TaskMachine):
         return here
 
     def at_return(self, context: CallContext, here: Arrived) -> Arrived:
-        """Allow for errors that end a routine early."""
+        """Note the end of a cycle; forget what a handler may have changed."""
         if context.caller is None:
             self.ends.append(here.modes)
-        file, flow = context.scope.file, context.flow
-        if len(flow.handlers):
-            if self._any_moves(context.scope, flow.handlers):
-                return here.lost()
-            if self._handler_returns(file, flow):
-                return replace(here, origins=here.origins | NOWHERE)
-        return here
+        return here.lost() if self._handlers_of(context).moves else here
 
-    def _handler_returns(self, file: int, flow: RoutineFlow) -> bool:
-        """Tell whether an error may end the routine early."""
-        text = self.texts[file]
-        words = {
-            one.word
-            for row in flow.handlers
-            if isinstance(one := inside(text.statement(row)), said.Leave)
-        }
-        return "return" in words or not words
+    # Errors.
+
+    def _handlers_of(self, context: CallContext) -> ErrorHandlers:
+        """Read the error handlers of a routine once."""
+        key = context.scope.file, context.routine.first
+        if key not in self._handlers:
+            scope, text = context.scope, self.texts[context.scope.file]
+
+            def read(operand: said.Operand | None, row: int) -> str:
+                return key_of(operand, self.task.number(operand, row, scope))
+
+            clauses = clauses_of(text, context.flow, read)
+            moves = self._any_moves(scope, context.flow.handlers, (EXIT_CYCLE,))
+            self._handlers[key] = ErrorHandlers(clauses, moves)
+        return self._handlers[key]
+
+    def _exits_of(self, context: CallContext) -> tuple[ErrorExit, ...]:
+        """Find where the program goes on behind errors raised in a routine."""
+        if context not in self._exits:
+            self._exits[context] = tuple(exits_of(context, self._handlers_of))
+        return self._exits[context]
+
+    def _fail(
+        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
+    ) -> None:
+        """Allow for an error that a statement raises and another routine handles.
+
+        The routine's own handler that goes on behind the statement, or with it again,
+        changes nothing of how the arm comes there.
+        """
+        for way in self._exits_of(context):
+            beside = way.own and way.context is context
+            if not beside and self._may_raise(one, way.numbers):
+                self._handled(context, row, way, replace(here, origins=NOWHERE))
+
+    def _may_raise(self, one: said.RapidStatement, numbers: Numbers) -> bool:
+        return may_raise(one, numbers, self.task.routines, self.task.declared)
+
+    def _interrupted(
+        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+    ) -> None:
+        """Allow for an error that ends a move on its way."""
+        always = one.name.startswith(PROCESSES) or "procerrrecovery" in self.task.called
+        for way in self._exits_of(context):
+            named = way.numbers is not None and bool(way.numbers & PATH_ERRORS)
+            if way.own and (named or (always and self._may_raise(one, way.numbers))):
+                self._handled(context, row, way, replace(here, origins=NOWHERE))
+
+    def _handled(
+        self, context: CallContext, row: int, way: ErrorExit, here: Arrived
+    ) -> None:
+        """Go on behind an error."""
+        here = here.lost() if way.lost else here
+        if way.context is context and way.own:
+            self.enter(context, row + way.row, here)
+        elif way.context is not None:
+            self.enter(way.context, way.row, here)
+        elif way.restarts:
+            self.restarts.append(here.modes)
+        else:
+            self.ends.append(here.modes)
+
+    def raise_error(
+        self, context: CallContext, row: int, one: said.Leave, here: Arrived
+    ) -> None:
+        """Go on behind ``RAISE``, see `TaskMachine.raise_error`."""
+        number = self.task.number(one.value, row, context.scope)
+        raised = numbers_of([one.value], lambda value: key_of(value, number))
+        for way in self._exits_of(context):
+            shared = common(way.numbers, raised)
+            if shared is None or shared:
+                self._handled(context, row, way, here)
 
     def part_otherwise(
         self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
@@ -201,6 +273,9 @@ class RapidMachine(TaskMachine):
         if name in self.task.routines:
             return self.unknown(context, row, here, "names several routines")
         kind = known_instructions().get(name)
+        if name == EXIT_CYCLE:
+            self.restarts.append(here.modes)
+            return None
         if name in STOPPED:
             return here.lost()
         if kind == "modal":
@@ -219,6 +294,7 @@ class RapidMachine(TaskMachine):
     ) -> Arrived:
         """Record the visits of a move."""
         signature, scope = MOTIONS[one.name], context.scope
+        self._interrupted(context, row, one, here)
         return self.arrive(
             context, row, here,
             lambda: [*self.goals.visits(one, signature, row, scope, here.modes)],
@@ -227,7 +303,14 @@ class RapidMachine(TaskMachine):
     def after_functions(
         self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
     ) -> Arrived:
-        """Allow for what the functions of a statement do."""
+        """Allow for what the functions of a statement do, and for its errors."""
+        here = self._after_functions(context, row, one, here)
+        self._fail(context, row, one, here)
+        return here
+
+    def _after_functions(
+        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
+    ) -> Arrived:
         for name in functions_in(one):
             found = self.task.routine(name, context.scope)
             own = name in self.task.routines
@@ -253,14 +336,22 @@ class RapidMachine(TaskMachine):
             self._moving[key] = self._any_moves(scope, rows)
         return self._moving[key]
 
-    def _any_moves(self, scope: Scope, rows: range) -> bool:
-        """Tell whether some statements may move the arm."""
+    def _any_moves(
+        self, scope: Scope, rows: range, passed: tuple[str, ...] = ()
+    ) -> bool:
+        """Return True if some statements may move the arm.
+
+        Args:
+            scope: Where they stand.
+            rows: Their rows.
+            passed: Instructions that do not count.
+        """
         text = self.texts[scope.file]
         for row in rows:
             one = inside(text.statement(row))
             if isinstance(one, said.LateCall | said.NotUnderstood):
                 return True
-            if isinstance(one, said.Instruction):
+            if isinstance(one, said.Instruction) and one.name not in passed:
                 found = self.task.routine(one.name, scope)
                 if found is not None:
                     if self._moves(*found):

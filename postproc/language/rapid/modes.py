@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 
 from postproc.language.rapid import syntax as said
@@ -44,6 +44,27 @@ class Modes:
         }
         differing["blocked"] = self.blocked | other.blocked
         return replace(self, **differing)
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Return the names of all modes."""
+        return tuple(f.name for f in fields(cls))
+
+    def continued(self, end: Modes, names: Iterable[str], displaced: bool) -> Modes:
+        """Allow for what holds where a cycle ends.
+
+        Args:
+            end: What holds there; what is unknown there does not count.
+            names: Modes that go on into the next cycle.
+            displaced: The displacement counts where it is unknown, too.
+        """
+        counted = {
+            name: getattr(end, name)
+            for name in names
+            if getattr(end, name) != getattr(LOST, name)
+            or (name == "shift" and displaced)
+        }
+        return self.joined(replace(self, **counted))
 
     def lost(self) -> Modes:
         """Forget all but why targets cannot be compensated."""
