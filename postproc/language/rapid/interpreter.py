@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, TypeGuard
 
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
@@ -26,10 +29,12 @@ from postproc.language.rapid.errors import (
     numbers_of,
 )
 from postproc.language.rapid.modes import (
+    ANYTHING,
     AT_START,
     HARMLESS,
     Modes,
     changed_modes,
+    given_modes,
 )
 from postproc.language.rapid.moves import Goals, pose_of
 from postproc.language.rapid.signatures import (
@@ -41,6 +46,7 @@ from postproc.language.rapid.task import RapidTask, functions_in, inside
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
+SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (
@@ -279,15 +285,21 @@ class RapidMachine(TaskMachine):
         if name in STOPPED:
             return here.lost()
         if kind == "modal":
-            modes = changed_modes(
-                name, one.arguments, here.modes,
-                lambda operand: self.task.number(operand, row, scope),
-                lambda operand: pose_of(self.task.record(operand, row, scope)),
-            )  # fmt: skip
-            return replace(here, modes=modes)
+            changed = self._changed(one, row, scope, here.modes)
+            return replace(here, modes=changed.allowing())
         if kind is not None or self.said_still(name):
             return here
         return self.outside(context, row, name, here)
+
+    def _changed(
+        self, one: said.Instruction, row: int, scope: Scope, modes: Modes
+    ) -> Modes:
+        """Carry out an instruction that changes how the moves after it are."""
+        return changed_modes(
+            one.name, one.arguments, modes,
+            lambda operand: self.task.number(operand, row, scope),
+            lambda operand: pose_of(self.task.record(operand, row, scope)),
+        )  # fmt: skip
 
     def _move(
         self, context: CallContext, row: int, one: said.Instruction, here: Arrived
@@ -295,10 +307,57 @@ class RapidMachine(TaskMachine):
         """Record the visits of a move."""
         signature, scope = MOTIONS[one.name], context.scope
         self._interrupted(context, row, one, here)
-        return self.arrive(
+        after = self.arrive(
             context, row, here,
             lambda: [*self.goals.visits(one, signature, row, scope, here.modes)],
         )  # fmt: skip
+        (last,) = after.origins
+        if math.isnan(self.visits[last].zone_mm):
+            after = replace(after, modes=after.modes.settled())
+        if one.name in SYNCHRONOUS:
+            return self._synchronous(context, row, one, after)
+        return after
+
+    def _synchronous(
+        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+    ) -> Arrived:
+        """Allow for the procedure that a move calls while the program runs ahead."""
+        placed = [argument.value for argument in one.arguments if not argument.name]
+        called = placed[-1] if placed else None
+        name = called.text.strip('"').lower() if _is_text(called) else ""
+        if self.said_still(name) and name not in self.task.routines:
+            return here
+        found = self.task.routine(name.split(":")[-1], context.scope)
+        given = None if found is None else self._given(*found)
+        if given is None:
+            what = "calls a procedure on its way that may move the arm"
+            what = what if found else f"{what}: it is in no file of the task"
+            here = self.unknown(context, row, here, what)
+        modes = here.modes.allowing(ANYTHING if given is None else given)
+        return replace(here, modes=modes)
+
+    def _given(
+        self, file: int, module: str, routine: HeadedRows
+    ) -> frozenset[tuple[str, Any]] | None:
+        """Return the modes that a procedure may set; None where it may move the arm."""
+        if not self._moves(file, module, routine):
+            return frozenset()
+        scope, found = self.task.scope_of(file, module, routine), set[tuple[str, Any]]()
+        for row in range(routine.first + 1, routine.last):
+            one = inside(self.texts[file].statement(row))
+            own = isinstance(one, said.Instruction) and one.name in self.task.routines
+            if isinstance(one, said.Instruction) and not own:
+                kind = known_instructions().get(one.name)
+                if kind == "modal" and one.name not in STOPPED:
+                    found |= given_modes(partial(self._changed, one, row, scope))
+                    continue
+                if kind is not None or self.said_still(one.name):
+                    continue
+            if own or isinstance(one, said.Instruction | said.LateCall):
+                return None
+            if isinstance(one, said.NotUnderstood):
+                return None
+        return frozenset(found)
 
     def after_functions(
         self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
@@ -367,6 +426,10 @@ class RapidMachine(TaskMachine):
 
 _TRAP = "a TRAP of the task may move the arm, or change its settings, at any time"
 _HANDLER = "the error handler of its routine may move the arm, or change its settings"
+
+
+def _is_text(operand: said.Operand | None) -> TypeGuard[said.StringLiteral]:
+    return isinstance(operand, said.StringLiteral)
 
 
 def _kind(routine: HeadedRows) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from postproc.language.rapid import syntax as said
 from postproc.language.visits import OrientationLaw, Switch
@@ -24,6 +25,8 @@ class Modes:
         wrist: Lines with the wrist's joints in proportion.
         override: Share of the programmed speed, NaN where not known.
         blocked: Why no target can be compensated; more than one reason.
+        pending: Modes, and values that a procedure may give them while the program
+            runs ahead, until the arm has stopped.
     """
 
     shift: tuple[float, ...] = NO_SHIFT
@@ -34,6 +37,7 @@ class Modes:
     wrist: bool = False
     override: float = 1.0
     blocked: frozenset[str] = frozenset()
+    pending: frozenset[tuple[str, Any]] = frozenset()
 
     def joined(self, other: Modes) -> Modes:
         """Keep what is the same on another way here."""
@@ -43,12 +47,29 @@ class Modes:
             if getattr(self, f.name) != getattr(other, f.name)
         }
         differing["blocked"] = self.blocked | other.blocked
+        differing["pending"] = self.pending | other.pending
         return replace(self, **differing)
+
+    def allowing(self, more: frozenset[tuple[str, Any]] = frozenset()) -> Modes:
+        """Allow for values that a procedure may have set, or sets later.
+
+        Args:
+            more: Those of a procedure that the arm's motion calls from here on.
+        """
+        pending = self.pending | more
+        found = replace(self, pending=pending)
+        for name, value in pending:
+            found = found.joined(replace(found, **{name: value}))
+        return found
+
+    def settled(self) -> Modes:
+        """Return what holds where the arm has stopped: procedures have run."""
+        return replace(self, pending=frozenset()) if self.pending else self
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
         """Return the names of all modes."""
-        return tuple(f.name for f in fields(cls))
+        return tuple(f.name for f in fields(cls) if f.name != "pending")
 
     def continued(self, end: Modes, names: Iterable[str], displaced: bool) -> Modes:
         """Allow for what holds where a cycle ends.
@@ -68,7 +89,7 @@ class Modes:
 
     def lost(self) -> Modes:
         """Forget all but why targets cannot be compensated."""
-        return replace(LOST, blocked=self.blocked)
+        return replace(LOST, blocked=self.blocked, pending=self.pending)
 
 
 AT_START = Modes()
@@ -80,6 +101,13 @@ LOST = Modes(
     arc_law=OrientationLaw.UNKNOWN,
     override=0.0,
 )
+
+ANYTHING: frozenset[tuple[str, Any]] = frozenset(
+    (name, getattr(LOST, name)) for name in Modes.names() if name != "blocked"
+)
+"""What a procedure may set that is not known."""
+
+OTHERWISE = replace(LOST, wrist=True)  # differs from `AT_START` in every mode
 
 OFFSET = "external axes are offset (EOffsOn, EOffsSet)"
 # Instructions that let the arm go elsewhere than targets say, and those that end it.
@@ -147,6 +175,23 @@ def changed_modes(
     if name in _ENDING:
         return replace(modes, blocked=modes.blocked - {_ENDING[name]})
     return modes if name in HARMLESS else replace(LOST, blocked=modes.blocked)
+
+
+def given_modes(
+    change: Callable[[Modes], Modes],
+) -> frozenset[tuple[str, Any]]:
+    """Return the modes that an instruction sets, whatever holds before it.
+
+    Args:
+        change: Carries the instruction out.
+    """
+    one, other = change(AT_START), change(OTHERWISE)
+    return frozenset(
+        (name, getattr(one, name))
+        for name in Modes.names()
+        if getattr(one, name) != getattr(AT_START, name)
+        or getattr(other, name) != getattr(OTHERWISE, name)
+    )
 
 
 # Only \CirPointOri takes the tool through the orientation of the circle's point.
