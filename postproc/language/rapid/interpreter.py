@@ -111,7 +111,7 @@ class RapidMachine(TaskMachine):
         """
         modes, displaced = here.modes, "pdispon" in self.task.called
         for end in self.ends:
-            modes = modes.continued(end, ("shift", "blocked"), displaced)
+            modes = modes.continued(end, ("shift", "blocked", "grip"), displaced)
         for end in self.restarts:
             modes = modes.continued(end, modes.names(), displaced)
         origins = here.origins | (NOWHERE if self.restarts else frozenset())
@@ -299,6 +299,7 @@ class RapidMachine(TaskMachine):
             one.name, one.arguments, modes,
             lambda operand: self.task.number(operand, row, scope),
             lambda operand: pose_of(self.task.record(operand, row, scope)),
+            lambda operand: self.goals.load(operand, row, scope),
         )  # fmt: skip
 
     def _move(

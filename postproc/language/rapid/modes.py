@@ -11,6 +11,8 @@ from postproc.language.visits import OrientationLaw, Switch
 
 NO_SHIFT = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # position [mm] and quaternion
 UNKNOWN_SHIFT: tuple[float, ...] = ()
+EMPTY_HAND = (0.0, 0.0, 0.0, 0.0)  # mass [kg] and its centre [mm]
+UNKNOWN_GRIP: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,8 @@ class Modes:
         arc_law: .. on arcs.
         wrist: Lines with the wrist's joints in proportion.
         override: Share of the programmed speed, NaN where not known.
+        grip: What GripLoad has put into the hand: mass [kg] and its centre in the tool
+            frame [mm]; empty: not known.
         blocked: Why no target can be compensated; more than one reason.
         pending: Modes, and values that a procedure may give them while the program
             runs ahead, until the arm has stopped.
@@ -36,6 +40,7 @@ class Modes:
     arc_law: OrientationLaw = OrientationLaw.ALONG_PATH
     wrist: bool = False
     override: float = 1.0
+    grip: tuple[float, ...] = EMPTY_HAND
     blocked: frozenset[str] = frozenset()
     pending: frozenset[tuple[str, Any]] = frozenset()
 
@@ -100,6 +105,7 @@ LOST = Modes(
     law=OrientationLaw.UNKNOWN,
     arc_law=OrientationLaw.UNKNOWN,
     override=0.0,
+    grip=UNKNOWN_GRIP,
 )
 
 ANYTHING: frozenset[tuple[str, Any]] = frozenset(
@@ -120,7 +126,6 @@ BLOCKING = {
     "waitwobj": ("dropwobj", "the work object is on a conveyor (WaitWObj)"),
 }
 _ENDING = {name: why for ends, why in BLOCKING.values() for name in ends.split()}
-PAYLOAD = "GripLoad names a load: the model's sag holds for that of the cell file"
 # They change nothing of where a target is and from which side it is reached.
 HARMLESS = frozenset(
     """
@@ -137,6 +142,7 @@ def changed_modes(
     modes: Modes,
     number: Callable[[said.Operand | None], float],
     pose: Callable[[said.Operand | None], tuple[float, ...]],
+    load: Callable[[said.Operand | None], tuple[float, ...]],
 ) -> Modes:
     """Carry out an instruction that changes how the moves after it are.
 
@@ -146,6 +152,7 @@ def changed_modes(
         modes: What holds before it.
         number: Evaluates a number, NaN where it is not known.
         pose: Evaluates a pose, empty where it is not known.
+        load: Evaluates a load, empty where it is not known.
     """
     switches = {one.name for one in arguments if one.name and one.value is None}
     placed = [one.value for one in arguments if not one.name]
@@ -169,7 +176,7 @@ def changed_modes(
             share = number(placed[0] if placed else None) / 100.0
             return replace(modes, override=share if 0.0 < share <= 1.0 else 0.0)
         case "gripload":
-            return _loaded(placed, modes)
+            return replace(modes, grip=load(placed[0] if placed else None))
     if name in BLOCKING:
         return replace(modes, blocked=modes.blocked | {BLOCKING[name][1]})
     if name in _ENDING:
@@ -214,11 +221,3 @@ def _singular(switches: set[str], modes: Modes) -> Modes:
     (word,) = switches if len(switches) == 1 else ("",)
     law = laws.get(word, OrientationLaw.UNKNOWN)
     return replace(modes, law=law, wrist=word == "wrist")
-
-
-def _loaded(placed: Sequence[said.Operand | None], modes: Modes) -> Modes:
-    """GripLoad: nothing in the hand is what the cell describes."""
-    names = [one.name for one in placed if isinstance(one, said.DataObject)]
-    if names == ["load0"]:
-        return replace(modes, blocked=modes.blocked - {PAYLOAD})
-    return replace(modes, blocked=modes.blocked | {PAYLOAD})
