@@ -491,7 +491,8 @@ class Collector:
         ):
             reason = texts[first] or of_runs[run] or moves.forms[form].reason
             problem = self.settings.problem(setting, Meaning(target))
-            reasons.append(self.reasons[reason or problem or texts[last]])
+            why = reason or problem or texts[last] or self.machine.handler
+            reasons.append(self.reasons[why])
         c.reason[moves.visit] = np.array(reasons, dtype=np.int64)[which]
 
     def _reason(self, run: MoveRun) -> str:
