@@ -42,7 +42,9 @@ NO_SLOTS = (-1,) * WIDTH
 _ZONE = re.compile(r"z(\d+)$")
 _SPEED = re.compile(r"v(\d+)$")
 USUAL_TURN = np.deg2rad(500.0)  # [rad/s] of the speeds that the controller knows
-_STEM = re.compile(r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search)")
+_STEM = re.compile(
+    r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search|calib|nut)"
+)
 SHORTEST = 0.5  # length of what counts as a quaternion
 Z0 = 0.3  # [mm]
 PLACEHOLDER = 0.01  # [kg] masses up to here, as of tool0, state nothing
@@ -54,7 +56,14 @@ _LEFT_BY = {
     "corr": "a sensor may correct the path (\\Corr)",
     "track": "a sensor may correct the path (\\Track)",
 }
-AT_A_STOP = ("spotl", "spotj", "spotml", "spotmj")  # they weld standing still
+AT_A_STOP = (
+    "spotl",
+    "spotj",
+    "spotml",
+    "spotmj",
+    "calibl",
+    "calibj",
+)  # they weld standing still
 
 
 @dataclass(frozen=True)
