@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 
+from postproc.files import is_system_module
 from postproc.language.collect import (
     IDENTITY,
     FoundGoal,
@@ -249,7 +250,7 @@ class Goals:
             name=shown,
             aux=aux,
             why=why or ("" if file >= 0 else "it is computed from other data"),
-            pins=self._pinned(name, operand),
+            pins=self._pinned(name, operand) or self._system(file),
         )
 
     def _own_places(
@@ -333,6 +334,12 @@ class Goals:
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
         return ""
+
+    def _system(self, file: int) -> str:
+        """Say that numbers stand in a system module, "" where they do not."""
+        if file < 0 or not is_system_module(self.task.files[file].text.source.name):
+            return ""
+        return "it stands in a system module, which is read and not rewritten"
 
     def _shifted(
         self, name: str, arguments: Sequence[said.Argument], row: int, scope: Scope
