@@ -497,3 +497,35 @@ def read_stream(stream: BinaryIO, name: str | Path) -> bytes:
     if len(data) > LARGEST:
         raise ProgramError(name, f"is longer than {LARGEST} bytes", "Is it a program?")
     return data
+
+
+def spreadsheet_text(text: str) -> str:
+    """Return a cell of a table that no spreadsheet takes for a formula.
+
+    >>> print(spreadsheet_text("=1+1"), spreadsheet_text("-1.5"), spreadsheet_text("W"))
+    '=1+1 -1.5 W
+    """
+    if not text.startswith(("=", "+", "-", "@", "\t", "\r")):
+        return text
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return f"'{text}"
+    return text
+
+
+SYSTEM_MODULES = "SYSMOD/"
+
+
+def name_read(path: Path) -> str:
+    """Return the name of a file that a job reads and never rewrites.
+
+    >>> name_read(Path("RAPID/TASK1/SYSMOD/user.sys")), name_read(Path("a/$config.dat"))
+    ('SYSMOD/user.sys', '$config.dat')
+    """
+    return f"{SYSTEM_MODULES}{path.name}" if is_module(path.name) else path.name
+
+
+def is_system_module(name: str) -> bool:
+    """Return True if a file is a system module that a job reads."""
+    return name.startswith(SYSTEM_MODULES)

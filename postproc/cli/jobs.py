@@ -7,8 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from postproc.batch.pages import (
+    OUTPUT,
     group_pages,
+    is_output,
     names_in,
     of_one_arm,
     program_arm,
@@ -32,6 +36,7 @@ from postproc.files import (
     is_shared_list,
     is_stream,
     is_variables,
+    name_read,
     program_key,
     program_of,
     read_input,
@@ -45,6 +50,9 @@ from postproc.language.visits import Diagnostic
 from postproc.model.model import Model, load_model
 from postproc.report.json import report_pieces
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.pose import record_from_pose
+
+SAME_PLACE, SAME_TURN = 1e-4, 1e-5  # [m] and of the axes: two bases are one
 
 # The pages of a program on the disk: programs beside it that only it names.
 
@@ -79,7 +87,7 @@ def find_pages(program: Path) -> Pages:
     ]
     main = program_key(program.name)
     shared = find_shared_list(program)
-    reads = () if shared is None else (shared,)
+    reads = (*((shared,) if shared else ()), *_read_elsewhere(program))
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes), reads)
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
@@ -102,6 +110,30 @@ def find_pages(program: Path) -> Pages:
     return Pages(tuple(programs[page] for page in pages), tuple(notes), reads)
 
 
+def _read_elsewhere(program: Path) -> tuple[Path, ...]:
+    """Return what a program of an archive reads in other folders."""
+    return language_of(program.name).reads(program) if is_program(program.name) else ()
+
+
+def archive_notes(program: Path, cell: Cell) -> tuple[Diagnostic, ...]:
+    """Say what the backup of a program knows of the arm, and the cell does not."""
+    notes: list[Diagnostic] = []
+    if not is_program(program.name):
+        return ()
+    arms = language_of(program.name).placed_arms(program)
+    for name, pose in arms[cell.arm_number - 1 : cell.arm_number]:
+        apart = np.abs(pose - cell.base.pose)
+        if apart[:3, 3].max() > SAME_PLACE or apart[:3, :3].max() > SAME_TURN:
+            x, y, z, *turns = record_from_pose(pose).tolist()
+            text = (
+                f"MOC.cfg of this backup places {name} otherwise than the cell. "
+                f"Paste into the cell: [base] xyz_mm = [{x:.3f}, {y:.3f}, {z:.3f}] "
+                f"euler_zyz_deg = [{', '.join(f'{v:.4f}' for v in turns)}]"
+            )
+            notes.append(Diagnostic(program.name, 1, "archive-base", text))
+    return tuple(notes)
+
+
 def _not_followed(program: Path, line: int, text: str) -> Diagnostic:
     return Diagnostic(program.name, line, "not-followed", text)
 
@@ -111,7 +143,7 @@ def _is_page(path: Path, outputs: bool) -> bool:
     ours = is_program(path.name) or is_data_list(path.name)
     if not (ours and path.is_file()) or is_shared_list(path.name):
         return False
-    return outputs or read_stamp(read_head(path)) is None
+    return outputs or not is_output(path)
 
 
 def _is_output(program: Path) -> bool:
@@ -219,10 +251,10 @@ class Job:
         reads = tuple((page, read_input(page)) for page in found.reads)
         given = (path, lsv, cell, model, *found.paths, *found.reads)
         inputs = tuple(p for p in given if p is not None)
+        notes = (*found.notes, *(() if path is None else archive_notes(path, loaded)))
         return cls(
-            path, name, source, values, pages, reads, found.notes, loaded, fitted,
-            inputs,
-        )  # fmt: skip
+            path, name, source, values, pages, reads, notes, loaded, fitted, inputs
+        )
 
     def run(
         self, options: Options, progress: Progress = silent, processes: int = 1
@@ -235,7 +267,10 @@ class Job:
             self.model,
             name=self.name,
             variables=variables,
-            pages={p.name: data for p, data in (*self.pages, *self.reads)},
+            pages={
+                **{p.name: data for p, data in self.pages},
+                **{name_read(p): data for p, data in self.reads},
+            },
             options=options,
             progress=progress,
             processes=processes,
@@ -380,7 +415,7 @@ def default_output(program: Path) -> Path:
     >>> default_output(Path("cell/job.pdl")).name
     'job.compensated.pdl'
     """
-    return program.with_name(f"{program.stem}.compensated{program.suffix}")
+    return program.with_name(f"{program.stem}{OUTPUT}{program.suffix}")
 
 
 def program_name(program: str, lsv: Path | None) -> str:
@@ -434,5 +469,6 @@ def read_files(program: Path, lsv: Path | None = None) -> dict[str, bytes]:
         name,
         source,
         None if values is None else read_input(values),
-        {path.name: read_input(path) for path in (*found.paths, *found.reads)},
+        {path.name: read_input(path) for path in found.paths}
+        | {name_read(path): read_input(path) for path in found.reads},
     )

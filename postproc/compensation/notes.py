@@ -9,7 +9,12 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, in_chunks
 from postproc.compensation.continuity import on_path
 from postproc.compensation.frames import taught_records
-from postproc.files import is_shared_list, is_variables, variables_of
+from postproc.files import (
+    is_shared_list,
+    is_system_module,
+    is_variables,
+    variables_of,
+)
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -59,7 +64,7 @@ def followed_pages(visits: Visits) -> list[Diagnostic]:
     return [
         Diagnostic(visits.files[0], 1, "page", f"{name} {texts[is_shared_list(name)]}")
         for name in visits.files[1:]
-        if not is_variables(name)
+        if not is_variables(name) and not is_system_module(name)
     ]
 
 

@@ -17,6 +17,7 @@ from postproc.compensation.eligibility import (
     mark_stranded,
 )
 from postproc.compensation.options import Options
+from postproc.compensation.payload import payload_of
 from postproc.compensation.targets import targets_from_visits
 from postproc.language.interface import Start
 from postproc.language.languages import language_of
@@ -209,7 +210,9 @@ def plan_visits(
     return Planned(targets, planned, reasons, none, none, on)
 
 
-def states_of(planned: Plan, cell: Cell, temperature: float) -> States:
+def states_of(
+    planned: Plan, cell: Cell, temperature: float, visits: Visits | None = None
+) -> States:
     """Describe the planned arrivals in the terms of the accuracy model.
 
     The time within a program says nothing about how warm the arm is, so it stays
@@ -219,7 +222,10 @@ def states_of(planned: Plan, cell: Cell, temperature: float) -> States:
         planned: The plan of n arrivals.
         cell: Payload.
         temperature: [deg C], NaN where not known.
+        visits: The arrivals, with the loads that the program states.
     """
+    given = (cell.payload_mass, cell.payload_com)
+    mass, centre = given if visits is None else payload_of(visits, cell)
     return make_states(
         planned.q,
         planned.side,
@@ -227,6 +233,6 @@ def states_of(planned: Plan, cell: Cell, temperature: float) -> States:
         travel=planned.travel,
         speed=planned.speed,
         temperature=temperature,
-        payload=cell.payload_mass,
-        payload_com=cell.payload_com,
+        payload=mass,
+        payload_com=centre,
     )

@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol
 
 from postproc.arrays import Floats, Ints
@@ -341,6 +342,14 @@ class Language(ABC):
             lines: All of them.
             wanted: 1-based lines, ascending but for 0: those that it does not have.
         """
+
+    def reads(self, program: Path) -> tuple[Path, ...]:
+        """Return files of an archive that a program reads and that stay as they are."""
+        return ()
+
+    def placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
+        """Return the arms of an archive, and their poses (4, 4) [m] in the world."""
+        return ()
 
     def prepare(self) -> None:  # noqa: B027 - most have nothing to load
         """Load what reading the first program takes."""

@@ -43,6 +43,7 @@ _KRL = (
     r"(?:,(?P<flags>S \d+,T \d+))?"
 )
 # The numbers of a target, and its flags where a language may write them anew.
+STAMP = re.compile(r"(--|!|;) postproc\b")
 TARGETS = {
     ".pdl": rf"(?P<numbers>(?<=TO POS\(){_SIX}|(?<=VIA POS\(){_SIX}"
     rf"|(?<=p\d := POS\(){_SIX}|(?<=p\d\d := POS\(){_SIX}|(?<=TO \{{){_SIX})",
@@ -153,8 +154,8 @@ def differing(
     old, stamped = source.decode().splitlines(), output.decode().splitlines()
     if Path(file).suffix == ".dat" and stamped == old:  # it holds no corrected point
         return None, ()
-    header = sum(line.startswith("&") for line in old)
-    if "postproc" not in stamped[header] or len(stamped) != len(old) + 1:
+    header = next((k for k, line in enumerate(stamped) if STAMP.match(line)), -1)
+    if header not in range(4) or len(stamped) != len(old) + 1:
         return 1, ()
     flags: list[tuple[int, str, str]] = []
     del stamped[header]

@@ -95,7 +95,8 @@ def _statement(children: Children) -> ast.Statement | None:
 
 
 def _unquoted(mark: str) -> str:
-    return str(mark)[1:-1]
+    """Return what stands between the quotes of a string; two are one inside of it."""
+    return str(mark)[1:-1].replace(mark[0] * 2, mark[0])
 
 
 def _declared(children: Children, first: int) -> tuple[str, tuple[str, ...]]:
@@ -302,6 +303,7 @@ RULES: dict[str, Rule] = {
     "format": lambda c: c[0],
     "open": lambda c: ast.Still("OPEN"),
     "open_clause": lambda c: None,
+    "cancel": lambda c: ast.CancelMove(tuple(part[0] for part in _of(c, ArmPart))),
     "still": lambda c: ast.Still(c[0], _terms(c[1:])),
     "still_word": lambda c: "",
     "soup": lambda c: ast.Still("soup", _terms(c)),
