@@ -438,7 +438,7 @@ def _laws_of(batch: Batch, driver: str, factor: str) -> list[Law]:
         places = low + (high - low) * np.arange(1, STEPS + 1) / (STEPS + 1)
         kinds.append([cell("step", float(at)) for at in places])
         if len(np.unique(x)) > FEW_VALUES:
-            bends = product((-0.4, 0.0, 0.4), (0.15, 0.3, 0.6))
+            bends = product((-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6), (0.1, 0.3))
             kinds.append(
                 [cell("saturating", middle + a * half, w * half) for a, w in bends]
             )

@@ -208,10 +208,13 @@ class Cell(CarriedEffect):
         moved = [replace(self, middle=self.middle + float(o) * step) for o in offsets]
         if self.law == "step":
             return [*moved]
-        return [
-            *moved,
-            *(replace(self, half=self.half * 2 ** float(o)) for o in offsets),
+        wide = float(np.abs(offsets).max(initial=0.0))
+        bends = [
+            replace(cell, half=cell.half * 2.0**by)
+            for cell in moved
+            for by in (-wide, 0.0, wide)
         ]
+        return [*bends, *(replace(cell, law="step") for cell in moved)]
 
     def amplitude(self, p: Floats, covariance: Floats) -> tuple[float, float] | None:
         """Return the size of a harmonic that turns, None of others."""
@@ -266,4 +269,4 @@ def _size(value: float, error: float, unit_: str) -> str:
     return f"{value:.3g} +- {error:.2g} {unit_}"
 
 
-STEPS = 7  # places of a step that are tried over a covariate's range
+STEPS = 15  # places of a step that are tried over a covariate's range
