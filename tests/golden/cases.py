@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 
 from tests.golden.case import Case, below, folders, kept
+from tests.golden.krl_cases import krl
 
 DESK = {"cell.toml": "desk/cell.toml", "model.json": "desk/model.json"}
 CELL = {"cell.toml": "programs/cell.toml"}
@@ -39,6 +40,7 @@ def all_cases() -> tuple[Case, ...]:
         small,
         pages,
         refused,
+        krl,
         helps,
     )
     return tuple(case for maker in makers for case in maker())
