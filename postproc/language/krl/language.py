@@ -32,7 +32,13 @@ from postproc.language.visits import never_reached
 _BEGIN = re.compile(
     rb"(?:\xef\xbb\xbf)?(?:\s|;[^\r\n]*[\r\n])*(?:&\w|(?:GLOBAL\s+)?DEF\s)", re.I
 )
-_ACCURACY = ("$abs_accur", "$abs_convert")
+# Switches of the controller's own accuracy model, and the words that switch it off.
+_ACCURACY = {
+    "$abs_accur": ("#none", "#off", "false"),
+    "$abs_convert": ("#none", "#off", "false"),
+    "$deactivate_abs_accur": ("true",),
+    "$suppress_abs_accur": ("true",),
+}
 _NOT_CLONED = "points of KRL are not cloned: give the move a point of its own"
 
 
@@ -120,24 +126,35 @@ def skeleton_of(text: KrlText) -> Skeleton:
 
 
 def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:
-    """Refuse a program that switches the controller's own accuracy model.
+    """Refuse a program that switches the controller's own accuracy model on.
 
     Raises:
         ProgramError: It does.
     """
     for file in files:
         for row in range(len(file.text)):
-            one = file.text.statement(row)
-            if isinstance(one, said.Assignment) and one.target.name in _ACCURACY:
-                if not _is_off(one.value):
-                    problem = f"sets {one.target.name.upper()}: the controller "
-                    problem += "compensates on its own, this would do it twice"
-                    cure = "Switch that off, here and on the controller"
-                    line = file.text.line(row)
-                    raise ProgramError(file.text.source.name, problem, cure, line=line)
+            name = _switches_on(file.text.statement(row))
+            if name:
+                problem = f"sets {name.upper()}: the controller "
+                problem += "compensates on its own, this would do it twice"
+                cure = "Switch that off, here and on the controller"
+                line = file.text.line(row)
+                raise ProgramError(file.text.source.name, problem, cure, line=line)
 
 
-def _is_off(value: said.Operand) -> bool:
-    if isinstance(value, said.EnumValue):
-        return value.name in ("#none", "#off")
-    return isinstance(value, said.DataObject) and value.name == "false"
+def _switches_on(one: said.SourceStatement) -> str:
+    """Name what a statement switches the accuracy model on with, "" if it does not."""
+    match one:
+        case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
+            return _switches_on(action)
+        case said.Assignment(target=said.DataObject(name=name), value=value):
+            if name in _ACCURACY and not _is_one_of(value, _ACCURACY[name]):
+                return name
+    return ""
+
+
+def _is_one_of(value: said.Operand, words: Sequence[str]) -> bool:
+    match value:
+        case said.EnumValue(name=word) | said.DataObject(name=word, steps=()):
+            return word in words
+    return False
