@@ -11,7 +11,12 @@ from postproc.language import collect
 from postproc.language.collect import Conditions, FoundGoal, Pose, cell_pose
 from postproc.language.krl.dialect import COMMENTS, KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
-from postproc.language.krl.modes import UNKNOWN, KrlModes, ModeReader
+from postproc.language.krl.modes import (
+    UNKNOWN,
+    KrlModes,
+    ModeReader,
+    payload_reason,
+)
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
 from postproc.language.krl.syntax import SplineBlock
 from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
@@ -27,6 +32,10 @@ _UNSIZED = "how early it is blended ($APO) is not known here"
 _IPO = "$IPO_MODE is not known here"
 _STATUS = "bit 2 of S and bit 4 of T disagree, otherwise than at the other points"
 _STILL_TOOL = "$ORI_TYPE = #CONSTANT: the tool keeps the orientation it comes with"
+_SWAPPED = (
+    "$TOOL and $BASE were set with IPO_FRAME #TCP, which swaps them on some "
+    "controllers: set them anew with #BASE"
+)
 _NOT_SET = "an inline setting (WITH) is not known"
 
 
@@ -56,7 +65,7 @@ def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, str]:
         assert isinstance(block, SplineBlock)
         given = [(v.begin, one) for one in block.settings] + given
     for row, setting in given:
-        reader = ModeReader(machine.task, row, v.scope, machine.start.payload_kg)
+        reader = ModeReader(machine.task, row, v.scope)
         after = reader.assigned(modes, setting)
         if after is None:
             return modes, f"{_NOT_SET}: {setting.target.name.upper()}"
@@ -84,7 +93,9 @@ def _conditions(
     given = (*sorted(modes.blocked), v.why, v.goal.why, unset, modes.tool.why)
     if v.goal.target != Meaning.JOINTS:
         given += (modes.base.why, "" if modes.interpolation else _IPO)
+        given += (_swapped(modes),)
     given += (_STATUS if odd else "", blending.why)
+    given += (payload_reason(modes, machine.start.payload_kg),)
     return Conditions(
         tool=modes.tool.pose,
         base=base,
@@ -102,6 +113,12 @@ def _conditions(
         overlap=blending.overlap,
         exact=blending.exact,
     )
+
+
+def _swapped(modes: KrlModes) -> str:
+    """Return why frames that were set for a fixed tool hold for no other move."""
+    remote = modes.tool.remote or modes.base.remote
+    return _SWAPPED if remote and modes.interpolation != "#tcp" else ""
 
 
 def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:

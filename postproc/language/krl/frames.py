@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from postproc.language.collect import IDENTITY, Pose, composed, flat
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import whole
+from postproc.language.krl.store import CORRECTIONS, KrlStore, entry_name
 from postproc.language.krl.task import CONFIG, KrlRecord, KrlTask
 from postproc.language.machine import Scope
 
@@ -24,11 +25,14 @@ class KrlFrame:
         pose: Where it is.
         why: Why targets with it cannot be compensated, "" where they can.
         taught: It was taught with the arm, and contains its error.
+        remote: It was set for a tool that stands still; controllers differ in which
+            of the two frames they take for it then.
     """
 
     pose: Pose
     why: str = ""
     taught: bool = False
+    remote: bool = False
 
 
 ZERO = KrlFrame(IDENTITY)
@@ -36,6 +40,12 @@ NUMBERS = {"$tool": "tool_no", "$base": "base_no"}  # in FDAT
 TABLES = {"$tool": "tool_data", "$base": "base_data"}
 _WHICH = "which entry of {} it takes is known only when the program runs"
 _CHAINED = "its base moves with another axis or arm ({})"
+_MAY_BE_ON = (
+    "{} may be TRUE here: BAS links {} to its {} then. Set it to FALSE, or call "
+    "BAS(#INITMOV,0), on every way here"
+)
+_CORRECTED = "{} is linked to its {}, and its value is not known here"
+_DOUBLE = "the program declares a {} of its own: BAS takes that of the controller"
 
 
 @dataclass(frozen=True)
@@ -46,6 +56,7 @@ class FrameReader:
         task: The files of the job.
         row, here: The statement.
         tool, base: What ``$TOOL`` and ``$BASE`` are there.
+        store: What the program has set before.
     """
 
     task: KrlTask
@@ -53,6 +64,7 @@ class FrameReader:
     here: Scope
     tool: KrlFrame
     base: KrlFrame
+    store: KrlStore = KrlStore()
 
     def frame(self, operand: said.Operand) -> KrlFrame:
         """Read a frame."""
@@ -84,7 +96,9 @@ class FrameReader:
         value = self.task.value(first, self.row, self.here)
         match name:
             case "stool2" if isinstance(value, KrlRecord):
-                return self.numbered("$tool", value.number("tool_no"))
+                found = self.numbered("$tool", value.number("tool_no"))
+                still = value.get("ipo_frame") != "#base"
+                return replace(found, remote=still) if still else found
             case "stool":
                 return self.numbered(
                     "$tool", self.task.number(first, self.row, self.here)
@@ -98,11 +112,31 @@ class FrameReader:
         return KrlFrame((), f"what {name.upper()} gives is not known")
 
     def numbered(self, name: str, number: float) -> KrlFrame:
-        """Return the tool or the base of a number; 0 is none."""
-        entry = whole(number)
+        """Return the tool or the base that BAS sets for a number; 0 is none."""
+        entry, table = whole(number), TABLES[name]
         if entry is None:
             return KrlFrame((), f"the number of its {name.upper()} is not known")
-        return ZERO if entry == 0 else self.entry(TABLES[name], entry)
+        if not self.task.is_global(table, self.here):
+            return KrlFrame((), _DOUBLE.format(table.upper()))
+        found = ZERO if entry <= 0 else self.entry(table, entry)
+        first, second = (self._correction(name, *pair) for pair in CORRECTIONS[name])
+        return self._product(self._product(first, found), second)
+
+    def _correction(self, name: str, frame: str, switch: str) -> KrlFrame:
+        """Return a frame that BAS links to an entry, no shift where it does not."""
+        on = self.store.get(switch)
+        if on is None:
+            on = self.task.initial_switch(switch)
+        if on is False:
+            return ZERO
+        shown = name.upper()
+        if on is None:
+            why = _MAY_BE_ON.format(switch.upper(), frame.upper(), shown)
+            return KrlFrame((), why)
+        found = self.store.get(frame)
+        if isinstance(found, KrlFrame):
+            return found
+        return KrlFrame((), _CORRECTED.format(frame.upper(), shown))
 
     def entry(self, table: str, number: int) -> KrlFrame:
         """Read an entry of TOOL_DATA or BASE_DATA."""
@@ -116,7 +150,10 @@ class FrameReader:
 
     def _element(self, table: str, number: int) -> KrlFrame | None:
         """Read an element of an array of frames, None where it is not known."""
-        if table in self.task.written:
+        held = self.store.get(entry_name(table, number))
+        if isinstance(held, KrlFrame) and self.task.is_global(table, self.here):
+            return held
+        if not self.task.is_steady(table, number):
             return None
         found = self.task.datum(table, self.here, (number,))
         if found is None or found[1].value is None:
@@ -166,8 +203,12 @@ class FrameReader:
     def _product(first: KrlFrame, second: KrlFrame) -> KrlFrame:
         if first.why or second.why or not (first.pose and second.pose):
             return KrlFrame((), first.why or second.why)
+        if ZERO in (first, second):
+            return second if first == ZERO else first
         return KrlFrame(
-            composed(first.pose, second.pose), taught=first.taught or second.taught
+            composed(first.pose, second.pose),
+            taught=first.taught or second.taught,
+            remote=first.remote or second.remote,
         )
 
 

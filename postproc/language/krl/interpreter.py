@@ -18,6 +18,7 @@ from postproc.language.krl.modes import (
     ModeReader,
 )
 from postproc.language.krl.moves import KrlGoals
+from postproc.language.krl.store import HELD
 from postproc.language.krl.task import (
     FUNCTIONS,
     STILL,
@@ -129,7 +130,7 @@ class KrlMachine(TaskMachine):
         return replace(after, modes=replace(after.modes, halted=False, goes_on=False))
 
     def _modes(self, context: CallContext, row: int) -> ModeReader:
-        return ModeReader(self.task, row, context.scope, self.start.payload_kg)
+        return ModeReader(self.task, row, context.scope)
 
     def _assign(
         self, context: CallContext, row: int, one: said.Assignment, here: Arrived
@@ -158,6 +159,7 @@ class KrlMachine(TaskMachine):
         if name in self.task.routines:
             return self.unknown(context, row, here, "names several routines")
         if name == "bas":
+            here = _halted(here, None) if _puts_out(one) else here
             modes = self._modes(context, row).bas(here.modes, one.arguments)
             return replace(here, modes=modes)
         if name == "pulse":
@@ -249,9 +251,15 @@ class KrlMachine(TaskMachine):
         return not (name in STILL or name in FUNCTIONS or self.said_still(name))
 
 
+def _puts_out(one: said.Instruction) -> bool:
+    """Return True if a call of BAS switches outputs, which may stop the arm."""
+    command = one.arguments[0].value if one.arguments else None
+    return isinstance(command, said.EnumValue) and command.name.startswith("#out_")
+
+
 def _is_modal(name: str) -> bool:
     """Tell whether setting a variable may change how moves are made."""
-    own = name in ("fdat_act", "pdat_act", "ldat_act")
+    own = name in ("fdat_act", "pdat_act", "ldat_act") or name in HELD
     return own or (name.startswith("$") and name not in HALTING | HARMLESS)
 
 

@@ -12,9 +12,11 @@ from postproc.language.flow import HeadedRows
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMMENTS
 from postproc.language.krl.program import KrlDatum, KrlFile, whole
+from postproc.language.krl.store import TABLES
 from postproc.language.machine import Scope
 
 CONFIG = "$config"
+ANY = -1  # an entry of a table whose number is not known
 DEEPEST = 20  # names that stand for names
 
 
@@ -164,6 +166,47 @@ class KrlTask:
     def written(self) -> frozenset[str]:
         """Names of data that something may change."""
         return self._uses[0]
+
+    def is_global(self, name: str, here: Scope) -> bool:
+        """Return True if a name means the data that all programs share, or BAS knows."""
+        if name in here.parameters:
+            return False
+        place = self.place(name, here)
+        return place is None or place[0] == CONFIG
+
+    def is_steady(self, table: str, number: int) -> bool:
+        """Return True if no statement of the files may change an entry of a table."""
+        return not ({number, ANY} & self._entries_written[table])
+
+    @cached_property
+    def _entries_written(self) -> Mapping[str, frozenset[int]]:
+        """Collect the entries of tables that statements may change."""
+        found: dict[str, set[int]] = {table: set() for table in TABLES}
+        for number, file in enumerate(self.files):
+            here = Scope(number, file.name, "")
+            for row in range(len(file.text)) if file.routines else ():
+                for target in changed_by(file.text.statement(row)):
+                    if target.name in found:
+                        found[target.name].add(self._entry(target, row, here))
+        return {table: frozenset(numbers) for table, numbers in found.items()}
+
+    def _entry(self, target: said.DataObject, row: int, here: Scope) -> int:
+        """Return the number of an entry, ANY where it is not known."""
+        index = self.index(target.steps[0], row, here) if target.steps else None
+        return index[0] if index is not None and len(index) == 1 else ANY
+
+    def initial_switch(self, name: str) -> bool | None:
+        """Return a switch that the program has not set so far, None if not known.
+
+        A switch that no file sets is FALSE, unless a list declares it TRUE: what ran
+        before may have left it so.
+        """
+        own = [
+            datum for file in self.files for datum in file.data if datum.name == name
+        ]
+        values = [one.value for one in own if one.value is not None]
+        off = all(is_word(value, "false") for value in values)
+        return False if off and name not in self.written else None
 
     @cached_property
     def read(self) -> frozenset[str]:
@@ -354,10 +397,8 @@ class _Uses:
 
     def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
         """Note arguments: a routine may change them, unless it is known not to."""
+        self.written |= {one.name for one in _changed_arguments(name, arguments)}
         for argument in arguments:
-            if isinstance(argument.value, said.DataObject):
-                if name not in (STILL - WRITING) | FUNCTIONS and name != "bas":
-                    self.written.add(argument.value.name)
             self.take(argument.value)
 
     def _destination(self, operand: said.Operand | None) -> None:
@@ -370,6 +411,37 @@ class _Uses:
                     self._destination(one)
             case _:
                 self.take(operand)
+
+
+def changed_by(one: said.SourceStatement) -> Iterator[said.DataObject]:
+    """Yield data that a statement may change, also what it does later."""
+    match one:
+        case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
+            yield from changed_by(action)
+            return
+        case said.Assignment(target=target):
+            yield target
+        case said.Instruction(name=name, arguments=arguments):
+            yield from _changed_arguments(name, arguments)
+    for part in parts_of(operands_of(one)):
+        if isinstance(part, said.FunctionCall):
+            yield from _changed_arguments(part.name, part.arguments)
+
+
+def _changed_arguments(
+    name: str, arguments: Sequence[said.Argument]
+) -> Iterator[said.DataObject]:
+    """Yield the arguments that a routine may change: all, unless it is known."""
+    if name in (STILL - WRITING) | FUNCTIONS or name == "bas":
+        return
+    for argument in arguments:
+        if isinstance(argument.value, said.DataObject):
+            yield argument.value
+
+
+def is_word(operand: said.Operand | None, word: str) -> bool:
+    """Return True if an operand is a word such as TRUE."""
+    return operand == said.DataObject(word)
 
 
 def operands_of(one: said.SourceStatement) -> Sequence[said.Operand | None]:
