@@ -12,7 +12,12 @@ from postproc.language.collect import IDENTITY, Pose, composed, flat
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import whole
-from postproc.language.krl.store import CORRECTIONS, KrlStore, entry_name
+from postproc.language.krl.store import (
+    CORRECTIONS,
+    NOTHING_SET,
+    KrlStore,
+    entry_name,
+)
 from postproc.language.krl.task import CONFIG, KrlRecord, KrlTask
 from postproc.language.machine import Scope
 
@@ -64,7 +69,7 @@ class FrameReader:
     here: Scope
     tool: KrlFrame
     base: KrlFrame
-    store: KrlStore = KrlStore()
+    store: KrlStore = NOTHING_SET
 
     def frame(self, operand: said.Operand) -> KrlFrame:
         """Read a frame."""

@@ -12,6 +12,7 @@ from postproc.language.krl.frames import NUMBERS, ZERO, FrameReader, KrlFrame
 from postproc.language.krl.program import whole
 from postproc.language.krl.store import (
     CORRECTION_FRAMES,
+    NOTHING_SET,
     SWITCHES,
     TABLES,
     KrlStore,
@@ -48,8 +49,8 @@ class KrlModes:
         fdat, pdat, ldat: ``FDAT_ACT``, ``PDAT_ACT`` and ``LDAT_ACT``.
         halted: The arm has stopped since the last move; None where that is not known.
         goes_on: ``CONTINUE`` stands before.
-        load: Mass that the arm carries [kg], as the program states it; `CELL_LOAD` where
-            it states none, `LOST_LOAD` where it states one that is not known.
+        load: Mass that the arm carries [kg], as the program states it; `CELL_LOAD`
+            where it states none, `LOST_LOAD` where the one stated is not known.
         store: What the program has set of tables, corrections and switches.
         blocked: Why no target can be compensated; more than one reason.
     """
@@ -70,7 +71,7 @@ class KrlModes:
     halted: bool | None = False
     goes_on: bool = False
     load: float = CELL_LOAD
-    store: KrlStore = KrlStore()
+    store: KrlStore = NOTHING_SET
     blocked: frozenset[str] = frozenset()
 
     def joined(self, other: KrlModes) -> KrlModes:

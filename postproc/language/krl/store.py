@@ -53,6 +53,9 @@ class KrlStore:
         return KrlStore(tuple(pair for pair in self.held if pair in other.held))
 
 
+NOTHING_SET = KrlStore()
+
+
 def entry_name(table: str, number: int) -> str:
     """Name an entry of a table.
 

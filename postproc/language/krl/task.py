@@ -168,7 +168,7 @@ class KrlTask:
         return self._uses[0]
 
     def is_global(self, name: str, here: Scope) -> bool:
-        """Return True if a name means the data that all programs share, or BAS knows."""
+        """Return True if a name means data that all programs share."""
         if name in here.parameters:
             return False
         place = self.place(name, here)
