@@ -10,6 +10,7 @@ from postproc.arrays import Bools, Floats, Ints, any_in_rows, in_chunks
 from postproc.compensation.continuity import on_path
 from postproc.compensation.frames import taught_records
 from postproc.files import is_shared_list, is_variables, variables_of
+from postproc.language.languages import language_of
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -27,6 +28,19 @@ def assumed_off(name: str, cell: Cell) -> Diagnostic:
     """State that the controller is taken not to compensate on its own."""
     text = f"the controller's own absolute accuracy is taken to be off ({cell.path})"
     return Diagnostic(name, 1, "absolute-accuracy", text)
+
+
+def controller_unknown(name: str, cell: Cell) -> list[Diagnostic]:
+    """State that the arm is assumed to have a controller that runs the program."""
+    if cell.controllers:
+        return []
+    language = language_of(name)
+    text = (
+        f"neither {cell.path} nor the file of the arm {cell.arm.name} names its "
+        f"controller: it is assumed to run {language.name}. Write "
+        f'controller = "{language.controller}" in the arm file'
+    )
+    return [Diagnostic(name, 1, "controller", text)]
 
 
 def tool_in_metres(visits: Visits) -> list[Diagnostic]:

@@ -268,6 +268,7 @@ class Language(ABC):
 
     Attributes:
         name: As its users call it.
+        controller: Whose controllers run it, as arm files and cells name them.
         suffixes: Of program files, in lower case, the usual one first.
         comment: What a comment begins with.
         dialect: What the numbers of its targets mean.
@@ -277,6 +278,7 @@ class Language(ABC):
     """
 
     name: str
+    controller: str
     suffixes: tuple[str, ...]
     comment: str
     dialect: Dialect

@@ -46,6 +46,7 @@ class Krl(Language):
     """The language of KUKA controllers."""
 
     name = "KRL"
+    controller = "kuka"
     suffixes = KRL_PROGRAMS
     comment = ";"
     dialect = KRL_DIALECT
