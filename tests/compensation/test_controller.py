@@ -6,8 +6,8 @@ import pytest
 
 from postproc.compensation.compensate import compensate
 from postproc.exceptions import CellError
-from postproc.robot.arm_file import read_arm_file, shipped_arms
 from postproc.robot.arm_file import arm_path as find_arm
+from postproc.robot.arm_file import read_arm_file, shipped_arms
 from postproc.robot.cell import load_cell
 from postproc.robot.machine_data import TEMPLATE
 from tests.cli.test_languages import NAMES
