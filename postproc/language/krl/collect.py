@@ -90,7 +90,9 @@ def _conditions(
     modes, unset = _effective(machine, v)
     joint = v.motion == Motion.JOINT
     blending = _blending(v, modes, end)
-    given = (*sorted(modes.blocked), v.why, v.goal.why, unset, modes.tool.why)
+    active = {why for _, why in modes.active}
+    blocked = modes.blocked | active | machine.everywhere
+    given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
     if v.goal.target != Meaning.JOINTS:
         given += (modes.base.why, "" if modes.interpolation else _IPO)
         given += (_swapped(modes),)

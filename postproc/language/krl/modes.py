@@ -52,6 +52,9 @@ class KrlModes:
         load: Mass that the arm carries [kg], as the program states it; `CELL_LOAD`
             where it states none, `LOST_LOAD` where the one stated is not known.
         store: What the program has set of tables, corrections and switches.
+        declared: Interrupts that may move the arm or end its moves, by number, and why
+            targets are left while one of them is on.
+        active: Those of them that may be on.
         blocked: Why no target can be compensated; more than one reason.
     """
 
@@ -72,6 +75,8 @@ class KrlModes:
     goes_on: bool = False
     load: float = CELL_LOAD
     store: KrlStore = NOTHING_SET
+    declared: frozenset[tuple[int, str]] = frozenset()
+    active: frozenset[tuple[int, str]] = frozenset()
     blocked: frozenset[str] = frozenset()
 
     def joined(self, other: KrlModes) -> KrlModes:
@@ -82,12 +87,15 @@ class KrlModes:
             if getattr(self, f.name) != getattr(other, f.name)
         }
         differing["store"] = self.store.joined(other.store)
-        differing["blocked"] = self.blocked | other.blocked
+        for name in ("declared", "active", "blocked"):
+            differing[name] = getattr(self, name) | getattr(other, name)
         return replace(self, **differing)
 
     def lost(self) -> KrlModes:
         """Forget all but why targets cannot be compensated."""
-        return replace(LOST, blocked=self.blocked)
+        return replace(
+            LOST, declared=self.declared, active=self.active, blocked=self.blocked
+        )
 
     def with_(self, **changed: Any) -> KrlModes:
         """Return it with other values."""

@@ -12,6 +12,7 @@ from postproc.language.flow import HeadedRows
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMMENTS
 from postproc.language.krl.program import KrlDatum, KrlFile, whole
+from postproc.language.krl.routines import package_routines
 from postproc.language.krl.store import TABLES
 from postproc.language.machine import Scope
 
@@ -63,21 +64,35 @@ STILL = frozenset(
     """
     ir_stopm pulse clear_pulse cread cwrite sread swrite copen cclose cioctl cast_to
     cast_from varstate strlen strdeclen strclear stradd strcomp strcopy strfind
-    msgnotify msgquit msgstate msgdialog set_kuka_msg clear_kuka_msg exists_kuka_msg
+    msgnotify msgquit msgstate msgdialog msgloop set_kuka_msg clear_kuka_msg
+    exists_kuka_msg set_krlmsg clear_krlmsg exists_krlmsg set_krldlg exists_krldlg
     mbx_rec on_error_proceed err_clear err_raise timer_limit delete_backward_buffer
     rob_timer get_decl_place m_comment setinfo lock unlock
+    eki_init eki_open eki_close eki_clear eki_clearbuffer eki_checkbuffer eki_send
+    eki_lock eki_unlock eki_setint eki_setreal eki_setbool eki_setstring eki_setframe
+    eki_getint eki_getreal eki_getbool eki_getstring eki_getframe eki_getintarray
+    eki_getrealarray eki_getboolarray eki_getframearray
     """.split()
 )
-WRITING = frozenset("cread sread cast_from mbx_rec strcopy strclear stradd".split())
+WRITING = frozenset(
+    """
+    cread sread cast_from mbx_rec strcopy strclear stradd eki_getint eki_getreal
+    eki_getbool eki_getstring eki_getframe eki_getintarray eki_getrealarray
+    eki_getboolarray eki_getframearray exists_krldlg
+    """.split()
+)
 FUNCTIONS = frozenset(
     """
     abs sqrt sin cos tan acos atan2 frand round trunc b_not inverse forward inv_pos
     strlen strdeclen strcomp strfind varstate cast_from_bits get_system_data
     stool stool2 sbase sipo_mode sload svel_cp svel_joint sacc_cp sacc_joint sapo
     sapo_ptp sori_typ scirc_typ sjerk sgear_jerk use_cm_pro_values exists_kuka_msg
-    ek lk ey euler mat_to_rpy rpy_to_mat
+    ek lk ey euler mat_to_rpy rpy_to_mat scirc_m s_exax_ign s_exax_ign2 k_root k_type
+    k_offs lk_offs k_addr k_name k_shift sync arcgetdelay arcgetpath
     """.split()
 )
+KEEPING = ((STILL - WRITING) | FUNCTIONS | package_routines().keys()) | {"bas"}
+"""Routines that change nothing of what they get."""
 
 
 @dataclass
@@ -418,7 +433,6 @@ def changed_by(one: said.SourceStatement) -> Iterator[said.DataObject]:
     match one:
         case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
             yield from changed_by(action)
-            return
         case said.Assignment(target=target):
             yield target
         case said.Instruction(name=name, arguments=arguments):
@@ -432,7 +446,7 @@ def _changed_arguments(
     name: str, arguments: Sequence[said.Argument]
 ) -> Iterator[said.DataObject]:
     """Yield the arguments that a routine may change: all, unless it is known."""
-    if name in (STILL - WRITING) | FUNCTIONS or name == "bas":
+    if name in KEEPING:
         return
     for argument in arguments:
         if isinstance(argument.value, said.DataObject):
@@ -463,6 +477,8 @@ def operands_of(one: said.SourceStatement) -> Sequence[said.Operand | None]:
             return [to, via, angle, *(one.value for one in settings)]
         case said.SplineBlock(settings=settings):
             return [one.value for one in settings]
+        case said.PathTrigger(values=values):
+            return values
         case _:
             return []
 

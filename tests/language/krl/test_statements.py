@@ -128,9 +128,9 @@ X = said.DataObject("x")
             "frame", (said.NamedField("x", said.Num(0)),)))),
         ("x=x:x", said.Assignment(X, said.Operation(":", (X, X)))),
         ("INTERRUPT DECL 3 WHEN x DO f()", said.InterruptDeclared(
-            X, said.Instruction("f"))),
+            said.Num(0), X, said.Instruction("f"))),
         ("TRIGGER WHEN PATH=-20 DELAY=0 DO f() PRIO=-1", said.PathTrigger(
-            said.Instruction("f"))),
+            said.Instruction("f"), (said.Num(0), said.Num(1), said.Num(2)))),
         ("PTP IF", said.NotUnderstood()),
         ("LIN", said.NotUnderstood()),
         ("x = = 1", said.NotUnderstood()),
