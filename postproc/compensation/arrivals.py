@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Floats, Ints
+from postproc.compensation.payload import payload_of
 from postproc.compensation.targets import few_frames
 from postproc.language.visits import Visits
 from postproc.model.model import CHUNK, Model
@@ -50,6 +51,7 @@ class ArrivalStates:
 
     def states(self, rows: Ints) -> States:
         """Describe some arrivals in the terms of the accuracy model."""
+        mass, centre = payload_of(self.visits, self.cell, rows)
         return make_states(
             self.q[rows],
             self.side[rows],
@@ -57,8 +59,8 @@ class ArrivalStates:
             travel=self.travel[rows],
             speed=self.speed[rows],
             temperature=self.temperature,
-            payload=self.cell.payload_mass,
-            payload_com=self.cell.payload_com,
+            payload=mass,
+            payload_com=centre,
             order=rows,
         )
 

@@ -10,6 +10,11 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints, taken
 from postproc.compensation.arc_angles import ArcAngles, written_points
+from postproc.compensation.payload import (
+    load_error,
+    load_reasons,
+    with_surveyed_load,
+)
 from postproc.compensation.program import Planned
 from postproc.compensation.targets import few_frames
 from postproc.exceptions import ModelError
@@ -256,7 +261,7 @@ def solve_visits(
         turn=np.full((n, 3), np.nan),
         residual=np.full(n, np.nan),
         std_error=np.full((n, 3), np.nan),
-        outside=_outside_survey(model, known, states),
+        outside=_outside_survey(model, cell, known, states),
     )
     everything = np.ones(n, dtype=bool)
     return solve_again(empty, everything, model, cell, planned, states, orientation)
@@ -299,8 +304,9 @@ def solve_again(
     out.q[known], out.command[known] = part.q, part.command
     out.turn[known] = _turns(part.command, plan.tcp[known])
     out.residual[known] = part.residual
-    std = model.std_on_flanks(cell.arm, here)
-    out.std_error[known] = std
+    near = with_surveyed_load(model, cell, here)
+    std = model.std_on_flanks(cell.arm, near)
+    out.std_error[known] = np.hypot(std, load_error(model, cell, here))
     _mark(out.outside, UNSURE, known, model.unsure(std), len(rows))
     if orientation:
         unsure = unsure_turn(model, cell.arm, here)
@@ -320,7 +326,9 @@ def std_errors(model: Model, cell: Cell, states: States, solved: Commands) -> Fl
     out = np.array(solved.std_error)
     rows = np.flatnonzero(solved.known & np.isnan(out[:, 0]))
     here = states.with_(direction=solved.direction)[rows]
-    out[rows] = model.std_error(cell.arm, here)
+    near = with_surveyed_load(model, cell, here)
+    added = load_error(model, cell, here)
+    out[rows] = np.hypot(model.std_error(cell.arm, near), added)
     return out
 
 
@@ -335,10 +343,14 @@ def _turns(new: Floats, old: Floats) -> Floats:
     return out
 
 
-def _outside_survey(model: Model, known: Bools, states: States) -> dict[str, Bools]:
+def _outside_survey(
+    model: Model, cell: Cell, known: Bools, states: States
+) -> dict[str, Bools]:
     """Say which visits lie outside of what was surveyed, whatever their directions."""
     rows, found = np.flatnonzero(known), dict[str, Bools]()
-    for text, mask in model.ranges.outside(states[rows], model.needs).items():
+    here, ranges = states[rows], replace(model.ranges, payload=None)
+    reasons = ranges.outside(here, model.needs) | load_reasons(model, cell, here)
+    for text, mask in reasons.items():
         _mark(found, text, rows, mask, len(known))
     return found
 

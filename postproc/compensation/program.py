@@ -17,6 +17,7 @@ from postproc.compensation.eligibility import (
     mark_stranded,
 )
 from postproc.compensation.options import Options
+from postproc.compensation.payload import payload_of
 from postproc.compensation.targets import targets_from_visits
 from postproc.language.interface import Start
 from postproc.language.languages import language_of
@@ -209,7 +210,7 @@ def plan_visits(
     return Planned(targets, planned, reasons, none, none, on)
 
 
-def states_of(planned: Plan, cell: Cell, temperature: float) -> States:
+def states_of(planned: Plan, visits: Visits, cell: Cell, temperature: float) -> States:
     """Describe the planned arrivals in the terms of the accuracy model.
 
     The time within a program says nothing about how warm the arm is, so it stays
@@ -217,9 +218,11 @@ def states_of(planned: Plan, cell: Cell, temperature: float) -> States:
 
     Args:
         planned: The plan of n arrivals.
+        visits: The arrivals, with the loads that the program states.
         cell: Payload.
         temperature: [deg C], NaN where not known.
     """
+    mass, centre = payload_of(visits, cell)
     return make_states(
         planned.q,
         planned.side,
@@ -227,6 +230,6 @@ def states_of(planned: Plan, cell: Cell, temperature: float) -> States:
         travel=planned.travel,
         speed=planned.speed,
         temperature=temperature,
-        payload=cell.payload_mass,
-        payload_com=cell.payload_com,
+        payload=mass,
+        payload_com=centre,
     )

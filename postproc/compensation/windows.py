@@ -29,11 +29,16 @@ TABLES = {
     "base": "frames",
     "uframe": "frames",
     "reason": "reasons",
+    "load": "loads",
     "block": "line",
     "pred": "line",
     "pred_start": "pred",
 }
-NOTHING_FIRST = ("names", "reasons")  # tables whose first row means that there is none
+NOTHING_FIRST = (
+    "names",
+    "reasons",
+    "loads",
+)  # tables whose first row means that there is none
 
 
 def concatenate(programs: Sequence[Visits]) -> Visits:
@@ -141,8 +146,8 @@ STEPS = (
     Meaning.PARTIAL_JOINTS,
 )  # fmt: skip
 SHARED = {
-    "files", "configs", "names", "frames", "frame_taught", "reasons", "pred_start",
-    "pred", "literals", "dialect",
+    "files", "configs", "names", "frames", "frame_taught", "reasons", "loads",
+    "pred_start", "pred", "literals", "dialect",
 }  # fmt: skip
 
 

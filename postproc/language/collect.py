@@ -31,6 +31,7 @@ from postproc.robot.trajectory import Motion
 TOO_COMPLEX = "the program is too complex to be followed"
 ONLY_SHIFTED = "it is shifted from a point that no move goes to: what to correct?"
 _NO_FRAME = -1
+NO_LOAD: tuple[float, ...] = (math.nan,) * 4  # one object: NaN differs from itself
 Pose = tuple[float, ...]
 """The rows of a pose (4, 4) [m] one after the other, empty where it is not known."""
 IDENTITY: Pose = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)
@@ -129,6 +130,8 @@ class Conditions:
         override: Share of the programmed speed, 0 or NaN where not known.
         overlap: Of moves that begin before the last has ended [%], NaN for a zone.
         exact: It is passed exactly, without stopping.
+        load: What the program states that the arm carries: mass [kg] and its centre in
+            the flange frame [m], empty where it states nothing.
     """
 
     tool: Pose
@@ -146,6 +149,7 @@ class Conditions:
     override: float = 1.0
     overlap: float = math.nan
     exact: bool = False
+    load: tuple[float, ...] = ()
 
 
 @dataclass
@@ -182,6 +186,7 @@ def visits_of(
     held = [conditions(v) for v in found]
     texts, n = machine.texts, len(found)
     tables = _Tables(Interned(), Interned([""]), Interned([""]))
+    loads = Interned[tuple[float, ...]]([NO_LOAD])
     literals, literal, follows = _literals(found, machine, dialect.width, comments)
     reasons = [_reason(c, machine.exhausted) for c in held]
     for k in np.flatnonzero(follows == _NO_LITERAL).tolist():
@@ -214,6 +219,8 @@ def visits_of(
         measure_id=tuple(_measured(found, texts, comments, moves)),
         literals=literals,
         dialect=dialect,
+        load=slim(np.array(loads.of([c.load or NO_LOAD for c in held]), np.int64)),
+        loads=np.array(list(loads), float).reshape(-1, 4),
     )  # fmt: skip
 
 

@@ -199,6 +199,11 @@ class TaskMachine(ABC):
         """Go on behind a statement that only this language has."""
         self.enter(context, row + 1, self.unknown(context, row, here))
 
+    def raise_error(  # noqa: B027 - most languages have no such statement
+        self, context: CallContext, row: int, one: said.Leave, here: Arrived
+    ) -> None:
+        """Go on where an error leads that a statement raises; nowhere: it stops."""
+
     def handles(self, one: said.SourceStatement) -> bool:
         """Tell whether the handlers of a routine begin with a statement."""
         return False
@@ -282,12 +287,12 @@ class TaskMachine(ABC):
                 self._next_round(context, row, here)
             case said.JumpTo(name=name):
                 self._jump(context, row, name, here)
+            case said.Leave(word="raise"):
+                self.raise_error(context, row, one, here)
+            case said.Leave(word="return"):
+                self._return(context, here)
             case said.Leave(word=word):
-                if word == "raise" and flow.handlers:  # one of them may go on here
-                    self.enter(context, row + 1, here)
-                if word in ("return", "raise"):  # a caller's handler may go on there
-                    self._return(context, here)
-                elif word == EXIT:
+                if word == EXIT:
                     self._exit(context, row, here)
             case _:
                 self.part_otherwise(context, row, one, here)

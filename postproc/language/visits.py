@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from functools import cached_property, lru_cache
 from typing import Any, Self
@@ -251,6 +251,9 @@ class Visits:
         measure_id: Ids of ``MEASURE <id>`` comments, n strings or "" where none.
         literals: The places in the text.
         dialect: What numbers and flags of the program mean, and its words.
+        load: Index into `loads`, (n,).
+        loads: Loads that the program states: mass [kg] and its centre in the flange
+            frame [m], (k, 4), NaN for what it does not state; loads[0] states nothing.
     """
 
     files: tuple[str, ...]
@@ -297,8 +300,13 @@ class Visits:
     measure_id: tuple[str, ...]
     literals: Literals
     dialect: Dialect
+    load: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    loads: Floats = field(default_factory=lambda: np.full((1, 4), np.nan))
 
     def __post_init__(self) -> None:
+        if len(self.load) != len(self.line):
+            none = np.broadcast_to(np.int8(0), (len(self.line),))
+            object.__setattr__(self, "load", none)
         read_only(self)
 
     def __len__(self) -> int:

@@ -190,11 +190,13 @@ class LimitSection(Strict):
         segment_ms: What a piece of a move with points on its way lasts at the
             programmed speed, at least.
         approach_mm: Most that a stop from which a target is approached anew is away.
+        payload_mm: Most that a load which was not surveyed adds to the standard error.
     """
 
     correction_mm: PositiveFloat = 5.0
     correction_deg: PositiveFloat = 1.0
     agree_mm: PositiveFloat = 0.02
+    payload_mm: PositiveFloat = 0.1
     step_mm: PositiveFloat = 0.5
     wrist_deg: PositiveFloat = 3.0
     joint_deg: Limits = JOINT_DEG

@@ -7,6 +7,7 @@ from functools import cache
 
 from tests.golden.case import Case, below, folders, kept
 from tests.golden.krl_cases import krl
+from tests.golden.rapid_cases import rapid
 
 DESK = {"cell.toml": "desk/cell.toml", "model.json": "desk/model.json"}
 CELL = {"cell.toml": "programs/cell.toml"}
@@ -41,6 +42,7 @@ def all_cases() -> tuple[Case, ...]:
         pages,
         refused,
         krl,
+        rapid,
         helps,
     )
     return tuple(case for maker in makers for case in maker())

@@ -146,7 +146,7 @@ def rapid(job: NeutralJob) -> bytes:
     ]
     lines = [
         "MODULE job",
-        f"  TASK PERS tooldata tWork:=[TRUE,{tool},[1,[0,0,1],[1,0,0,0],0,0,0]];",
+        f"  TASK PERS tooldata tWork:=[TRUE,{tool},{_load(job)}];",
         f'  TASK PERS wobjdata wPart:=[FALSE,TRUE,"",{frame},{none}];',
         f"  CONST speeddata vWork:=[{1000 * job.speed:g},500,5000,1000];",
         *(f"  CONST zonedata zone{m.zone_mm:g}:=[FALSE,{m.zone_mm:g},1,1,1,1,1];"
@@ -157,6 +157,13 @@ def rapid(job: NeutralJob) -> bytes:
         "ENDMODULE",
     ]  # fmt: skip
     return "\n".join(lines).encode() + b"\n"
+
+
+def _load(job: NeutralJob) -> str:
+    """Write what the arm carries as the cell says; a placeholder where it does not."""
+    mass = job.cell.payload_mass
+    centre = ",".join(f"{x:g}" for x in (job.cell.payload_com / MM).tolist())
+    return f"[{mass if mass == mass else 0.001:g},[{centre}],[1,0,0,0],0,0,0]"
 
 
 def _rapid_move(job: NeutralJob, move: NeutralMove) -> str:

@@ -324,7 +324,7 @@ def _collected(
     """
     world = machine.world
     columns = VisitColumns(int(offsets[-1]), _most_axes(runs, world), numbers)
-    settings = SettingColumns(world.start.payload_kg)
+    settings = SettingColumns()
     collector = Collector(machine, columns, settings)
     collector.fill(zip(offsets.tolist(), runs, strict=False))
     if machine.exhausted:

@@ -14,7 +14,7 @@ from postproc.language.marks import MEASURE
 from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.dialect import COMMENTS
-from postproc.language.pdl2.disturbances import disturbance
+from postproc.language.pdl2.disturbances import disturbance, stated_load
 from postproc.language.pdl2.job import base_variable
 from postproc.language.pdl2.machine import WRITTEN, Goal, Machine, MoveForm, MoveRun
 from postproc.language.pdl2.program import Program
@@ -55,12 +55,12 @@ _WITHOUT_UFRAME = (Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY
 class SettingColumns:
     """Each distinct state of the settings becomes one row, read off once."""
 
-    def __init__(self, payload_kg: float) -> None:
-        self._payload_kg = payload_kg
+    def __init__(self) -> None:
         self._kept: list[Settings] = []
         self._rows = Interned[int]()
         self._problems: list[tuple[str, str]] = []
         self._frames = Interned[tuple[tuple[float, ...], bool]]()
+        self._loads = Interned([stated_load({})])
         self._table: dict[str, list[Any]] = {}
 
     def index(self, settings: Settings) -> int:
@@ -70,7 +70,9 @@ class SettingColumns:
             self._kept.append(settings)  # keeps its id from being used again
             for name, value in _row(settings, self._frame).items():
                 self._table.setdefault(name, []).append(value)
-            found = disturbance(settings, self._payload_kg)
+            load = self._loads[stated_load(settings)]
+            self._table.setdefault("load", []).append(load)
+            found = disturbance(settings)
             tool = ("tool", "tool_rmt")
             pose = found or _unknown(settings, ("uframe", "base", *tool))
             self._problems.append((pose, found or _unknown(settings, tool)))
@@ -102,8 +104,10 @@ class SettingColumns:
         if not columns:
             empty = _row({}, lambda value: -1)
             columns = {name: np.array([value])[:0] for name, value in empty.items()}
+            columns["load"] = np.zeros(0, dtype=np.int64)
         records = np.array([f for f, _ in frames], float).reshape(-1, 6)
         columns["frames"] = pose_from_record(records)
+        columns["loads"] = np.array(list(self._loads), float)
         columns["frame_taught"] = np.array([taught for _, taught in frames], bool)
         return columns
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from postproc.language.pdl2.store import Settings
 from postproc.language.pdl2.values import Nothing
 
@@ -13,15 +15,13 @@ LEADING = {
 }
 CALIBRATION, PAYLOAD = "cal_sys", "tool_mass"
 DISTURBING = frozenset({*LEADING, CALIBRATION, PAYLOAD})
-SAME_KG = 0.05  # masses that differ less are one, as they are written
 
 
-def disturbance(settings: Settings, payload_kg: float) -> str:
+def disturbance(settings: Settings) -> str:
     """Say why a target is not reached as it is written, "" where it is.
 
     Args:
         settings: What holds at a move.
-        payload_kg: What the cell says that the arm carries, NaN where it does not.
     """
     for name, what in LEADING.items():
         if settings.get(name, False) is not False:
@@ -29,11 +29,14 @@ def disturbance(settings: Settings, payload_kg: float) -> str:
     if CALIBRATION in settings:
         return "$CAL_SYS is assigned: the model was made for another calibration"
     mass = settings.get(PAYLOAD)
-    if mass is None or (isinstance(mass, float) and abs(mass - payload_kg) <= SAME_KG):
+    if mass is None or isinstance(mass, float):
         return ""
-    cure = "the model's sag holds for that of the cell file ([payload] mass_kg)"
-    if not isinstance(mass, float):
-        why = mass.why if isinstance(mass, Nothing) else "it is no number"
-        return f"$TOOL_MASS is not known here: {why}; {cure}"
-    given = "gives none" if payload_kg != payload_kg else f"gives {payload_kg:g} kg"
-    return f"$TOOL_MASS is {mass:g} kg and the cell file {given}: {cure}"
+    why = mass.why if isinstance(mass, Nothing) else "it is no number"
+    return f"$TOOL_MASS is not known here: {why}; how far the arm sags hangs on it"
+
+
+def stated_load(settings: Settings) -> tuple[float, ...]:
+    """Return mass [kg] and centre [m] of the load that settings state, NaN for none."""
+    mass = settings.get(PAYLOAD)
+    stated = mass if isinstance(mass, float) and mass >= 0.0 else math.nan
+    return (stated, *(math.nan,) * 3)

@@ -42,6 +42,7 @@ CHANGING = frozenset(
 
 
 FRAMES = ("tool", "base", "uframe")
+CANCELLING = (ast.CancelMove, ast.ExitCycle)
 
 # What text may do that is not understood.
 
@@ -91,12 +92,14 @@ class Effects:
         assigned: Names of variables and settings (with ``$``) it may change.
         read: Names of variables and settings that occur in it.
         calls: Names it calls that its file does not hold.
+        cancels: Statements of it that end moves on their way.
     """
 
     moves: bool
     assigned: frozenset[str]
     read: frozenset[str]
     calls: frozenset[str]
+    cancels: frozenset[ast.CancelMove | ast.ExitCycle] = frozenset()
 
 
 def invocations(node: object) -> Iterator[ast.Invoke]:
@@ -162,6 +165,7 @@ def _united(program: Program, own: list[Effects], names: frozenset[str]) -> Effe
         frozenset().union(*(e.assigned for e in own)),
         frozenset().union(*(e.read for e in own)),
         frozenset(n for n in names if n not in program.routines),
+        frozenset().union(*(e.cancels for e in own)),
     )
 
 
@@ -195,6 +199,8 @@ def _direct(statement: ast.Statement) -> Effects:
     assigned: set[str] = set()
     calls = {i.name for i in invocations(statement)}
     moves = False
+    action = ast.action(statement)
+    cancels = frozenset([action] if isinstance(action, CANCELLING) else [])
     match statement:
         case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
             if then is not None:
@@ -224,7 +230,7 @@ def _direct(statement: ast.Statement) -> Effects:
         assigned.add(f"${TRACKING}")
     read = frozenset(reference.name for reference in references(statement))
     called = frozenset(calls - PURE - CHANGING)
-    return Effects(moves, frozenset(assigned), read, called)
+    return Effects(moves, frozenset(assigned), read, called, cancels)
 
 
 def _assigned_name(reference: ast.Reference) -> str:
@@ -262,6 +268,11 @@ class CallGraph:
     parts: tuple[LiveRows, ...]
     moves: bool
     frames: bool
+
+    @property
+    def cancels(self) -> frozenset[ast.CancelMove | ast.ExitCycle]:
+        """Statements that end moves on their way."""
+        return frozenset().union(*(part.effects.cancels for part in self.parts))
 
     @property
     def assigned(self) -> frozenset[str]:

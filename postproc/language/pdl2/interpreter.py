@@ -23,6 +23,7 @@ from postproc.language.pdl2.calls import (
 from postproc.language.pdl2.collect import collect
 from postproc.language.pdl2.context import HANDLED, Context
 from postproc.language.pdl2.effects import (
+    CallGraph,
     changed_arguments,
     is_harmless,
     live_rows,
@@ -188,6 +189,10 @@ def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
     """Run one statement; tell whether the next row follows."""
     text = statement.text if isinstance(statement, ast.Unknown) else ""
     statement = recovered(statement)
+    if machine.cycle_left:
+        left = here.store.copy()
+        left.last = frozenset({ELSEWHERE})
+        machine.begin_cycle(here, left)
     if isinstance(statement, _OTHERS_RUN) or text:
         let_others_run(here)
     if text and not isinstance(statement, ast.Unknown):
@@ -216,9 +221,24 @@ def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
                 invalidate(here, operand, f"{word} changes it")
         case ast.Unknown():
             _unknown(machine, here, statement)
+        case ast.CancelMove(arms):
+            if not arms or any(here.is_ours(arm) is not False for arm in arms):
+                _cancel(here)
         case _:
             return _control(machine, here, statement)
     return True
+
+
+_RUNNING = re.compile(
+    rb"^[^\n]*?\b(?:ADVANCE|MOVEFLY|SYNCMOVEFLY|ASYNC)\b", re.I | re.M
+)
+
+
+def _cancel(here: Execution) -> None:
+    """End a move on its way, where the program may have gone on before its end."""
+    programs = here.world.programs()
+    if any(_RUNNING.search(one.lines.source.data) for one in programs):
+        here.store.last |= {ELSEWHERE}
 
 
 def _control(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
@@ -242,8 +262,9 @@ def _control(machine: Machine, here: Execution, statement: ast.Statement) -> boo
             end_round(machine, here)
         case ast.Goto(label):
             machine.push(here.context, blocks.labels[label], here.store)
-        case ast.ExitCycle() if blocks.cycle >= 0:
-            machine.push(here.context, blocks.cycle, here.store)
+        case ast.ExitCycle():
+            _cancel(here)
+            return not machine.begin_cycle(here, here.store)
         case ast.Return():
             machine.leave(here, by_return=True)
         case ast.Condition():
@@ -627,9 +648,44 @@ def _handlers(machine: Machine, store: Store) -> None:
                         world.loosen(root, "a condition handler may use it")
                 if reach.moves:
                     _moving_handler(machine, place, first, unknown)
+                elif reach.cancels:
+                    _cancelling_handler(machine, place, first, reach)
     for name in machine.volatile:
         if name.startswith("$"):
             store.set(**{name[1:]: Nothing("a condition handler changes it")})
+
+
+def _ends_ours(world: World, place: Place, first: int, reach: CallGraph) -> bool:
+    """Return True if a handler may end moves of our arm."""
+    if any(part.effects.cancels for part in reach.parts[1:]):
+        return True
+    for row in range(first, place.body.blocks.end[first]):
+        action = ast.action(place.program.statement(row))
+        if isinstance(action, ast.CancelMove):
+            at = Execution(world, place, row, Store(lambda key: None))
+            ours = [at.is_ours(arm) is not False for arm in action.arms]
+            if any(ours) or not ours:
+                return True
+    return False
+
+
+def _cancelling_handler(
+    machine: Machine, place: Place, row: int, reach: CallGraph
+) -> None:
+    """Allow for a handler that ends moves on their way."""
+    cycles = any(isinstance(one, ast.ExitCycle) for one in reach.cancels)
+    if not cycles and not _ends_ours(machine.world, place, row, reach):
+        return
+    machine.interrupted = True
+    machine.cycle_left |= cycles
+    machine.world.report_once(
+        place.program,
+        row,
+        "handler-cancels",
+        str(row),
+        "this condition handler may end a move on its way (CANCEL, EXIT CYCLE) at any "
+        "time: no move's origin is sure",
+    )
 
 
 def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> None:

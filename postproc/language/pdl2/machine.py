@@ -166,6 +166,7 @@ class Machine:
         widened: Loops that are not unrolled.
         recursive: Bodies (by id) that call themselves, directly or not.
         interrupted: A condition handler may move the arm at any time.
+        cycle_left: A condition handler may begin the cycle again at any time.
         exhausted: The program is too complex to be followed to the end.
     """
 
@@ -182,6 +183,7 @@ class Machine:
     volatile: frozenset[str] = frozenset()
     recursive: set[int] = field(default_factory=set)
     interrupted: bool = False
+    cycle_left: bool = False
     exhausted: bool = False
     rows: int = 0
     _heap: list[tuple[Point, int]] = field(default_factory=list)
@@ -296,6 +298,18 @@ class Machine:
             found += [ast.Invoke(name, ()) for name in sorted(alone)]
             known = self._called[id(statement)] = tuple(found)
         return known
+
+    def begin_cycle(self, here: Execution, store: Store) -> bool:
+        """Go on with the next cycle of the program that runs; False without one."""
+        context = here.context
+        while True:
+            cycle = self.places[context].body.blocks.cycle
+            if cycle >= 0:
+                self.push(context, cycle, store)
+                return True
+            if context is self.root:
+                return False
+            context = context.outer
 
     # ---- calls ----------------------------------------------------------------------
     def calls_to(self, body: Body, context: Context) -> list[Body]:

@@ -302,6 +302,7 @@ RULES: dict[str, Rule] = {
     "format": lambda c: c[0],
     "open": lambda c: ast.Still("OPEN"),
     "open_clause": lambda c: None,
+    "cancel": lambda c: ast.CancelMove(tuple(part[0] for part in _of(c, ArmPart))),
     "still": lambda c: ast.Still(c[0], _terms(c[1:])),
     "still_word": lambda c: "",
     "soup": lambda c: ast.Still("soup", _terms(c)),

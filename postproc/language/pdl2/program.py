@@ -447,7 +447,9 @@ class Program:
 
 # Programs from lines: declarations, routines, blocks, and where each jump leads.
 
-_PLAIN = (ast.Move, ast.Assign, ast.Call, ast.Transfer, ast.Still)
+_PLAIN = (
+    ast.Move, ast.Assign, ast.Call, ast.Transfer, ast.Still, ast.CancelMove
+)  # fmt: skip
 
 
 @dataclass

@@ -269,6 +269,17 @@ class Still(Statement):
     terms: tuple[Reference | Invoke, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class CancelMove(Statement):
+    """``CANCEL CURRENT FOR ARM[n]``, ``CANCEL ALL``: moves end on their way.
+
+    Attributes:
+        arms: The arms whose moves end; none: those of the program's arm.
+    """
+
+    arms: tuple[Expression, ...] = ()
+
+
 # Statements that decide what runs next.
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from postproc.language import collect
 from postproc.language.collect import Conditions, Pose, cell_pose, composed
 from postproc.language.rapid.dialect import COMMENTS, RAPID_DIALECT
@@ -13,8 +15,14 @@ from postproc.language.rapid.moves import (
     pose_of_numbers,
 )
 from postproc.language.visits import Meaning, Visits
+from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
+_GRIP = "what the arm carries is not known here (GripLoad)"
+_PART_ALONE = (
+    "GripLoad states a part, and the tool states no mass of its own: what the arm "
+    "carries in all is not known. State the mass in tooldata"
+)
 _SHIFT = "the program displacement (PDispOn, PDispSet) is not known here"
 
 
@@ -51,7 +59,22 @@ def _conditions(v: RapidVisit, base: Pose, uframe: Pose) -> Conditions:
         speed=v.speed,
         wrist=bool(v.modes.wrist) and not joint,
         override=v.modes.override,
+        load=_load(v),
     )
+
+
+def _load(v: RapidVisit) -> tuple[float, ...]:
+    """Return what the program states that the arm carries, see `Conditions.load`."""
+    if v.total:
+        mass, *centre = v.total
+        return mass, *(x * MM for x in centre)
+    if not v.tool.load or not v.modes.grip or not v.tool.pose:
+        return ()
+    mass, *own = v.tool.load
+    carried, *part = v.modes.grip
+    at = np.array(v.tool.pose).reshape(4, 4) @ np.array([*(x * MM for x in part), 1.0])
+    centre = (mass * MM * np.array(own) + carried * at[:3]) / (mass + carried)
+    return mass + carried, *centre.tolist()
 
 
 def _displaced(wobj: FrameOfMove, shift: tuple[float, ...]) -> Pose:
@@ -63,10 +86,19 @@ def _displaced(wobj: FrameOfMove, shift: tuple[float, ...]) -> Pose:
     return composed(wobj.pose, pose_of_numbers(shift))
 
 
+def _unweighed(v: RapidVisit) -> str:
+    """Say why it is not known what the arm carries, "" where it is."""
+    if v.total:
+        return ""
+    if not v.modes.grip:
+        return _GRIP
+    return _PART_ALONE if v.modes.grip[0] and not v.tool.load else ""
+
+
 def _reasons(v: RapidVisit) -> tuple[str, ...]:
     """Say why a visit cannot be compensated."""
     given = (*sorted(v.modes.blocked), v.why, v.goal.why, v.tool.why)
     if v.goal.target == Meaning.JOINTS:
-        return given
+        return (*given, _unweighed(v))
     unknown = v.modes.shift == UNKNOWN_SHIFT
-    return (*given, v.wobj.why, _SHIFT if unknown else "")
+    return (*given, v.wobj.why, _SHIFT if unknown else "", _unweighed(v))

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, TypeGuard
 
-from postproc.language.flow import HeadedRows, RoutineFlow
+from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
 from postproc.language.machine import (
     NOWHERE,
@@ -14,12 +17,24 @@ from postproc.language.machine import (
     TaskMachine,
 )
 from postproc.language.rapid import syntax as said
+from postproc.language.rapid.error_paths import ErrorExit, ErrorHandlers, exits_of
+from postproc.language.rapid.errors import (
+    EXIT_CYCLE,
+    PATH_ERRORS,
+    Numbers,
+    clauses_of,
+    common,
+    key_of,
+    may_raise,
+    numbers_of,
+)
 from postproc.language.rapid.modes import (
+    ANYTHING,
     AT_START,
     HARMLESS,
-    UNKNOWN_SHIFT,
     Modes,
     changed_modes,
+    given_modes,
 )
 from postproc.language.rapid.moves import Goals, pose_of
 from postproc.language.rapid.signatures import (
@@ -31,6 +46,8 @@ from postproc.language.rapid.task import RapidTask, functions_in, inside
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
+SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
+PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (
     said.FileHeader, said.DataDeclaration, said.ConnectTrap, said.Assignment,
@@ -47,11 +64,15 @@ class RapidMachine(TaskMachine):
         task: Its modules.
         goals: Reads destinations, tools, work objects and zones.
         ends: What holds where the main routine ends.
+        restarts: What holds where a cycle ends before that.
     """
 
     task: RapidTask = field(kw_only=True)
     goals: Goals = field(kw_only=True)
     ends: list[Modes] = field(default_factory=list)
+    restarts: list[Modes] = field(default_factory=list)
+    _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
+    _exits: dict[CallContext, tuple[ErrorExit, ...]] = field(default_factory=dict)
     _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
 
     @classmethod
@@ -83,18 +104,18 @@ class RapidMachine(TaskMachine):
             self.follow_all()
 
     def _next_cycle(self, here: Arrived) -> Arrived:
-        """Say how main begins once more: what displaces or blocks at its end may hold.
+        """Return how main begins again: with the modes that hold where a cycle ends.
 
         What an unknown call leaves unknown there does not count:
         it would leave whole programs.
         """
         modes, displaced = here.modes, "pdispon" in self.task.called
         for end in self.ends:
-            joined = modes.joined(end)
-            modes = replace(modes, blocked=joined.blocked)
-            if end.shift != UNKNOWN_SHIFT or displaced:
-                modes = replace(modes, shift=joined.shift)
-        return replace(here, modes=modes)
+            modes = modes.continued(end, ("shift", "blocked", "grip"), displaced)
+        for end in self.restarts:
+            modes = modes.continued(end, modes.names(), displaced)
+        origins = here.origins | (NOWHERE if self.restarts else frozenset())
+        return Arrived(origins, modes)
 
     def _procedures(self) -> list[tuple[int, str, HeadedRows]]:
         routines = (one for found in self.task.routines.values() for one in found)
@@ -132,7 +153,7 @@ class RapidMachine(TaskMachine):
 
     def at_call(self, context: CallContext, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
-        if self._any_moves(context.scope, context.flow.handlers):
+        if self._handlers_of(context).moves:
             here = replace(
                 here,
                 modes=replace(here.modes, blocked=here.modes.blocked | {_HANDLER}),
@@ -140,26 +161,83 @@ class RapidMachine(TaskMachine):
         return here
 
     def at_return(self, context: CallContext, here: Arrived) -> Arrived:
-        """Allow for errors that end a routine early."""
+        """Note the end of a cycle; forget what a handler may have changed."""
         if context.caller is None:
             self.ends.append(here.modes)
-        file, flow = context.scope.file, context.flow
-        if len(flow.handlers):
-            if self._any_moves(context.scope, flow.handlers):
-                return here.lost()
-            if self._handler_returns(file, flow):
-                return replace(here, origins=here.origins | NOWHERE)
-        return here
+        return here.lost() if self._handlers_of(context).moves else here
 
-    def _handler_returns(self, file: int, flow: RoutineFlow) -> bool:
-        """Tell whether an error may end the routine early."""
-        text = self.texts[file]
-        words = {
-            one.word
-            for row in flow.handlers
-            if isinstance(one := inside(text.statement(row)), said.Leave)
-        }
-        return "return" in words or not words
+    # Errors.
+
+    def _handlers_of(self, context: CallContext) -> ErrorHandlers:
+        """Read the error handlers of a routine once."""
+        key = context.scope.file, context.routine.first
+        if key not in self._handlers:
+            scope, text = context.scope, self.texts[context.scope.file]
+
+            def read(operand: said.Operand | None, row: int) -> str:
+                return key_of(operand, self.task.number(operand, row, scope))
+
+            clauses = clauses_of(text, context.flow, read)
+            moves = self._any_moves(scope, context.flow.handlers, (EXIT_CYCLE,))
+            self._handlers[key] = ErrorHandlers(clauses, moves)
+        return self._handlers[key]
+
+    def _exits_of(self, context: CallContext) -> tuple[ErrorExit, ...]:
+        """Find where the program goes on behind errors raised in a routine."""
+        if context not in self._exits:
+            self._exits[context] = tuple(exits_of(context, self._handlers_of))
+        return self._exits[context]
+
+    def _fail(
+        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
+    ) -> None:
+        """Allow for an error that a statement raises and another routine handles.
+
+        The routine's own handler that goes on behind the statement, or with it again,
+        changes nothing of how the arm comes there.
+        """
+        for way in self._exits_of(context):
+            beside = way.own and way.context is context
+            if not beside and self._may_raise(one, way.numbers):
+                self._handled(context, row, way, replace(here, origins=NOWHERE))
+
+    def _may_raise(self, one: said.RapidStatement, numbers: Numbers) -> bool:
+        return may_raise(one, numbers, self.task.routines, self.task.declared)
+
+    def _interrupted(
+        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+    ) -> None:
+        """Allow for an error that ends a move on its way."""
+        always = one.name.startswith(PROCESSES) or "procerrrecovery" in self.task.called
+        for way in self._exits_of(context):
+            named = way.numbers is not None and bool(way.numbers & PATH_ERRORS)
+            if way.own and (named or (always and self._may_raise(one, way.numbers))):
+                self._handled(context, row, way, replace(here, origins=NOWHERE))
+
+    def _handled(
+        self, context: CallContext, row: int, way: ErrorExit, here: Arrived
+    ) -> None:
+        """Go on behind an error."""
+        here = here.lost() if way.lost else here
+        if way.context is context and way.own:
+            self.enter(context, row + way.row, here)
+        elif way.context is not None:
+            self.enter(way.context, way.row, here)
+        elif way.restarts:
+            self.restarts.append(here.modes)
+        else:
+            self.ends.append(here.modes)
+
+    def raise_error(
+        self, context: CallContext, row: int, one: said.Leave, here: Arrived
+    ) -> None:
+        """Go on behind ``RAISE``, see `TaskMachine.raise_error`."""
+        number = self.task.number(one.value, row, context.scope)
+        raised = numbers_of([one.value], lambda value: key_of(value, number))
+        for way in self._exits_of(context):
+            shared = common(way.numbers, raised)
+            if shared is None or shared:
+                self._handled(context, row, way, here)
 
     def part_otherwise(
         self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
@@ -201,33 +279,98 @@ class RapidMachine(TaskMachine):
         if name in self.task.routines:
             return self.unknown(context, row, here, "names several routines")
         kind = known_instructions().get(name)
+        if name == EXIT_CYCLE:
+            self.restarts.append(here.modes)
+            return None
         if name in STOPPED:
             return here.lost()
         if kind == "modal":
-            modes = changed_modes(
-                name, one.arguments, here.modes,
-                lambda operand: self.task.number(operand, row, scope),
-                lambda operand: pose_of(self.task.record(operand, row, scope)),
-            )  # fmt: skip
-            return replace(here, modes=modes)
+            changed = self._changed(one, row, scope, here.modes)
+            return replace(here, modes=changed.allowing())
         if kind is not None or self.said_still(name):
             return here
         return self.outside(context, row, name, here)
+
+    def _changed(
+        self, one: said.Instruction, row: int, scope: Scope, modes: Modes
+    ) -> Modes:
+        """Carry out an instruction that changes how the moves after it are."""
+        return changed_modes(
+            one.name, one.arguments, modes,
+            lambda operand: self.task.number(operand, row, scope),
+            lambda operand: pose_of(self.task.record(operand, row, scope)),
+            lambda operand: self.goals.load(operand, row, scope),
+        )  # fmt: skip
 
     def _move(
         self, context: CallContext, row: int, one: said.Instruction, here: Arrived
     ) -> Arrived:
         """Record the visits of a move."""
         signature, scope = MOTIONS[one.name], context.scope
-        return self.arrive(
+        self._interrupted(context, row, one, here)
+        after = self.arrive(
             context, row, here,
             lambda: [*self.goals.visits(one, signature, row, scope, here.modes)],
         )  # fmt: skip
+        (last,) = after.origins
+        if math.isnan(self.visits[last].zone_mm):
+            after = replace(after, modes=after.modes.settled())
+        if one.name in SYNCHRONOUS:
+            return self._synchronous(context, row, one, after)
+        return after
+
+    def _synchronous(
+        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+    ) -> Arrived:
+        """Allow for the procedure that a move calls while the program runs ahead."""
+        placed = [argument.value for argument in one.arguments if not argument.name]
+        called = placed[-1] if placed else None
+        name = called.text.strip('"').lower() if _is_text(called) else ""
+        if self.said_still(name) and name not in self.task.routines:
+            return here
+        found = self.task.routine(name.split(":")[-1], context.scope)
+        given = None if found is None else self._given(*found)
+        if given is None:
+            what = "calls a procedure on its way that may move the arm"
+            what = what if found else f"{what}: it is in no file of the task"
+            here = self.unknown(context, row, here, what)
+        modes = here.modes.allowing(ANYTHING if given is None else given)
+        return replace(here, modes=modes)
+
+    def _given(
+        self, file: int, module: str, routine: HeadedRows
+    ) -> frozenset[tuple[str, Any]] | None:
+        """Return the modes that a procedure may set; None where it may move the arm."""
+        if not self._moves(file, module, routine):
+            return frozenset()
+        scope, found = self.task.scope_of(file, module, routine), set[tuple[str, Any]]()
+        for row in range(routine.first + 1, routine.last):
+            one = inside(self.texts[file].statement(row))
+            own = isinstance(one, said.Instruction) and one.name in self.task.routines
+            if isinstance(one, said.Instruction) and not own:
+                kind = known_instructions().get(one.name)
+                if kind == "modal" and one.name not in STOPPED:
+                    found |= given_modes(partial(self._changed, one, row, scope))
+                    continue
+                if kind is not None or self.said_still(one.name):
+                    continue
+            if own or isinstance(one, said.Instruction | said.LateCall):
+                return None
+            if isinstance(one, said.NotUnderstood):
+                return None
+        return frozenset(found)
 
     def after_functions(
         self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
     ) -> Arrived:
-        """Allow for what the functions of a statement do."""
+        """Allow for what the functions of a statement do, and for its errors."""
+        here = self._after_functions(context, row, one, here)
+        self._fail(context, row, one, here)
+        return here
+
+    def _after_functions(
+        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
+    ) -> Arrived:
         for name in functions_in(one):
             found = self.task.routine(name, context.scope)
             own = name in self.task.routines
@@ -253,14 +396,22 @@ class RapidMachine(TaskMachine):
             self._moving[key] = self._any_moves(scope, rows)
         return self._moving[key]
 
-    def _any_moves(self, scope: Scope, rows: range) -> bool:
-        """Tell whether some statements may move the arm."""
+    def _any_moves(
+        self, scope: Scope, rows: range, passed: tuple[str, ...] = ()
+    ) -> bool:
+        """Return True if some statements may move the arm.
+
+        Args:
+            scope: Where they stand.
+            rows: Their rows.
+            passed: Instructions that do not count.
+        """
         text = self.texts[scope.file]
         for row in rows:
             one = inside(text.statement(row))
             if isinstance(one, said.LateCall | said.NotUnderstood):
                 return True
-            if isinstance(one, said.Instruction):
+            if isinstance(one, said.Instruction) and one.name not in passed:
                 found = self.task.routine(one.name, scope)
                 if found is not None:
                     if self._moves(*found):
@@ -276,6 +427,10 @@ class RapidMachine(TaskMachine):
 
 _TRAP = "a TRAP of the task may move the arm, or change its settings, at any time"
 _HANDLER = "the error handler of its routine may move the arm, or change its settings"
+
+
+def _is_text(operand: said.Operand | None) -> TypeGuard[said.StringLiteral]:
+    return isinstance(operand, said.StringLiteral)
 
 
 def _kind(routine: HeadedRows) -> str:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from postproc.language.rapid import syntax as said
 from postproc.language.visits import OrientationLaw, Switch
 
 NO_SHIFT = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # position [mm] and quaternion
 UNKNOWN_SHIFT: tuple[float, ...] = ()
+EMPTY_HAND = (0.0, 0.0, 0.0, 0.0)  # mass [kg] and its centre [mm]
+UNKNOWN_GRIP: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,11 @@ class Modes:
         arc_law: .. on arcs.
         wrist: Lines with the wrist's joints in proportion.
         override: Share of the programmed speed, NaN where not known.
+        grip: What GripLoad has put into the hand: mass [kg] and its centre in the tool
+            frame [mm]; empty: not known.
         blocked: Why no target can be compensated; more than one reason.
+        pending: Modes, and values that a procedure may give them while the program
+            runs ahead, until the arm has stopped.
     """
 
     shift: tuple[float, ...] = NO_SHIFT
@@ -33,7 +40,9 @@ class Modes:
     arc_law: OrientationLaw = OrientationLaw.ALONG_PATH
     wrist: bool = False
     override: float = 1.0
+    grip: tuple[float, ...] = EMPTY_HAND
     blocked: frozenset[str] = frozenset()
+    pending: frozenset[tuple[str, Any]] = frozenset()
 
     def joined(self, other: Modes) -> Modes:
         """Keep what is the same on another way here."""
@@ -43,11 +52,49 @@ class Modes:
             if getattr(self, f.name) != getattr(other, f.name)
         }
         differing["blocked"] = self.blocked | other.blocked
+        differing["pending"] = self.pending | other.pending
         return replace(self, **differing)
+
+    def allowing(self, more: frozenset[tuple[str, Any]] = frozenset()) -> Modes:
+        """Allow for values that a procedure may have set, or sets later.
+
+        Args:
+            more: Those of a procedure that the arm's motion calls from here on.
+        """
+        pending = self.pending | more
+        found = replace(self, pending=pending)
+        for name, value in pending:
+            found = found.joined(replace(found, **{name: value}))
+        return found
+
+    def settled(self) -> Modes:
+        """Return what holds where the arm has stopped: procedures have run."""
+        return replace(self, pending=frozenset()) if self.pending else self
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Return the names of all modes."""
+        return tuple(f.name for f in fields(cls) if f.name != "pending")
+
+    def continued(self, end: Modes, names: Iterable[str], displaced: bool) -> Modes:
+        """Allow for what holds where a cycle ends.
+
+        Args:
+            end: What holds there; what is unknown there does not count.
+            names: Modes that go on into the next cycle.
+            displaced: The displacement counts where it is unknown, too.
+        """
+        counted = {
+            name: getattr(end, name)
+            for name in names
+            if getattr(end, name) != getattr(LOST, name)
+            or (name == "shift" and displaced)
+        }
+        return self.joined(replace(self, **counted))
 
     def lost(self) -> Modes:
         """Forget all but why targets cannot be compensated."""
-        return replace(LOST, blocked=self.blocked)
+        return replace(LOST, blocked=self.blocked, pending=self.pending)
 
 
 AT_START = Modes()
@@ -58,7 +105,15 @@ LOST = Modes(
     law=OrientationLaw.UNKNOWN,
     arc_law=OrientationLaw.UNKNOWN,
     override=0.0,
+    grip=UNKNOWN_GRIP,
 )
+
+ANYTHING: frozenset[tuple[str, Any]] = frozenset(
+    (name, getattr(LOST, name)) for name in Modes.names() if name != "blocked"
+)
+"""What a procedure may set that is not known."""
+
+OTHERWISE = replace(LOST, wrist=True)  # differs from `AT_START` in every mode
 
 OFFSET = "external axes are offset (EOffsOn, EOffsSet)"
 # Instructions that let the arm go elsewhere than targets say, and those that end it.
@@ -71,7 +126,6 @@ BLOCKING = {
     "waitwobj": ("dropwobj", "the work object is on a conveyor (WaitWObj)"),
 }
 _ENDING = {name: why for ends, why in BLOCKING.values() for name in ends.split()}
-PAYLOAD = "GripLoad names a load: the model's sag holds for that of the cell file"
 # They change nothing of where a target is and from which side it is reached.
 HARMLESS = frozenset(
     """
@@ -88,6 +142,7 @@ def changed_modes(
     modes: Modes,
     number: Callable[[said.Operand | None], float],
     pose: Callable[[said.Operand | None], tuple[float, ...]],
+    load: Callable[[said.Operand | None], tuple[float, ...]],
 ) -> Modes:
     """Carry out an instruction that changes how the moves after it are.
 
@@ -97,6 +152,7 @@ def changed_modes(
         modes: What holds before it.
         number: Evaluates a number, NaN where it is not known.
         pose: Evaluates a pose, empty where it is not known.
+        load: Evaluates a load, empty where it is not known.
     """
     switches = {one.name for one in arguments if one.name and one.value is None}
     placed = [one.value for one in arguments if not one.name]
@@ -120,12 +176,29 @@ def changed_modes(
             share = number(placed[0] if placed else None) / 100.0
             return replace(modes, override=share if 0.0 < share <= 1.0 else 0.0)
         case "gripload":
-            return _loaded(placed, modes)
+            return replace(modes, grip=load(placed[0] if placed else None))
     if name in BLOCKING:
         return replace(modes, blocked=modes.blocked | {BLOCKING[name][1]})
     if name in _ENDING:
         return replace(modes, blocked=modes.blocked - {_ENDING[name]})
     return modes if name in HARMLESS else replace(LOST, blocked=modes.blocked)
+
+
+def given_modes(
+    change: Callable[[Modes], Modes],
+) -> frozenset[tuple[str, Any]]:
+    """Return the modes that an instruction sets, whatever holds before it.
+
+    Args:
+        change: Carries the instruction out.
+    """
+    one, other = change(AT_START), change(OTHERWISE)
+    return frozenset(
+        (name, getattr(one, name))
+        for name in Modes.names()
+        if getattr(one, name) != getattr(AT_START, name)
+        or getattr(other, name) != getattr(OTHERWISE, name)
+    )
 
 
 # Only \CirPointOri takes the tool through the orientation of the circle's point.
@@ -148,11 +221,3 @@ def _singular(switches: set[str], modes: Modes) -> Modes:
     (word,) = switches if len(switches) == 1 else ("",)
     law = laws.get(word, OrientationLaw.UNKNOWN)
     return replace(modes, law=law, wrist=word == "wrist")
-
-
-def _loaded(placed: Sequence[said.Operand | None], modes: Modes) -> Modes:
-    """GripLoad: nothing in the hand is what the cell describes."""
-    names = [one.name for one in placed if isinstance(one, said.DataObject)]
-    if names == ["load0"]:
-        return replace(modes, blocked=modes.blocked - {PAYLOAD})
-    return replace(modes, blocked=modes.blocked | {PAYLOAD})

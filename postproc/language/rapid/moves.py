@@ -24,7 +24,7 @@ from postproc.language.rapid.dialect import (
     WIDTH,
     rotation_from_quaternion,
 )
-from postproc.language.rapid.modes import Modes
+from postproc.language.rapid.modes import EMPTY_HAND, Modes
 from postproc.language.rapid.signatures import Signature
 from postproc.language.rapid.targets import COUNTS
 from postproc.language.rapid.task import (
@@ -45,6 +45,7 @@ USUAL_TURN = np.deg2rad(500.0)  # [rad/s] of the speeds that the controller know
 _STEM = re.compile(r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search)")
 SHORTEST = 0.5  # length of what counts as a quaternion
 Z0 = 0.3  # [mm]
+PLACEHOLDER = 0.01  # [kg] masses up to here, as of tool0, state nothing
 UNKNOWN_ZONE = -1.0
 RUN_TIME = "it is known only when the program runs"
 # Options whose moves are left.
@@ -52,7 +53,6 @@ _LEFT_BY = {
     "id": "it moves together with another arm (\\ID)",
     "corr": "a sensor may correct the path (\\Corr)",
     "track": "a sensor may correct the path (\\Track)",
-    "tload": "\\TLoad names a load: the model's sag holds for that of the cell file",
 }
 AT_A_STOP = ("spotl", "spotj", "spotml", "spotmj")  # they weld standing still
 
@@ -67,20 +67,24 @@ class FrameOfMove:
         held: Robhold: the arm holds it.
         why: Why targets with it cannot be compensated, "" where they can.
         taught: It was taught with the arm, and contains its error.
+        load: Of a tool: mass [kg] and its centre in the flange frame [mm]; empty where
+            the numbers are a placeholder, or not known.
     """
 
     pose: Pose
     held: bool
     why: str = ""
     taught: bool = False
+    load: tuple[float, ...] = ()
 
 
 @dataclass
 class RapidVisit(FoundVisit):
-    """One arrival, as it is found.
+    r"""One arrival, as it is found.
 
     Attributes:
         tool, wobj: Its frames.
+        total: What ``\TLoad`` says that the arm carries in all, as `FrameOfMove.load`.
         zone_mm: Size of its zone, NaN where it stops.
         speed: Along the path [m/s], NaN where not known.
     """
@@ -89,6 +93,7 @@ class RapidVisit(FoundVisit):
     wobj: FrameOfMove = field(kw_only=True)
     zone_mm: float = field(kw_only=True)
     speed: float = field(kw_only=True)
+    total: tuple[float, ...] = field(kw_only=True, default=())
 
 
 @dataclass
@@ -117,21 +122,48 @@ class Goals:
         motion = _motion(one.name, signature)
         why = "" if signature.reaches else _ends_elsewhere(one.name)
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
+        total, untold = self._total(one, row, scope)
+        why = why or untold
         if zone == UNKNOWN_ZONE:
             why = why or "its zone is not known: no zonedata of the files at hand"
         if signature.via >= 0:
             goal = self.goal(ends[1], signature, row, scope)
             yield RapidVisit(
                 scope, row, motion, True, goal, modes, why=why,
-                tool=tool, wobj=wobj, zone_mm=zone, speed=speed,
+                tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
             )  # fmt: skip
         goal = self.goal(ends[0], signature, row, scope)
         if not signature.reaches:
             goal = FoundGoal(Meaning.UNKNOWN, NOTHING, why=why, name=goal.name)
         yield RapidVisit(
             scope, row, motion, False, goal, modes, why=why,
-            tool=tool, wobj=wobj, zone_mm=zone, speed=speed,
+            tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
         )  # fmt: skip
+
+    def load(
+        self, operand: said.Operand | None, row: int, scope: Scope
+    ) -> tuple[float, ...]:
+        """Read mass [kg] and centre [mm] of loaddata, empty where they are not known.
+
+        ``load0`` and other loads up to a hundredth of a kilogram are no load.
+        """
+        if isinstance(operand, said.DataObject) and operand.name == "load0":
+            if not operand.steps and "load0" not in self.task.declared:
+                return EMPTY_HAND
+        found = load_of(self.task.record(operand, row, scope))
+        return EMPTY_HAND if found and found[0] <= PLACEHOLDER else found
+
+    def _total(
+        self, one: said.Instruction, row: int, scope: Scope
+    ) -> tuple[tuple[float, ...], str]:
+        r"""Read ``\TLoad``: all that the arm carries, and why that is not known."""
+        given = [argument for argument in one.arguments if argument.name == "tload"]
+        if not given:
+            return (), ""
+        found = self.load(given[0].value, row, scope)
+        if not found or given[0].passed_on:
+            return (), "the load that \\TLoad names is not known"
+        return (() if found == EMPTY_HAND else found), ""
 
     def _conditions(
         self,
@@ -569,7 +601,21 @@ def _tool_of(found: Nested | None) -> FrameOfMove | None:
     held, pose = found[0], _pose_numbers(found[1])
     if pose is None or not isinstance(held, WrittenNumber):
         return None
-    return FrameOfMove(pose_of_numbers(pose), bool(held.value))
+    load = load_of(found[2]) if len(found) > 2 else ()
+    stated = load if load and load[0] > PLACEHOLDER else ()
+    return FrameOfMove(pose_of_numbers(pose), bool(held.value), load=stated)
+
+
+def load_of(found: Nested | None) -> tuple[float, ...]:
+    """Return mass [kg] and centre [mm] of ``[mass, [x,y,z], ..]``, else nothing."""
+    if not isinstance(found, tuple) or len(found) < 2:
+        return ()
+    mass, centre = found[:2]
+    if not isinstance(mass, WrittenNumber) or not isinstance(centre, tuple):
+        return ()
+    at = [one.value for one in centre if isinstance(one, WrittenNumber)]
+    known = len(at) == 3 and mass.value >= 0.0
+    return (mass.value, *at) if known else ()
 
 
 def _wobj_of(found: Nested | None) -> FrameOfMove | None:

@@ -11,19 +11,16 @@ from postproc.language.pdl2.values import Nothing
 from tests.language.pdl2.test_routines import FIRST, followed, handler, reasons, routine
 
 
-@pytest.mark.parametrize(
-    ("mass", "payload", "said"),
-    [
-        (40.0, 40.0, ""),
-        (40.04, 40.0, ""),
-        (41.0, 40.0, "is 41 kg and the cell file gives 40 kg"),
-        (40.0, math.nan, "the cell file gives none"),
-        (Nothing("it is read"), 40.0, "not known here: it is read"),
-    ],
-)
-def test_the_payload_must_be_that_of_the_cell(mass, payload, said) -> None:
-    found = disturbance({"tool_mass": mass}, payload)
-    assert said in found and bool(found) is bool(said)
+def test_a_stated_payload_is_used() -> None:
+    visits = followed("$TOOL_MASS := 41", FIRST).visits
+    assert visits.loads[visits.load[0]][0] == 41.0 and not visits.reason[0]
+    none = followed(FIRST).visits
+    assert math.isnan(none.loads[none.load[0]][0])
+
+
+def test_a_payload_that_is_not_known_is_left() -> None:
+    found = disturbance({"tool_mass": Nothing("it is read")})
+    assert "not known here: it is read" in found and not disturbance({"tool_mass": 4.0})
 
 
 def test_what_a_way_around_may_leave_on_counts() -> None:
@@ -43,5 +40,6 @@ def test_what_a_function_switches_on_counts(inner: str) -> None:
 
 
 def test_what_is_set_for_one_move_counts_for_it() -> None:
-    found = reasons(followed(f"{FIRST} WITH $TOOL_MASS = 9", FIRST, payload_kg=8.0))
-    assert "is 9 kg" in found[0] and found[1] == ""
+    visits = followed(f"{FIRST} WITH $TOOL_MASS = 9", FIRST).visits
+    masses = visits.loads[visits.load, 0].tolist()
+    assert masses[0] == 9.0 and math.isnan(masses[1])

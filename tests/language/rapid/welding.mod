@@ -17,7 +17,7 @@ MODULE Welding(SYSMODULE, NOSTEPIN)
     [[4,5,6],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]];
   VAR robtarget later;
   CONST jointtarget jPark:=[[0,-20.5,15,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
-  TASK PERS tooldata tTorch:=[TRUE,[[95.3,-2.1,352.7],[0.924,0,0.3827,0]],[3.2,[0,10,90],[1,0,0,0],0,0,0]];
+  TASK PERS tooldata tTorch:=[TRUE,[[95.3,-2.1,352.7],[0.924,0,0.3827,0]],[0.001,[0,10,90],[1,0,0,0],0,0,0]];
   TASK PERS wobjdata wTable:=[FALSE,TRUE,"",[[850,-300,412.5],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
   PERS loaddata load1:=[5,[50,0,50],[1,0,0,0],0,0,0];
   CONST speeddata vSlow:=[50,500,5000,1000];

@@ -1,0 +1,257 @@
+"""Errors of RAPID: what may raise them, and where a handler goes on behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise
+
+from postproc.language.flow import CLOSING, RoutineFlow
+from postproc.language.rapid import syntax as said
+from postproc.language.rapid.task import functions_in, inside
+from postproc.language.statements import StatementText
+
+Numbers = frozenset[str] | None
+"""Names of error numbers; None: any."""
+
+ANY: Numbers = None
+NO_NUMBERS: Numbers = frozenset()
+EVERY_JUMP = "long_jmp_all_err"
+LARGEST_OWN = 90.0  # numbers up to here are the program's own
+LEAVES = ("retry", "trynext", "return", "raise")
+EXIT_CYCLE = "exitcycle"
+
+# Beginnings of the instructions and functions that can raise an error. Errors that are
+# not named here may come of any statement.
+RAISED_BY: Mapping[str, tuple[str, ...]] = {
+    "err_wait_maxtime": ("wait",),
+    "err_waitsync": ("waitsynctask", "syncmove"),
+    "err_gowaitlim": ("waitgo", "waitgi"),
+    "err_aowaitlim": ("waitao", "waitai"),
+    "err_whlsearch": ("search", "path"),
+    "err_sigsupsearch": ("search",),
+    "err_tp_maxtime": ("tpread", "ui"),
+    "err_tp_dibreak": ("tpread", "ui"),
+    "err_tp_dobreak": ("tpread", "ui"),
+    "err_tp_persboolbreak": ("tpread", "ui"),
+    "err_tp_no_client": ("tpread", "ui"),
+    "err_sock_timeout": ("socket",),
+    "err_sock_closed": ("socket",),
+    "err_filenotfnd": ("open", "load", "startload", "copyfile", "renamefile", "remove"),
+    "err_fileopen": ("open", "load", "startload"),
+    "err_fileacc": ("read", "write", "open", "copyfile", "clear", "pack"),
+    "err_fileeof": ("read", "unpack"),
+    "err_rcvdata": ("read", "rmq", "socket"),
+    "err_loaded": ("load", "startload", "waitload"),
+    "err_unload": ("unload", "waitload"),
+    "err_modulename": ("load", "waitload", "startload"),
+    "err_ioenable": ("ioenable", "iodisable"),
+    "err_iodisable": ("ioenable", "iodisable"),
+}
+PATH_ERRORS = frozenset(["err_path_stop", "err_coll_stop", "err_motsup"])
+
+
+@dataclass(frozen=True)
+class HandlerEnd:
+    """A word with which an error handler goes on.
+
+    Attributes:
+        word: retry, trynext, return, raise or exitcycle.
+        numbers: Errors that it is reached with.
+    """
+
+    word: str
+    numbers: Numbers
+
+
+@dataclass(frozen=True)
+class ErrorClause:
+    """An error handler of a routine.
+
+    Attributes:
+        numbers: Errors that it takes; any where it has no list.
+        listed: It has a list: errors jump to it over handlers between.
+        ends: How it goes on; where it does not, the program stops.
+    """
+
+    numbers: Numbers
+    listed: bool
+    ends: tuple[HandlerEnd, ...]
+
+
+def common(one: Numbers, other: Numbers) -> Numbers:
+    """Return the errors that two sets share."""
+    if one is None or other is None:
+        return other if one is None else one
+    return one & other
+
+
+def together(one: Numbers, other: Numbers) -> Numbers:
+    """Return the errors of two sets."""
+    return None if one is None or other is None else one | other
+
+
+ReadNumber = Callable[[said.Operand | None, int], str]
+"""Names an error number that stands in a row, "" where it is not known."""
+
+
+def key_of(operand: said.Operand | None, value: float) -> str:
+    """Name an error number, "" where it is not known.
+
+    Args:
+        operand: What stands for it.
+        value: Its value, NaN where it is not known before the program runs.
+    """
+    if value > 0.0:
+        return f"{value:g}" if value <= LARGEST_OWN else ""
+    if isinstance(operand, said.DataObject) and not operand.steps:
+        return operand.name
+    return ""
+
+
+def numbers_of(
+    operands: Iterable[said.Operand | None], read: Callable[[said.Operand | None], str]
+) -> Numbers:
+    """Name error numbers, any where one of them is not known."""
+    names = frozenset(read(one) for one in operands)
+    return ANY if "" in names or EVERY_JUMP in names else names
+
+
+def clauses_of(
+    text: StatementText[said.RapidStatement], flow: RoutineFlow, read: ReadNumber
+) -> tuple[ErrorClause, ...]:
+    """Read the error handlers of a routine.
+
+    Args:
+        text: The statements of its file.
+        flow: Its blocks.
+        read: Names an error number.
+    """
+    found: list[ErrorClause] = []
+    rows = list(flow.handlers)
+    starts = [k for k in rows if _begins(text.statement(k))] + [flow.handlers.stop]
+    for first, behind in pairwise(starts):
+        head = text.statement(first)
+        if isinstance(head, said.ErrorHandler):
+            listed = bool(head.numbers)
+            numbers = _read(head.numbers, first, read) if listed else ANY
+            statements = [(k, text.statement(k)) for k in range(first + 1, behind)]
+            ends = tuple(_ends(statements, read))
+            found.append(ErrorClause(numbers, listed, ends))
+    return tuple(found)
+
+
+def _read(
+    operands: Iterable[said.Operand | None], row: int, read: ReadNumber
+) -> Numbers:
+    """Name the error numbers of a statement."""
+    return numbers_of(operands, lambda operand: read(operand, row))
+
+
+def _begins(one: said.RapidStatement) -> bool:
+    """Return True if a clause behind the statements of a routine begins."""
+    return isinstance(one, said.ErrorHandler) or (
+        isinstance(one, said.BlockWord) and one.word in ("undo", "backward")
+    )
+
+
+def _ends(
+    statements: Iterable[tuple[int, said.RapidStatement]], read: ReadNumber
+) -> Iterator[HandlerEnd]:
+    """Find how a handler goes on, and with which errors each word is reached."""
+    blocks: list[Numbers] = []
+    tested: list[bool] = []
+    for row, one in statements:
+        match one:
+            case said.Branch(word="if", values=(condition, *_)):
+                blocks.append(_asked(condition, row, read))
+            case said.Branch(word="elseif", values=(condition, *_)) if blocks:
+                blocks[-1] = _asked(condition, row, read)
+            case said.Branch(word="test", values=(value, *_)):
+                tested.append(_is_errno(value))
+                blocks.append(NO_NUMBERS)
+            case said.Branch(word="case", values=values) if blocks and tested:
+                blocks[-1] = _read(values, row, read) if tested[-1] else ANY
+            case said.Branch(word="default") | said.BlockWord(word="else") if blocks:
+                blocks[-1] = ANY
+            case said.Branch() | said.ForLoop():
+                blocks.append(ANY)
+            case said.BlockWord(word=word) if word in CLOSING and blocks:
+                blocks.pop()
+                if word == "endtest":
+                    tested.pop()
+            case _:
+                yield from _end(one, row, reduce(common, blocks, ANY), read)
+
+
+def _end(
+    one: said.RapidStatement, row: int, numbers: Numbers, read: ReadNumber
+) -> Iterator[HandlerEnd]:
+    """Yield the word with which a statement of a handler goes on."""
+    while isinstance(one, said.CompactIf):
+        numbers = common(numbers, _asked(one.condition, row, read))
+        one = one.statement
+    if isinstance(one, said.Leave) and one.word in LEAVES:
+        yield HandlerEnd(one.word, numbers)
+    elif isinstance(one, said.Instruction) and one.name == EXIT_CYCLE:
+        yield HandlerEnd(EXIT_CYCLE, numbers)
+    elif isinstance(one, said.JumpTo):  # what the label is reached with is not followed
+        yield from (HandlerEnd(word, ANY) for word in LEAVES)
+
+
+def _asked(condition: said.Operand, row: int, read: ReadNumber) -> Numbers:
+    """Return the errors for which a condition can hold."""
+    match condition:
+        case said.Operation(operator="=", operands=(left, right)):
+            if _is_errno(left) or _is_errno(right):
+                return _read([right if _is_errno(left) else left], row, read)
+        case said.Operation(operator="OR", operands=(left, right)):
+            return together(_asked(left, row, read), _asked(right, row, read))
+        case said.Operation(operator="AND", operands=(left, right)):
+            return common(_asked(left, row, read), _asked(right, row, read))
+    return ANY
+
+
+def _is_errno(operand: said.Operand | None) -> bool:
+    return isinstance(operand, said.DataObject) and operand.name == "errno"
+
+
+def may_raise(
+    one: said.RapidStatement,
+    numbers: Numbers,
+    routines: Collection[str],
+    declared: Collection[str],
+) -> bool:
+    """Return True if a statement can raise one of some errors by itself.
+
+    Args:
+        one: The statement; ``RAISE`` is not asked for.
+        numbers: The errors.
+        routines: Names of the routines of the task.
+        declared: Names of the data of the task.
+    """
+    if isinstance(one, said.LabelMark | said.BlockWord | said.JumpTo):
+        return False
+    if numbers is None:
+        return True
+    functions = [*functions_in(one)]
+    if any(name in routines for name in functions):
+        return bool(numbers)
+    one = inside(one)
+    name = one.name if isinstance(one, said.Instruction) else ""
+    return any(_raises([name, *functions], k, k in declared) for k in numbers)
+
+
+def _raises(called: Sequence[str], number: str, declared: bool) -> bool:
+    """Return True if instructions or functions can raise an error."""
+    if called[0] in RAISING:
+        return True
+    if number[:1].isdigit() or declared:
+        return False
+    starts = RAISED_BY.get(number)
+    return starts is None or any(name.startswith(starts) for name in called)
+
+
+RAISING = ("errraise", "raisetouser", "procerrrecovery")
+"""Instructions that raise any error."""
