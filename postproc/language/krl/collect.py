@@ -12,10 +12,11 @@ from postproc.language.collect import Conditions, FoundGoal, Pose, cell_pose
 from postproc.language.krl.dialect import COMMENTS, KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.modes import (
+    LOST_LOAD,
+    NO_LOAD,
     UNKNOWN,
     KrlModes,
     ModeReader,
-    payload_reason,
 )
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
 from postproc.language.krl.syntax import SplineBlock
@@ -97,7 +98,7 @@ def _conditions(
         given += (modes.base.why, "" if modes.interpolation else _IPO)
         given += (_swapped(modes),)
     given += (_STATUS if odd else "", blending.why)
-    given += (payload_reason(modes, machine.start.payload_kg),)
+    given += (NO_LOAD if modes.load == LOST_LOAD else "",)
     return Conditions(
         tool=modes.tool.pose,
         base=base,
@@ -114,7 +115,14 @@ def _conditions(
         override=modes.share if joint else 1.0,
         overlap=blending.overlap,
         exact=blending.exact,
+        load=_load(modes),
     )
+
+
+def _load(modes: KrlModes) -> tuple[float, ...]:
+    """Return what the program states that the arm carries, see `Conditions.load`."""
+    unknown = not modes.load or modes.load == LOST_LOAD
+    return () if unknown else (*modes.load, *(math.nan,) * 3)[:4]
 
 
 def _swapped(modes: KrlModes) -> str:

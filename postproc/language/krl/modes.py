@@ -21,9 +21,11 @@ from postproc.language.krl.store import (
 from postproc.language.krl.task import KrlRecord, KrlTask, KrlValue, is_word
 from postproc.language.machine import Scope
 from postproc.language.visits import OrientationLaw
+from postproc.robot.pose import MM
 
 UNKNOWN = -1.0  # a number that is not known
-CELL_LOAD, LOST_LOAD = -1.0, -2.0
+CELL_LOAD: tuple[float, ...] = ()
+LOST_LOAD: tuple[float, ...] = (-1.0,)
 LOST_FRAME = KrlFrame(
     (),
     "which $TOOL and $BASE hold here is not known: set them anew behind what is not "
@@ -49,8 +51,9 @@ class KrlModes:
         fdat, pdat, ldat: ``FDAT_ACT``, ``PDAT_ACT`` and ``LDAT_ACT``.
         halted: The arm has stopped since the last move; None where that is not known.
         goes_on: ``CONTINUE`` stands before.
-        load: Mass that the arm carries [kg], as the program states it; `CELL_LOAD`
-            where it states none, `LOST_LOAD` where the one stated is not known.
+        load: What the arm carries, as the program states it: mass [kg], and its centre
+            in the flange frame [m] where that is known; `CELL_LOAD` where it states
+            nothing, `LOST_LOAD` where what it states is not known.
         store: What the program has set of tables, corrections and switches.
         declared: Interrupts that may move the arm or end its moves, by number, and why
             targets are left while one of them is on.
@@ -73,7 +76,7 @@ class KrlModes:
     ldat: KrlValue | None = None
     halted: bool | None = False
     goes_on: bool = False
-    load: float = CELL_LOAD
+    load: tuple[float, ...] = CELL_LOAD
     store: KrlStore = NOTHING_SET
     declared: frozenset[tuple[int, str]] = frozenset()
     active: frozenset[tuple[int, str]] = frozenset()
@@ -129,8 +132,7 @@ _SWITCHED_OFF: Sequence[tuple[str, object]] = (
 BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
 """Commands of BAS that change neither frames nor blending nor speed."""
 INITIAL = "BAS(#INITMOV) may set {} anew: set it behind that"
-PAYLOAD = "$LOAD is not what the cell says that the arm carries"
-NO_PAYLOAD = "which $LOAD holds here is not known: set it anew on every way here"
+NO_LOAD = "which $LOAD holds here is not known: set it again on every way here"
 SOFT = "an axis is soft ($SOFT_PLCL)"
 MOVED_BASE = "$ROBROOT or $WORLD is set by the program"
 # System variables that change nothing of where targets are and from which side they are
@@ -236,8 +238,8 @@ class ModeReader:
     def _entry_value(self, modes: KrlModes, one: said.Assignment) -> object | None:
         """Read the frame that an entry gets, or the mass of a load."""
         if one.target.name == "load_data":
-            mass = self._record(one.value).number("m")
-            return None if math.isnan(mass) else mass
+            load = load_of(self._record(one.value))
+            return None if load == LOST_LOAD else load
         found = self.frames(modes).frame(one.value)
         taught = found.taught or one.target.name in self.task.taught
         return None if found.why or not found.pose else replace(found, taught=taught)
@@ -327,9 +329,7 @@ class ModeReader:
         """Read ``SAPO(LCPDAT1)``, ``SAPO_PTP(PPDAT1)`` or ``{CDIS 5.0, ..}``."""
         if isinstance(operand, said.FunctionCall):
             held = self._record(self._argument(operand))
-            share = held.get("apo_mode") == "#cptp"  # then it is no distance
-            size = UNKNOWN if share else known(held.number("apo_dist"))
-            return replace(modes, distance=size)
+            return replace(modes, distance=known(held.number("apo_dist")))
         found = self._record(operand)
         return replace(
             modes,
@@ -342,7 +342,15 @@ class ModeReader:
         operand: said.Operand | None = one.value
         match one.target.steps, operand:
             case ("m",), _:
-                return _weighed(modes, self._number(operand))
+                mass, centre = self._number(operand), modes.load[1:]
+                return replace(modes, load=_load_of(mass, centre))
+            case ("cm",), _:
+                centre = _centre_of(self._record(operand))
+                known = centre and modes.load and modes.load != LOST_LOAD
+                load = (modes.load[0], *centre) if known else LOST_LOAD
+                return replace(modes, load=load)
+            case ("cm", *_), _:
+                return replace(modes, load=LOST_LOAD)
             case (), said.FunctionCall(name="sload"):
                 return self.loaded(modes, self._number(self._argument(operand)))
             case (), said.DataObject(
@@ -351,7 +359,7 @@ class ModeReader:
                 index = self.task.index(step, self.row, self.here) or (math.nan,)
                 return self.loaded(modes, index[0])
             case (), _:
-                return _weighed(modes, self._record(operand).number("m"))
+                return replace(modes, load=load_of(self._record(operand)))
         return modes
 
     def loaded(self, modes: KrlModes, number: float) -> KrlModes:
@@ -360,8 +368,8 @@ class ModeReader:
         if entry is None:
             return replace(modes, load=LOST_LOAD)
         held = modes.store.get(entry_name("load_data", entry))
-        if isinstance(held, float):
-            return _weighed(modes, held)
+        if isinstance(held, tuple):
+            return replace(modes, load=held)
         if not self.task.is_steady("load_data", entry):
             return replace(modes, load=LOST_LOAD)
         found = self.task.datum("load_data", self.here, (entry,))
@@ -370,8 +378,8 @@ class ModeReader:
         file, datum = found
         there = Scope(file, self.task.files[file].name, "")
         value = self.task.value(datum.value, datum.row, there)
-        mass = value.number("m") if isinstance(value, KrlRecord) else math.nan
-        return _weighed(modes, mass)
+        load = load_of(value) if isinstance(value, KrlRecord) else LOST_LOAD
+        return replace(modes, load=load)
 
     # BAS(#command, value), as the controller's bas.src carries it out.
 
@@ -460,29 +468,24 @@ class ModeReader:
         )
 
 
-LOAD_KG, LOAD_SHARE = 1.0, 0.1  # that a load may be off what the cell says
+def load_of(record: KrlRecord) -> tuple[float, ...]:
+    """Return the load that a record states, see `KrlModes.load`."""
+    centre = record.get("cm")
+    known = _centre_of(centre) if isinstance(centre, KrlRecord) else ()
+    return _load_of(record.number("m"), known)
 
 
-def payload_reason(modes: KrlModes, cell_kg: float) -> str:
-    """Return why targets are left with the load of the program, "" where they are not.
-
-    Args:
-        modes: What holds at the target.
-        cell_kg: What the cell says that the arm carries, NaN where it does not say.
-    """
-    if math.isnan(cell_kg) or modes.load == CELL_LOAD:
-        return ""
-    if modes.load == LOST_LOAD:
-        return NO_PAYLOAD
-    off = abs(modes.load - cell_kg)
-    return PAYLOAD if off > max(LOAD_KG, LOAD_SHARE * cell_kg) else ""
-
-
-def _weighed(modes: KrlModes, mass: float) -> KrlModes:
-    """Take a mass; a negative one states none, and stands for the arm's default."""
+def _load_of(mass: float, centre: tuple[float, ...]) -> tuple[float, ...]:
+    """Return a load; a negative mass states none, and stands for the arm's default."""
     if math.isnan(mass):
-        return replace(modes, load=LOST_LOAD)
-    return replace(modes, load=mass if mass >= 0 else CELL_LOAD)
+        return LOST_LOAD
+    return (mass, *centre) if mass >= 0 else CELL_LOAD
+
+
+def _centre_of(record: KrlRecord) -> tuple[float, ...]:
+    """Return a centre of mass [m], () where it is not known."""
+    found = tuple(record.number(name) * MM for name in ("x", "y", "z"))
+    return () if any(map(math.isnan, found)) else found
 
 
 def known(value: float) -> float:

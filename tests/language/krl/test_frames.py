@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.language.interface import Start
 from tests.language.krl.test_visits import CONFIG, NEW, frame, job, reasons
 
 SHIFT = "{X 0,Y 0,Z 5,A 0,B 0,C 0}"
@@ -176,33 +175,54 @@ def test_an_interrupt_that_sets_an_entry_leaves_everything():
 # Loads.
 
 
+def loads(found):
+    v = found.visits
+    return v.loads[v.load]
+
+
+LOAD = "{M 90,CM {X 10,Y 20,Z 30,A 0,B 0,C 0},J {X 1,Y 1,Z 1}}"
+
+
 @pytest.mark.parametrize(
     "line",
-    ["$LOAD.M=90", "LOAD_DATA[1]={M 90}\nBAS(#TOOL,1)", "$LOAD={M 90}",
-     "LOAD_DATA[1]={M 90}\n$LOAD=SLOAD(1)", "LOAD_DATA[1]={M 90}\n$LOAD=LOAD_DATA[1]"],
+    [f"$LOAD={LOAD}", f"LOAD_DATA[1]={LOAD}\nBAS(#TOOL,1)",
+     f"LOAD_DATA[1]={LOAD}\n$LOAD=SLOAD(1)",
+     f"LOAD_DATA[1]={LOAD}\n$LOAD=LOAD_DATA[1]",
+     f"LOAD_DATA[1]={LOAD}\nFDAT_ACT=FP1\nBAS(#FRAMES)",
+     "$LOAD.M=90\n$LOAD.CM={X 10,Y 20,Z 30,A 0,B 0,C 0}"],
 )  # fmt: skip
-def test_every_form_that_sets_a_load_is_compared(line):
-    start = Start(payload_kg=40.0)
-    assert "$LOAD is not" in reasons(job(line, "LIN XP1", start=start))[0]
-    assert reasons(job(line.replace("90", "40"), "LIN XP1", start=start)) == [""]
+def test_every_form_that_sets_a_load_is_taken(line):
+    found = job("BAS(#TOOL,0)", "LIN XP1", line, "LIN XP1", "LIN XP1")
+    assert reasons(found) == [""] * 3
+    nan, own = [np.nan] * 4, [90.0, 0.01, 0.02, 0.03]
+    np.testing.assert_allclose(loads(found), [nan, own, own])
+
+
+def test_a_move_may_state_its_own_load():
+    found = job("BAS(#TOOL,0)", f"SLIN XP1{NEW}", "SLIN XP1")
+    np.testing.assert_allclose(loads(found)[0], [40.0, 0.0, 0.0, 0.0])
+    assert np.isnan(loads(found)[1]).all()
+
+
+def test_a_mass_alone_keeps_the_centre_that_was_stated():
+    found = job("$LOAD.M=50", "LIN XP1", f"$LOAD={LOAD}", "$LOAD.M=50", "LIN XP1")
+    np.testing.assert_allclose(loads(found)[0], [50, *[np.nan] * 3])
+    np.testing.assert_allclose(loads(found)[1], [50, 0.01, 0.02, 0.03])
 
 
 @pytest.mark.parametrize(
     "line",
-    ["$LOAD.M=N2", "$LOAD=camera( )", "$LOAD=LOAD_DATA[N2]", "LOAD_DATA[1].M=N2",
-     "IF $IN[1] THEN\n$LOAD.M=90\nENDIF"],
+    ["$LOAD.M=N2", "$LOAD=camera( )", "$LOAD=LOAD_DATA[N2]", "$LOAD=SLOAD(N2)",
+     "LOAD_DATA[1].M=N2\nBAS(#TOOL,1)", "IF $IN[1] THEN\n$LOAD.M=90\nENDIF",
+     f"$LOAD={LOAD}\n$LOAD.CM.X=N2", "$LOAD.CM={X 1,Y N2,Z 3}"],
 )  # fmt: skip
 def test_a_load_that_is_not_known_leaves_targets(line):
     more = "DEFFCT LOAD camera( )\nRETURN $LOAD\nENDFCT\n"
-    start = Start(payload_kg=40.0)
-    found = job(line, "BAS(#TOOL,1)", "LIN XP1", "N2=1", start=start, more=more)
-    if line.startswith("LOAD_DATA"):
-        assert "$LOAD" in reasons(found)[0]
-    found = job(line, "LIN XP1", "N2=1", start=start, more=more)
-    assert reasons(found)[0] or line.startswith("LOAD_DATA")
+    found = job("BAS(#TOOL,0)", line, "LIN XP1", "N2=1", more=more)
+    assert "$LOAD" in reasons(found)[0]
 
 
 @pytest.mark.parametrize("line", ["$LOAD.M=-1", "$LOAD={M -1}", "BAS(#TOOL,0)"])
 def test_a_placeholder_states_no_load(line):
-    start = Start(payload_kg=40.0)
-    assert reasons(job(line, "LIN XP1", start=start)) == [""]
+    found = job(line, "LIN XP1")
+    assert reasons(found) == [""] and np.isnan(loads(found)).all()

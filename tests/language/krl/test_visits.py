@@ -242,13 +242,15 @@ def test_speeds_and_blending():
 
 
 def test_blending_of_inline_settings():
-    """A distance that its record holds as a share of the way is not known."""
+    """Both functions of bas.src take APO_DIST for the distance, whatever APO_MODE is."""
     line, joint = "$APO=SAPO(LCPDAT1)", "$APO=SAPO_PTP(PPDAT1)"
     found = job(
         f"SLIN XP1 WITH {line} C_SPL", f"SPTP XP2 WITH {joint} C_SPL", "SLIN XP1"
     )
-    assert found.visits.zone_mm[0] == 12.5 and "$APO" not in reasons(found)[0]
-    assert "$APO" in reasons(found)[1]
+    assert found.visits.zone_mm[:2].tolist() == [12.5, 50.0]
+    assert reasons(found) == [""] * 3
+    lost = job(f"SPTP XP2 WITH {joint} C_SPL", "SLIN XP1", "PPDAT1.APO_DIST=3")
+    assert "$APO" in reasons(lost)[0]
 
 
 @pytest.mark.parametrize(
@@ -376,13 +378,6 @@ def test_home_holds_no_target():
 def test_a_remote_tool():
     found = job("FDAT_ACT=FOUT", "BAS(#FRAMES)", "LIN XP1")
     assert found.visits.tool_remote.tolist() == [True]
-
-
-def test_the_load_must_be_that_of_the_cell():
-    held = ["FDAT_ACT=FP1", "BAS(#FRAMES)", "LIN XP1"]
-    assert "$LOAD" in reasons(job(*held, start=Start(payload_kg=10.0)))[0]
-    assert reasons(job(*held, start=Start(payload_kg=40.5))) == [""]
-    assert reasons(job(*held)) == [""]
 
 
 def test_external_axes_count_where_they_are_not_0_or_the_arm_has_some():
