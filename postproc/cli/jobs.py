@@ -25,12 +25,13 @@ from postproc.files import (
     Content,
     base_name,
     check_places,
-    find_shared_list,
+    find_shared,
     find_variables,
     is_data_list,
     is_program,
     is_shared_list,
     is_stream,
+    is_system_file,
     is_variables,
     program_key,
     program_of,
@@ -78,8 +79,7 @@ def find_pages(program: Path) -> Pages:
         for name, line in outside.items()
     ]
     main = program_key(program.name)
-    shared = find_shared_list(program)
-    reads = () if shared is None else (shared,)
+    reads = find_shared(program)
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes), reads)
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
@@ -110,6 +110,8 @@ def _is_page(path: Path, outputs: bool) -> bool:
     """Tell whether a file is a program or a data list, be it an output or not."""
     ours = is_program(path.name) or is_data_list(path.name)
     if not (ours and path.is_file()) or is_shared_list(path.name):
+        return False
+    if is_system_file(path):
         return False
     return outputs or read_stamp(read_head(path)) is None
 

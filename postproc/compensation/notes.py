@@ -9,7 +9,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, in_chunks
 from postproc.compensation.continuity import on_path
 from postproc.compensation.frames import taught_records
-from postproc.files import is_shared_list, is_variables, variables_of
+from postproc.files import is_shared_list, is_submit, is_variables, variables_of
 from postproc.language.languages import language_of
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
@@ -70,10 +70,11 @@ def followed_pages(visits: Visits) -> list[Diagnostic]:
         "is followed, and rewritten, as a page of this program",
         "is read, and not rewritten: all programs share it",
     )
+    names = [name for name in visits.files[1:] if not is_variables(name)]
     return [
-        Diagnostic(visits.files[0], 1, "page", f"{name} {texts[is_shared_list(name)]}")
-        for name in visits.files[1:]
-        if not is_variables(name)
+        Diagnostic(visits.files[0], 1, "page", f"{name} {texts[shared]}")
+        for name in names
+        for shared in (is_shared_list(name) or is_submit(name),)
     ]
 
 

@@ -129,7 +129,7 @@ class FrameReader:
 
     def _correction(self, name: str, frame: str, switch: str) -> KrlFrame:
         """Return a frame that BAS links to an entry, no shift where it does not."""
-        on = self.store.get(switch)
+        on = self._held(switch, switch)
         if on is None:
             on = self.task.initial_switch(switch)
         if on is False:
@@ -138,7 +138,7 @@ class FrameReader:
         if on is None:
             why = _MAY_BE_ON.format(switch.upper(), frame.upper(), shown)
             return KrlFrame((), why)
-        found = self.store.get(frame)
+        found = self._held(frame, frame)
         if isinstance(found, KrlFrame):
             return found
         return KrlFrame((), _CORRECTED.format(frame.upper(), shown))
@@ -155,7 +155,7 @@ class FrameReader:
 
     def _element(self, table: str, number: int) -> KrlFrame | None:
         """Read an element of an array of frames, None where it is not known."""
-        held = self.store.get(entry_name(table, number))
+        held = self._held(table, entry_name(table, number))
         if isinstance(held, KrlFrame) and self.task.is_global(table, self.here):
             return held
         if not self.task.is_steady(table, number):
@@ -168,6 +168,10 @@ class FrameReader:
         pose = pose_of(self.task.value(datum.value, datum.row, there))
         taught = self.task.is_taught(table, file, datum.row)
         return KrlFrame(pose, taught=taught) if pose else None
+
+    def _held(self, name: str, key: str) -> object | None:
+        """Return what the program has set, unless something beside it may change it."""
+        return None if name in self.task.beside else self.store.get(key)
 
     def _is_chained(self, number: int) -> bool:
         """Tell whether a base hangs on an external axis."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -20,6 +21,7 @@ from postproc.language.krl.modes import (
 from postproc.language.krl.moves import KrlGoals
 from postproc.language.krl.program import whole
 from postproc.language.krl.routines import AHEAD, ASSUMED, package_routines
+from postproc.language.krl.statements import KrlText
 from postproc.language.krl.store import HELD
 from postproc.language.krl.task import (
     FUNCTIONS,
@@ -273,7 +275,7 @@ class KrlMachine(TaskMachine):
     def _switched_on(self) -> set[int]:
         """Numbers of the interrupts that some statement switches on."""
         found = set()
-        for file, text in enumerate(self.texts):
+        for file, text in self._robot_texts():
             here = Scope(file, self.task.files[file].name, "")
             for row in range(len(text)):
                 one = text.statement(row)
@@ -295,6 +297,12 @@ class KrlMachine(TaskMachine):
             here, modes=here.modes.with_(blocked=here.modes.blocked | {_INTERRUPT})
         )
 
+    def _robot_texts(self) -> Iterator[tuple[int, KrlText]]:
+        """Yield files and statements, but for those of submit programs."""
+        for file, text in enumerate(self.texts):
+            if not self.task.files[file].is_submit:
+                yield file, text
+
     @cached_property
     def everywhere(self) -> frozenset[str]:
         """Return why no target can be compensated, once all ways are followed.
@@ -304,7 +312,7 @@ class KrlMachine(TaskMachine):
         """
         found = set()
         unseen_on = False
-        for file, text in enumerate(self.texts):
+        for file, text in self._robot_texts():
             for row in range(len(text)):
                 if (file, row) in self._met:
                     continue

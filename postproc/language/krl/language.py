@@ -65,6 +65,9 @@ class Krl(Language):
     ) -> JobReading:
         """Read the files of a job, the source that runs first; see `Language.read`."""
         files = [read_once(source, known, read_krl) for source in sources]
+        if files[0].is_submit:
+            problem = "is a submit program, which moves no arm"
+            raise ProgramError(sources[0].name, problem, "Give the .src of a program")
         if not files[0].routines:
             problem, cure = "the file holds no routine", "Give the .src of a program"
             raise ProgramError(sources[0].name, problem, cure)

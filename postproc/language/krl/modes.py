@@ -368,7 +368,7 @@ class ModeReader:
         if entry is None:
             return replace(modes, load=LOST_LOAD)
         held = modes.store.get(entry_name("load_data", entry))
-        if isinstance(held, tuple):
+        if isinstance(held, tuple) and "load_data" not in self.task.beside:
             return replace(modes, load=held)
         if not self.task.is_steady("load_data", entry):
             return replace(modes, load=LOST_LOAD)

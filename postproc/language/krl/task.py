@@ -130,7 +130,7 @@ class KrlTask:
         """Routines by name: file, place, and whether other files know each."""
         found = defaultdict(list)
         for number, file in enumerate(self.files):
-            for k, scope in enumerate(file.routines):
+            for k, scope in enumerate(() if file.is_submit else file.routines):
                 shared = k == 0 or scope.head.shared
                 found[scope.head.name].append((number, scope, shared))
         return found
@@ -229,16 +229,28 @@ class KrlTask:
         return self._uses[1]
 
     @cached_property
+    def beside(self) -> frozenset[str]:
+        """Names of data that submit programs may change at any time."""
+        found = set[str]()
+        for file in (f for f in self.files if f.is_submit):
+            own = {datum.name for datum in file.data if not datum.shared}
+            uses = _Uses()
+            for one in file.text.said:
+                uses.note(one)
+            found |= uses.written - own
+        return frozenset(found)
+
+    @cached_property
     def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
         uses = _Uses()
-        for file in self.files:
+        for file in (f for f in self.files if not f.is_submit):
             lists = file.routines == ()
             for one in file.text.said:
                 if not (lists and isinstance(one, said.Assignment)):
                     uses.note(one)
                 else:
                     uses.take(one.value)
-        return frozenset(uses.written), frozenset(uses.read)
+        return frozenset(uses.written) | self.beside, frozenset(uses.read) | self.beside
 
     @cached_property
     def _taught_lines(self) -> list[frozenset[int]]:

@@ -242,7 +242,7 @@ def test_speeds_and_blending():
 
 
 def test_blending_of_inline_settings():
-    """Both functions of bas.src take APO_DIST for the distance, whatever APO_MODE is."""
+    """Both functions of bas.src take APO_DIST for it, whatever APO_MODE is."""
     line, joint = "$APO=SAPO(LCPDAT1)", "$APO=SAPO_PTP(PPDAT1)"
     found = job(
         f"SLIN XP1 WITH {line} C_SPL", f"SPTP XP2 WITH {joint} C_SPL", "SLIN XP1"
