@@ -561,3 +561,18 @@ def read_stream(stream: BinaryIO, name: str | Path) -> bytes:
     if len(data) > LARGEST:
         raise ProgramError(name, f"is longer than {LARGEST} bytes", "Is it a program?")
     return data
+
+
+def spreadsheet_text(text: str) -> str:
+    """Return a cell of a table that no spreadsheet takes for a formula.
+
+    >>> print(spreadsheet_text("=1+1"), spreadsheet_text("-1.5"), spreadsheet_text("W"))
+    '=1+1 -1.5 W
+    """
+    if not text.startswith(("=", "+", "-", "@", "\t", "\r")):
+        return text
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return f"'{text}"
+    return text

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from postproc.batch.pages import read_head
 from postproc.compensation.outcome import LEFT_ALONE, with_left
 from postproc.compensation.record import (
     FileRecord,
@@ -26,6 +27,7 @@ from postproc.files import (
     holds_targets,
     is_compiled,
     is_data_list,
+    is_module,
     is_program,
     is_variables,
     program_of,
@@ -107,6 +109,7 @@ def check(
     names = {place.lower(): place for place in places}
     look = _Look(folder, source, current, names, strict_calls)
     findings = [f for place in places for f in look.at(place)]
+    findings += _mixed(folder, [place for place in places if current(place) is None])
     if source is not None:
         findings += _absent(source, set(places))
     programs = sum(map(is_program, places))
@@ -127,6 +130,26 @@ def _places(root: Path) -> Iterator[str]:
     for parent, _, names in os.walk(root, onerror=fail):
         for name in sorted(names):
             yield (Path(parent) / name).relative_to(root).as_posix()
+
+
+def _mixed(root: Path, places: Sequence[str]) -> Iterator[CheckFinding]:
+    """Find modules of a task, and sources with data lists, of different models."""
+    models: dict[str, dict[str, str]] = {}
+    for place in places:
+        if is_program(place) or is_data_list(place):
+            stamp = read_stamp(read_head(root / place))
+            folder, _, name = place.rpartition("/")
+            job = folder if is_module(name) else f"{folder}/{name.rpartition('.')[0]}"
+            if stamp is not None:
+                models.setdefault(job, {}).setdefault(stamp.model, place)
+    for found in models.values():
+        (model, place), *others = found.items()
+        for other, at in others:
+            text = (
+                f"was made with model {other}, and {place} beside it with {model}: "
+                "they are one job. Compensate it again"
+            )
+            yield CheckFinding(at, "mixed-models", text)
 
 
 def _absent(source: Path, places: set[str]) -> list[CheckFinding]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from stat import S_ISREG
 
 from postproc import _native
+from postproc.compensation.record import sidecar_path
 from postproc.files import (
     KRL_PROGRAMS,
     base_name,
@@ -23,7 +24,8 @@ from postproc.files import (
 )
 from postproc.language.stamp import read_stamp
 
-HEAD = 1 << 12  # bytes: the stamp of an output stands on its first line
+HEAD = 1 << 14  # bytes: the stamp of an output stands near its first line
+OUTPUT = ".compensated"  # ends the name of an output, before its suffix
 
 _WORDS = (b"import", b"routine", b"call")  # what names a program begins with one
 _NAMED = re.compile(
@@ -143,8 +145,17 @@ def _modules_beside(path: Path) -> Iterator[Path]:
 @lru_cache(maxsize=8192)
 def _is_part(path: Path, changed: int, size: int) -> bool:
     """Tell whether a module belongs to a task whose main routine is elsewhere."""
-    text = _read(path, -1)
-    return _MAIN.search(text) is None and read_stamp(text[:HEAD]) is None
+    return _MAIN.search(_read(path, -1)) is None and not is_output(path)
+
+
+def is_output(path: Path) -> bool:
+    """Return True if a compensation has written a file beside its source.
+
+    Of an output in which nothing was changed, its name and its record tell.
+    """
+    if read_stamp(read_head(path)) is not None:
+        return True
+    return path.stem.endswith(OUTPUT) and sidecar_path(path).is_file()
 
 
 def read_head(path: Path) -> bytes:

@@ -41,7 +41,7 @@ from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program, tell_directions
 from postproc.cli.readings import Readings, read_setup, rows_of
 from postproc.exceptions import PostprocError
-from postproc.files import write_all
+from postproc.files import spreadsheet_text, write_all
 from postproc.model.model import (
     FreePart,
     Model,
@@ -590,7 +590,8 @@ def written(
     out = io.StringIO()
     writer = csv.writer(out, delimiter=";" if table.decimal == "," else ",")
     writer.writerow([*table.columns, *header, "outside"])
-    for line, cells in zip(table.line, table.cells, strict=True):
+    for line, own in zip(table.line, table.cells, strict=True):
+        cells = [spreadsheet_text(cell) for cell in own]
         i = row_of.get(int(line))
         if i is None:
             why = "fixed point" if int(line) in fixed else "beam lost"

@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from postproc.batch.pages import (
+    OUTPUT,
     group_pages,
+    is_output,
     names_in,
     of_one_arm,
     program_arm,
@@ -113,7 +115,7 @@ def _is_page(path: Path, outputs: bool) -> bool:
         return False
     if is_system_file(path):
         return False
-    return outputs or read_stamp(read_head(path)) is None
+    return outputs or is_data_list(path.name) or not is_output(path)
 
 
 def _is_output(program: Path) -> bool:
@@ -382,7 +384,7 @@ def default_output(program: Path) -> Path:
     >>> default_output(Path("cell/job.pdl")).name
     'job.compensated.pdl'
     """
-    return program.with_name(f"{program.stem}.compensated{program.suffix}")
+    return program.with_name(f"{program.stem}{OUTPUT}{program.suffix}")
 
 
 def program_name(program: str, lsv: Path | None) -> str:

@@ -25,6 +25,20 @@ _HEADER = re.compile(  # of a module or a source: it stands before all else
     rb"|(?:[ \t]*+(?:\r\n?+|\n))*+(?:[ \t]*+&[^\r\n]*+(?:\r\n?+|\n))++)",
     re.DOTALL,
 )
+_MODULE = re.compile(  # the whole line with which a module begins
+    rb"(?:\xef\xbb\xbf)?(?:[ \t]*+(?:![^\r\n]*+)?(?:\r\n?+|\n))*+"
+    rb"[ \t]*+MODULE[ \t]++\w++[ \t]*+(?:\([^()\r\n!]*+\)[ \t]*+)?(?:![^\r\n]*+)?"
+    rb"(?:\r\n?+|\n)",
+    re.IGNORECASE,
+)
+
+
+_ROUTINE = re.compile(  # .. and with which a source of KRL, or its data list, does
+    rb"(?:\xef\xbb\xbf)?(?:[ \t]*+(?:;[^\r\n]*+)?(?:\r\n?+|\n))*+"
+    rb"[ \t]*+(?:GLOBAL[ \t]++)?DEF(?:DAT[ \t]|FCT[ \t]|[ \t])[^\r\n;]*+(?:;[^\r\n]*+)?"
+    rb"(?:\r\n?+|\n)",
+    re.IGNORECASE,
+)
 
 
 @dataclass(frozen=True)
@@ -58,14 +72,27 @@ def source_hash(source: Source) -> str:
 
 
 def stamp_place(data: bytes) -> int:
-    """Return the offset at which a stamp goes into a text: behind a file header."""
+    """Return the offset at which a stamp goes into a text.
+
+    It stands behind the line with which a module or a source begins, where controllers
+    keep comments when they save; else behind a file header or a byte-order mark.
+    """
+    header = _header_end(data)
+    found = _MODULE.match(data, header) or _ROUTINE.match(data, header)
+    return found.end() if found else header
+
+
+def _header_end(data: bytes) -> int:
+    """Return where a file header ends, or a byte-order mark, 0 without both."""
     found = _HEADER.match(data)
-    return found.end() if found else 0
+    if found:
+        return found.end()
+    return len(UTF8_MARK) if data.startswith(UTF8_MARK) else 0
 
 
 def read_stamp(data: bytes) -> Stamp | None:
     """Return the stamp on line 1 or behind a file header, None where there is none."""
-    found = _found(data) or _STAMP.match(data.removeprefix(UTF8_MARK))
+    found = _found(data)
     if found is None:
         return None
     return Stamp(
@@ -102,5 +129,7 @@ def stamp_span(data: bytes) -> Span:
 
 
 def _found(data: bytes) -> re.Match[bytes] | None:
-    """Find the stamp behind the file header, or on line 1."""
-    return _STAMP.match(data, stamp_place(data)) or _STAMP.match(data)
+    """Find the stamp behind the line of a module or the file header, or on line 1."""
+    places = stamp_place(data), _header_end(data), 0
+    found = (_STAMP.match(data, place) for place in places)
+    return next(filter(None, found), None)

@@ -254,6 +254,7 @@ class Visits:
         load: Index into `loads`, (n,).
         loads: Loads that the program states: mass [kg] and its centre in the flange
             frame [m], (k, 4), NaN for what it does not state; loads[0] states nothing.
+        weaves: The tool weaves on the way, or may, (n,).
     """
 
     files: tuple[str, ...]
@@ -302,11 +303,13 @@ class Visits:
     dialect: Dialect
     load: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     loads: Floats = field(default_factory=lambda: np.full((1, 4), np.nan))
+    weaves: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
-        if len(self.load) != len(self.line):
-            none = np.broadcast_to(np.int8(0), (len(self.line),))
-            object.__setattr__(self, "load", none)
+        for name, nothing in (("load", np.int8(0)), ("weaves", np.False_)):
+            if len(getattr(self, name)) != len(self.line):
+                none = np.broadcast_to(nothing, (len(self.line),))
+                object.__setattr__(self, name, none)
         read_only(self)
 
     def __len__(self) -> int:

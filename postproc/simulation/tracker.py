@@ -12,7 +12,7 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.exceptions import MeasurementError
-from postproc.files import write_all
+from postproc.files import spreadsheet_text, write_all
 from postproc.language.visits import Visits
 from postproc.simulation.arm import VirtualArm, at_start, move
 from postproc.simulation.controller import VirtualCell
@@ -383,7 +383,9 @@ def write_measurements(
 def _table(campaign: Campaign, direction: bool) -> tuple[list[str], list[list[str]]]:
     """Return the header and the rows as text."""
     a, joints = campaign.arrivals, range(1, 7)
-    columns: list[tuple[str, Sequence[object]]] = [("id", campaign.ids)]
+    columns: list[tuple[str, Sequence[object]]] = [
+        ("id", [spreadsheet_text(str(one)) for one in campaign.ids])
+    ]
     columns += _columns([f"q{j}_deg" for j in joints], np.degrees(a.q), 5)
     if direction:
         columns += _columns([f"lambda{j}" for j in joints], _signs(a.side), 0)

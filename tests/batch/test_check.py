@@ -16,6 +16,8 @@ from postproc.compensation.options import AS_USUAL
 from postproc.compensation.outcome import Status
 from postproc.exceptions import ProgramError
 from postproc.files import TEMPORARY
+from postproc.language.source import Source
+from postproc.language.stamp import stamp_line
 from postproc.model.model import load_model
 from tests.inline import InlinePool
 from tests.plant import grow, program
@@ -179,3 +181,17 @@ def test_the_command_takes_each_program_s_model_from_the_plan(trees, job_folder)
     assert found.exit_code == 1
     assert found.stderr.count("older-model") == 1
     assert "spot.pdl: older-model" in found.stderr
+
+
+def test_modules_of_a_task_with_two_models_are_found(tmp_path):
+    for name, model in (("a.mod", "one"), ("b.mod", "two"), ("c/d.mod", "three")):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        source = Source(name, b"MODULE m\nENDMODULE\n")
+        line = stamp_line("1.0", model, source, "!")
+        path.write_bytes(b"MODULE m\n" + line + b"ENDMODULE\n")
+    assert ("b.mod", "mixed-models") in codes(check(tmp_path))
+    assert not {place for place, code in codes(check(tmp_path, lambda place: "one"))
+                if code == "mixed-models"}  # fmt: skip
+    (tmp_path / "b.mod").unlink()
+    assert "mixed-models" not in {code for _, code in codes(check(tmp_path))}

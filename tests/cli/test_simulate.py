@@ -33,6 +33,13 @@ def test_measured_visits_carry_their_ids(desk):
     assert [r["id"] for r in rows_of(out)] == ["hole_1", "hole_2"]
 
 
+def test_an_id_is_no_formula_of_a_spreadsheet(desk):
+    marked = ("-- MEASURE =HYPERLINK(1)", POSE, "-- MEASURE @SUM(1)", FIRST)
+    source, out = desk.put("job.pdl", program(FIRST, *marked)), desk.folder / "m.csv"
+    assert cli("simulate", source, "--cell", desk.cell, "-o", out).exit_code == 0
+    assert [r["id"] for r in rows_of(out)] == ["'=HYPERLINK(1)", "'@SUM(1)"]
+
+
 def test_a_seed_is_an_arm(desk):
     source = desk.put("job.pdl", program(FIRST, POSE))
     made = []

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from postproc.exceptions import ProgramError
 from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
@@ -40,6 +41,16 @@ def test_new_numbers_have_enough_digits_and_nothing_else_changes() -> None:
         b"-0.00000", b"-0.50000"
     ).replace(b"1e1", b"10.5000").replace(b"{1, 2.5, 3,", b"{1.00001, 2.5, -3.00000,")
     assert difference(source, Source("a.pdl", out), mine) == ""
+
+
+@pytest.mark.parametrize("digits", [1_001, 65_540])
+def test_a_number_with_too_many_digits_is_refused(digits) -> None:
+    long = PROGRAM.replace(b"{1, ", b"{1." + b"0" * digits + b", ")
+    source = source_from_bytes("a.pdl", long)
+    literals = resolve(parse(source)).visits.literals
+    new = np.array([[2.0, 2.5, 3.0, 4.0, 5.0, 6.0]])
+    with pytest.raises(ProgramError, match=r"a\.pdl:4: .*1,000 digits.*15"):
+        edits(literals, (source,), np.array([1]), new, PDL2_DIALECT)
 
 
 def test_a_difference_that_was_not_meant_is_found() -> None:

@@ -91,3 +91,42 @@ def test_a_stamp_in_front_of_a_header_is_known() -> None:
     out = stamp_line("1.0", "abc", source, "!") + source.data
     assert read_stamp(out) == Stamp("1.0", "abc", source_hash(source))
     assert strip_stamp(out) == source.data
+
+
+@pytest.mark.parametrize("head", [
+    b"MODULE a\r\n", b"module a (SYSMODULE,NOVIEW)  ! mine\r\n",
+    b"! by hand\nMODULE a\n", b"\xef\xbb\xbfMODULE a\r\n",
+    HEADER + b"\r\n  MODULE a\r\n",
+])  # fmt: skip
+def test_a_stamp_goes_into_the_module(head) -> None:
+    source = source_from_bytes("a.mod", head + b"  VAR num n;\r\nENDMODULE\r\n")
+    out = stamped("1.0", "abc", source, source.data)
+    assert out.startswith(head + b"-- postproc 1.0")
+    assert read_stamp(out) == Stamp("1.0", "abc", source_hash(source))
+    assert strip_stamp(out) == source.data
+
+
+def test_a_head_on_several_lines_is_not_torn() -> None:
+    source = source_from_bytes("a.mod", b"MODULE a(\nSYSMODULE)\nENDMODULE\n")
+    out = stamped("1.0", "abc", source, source.data)
+    assert out.startswith(b"-- postproc") and strip_stamp(out) == source.data
+
+
+def test_a_byte_order_mark_stays_first() -> None:
+    source = source_from_bytes("a.pdl", b"\xef\xbb\xbfPROGRAM a\nBEGIN\nEND a\n")
+    out = stamped("1.0", "abc", source, source.data)
+    assert out.startswith(b"\xef\xbb\xbf-- postproc")
+    assert read_stamp(out) == Stamp("1.0", "abc", source_hash(source))
+    assert strip_stamp(out) == source.data
+    before = stamp_line("1.0", "abc", source, "--") + source.data
+    assert read_stamp(before) == Stamp("1.0", "abc", source_hash(source))
+    assert strip_stamp(before) == source.data
+
+
+@pytest.mark.parametrize("place", [0, len(HEADER) + 2])
+def test_a_stamp_where_it_used_to_stand_is_known(place) -> None:
+    source = source_from_bytes("a.mod", HEADER + b"\r\n" + MODULE)
+    line = stamp_line("1.0", "abc", source, "!")
+    out = source.data[:place] + line + source.data[place:]
+    assert read_stamp(out) == Stamp("1.0", "abc", source_hash(source))
+    assert strip_stamp(out) == source.data and is_stamped(source_from_bytes("a", out))

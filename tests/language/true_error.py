@@ -155,8 +155,8 @@ def differing(
     old, stamped = source.decode().splitlines(), output.decode().splitlines()
     if Path(file).suffix == ".dat" and stamped == old:  # it holds no corrected point
         return None, ()
-    header = sum(line.startswith("&") for line in old)
-    if "postproc" not in stamped[header] or len(stamped) != len(old) + 1:
+    header = next((k for k, line in enumerate(stamped) if "postproc" in line), -1)
+    if header < 0 or len(stamped) != len(old) + 1:
         return 1, ()
     flags: list[tuple[int, str, str]] = []
     del stamped[header]

@@ -35,6 +35,9 @@ def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int
     status, before = decisions.status, np.maximum(v.before, 0)
     corrected = (status == Status.SAFE) | (status == Status.UNCHANGED)
     ends = (v.literal >= 0) & (v.target == Meaning.POSE) & corrected
+    has = (v.literal >= 0) & (len(v.literals) > 0)
+    taught = np.zeros(len(v), dtype=bool)
+    taught[has] = v.literals.taught[v.literal[has]]
     frames = [v.tool, v.base, v.uframe, v.config]
     alike = np.all([column == column[before] for column in frames], axis=0)
     found: dict[int, str] = {}
@@ -42,7 +45,13 @@ def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int
         (v.motion == Motion.JOINT, "it is no line and no arc"),
         (v.before < 0, "where it comes from is not one known place"),
         (_several(v), "it is reached several times"),
+        (
+            taught | taught[before],
+            "an end of it is taught: it contains the arm's error",
+        ),
         (~(ends & ends[before]), "its ends are not both corrected poses"),
+        (v.weaves, "it weaves, or may: what is counted along it would begin anew"),
+        (v.load > 0, "the program states what the arm carries on it"),
         (~alike, "it begins with other frames or configuration flags"),
         (~np.isnan(v.aux).all(axis=1), "auxiliary axes move along"),
         (v.tool_remote, "the arm holds the part"),

@@ -14,7 +14,7 @@ from postproc.language.marks import MEASURE
 from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.dialect import COMMENTS
-from postproc.language.pdl2.disturbances import disturbance, stated_load
+from postproc.language.pdl2.disturbances import disturbance, stated_load, weaves
 from postproc.language.pdl2.job import base_variable
 from postproc.language.pdl2.machine import WRITTEN, Goal, Machine, MoveForm, MoveRun
 from postproc.language.pdl2.program import Program
@@ -72,6 +72,7 @@ class SettingColumns:
                 self._table.setdefault(name, []).append(value)
             load = self._loads[stated_load(settings)]
             self._table.setdefault("load", []).append(load)
+            self._table.setdefault("weaves", []).append(weaves(settings))
             found = disturbance(settings)
             tool = ("tool", "tool_rmt")
             pose = found or _unknown(settings, ("uframe", "base", *tool))
@@ -105,6 +106,7 @@ class SettingColumns:
             empty = _row({}, lambda value: -1)
             columns = {name: np.array([value])[:0] for name, value in empty.items()}
             columns["load"] = np.zeros(0, dtype=np.int64)
+            columns["weaves"] = np.zeros(0, dtype=bool)
         records = np.array([f for f, _ in frames], float).reshape(-1, 6)
         columns["frames"] = pose_from_record(records)
         columns["loads"] = np.array(list(self._loads), float)
@@ -489,7 +491,8 @@ class Collector:
         ):
             reason = texts[first] or of_runs[run] or moves.forms[form].reason
             problem = self.settings.problem(setting, Meaning(target))
-            reasons.append(self.reasons[reason or problem or texts[last]])
+            why = reason or problem or texts[last] or self.machine.handler
+            reasons.append(self.reasons[why])
         c.reason[moves.visit] = np.array(reasons, dtype=np.int64)[which]
 
     def _reason(self, run: MoveRun) -> str:

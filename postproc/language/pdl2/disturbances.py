@@ -14,7 +14,8 @@ LEADING = {
     "conv_enbl": "the arm may follow a conveyor ($CONV_ENBL)",
 }
 CALIBRATION, PAYLOAD = "cal_sys", "tool_mass"
-DISTURBING = frozenset({*LEADING, CALIBRATION, PAYLOAD})
+WEAVING = ("weave_num", "weave_type")
+DISTURBING = frozenset({*LEADING, *WEAVING, CALIBRATION, PAYLOAD})
 
 
 def disturbance(settings: Settings) -> str:
@@ -40,3 +41,8 @@ def stated_load(settings: Settings) -> tuple[float, ...]:
     mass = settings.get(PAYLOAD)
     stated = mass if isinstance(mass, float) and mass >= 0.0 else math.nan
     return (stated, *(math.nan,) * 3)
+
+
+def weaves(settings: Settings) -> bool:
+    """Return True if the tool weaves on the way, or may: ``$WEAVE_NUM`` is not 0."""
+    return any(settings.get(name, 0.0) != 0.0 for name in WEAVING)

@@ -689,7 +689,9 @@ def _cancelling_handler(
 
 
 def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> None:
+    line = int(place.program.lines.line[row])
     machine.interrupted = True
+    machine.handler = f"a condition handler (line {line}) may move the arm at any time"
     machine.world.report_once(
         place.program,
         row,

@@ -166,6 +166,8 @@ class Machine:
         widened: Loops that are not unrolled.
         recursive: Bodies (by id) that call themselves, directly or not.
         interrupted: A condition handler may move the arm at any time.
+        handler: Why no move can be compensated that a handler may interrupt, "" where
+            none moves the arm.
         cycle_left: A condition handler may begin the cycle again at any time.
         exhausted: The program is too complex to be followed to the end.
     """
@@ -183,6 +185,7 @@ class Machine:
     volatile: frozenset[str] = frozenset()
     recursive: set[int] = field(default_factory=set)
     interrupted: bool = False
+    handler: str = ""
     cycle_left: bool = False
     exhausted: bool = False
     rows: int = 0

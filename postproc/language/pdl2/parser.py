@@ -95,7 +95,8 @@ def _statement(children: Children) -> ast.Statement | None:
 
 
 def _unquoted(mark: str) -> str:
-    return str(mark)[1:-1]
+    """Return what stands between the quotes of a string; two are one inside of it."""
+    return str(mark)[1:-1].replace(mark[0] * 2, mark[0])
 
 
 def _declared(children: Children, first: int) -> tuple[str, tuple[str, ...]]:

@@ -68,3 +68,10 @@ def test_a_handler_may_leave_any_statement_of_the_cycle():
     assert "trajectory" in reasons(found)[0] and not reasons(found)[1]
     assert ELSEWHERE in found.visits.predecessors(0)
     assert not any(reasons(followed(*body)))
+
+
+def test_a_handler_that_moves_leaves_what_it_may_interrupt():
+    move = "MOVE JOINT TO {9, 0, 0, 0, 0, 0}"
+    found = reasons(followed(*handler(move), FIRST, LAST))
+    assert all(found) and sum("may move the arm" in why for why in found) == 2
+    assert not any(reasons(followed(*handler("CANCEL ALL"), FIRST, LAST)))
