@@ -72,6 +72,7 @@ class Krl(Language):
             problem, cure = "the file holds no routine", "Give the .src of a program"
             raise ProgramError(sources[0].name, problem, cure)
         _refuse_own_accuracy(files)
+        _refuse_doubles(files)
         machine = KrlMachine.of(KrlTask(files, start.taught), start)
         machine.run()
         visits = visits_of(machine)
@@ -144,6 +145,30 @@ def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:
                 cure = "Switch that off, here and on the controller"
                 line = file.text.line(row)
                 raise ProgramError(file.text.source.name, problem, cure, line=line)
+
+
+POINTS = frozenset("e6pos pos e6axis axis frame".split())
+
+
+def _refuse_doubles(files: Sequence[KrlFile]) -> None:
+    """Refuse a data list that declares a point twice, or gives it two values.
+
+    Raises:
+        ProgramError: One does: which of the values holds is not known.
+    """
+    for file in (one for one in files if not one.routines):
+        types = {datum.name: datum.type for datum in file.data if datum.type}
+        first: dict[tuple[str, tuple[int, ...]], int] = {}
+        for datum in file.data:
+            if datum.value is None or types.get(datum.name) not in POINTS:
+                continue
+            row = first.setdefault((datum.name, datum.index), datum.row)
+            if row != datum.row:
+                lines = [file.text.line(at) for at in (row, datum.row)]
+                problem = f"gives {datum.name.upper()} a second value, after line "
+                cure = "Keep the one that the controller has"
+                name, problem = file.text.source.name, f"{problem}{lines[0]}"
+                raise ProgramError(name, problem, cure, line=lines[1])
 
 
 def _switches_on(one: said.SourceStatement) -> str:

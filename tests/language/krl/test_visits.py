@@ -558,6 +558,17 @@ def test_the_controllers_own_accuracy_is_refused():
     assert reasons(job("$ABS_ACCUR=FALSE", "LIN XP1")) == [""]
 
 
+@pytest.mark.parametrize(
+    "more",
+    ["DECL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 180,S 2,T 35}", "XS[2]={X 5}",
+     "DECL E6AXIS XA={A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}", "XP1={X 1}"],
+)  # fmt: skip
+def test_a_point_with_two_values_in_a_list_is_refused(more):
+    with pytest.raises(ProgramError, match=r"m\.dat:\d+: gives X.* a second value"):
+        job("LIN XP1", data=f"{DATA}{more}\n")
+    assert reasons(job("LIN XP1", data=f"{DATA}INT N=4\nDECL E6POS XNEW\n")) == [""]
+
+
 def test_a_data_list_alone_is_refused():
     with pytest.raises(ProgramError, match="no routine"):
         Krl().read([Source("m.dat", b"DEFDAT m\nENDDAT\n")], Start())
