@@ -27,6 +27,7 @@ from postproc.language.krl.task import (
     FUNCTIONS,
     STILL,
     KrlTask,
+    changed_by,
     operands_of,
     parts_of,
 )
@@ -110,6 +111,7 @@ class KrlMachine(TaskMachine):
     ) -> Arrived | None:
         """Carry a statement out; None where it goes on in a routine."""
         here = self.after_functions(context, row, one, here)
+        here = self._forget(context, row, one, here)
         match one:
             case said.KrlMove():
                 return self._move(context, row, one, here)
@@ -129,6 +131,26 @@ class KrlMachine(TaskMachine):
                 return self._trigger(context, one, here)
             case _:
                 return here
+
+    def _forget(
+        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+    ) -> Arrived:
+        """Forget what a routine may change of what is handed over to it."""
+        if isinstance(one, said.InterruptDeclared | said.PathTrigger):
+            return here
+        own = one.target if isinstance(one, said.Assignment) else None
+        store = here.modes.store
+        for target in changed_by(one):
+            name = target.name
+            if target is own or not _is_modal(name):
+                continue
+            if name not in HELD:
+                what = f"hands {name.upper()} over, which may be changed"
+                return self.unknown(context, row, here, what)
+            store = store.without(name).with_(name, None)
+        if store == here.modes.store:
+            return here
+        return replace(here, modes=here.modes.with_(store=store))
 
     def _move(
         self, context: CallContext, row: int, one: said.KrlMove, here: Arrived
@@ -374,12 +396,12 @@ class KrlMachine(TaskMachine):
         match one:
             case said.KrlMove() | said.SplineBlock() | said.NotUnderstood():
                 return frozenset([MOVES])
-            case said.Assignment(target=target) if _is_modal(target.name):
-                return frozenset([MOVES])
             case said.InterruptSwitched(word=word) if word in (BRAKES, RESUMES):
                 return frozenset([word])
             case said.PathTrigger(action=action):
                 return self._own(file, action, called)
+        if any(_is_modal(target.name) for target in changed_by(one)):
+            return frozenset([MOVES])
         here = Scope(file, self.task.files[file].name, "")
         parts = parts_of(operands_of(one))
         names = [p.name for p in parts if isinstance(p, said.FunctionCall)]

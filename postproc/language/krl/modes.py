@@ -134,6 +134,8 @@ BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split
 INITIAL = "BAS(#INITMOV) may set {} anew: set it behind that"
 NO_LOAD = "which $LOAD holds here is not known: set it again on every way here"
 SOFT = "an axis is soft ($SOFT_PLCL)"
+GENERATOR = "a function generator ($TECH) moves the tool off its path"
+AXIS_LOAD = "the program sets a load on an axis ($LOAD_A1 to $LOAD_A3)"
 MOVED_BASE = "$ROBROOT or $WORLD is set by the program"
 # System variables that change nothing of where targets are and from which side they are
 # reached; those in the first list do not stop what is planned ahead either.
@@ -196,6 +198,10 @@ class ModeReader:
                 return self._load(modes, one)
             case "$soft_plcl" | "$softn":
                 return replace(modes, blocked=modes.blocked | {SOFT})
+            case "$tech" | "$tech_c":
+                return replace(modes, blocked=modes.blocked | {GENERATOR})
+            case "$load_a1" | "$load_a2" | "$load_a3":
+                return replace(modes, blocked=modes.blocked | {AXIS_LOAD})
             case "$robroot" | "$world":
                 return replace(modes, blocked=modes.blocked | {MOVED_BASE})
             case "fdat_act" | "pdat_act" | "ldat_act":

@@ -226,3 +226,27 @@ def test_a_load_that_is_not_known_leaves_targets(line):
 def test_a_placeholder_states_no_load(line):
     found = job(line, "LIN XP1")
     assert reasons(found) == [""] and np.isnan(loads(found)).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "left"),
+    [("set_it(TOOL_CORR_ON)", True), ("N2=get_it(BASE_CORR_ON)", True),
+     ("set_it(BASE_DATA[2])", True), ("set_it(TOOL_DATA[N2])", True),
+     ("set_it($BASE)", True), ("set_it(XP2)", False), ("set_it($OUT[1])", False)],
+)  # fmt: skip
+def test_what_is_handed_over_may_be_changed(call, left):
+    more = "DEF set_it(a:OUT)\nBOOL a\na=TRUE\nEND\n"
+    more += "DEFFCT BOOL get_it(a:OUT)\nBOOL a\na=TRUE\nRETURN a\nENDFCT\n"
+    known = ["BASE_DATA[2]={X 1,Y 2,Z 3,A 0,B 0,C 0}", INIT, "$IPO_MODE=#BASE"]
+    known.append("TOOL_DATA[1]={X 1,Y 2,Z 3,A 0,B 0,C 0}")
+    lines = ["$BASE=BASE_DATA[2]", call]
+    rest = [] if call == "set_it($BASE)" else ["BAS(#TOOL,1)", "BAS(#BASE,2)"]
+    found = job(*known, *lines, *rest, "LIN XP1", more=more)
+    assert bool(reasons(found)[0]) == left
+
+
+@pytest.mark.parametrize(
+    "line", ["$TECH.MODE=#CYCLE", "$TECH[1].CLASS=#PATH", "$LOAD_A3.M=12"]
+)
+def test_what_moves_or_loads_the_arm_besides_leaves_targets(line):
+    assert reasons(job(line, "LIN XP1"))[0]

@@ -84,11 +84,13 @@ def test_an_interrupt_of_a_routine_that_is_not_followed_leaves_everything():
     ["TRIGGER WHEN DISTANCE=0 DELAY=0 DO found_it( ) PRIO=-1",
      "TRIGGER WHEN PATH=-20 ONSTART DELAY=5 DO $BASE=BASE_DATA[3]",
      "TRIGGER WHEN DISTANCE=1 DELAY=0 DO BASE_CORR_ON=TRUE",
-     "TRIGGER WHEN DISTANCE=1 DELAY=0 DO unknown_it( )"],
+     "TRIGGER WHEN DISTANCE=1 DELAY=0 DO unknown_it( )",
+     "TRIGGER WHEN DISTANCE=1 DELAY=0 DO takes($BASE)"],
 )  # fmt: skip
 def test_a_trigger_that_sets_what_moves_need_leaves_what_comes_behind(line):
     """The program is ahead: setting it again may be read before the trigger comes."""
-    found = job(*FRAMES, "LIN XP1", line, "LIN XP1", *FRAMES, "LIN XP1", more=SETS)
+    more = SETS + "DEF takes(a:OUT)\nFRAME a\na=$NULLFRAME\nEND\n"
+    found = job(*FRAMES, "LIN XP1", line, "LIN XP1", *FRAMES, "LIN XP1", more=more)
     assert left(found) == [False, True, True]
 
 
