@@ -178,12 +178,20 @@ def _ends(found: Sequence[KrlVisit]) -> Sequence[str]:
 def _end(v: KrlVisit, after: Sequence[KrlVisit]) -> str:
     """Tell whether the arm stops at a visit, by those behind it."""
     stops = [
-        True if one.by_spline_planner != v.by_spline_planner else one.modes.halted
+        True if one.by_spline_planner != v.by_spline_planner else _halted(v, one)
         for one in after
     ]
     if all(stop is True for stop in stops):
         return STOP
     return PASS if all(stop is False for stop in stops) else MAYBE
+
+
+def _halted(v: KrlVisit, after: KrlVisit) -> bool | None:
+    """Return whether the program waits between two moves, None if not known."""
+    if after.modes.ahead != v.modes.ahead and not after.modes.halted:
+        return None
+    halted: bool | None = after.modes.halted
+    return halted
 
 
 def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:

@@ -109,7 +109,20 @@ class KrlMachine(TaskMachine):
     def act(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
     ) -> Arrived | None:
-        """Carry a statement out; None where it goes on in a routine."""
+        """Carry a statement out; None where it goes on in a routine.
+
+        Behind ON_ERROR_PROCEED an error skips it: both ways go on then.
+        """
+        if not here.modes.perhaps:
+            return self._carry_out(context, row, one, here)
+        here = replace(here, modes=here.modes.with_(perhaps=False))
+        after = self._carry_out(context, row, one, here)
+        return None if after is None else after.joined(here)
+
+    def _carry_out(
+        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+    ) -> Arrived | None:
+        """Carry a statement out without an error."""
         here = self.after_functions(context, row, one, here)
         here = self._forget(context, row, one, here)
         match one:
@@ -198,6 +211,8 @@ class KrlMachine(TaskMachine):
             return replace(here, modes=modes)
         if name == "pulse":
             return _halted(here, True)
+        if name == "on_error_proceed":
+            return replace(here, modes=here.modes.with_(perhaps=True))
         if name in STILL or self.said_still(name):
             return _halted(here, None)
         if name in package_routines() and not self._is_overruled(name):

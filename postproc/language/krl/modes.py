@@ -55,6 +55,7 @@ class KrlModes:
             in the flange frame [m] where that is known; `CELL_LOAD` where it states
             nothing, `LOST_LOAD` where what it states is not known.
         store: What the program has set of tables, corrections and switches.
+        perhaps: The next statement is skipped where an error comes up in it.
         declared: Interrupts that may move the arm or end its moves, by number, and why
             targets are left while one of them is on.
         active: Those of them that may be on.
@@ -78,6 +79,7 @@ class KrlModes:
     goes_on: bool = False
     load: tuple[float, ...] = CELL_LOAD
     store: KrlStore = NOTHING_SET
+    perhaps: bool = False
     declared: frozenset[tuple[int, str]] = frozenset()
     active: frozenset[tuple[int, str]] = frozenset()
     blocked: frozenset[str] = frozenset()

@@ -197,6 +197,7 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "settings": lambda c: tuple(c),
     "setting": lambda c: said.Assignment(*c),
     "assignment": lambda c: said.Assignment(*c),
+    "proceed": lambda c: said.Instruction("on_error_proceed", ()),
     "instruction": _called(said.Instruction),
     "arguments": lambda c: tuple(c),
     "argument": lambda c: said.Argument(c[0] if c else None),
@@ -227,7 +228,12 @@ RESERVED = frozenset(
     """.split()
 )
 """Words that name nothing."""
-_NAMES_ONLY = ("ext", "extp", "extfct", "extfctp", "signal", "enum", "struc", "import")
+_NAMES_ONLY = frozenset(
+    """
+    ext extp extfct extfctp signal enum struc import channel confirm anin anout digin
+    """.split()
+)
+"""Words of statements that name something, or read and write in the background."""
 
 _PARSER = FormParser("krl", RULES, RESERVED, LONGEST, DEEPEST)
 
