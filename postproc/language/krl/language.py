@@ -18,6 +18,7 @@ from postproc.language.interface import (
     Start,
 )
 from postproc.language.krl import syntax as said
+from postproc.language.krl.causes import first_cause
 from postproc.language.krl.collect import visits_of
 from postproc.language.krl.dialect import KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
@@ -73,13 +74,15 @@ class Krl(Language):
             raise ProgramError(sources[0].name, problem, cure)
         _refuse_own_accuracy(files)
         _refuse_doubles(files)
-        machine = KrlMachine.of(KrlTask(files, start.taught), start)
+        task = KrlTask(files, start.taught)
+        machine = KrlMachine.of(task, start)
         machine.run()
         visits = visits_of(machine)
         missed = machine.missed({k: file.moves for k, file in enumerate(files)})
         told = never_reached(missed, f"DEF {files[0].routines[0].head.name}", "program")
         own = (d for file in files for d in file.diagnostics)
-        found = [*own, *machine.diagnostics, *told]
+        causes = first_cause(machine, visits)
+        found = [*causes, *own, *machine.diagnostics, *told]
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
         kept = tuple(f for f in files if f.text.source.name not in corrected)
         texts = tuple(skeleton_of(file.text) for file in files)
