@@ -6,9 +6,11 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol
 
 from postproc.arrays import Floats, Ints
+from postproc.language.archive import Archive
 from postproc.language.dialect import Dialect
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import CloneError, Edit, Source
@@ -343,6 +345,10 @@ class Language(ABC):
             lines: All of them.
             wanted: 1-based lines, ascending but for 0: those that it does not have.
         """
+
+    def read_archive(self, folder: Path) -> Archive | None:
+        """Return what the archive of a controller gives, None for any other folder."""
+        return None
 
     def prepare(self) -> None:  # noqa: B027 - most have nothing to load
         """Load what reading the first program takes."""

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
+from postproc.batch.archive import missing_in_cell
+from postproc.language.krl.archive import read_archive
+from postproc.robot.cell import load_cell
 from tests.language.krl.test_submits import BAS
 from tests.language.neutral_job import LANGUAGES, drawn
 from tests.written import cli
@@ -65,3 +69,57 @@ def test_a_job_knows_what_runs_beside_it(archive, job_folder):
     alone = cli("compensate", sub, "--cell", archive / "cell.toml", "--model",
                 job_folder / "model.json")  # fmt: skip
     assert alone.exit_code == 2 and "is a submit program" in alone.output
+
+
+CONFIG = """DEFDAT $CONFIG
+DECL FRAME TOOL_DATA[16]
+TOOL_DATA[1]={X 10.0,Y 20.0,Z 300.0,A 0.0,B 0.0,C 0.0}
+TOOL_DATA[2]={X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}
+BASE_DATA[4]={X 1000.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}
+LOAD_DATA[1]={M -1.0,CM {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z 0.0}}
+LOAD_DATA[3]={M 46.0,CM {X 62.0,Y 0.5,Z 214.0,A 0.0,B 0.0,C 0.0},J {X 1,Y 1,Z 1}}
+DECL E6AXIS XHOME={A1 0.0,A2 -90.0,A3 90.0,A4 0.0,A5 45.0,A6 0.0,E1 0.0}
+ENDDAT
+"""
+MACHINE = """DEFDAT $MACHINE PUBLIC
+INT $EX_AX_NUM=1
+FRAME $ROBROOT={X 0.0,Y 100.0,Z 500.0,A 90.0,B 0.0,C 0.0} ;base of the arm
+ENDDAT
+"""
+
+
+@pytest.fixture
+def lists(archive):
+    """Write lists of a controller; return the folder, and a cell that says little."""
+    (archive / "KRC/R1/System/$config.dat").write_text(CONFIG)
+    (archive / "KRC/R1/Mada/$machine.dat").write_text(MACHINE)
+    (archive / "own.toml").write_text('[robot]\narm = "kr210-r2700-extra"\n')
+    return archive
+
+
+def test_an_archive_tells_what_the_cell_lacks(lists):
+    found = read_archive(lists / "KRC")
+    assert found.entries == {"tools": (1,), "bases": (4,), "loads": (3,)}
+    assert found.load == (46.0, 62.0, 0.5, 214.0) and found.external == 1
+    assert found.home == (0.0, -90.0, 90.0, 0.0, 45.0, 0.0)
+    told = missing_in_cell(found, load_cell(lists / "own.toml"))
+    assert told[0].endswith("gives tools 1; bases 4; loads 3")
+    pasted = "\n".join(line.strip() for line in told[2:])
+    head = '[robot]\narm = "kr210-r2700-extra"\n'
+    (lists / "new.toml").write_text(head + pasted + "\n")
+    cell = load_cell(lists / "new.toml")
+    assert cell.payload_mass == 46.0 and cell.aux == {1: "track"}
+    np.testing.assert_allclose(cell.base.pose[:3, 3], [0.0, 0.1, 0.5])
+    np.testing.assert_allclose(cell.base.pose[:3, 0], [0.0, 1.0, 0.0], atol=1e-9)
+    assert len(missing_in_cell(found, cell)) == 1
+
+
+def test_a_batch_lists_it_before_any_file(lists, job_folder):
+    run = batch(lists, job_folder)
+    told = run.output.index("R1/System/$config.dat gives tools 1")
+    assert told < run.output.index("programs and files")
+    assert "[payload]" in run.output and "absolute_accuracy" not in run.output
+
+
+def test_a_folder_without_lists_is_no_archive(tmp_path):
+    assert read_archive(tmp_path) is None

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from postproc.exceptions import ProgramError
 from postproc.files import KRL_PROGRAMS
+from postproc.language.archive import Archive
 from postproc.language.grammars import line_parser
 from postproc.language.interface import (
     Cloner,
@@ -18,6 +20,7 @@ from postproc.language.interface import (
     Start,
 )
 from postproc.language.krl import syntax as said
+from postproc.language.krl.archive import read_archive
 from postproc.language.krl.causes import first_cause
 from postproc.language.krl.collect import visits_of
 from postproc.language.krl.dialect import KRL_DIALECT
@@ -102,6 +105,10 @@ class Krl(Language):
     def holds_joints(self, line: str) -> bool:
         """Tell whether a line holds joint angles."""
         return _JOINTS.match(line) is not None
+
+    def read_archive(self, folder: Path) -> Archive | None:
+        """Read ``$config.dat`` and ``$machine.dat`` of an archive."""
+        return read_archive(folder)
 
     def prepare(self) -> None:
         """Load the parser of statements."""

@@ -22,7 +22,13 @@ from postproc.exceptions import PostprocError
 from postproc.language.visits import Meaning
 
 NO_TARGETS = (Meaning.HOME, Meaning.RELATIVE_TOOL, Meaning.RELATIVE_UFRAME, Meaning.BY)
-NO_TARGET = ("holds no target", "when the program runs", "external", "numbers are")
+NO_TARGET = (
+    "holds no target",
+    "the program runs",
+    "that runs",
+    "external",
+    "numbers are",
+)
 
 
 def outcomes(path: Path, cell: Path, model: Path) -> Counter[str]:
