@@ -56,12 +56,10 @@ class KrlMachine(TaskMachine):
     Attributes:
         task: Its files.
         goals: Reads destinations.
-        unknown_calls: Routines in no available file, and where each is called first.
     """
 
     task: KrlTask = field(kw_only=True)
     goals: KrlGoals = field(kw_only=True)
-    unknown_calls: dict[str, tuple[int, int]] = field(default_factory=dict)
     _known: dict[tuple[int, int], _Effects] = field(default_factory=dict)
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -219,9 +217,6 @@ class KrlMachine(TaskMachine):
             return _halted(here, None)
         if name in package_routines() and not self._is_overruled(name):
             return self._assume(context, row, name, here)
-        if name not in self.start.routines:
-            place = context.scope.file, row
-            self.unknown_calls[name] = min(self.unknown_calls.get(name, place), place)
         return self.outside(context, row, name, here)
 
     def _is_overruled(self, name: str) -> bool:

@@ -21,7 +21,6 @@ from postproc.language.interface import (
 )
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
-from postproc.language.krl.causes import first_cause
 from postproc.language.krl.collect import visits_of
 from postproc.language.krl.dialect import KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
@@ -77,15 +76,13 @@ class Krl(Language):
             raise ProgramError(sources[0].name, problem, cure)
         _refuse_own_accuracy(files)
         _refuse_doubles(files)
-        task = KrlTask(files, start.taught)
-        machine = KrlMachine.of(task, start)
+        machine = KrlMachine.of(KrlTask(files, start.taught), start)
         machine.run()
         visits = visits_of(machine)
         missed = machine.missed({k: file.moves for k, file in enumerate(files)})
         told = never_reached(missed, f"DEF {files[0].routines[0].head.name}", "program")
         own = (d for file in files for d in file.diagnostics)
-        causes = first_cause(machine, visits)
-        found = [*causes, *own, *machine.diagnostics, *told]
+        found = [*own, *machine.diagnostics, *told]
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
         kept = tuple(f for f in files if f.text.source.name not in corrected)
         texts = tuple(skeleton_of(file.text) for file in files)
