@@ -576,3 +576,20 @@ def spreadsheet_text(text: str) -> str:
     except ValueError:
         return f"'{text}"
     return text
+
+
+SYSTEM_MODULES = "SYSMOD/"
+
+
+def name_read(path: Path) -> str:
+    """Return the name of a file that a job reads and never rewrites.
+
+    >>> name_read(Path("RAPID/TASK1/SYSMOD/user.sys")), name_read(Path("a/$config.dat"))
+    ('SYSMOD/user.sys', '$config.dat')
+    """
+    return f"{SYSTEM_MODULES}{path.name}" if is_module(path.name) else path.name
+
+
+def is_system_module(name: str) -> bool:
+    """Return True if a file is a system module that a job reads."""
+    return name.startswith(SYSTEM_MODULES)

@@ -74,7 +74,7 @@ def join_program(
     rows = np.array([_visit_of(places, i, table.path, line) for i, line in zip(
         ids, table.line.tolist(), strict=True)], dtype=np.int64)  # fmt: skip
     order = np.argsort(rows, kind="stable")
-    states = states_of(planned.plan, visits, cell, cell.temperature)[rows[order]]
+    states = states_of(planned.plan, cell, cell.temperature, visits)[rows[order]]
     recorded = {
         name: scale * table.numbers(column, empty=True)[order]
         for column, (name, scale) in COVARIATES.items()

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from postproc.batch.pages import (
     OUTPUT,
     group_pages,
@@ -35,6 +37,7 @@ from postproc.files import (
     is_stream,
     is_system_file,
     is_variables,
+    name_read,
     program_key,
     program_of,
     read_input,
@@ -48,6 +51,9 @@ from postproc.language.visits import Diagnostic
 from postproc.model.model import Model, load_model
 from postproc.report.json import report_pieces
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.pose import record_from_pose
+
+SAME_PLACE, SAME_TURN = 1e-4, 1e-5  # [m] and of the axes: two bases are one
 
 # The pages of a program on the disk: programs beside it that only it names.
 
@@ -81,7 +87,7 @@ def find_pages(program: Path) -> Pages:
         for name, line in outside.items()
     ]
     main = program_key(program.name)
-    reads = find_shared(program)
+    reads = (*find_shared(program), *_read_elsewhere(program))
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes), reads)
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
@@ -102,6 +108,30 @@ def find_pages(program: Path) -> Pages:
     pages = group_pages(alone).get(main, ())
     notes += _left_out(programs, named, (main, *pages), apart)
     return Pages(tuple(programs[page] for page in pages), tuple(notes), reads)
+
+
+def _read_elsewhere(program: Path) -> tuple[Path, ...]:
+    """Return what a program of an archive reads in other folders."""
+    return language_of(program.name).reads(program) if is_program(program.name) else ()
+
+
+def archive_notes(program: Path, cell: Cell) -> tuple[Diagnostic, ...]:
+    """Say what the backup of a program knows of the arm, and the cell does not."""
+    notes: list[Diagnostic] = []
+    if not is_program(program.name):
+        return ()
+    arms = language_of(program.name).placed_arms(program)
+    for name, pose in arms[cell.arm_number - 1 : cell.arm_number]:
+        apart = np.abs(pose - cell.base.pose)
+        if apart[:3, 3].max() > SAME_PLACE or apart[:3, :3].max() > SAME_TURN:
+            x, y, z, *turns = record_from_pose(pose).tolist()
+            text = (
+                f"MOC.cfg of this backup places {name} otherwise than the cell. "
+                f"Paste into the cell: [base] xyz_mm = [{x:.3f}, {y:.3f}, {z:.3f}] "
+                f"euler_zyz_deg = [{', '.join(f'{v:.4f}' for v in turns)}]"
+            )
+            notes.append(Diagnostic(program.name, 1, "archive-base", text))
+    return tuple(notes)
 
 
 def _not_followed(program: Path, line: int, text: str) -> Diagnostic:
@@ -223,10 +253,10 @@ class Job:
         reads = tuple((page, read_input(page)) for page in found.reads)
         given = (path, lsv, cell, model, *found.paths, *found.reads)
         inputs = tuple(p for p in given if p is not None)
+        notes = (*found.notes, *(() if path is None else archive_notes(path, loaded)))
         return cls(
-            path, name, source, values, pages, reads, found.notes, loaded, fitted,
-            inputs,
-        )  # fmt: skip
+            path, name, source, values, pages, reads, notes, loaded, fitted, inputs
+        )
 
     def run(
         self, options: Options, progress: Progress = silent, processes: int = 1
@@ -239,7 +269,10 @@ class Job:
             self.model,
             name=self.name,
             variables=variables,
-            pages={p.name: data for p, data in (*self.pages, *self.reads)},
+            pages={
+                **{p.name: data for p, data in self.pages},
+                **{name_read(p): data for p, data in self.reads},
+            },
             options=options,
             progress=progress,
             processes=processes,
@@ -438,5 +471,6 @@ def read_files(program: Path, lsv: Path | None = None) -> dict[str, bytes]:
         name,
         source,
         None if values is None else read_input(values),
-        {path.name: read_input(path) for path in (*found.paths, *found.reads)},
+        {path.name: read_input(path) for path in found.paths}
+        | {name_read(path): read_input(path) for path in found.reads},
     )

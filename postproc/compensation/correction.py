@@ -344,7 +344,7 @@ def _worked(
     with clock("plan"):
         planned = plan_visits(visits, cell, timed, lead.begin, arrived, doubtful)
         planned = correct_taught(planned, visits, cell, model)
-    states = states_of(planned.plan, visits, cell, setting.temperature)
+    states = states_of(planned.plan, cell, setting.temperature, visits)
     found = iterate(reading, planned, states, setting, lead, trail)
     check_motion(visits, found.moved, cell.limits)
     with clock("report"):

@@ -9,7 +9,13 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, in_chunks
 from postproc.compensation.continuity import on_path
 from postproc.compensation.frames import taught_records
-from postproc.files import is_shared_list, is_submit, is_variables, variables_of
+from postproc.files import (
+    is_shared_list,
+    is_submit,
+    is_system_module,
+    is_variables,
+    variables_of,
+)
 from postproc.language.languages import language_of
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
@@ -74,6 +80,7 @@ def followed_pages(visits: Visits) -> list[Diagnostic]:
     return [
         Diagnostic(visits.files[0], 1, "page", f"{name} {texts[shared]}")
         for name in names
+        if not is_system_module(name)
         for shared in (is_shared_list(name) or is_submit(name),)
     ]
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import Visits
-from postproc.model.effects.compliance import SCALE
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
@@ -18,6 +17,7 @@ from postproc.robot.state import States
 LOADED = frozenset(["payload", "compliance"])  # effects of what the arm carries
 MARGIN = 0.5  # [kg] beyond the surveyed loads that counts as surveyed
 SHARE = 0.1  # .. of the load itself
+USUAL_SOFTNESS = 1e-7  # [rad/(N m)] of the gears of a large arm
 
 
 def payload_of(
@@ -89,7 +89,7 @@ def _usual_yield(cell: Cell, here: States, near: States) -> Floats:
     """Return how far soft joints may yield to a change of the load, (n, 3) [m]."""
     batch = Batch(cell.arm, here)
     torque = batch.loads.payload - Batch(cell.arm, near).loads.payload
-    moved = batch.jacobian * (SCALE * torque)[:, None, :]
+    moved = batch.jacobian * (USUAL_SOFTNESS * torque)[:, None, :]
     return np.asarray(np.linalg.norm(moved, axis=2))
 
 

@@ -210,7 +210,9 @@ def plan_visits(
     return Planned(targets, planned, reasons, none, none, on)
 
 
-def states_of(planned: Plan, visits: Visits, cell: Cell, temperature: float) -> States:
+def states_of(
+    planned: Plan, cell: Cell, temperature: float, visits: Visits | None = None
+) -> States:
     """Describe the planned arrivals in the terms of the accuracy model.
 
     The time within a program says nothing about how warm the arm is, so it stays
@@ -218,11 +220,12 @@ def states_of(planned: Plan, visits: Visits, cell: Cell, temperature: float) -> 
 
     Args:
         planned: The plan of n arrivals.
-        visits: The arrivals, with the loads that the program states.
         cell: Payload.
         temperature: [deg C], NaN where not known.
+        visits: The arrivals, with the loads that the program states.
     """
-    mass, centre = payload_of(visits, cell)
+    given = (cell.payload_mass, cell.payload_com)
+    mass, centre = given if visits is None else payload_of(visits, cell)
     return make_states(
         planned.q,
         planned.side,

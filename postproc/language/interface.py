@@ -350,5 +350,13 @@ class Language(ABC):
         """Return what the archive of a controller gives, None for any other folder."""
         return None
 
+    def reads(self, program: Path) -> tuple[Path, ...]:
+        """Return files of an archive that a program reads and that stay as they are."""
+        return ()
+
+    def placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
+        """Return the arms of an archive, and their poses (4, 4) [m] in the world."""
+        return ()
+
     def prepare(self) -> None:  # noqa: B027 - most have nothing to load
         """Load what reading the first program takes."""

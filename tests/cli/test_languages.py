@@ -158,15 +158,15 @@ def test_a_batch_joins_the_modules_of_a_task(place):
     )
     assert batch(place).exit_code in (0, 1)
     made = place.folder / "new" / job.parent.name / "points.mod"
-    assert points and made.read_bytes().startswith(b"! postproc")
+    assert points and b"MODULE points\n! postproc" in made.read_bytes()
 
 
-def test_the_stamp_of_a_module_with_a_header_stands_behind_it(place):
+def test_the_stamp_of_a_module_with_a_header_stands_inside(place):
     job, header = source(place, NAMES["RAPID"]), b"%%%\n VERSION:1\n%%%\n"
     job.write_bytes(header + job.read_bytes())
     given = job.read_bytes()
     made = out(place, NAMES["RAPID"])
-    assert made.read_bytes().startswith(header + b"! postproc ")
+    assert made.read_bytes().startswith(header + b"MODULE job\n! postproc ")
     again = place.compensate(made, "-o", place.folder / "again.mod")
     assert again.exit_code == 2 and "postproc" in again.stderr
     told = cli("diff", job, made).output

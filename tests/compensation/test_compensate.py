@@ -183,7 +183,6 @@ DISTURBED = {
     "$CAL_SYS[2] := 3.0": "",
     "$ARM_DATA[1].CAL_SYS[2] := 3.0": "",
     "$CAL_SYS := {0, 0, -90, 0, 60, 0}": "",
-    "$TOOL_MASS := 55.0": "",
     "$TOOL_MASS := mass": "",
 }
 
@@ -194,6 +193,15 @@ def test_targets_are_left_where_the_arm_does_not_go_as_written(run, line):
     assert statuses(outcome)[:2] == ["SAFE", "DISPLAY"]
     assert (statuses(outcome)[2] == "SAFE") is bool(DISTURBED[line])
     assert outcome.exit_code == 1
+
+
+@pytest.mark.parametrize(("mass", "status"), [(0.2, "SAFE"), (200.0, "GUARDED")])
+def test_a_stated_load_counts_and_is_guarded_by_what_it_leaves_unsure(
+    run, mass, status
+):
+    outcome = run(JOINTS, f"$TOOL_MASS := {mass}", POSE)
+    assert statuses(outcome) == ["SAFE", status]
+    assert any("payload_mm" in why for why in whys(outcome)) is (status == "GUARDED")
 
 
 def test_settings_that_disturb_nothing(run):

@@ -287,8 +287,10 @@ class RapidMachine(TaskMachine):
         if kind == "modal":
             changed = self._changed(one, row, scope, here.modes)
             return replace(here, modes=changed.allowing())
-        if kind is not None or self.said_still(name):
+        if kind in ("still", "modal") or self.said_still(name):
             return here
+        if kind == "left" and name not in self.start.routines:
+            return self.unknown(context, row, here, _LEFT)
         return self.outside(context, row, name, here)
 
     def _changed(
@@ -352,7 +354,7 @@ class RapidMachine(TaskMachine):
                 if kind == "modal" and one.name not in STOPPED:
                     found |= given_modes(partial(self._changed, one, row, scope))
                     continue
-                if kind is not None or self.said_still(one.name):
+                if kind == "still" or self.said_still(one.name):
                     continue
             if own or isinstance(one, said.Instruction | said.LateCall):
                 return None
@@ -425,6 +427,7 @@ class RapidMachine(TaskMachine):
         return still or self.said_still(name)
 
 
+_LEFT = "may move the arm, or change how it moves, in a way that is not followed"
 _TRAP = "a TRAP of the task may move the arm, or change its settings, at any time"
 _HANDLER = "the error handler of its routine may move the arm, or change its settings"
 

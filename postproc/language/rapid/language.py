@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
+from postproc.arrays import Floats
 from postproc.exceptions import ProgramError
-from postproc.files import MODULES
+from postproc.files import MODULES, is_system_module
 from postproc.language.grammars import line_parser
 from postproc.language.interface import (
     Cloner,
@@ -18,6 +20,7 @@ from postproc.language.interface import (
     Start,
 )
 from postproc.language.outline import read_once
+from postproc.language.rapid.backup import mounted_arms, system_modules
 from postproc.language.rapid.collect import visits_of
 from postproc.language.rapid.dialect import RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
@@ -65,8 +68,10 @@ class Rapid(Language):
         visits = visits_of(machine)
         moves = {k: [m.row for m in file.moves] for k, file in enumerate(files)}
         missed = machine.missed(moves)
+        missed = {k: v for k, v in missed.items() if not is_system_module(k)}
         told = never_reached(missed, "main", "module")
         own = (d for file in files for d in file.diagnostics)
+        own = (d for d in own if not is_system_module(d.file))
         found = [d for d in own if d.code not in _SAID_AGAIN]
         found += [*machine.diagnostics, *told]
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
@@ -94,6 +99,14 @@ class Rapid(Language):
     def holds_joints(self, line: str) -> bool:
         """Tell whether a line declares joint angles, or moves to some."""
         return _JOINTS.match(line) is not None
+
+    def reads(self, program: Path) -> tuple[Path, ...]:
+        """Return the system modules of the task, in a backup."""
+        return system_modules(program)
+
+    def placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
+        """Return the arms of a backup, and where ``MOC.cfg`` places them."""
+        return tuple((arm.name, arm.pose) for arm in mounted_arms(program))
 
     def prepare(self) -> None:
         """Load the parser of statements."""

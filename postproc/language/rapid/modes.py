@@ -130,6 +130,7 @@ _ENDING = {name: why for ends, why in BLOCKING.values() for name in ends.split()
 HARMLESS = frozenset(
     """
     accset speedrefresh worldacclim pathacclim pathresol motionsup
+    motionprocessmodeset cornerpathwarning
     mechunitload actunit deactunit corrwrite tuneservo tunereset stopmove
     startmove
     """.split()
@@ -175,6 +176,8 @@ def changed_modes(
         case "velset":
             share = number(placed[0] if placed else None) / 100.0
             return replace(modes, override=share if 0.0 < share <= 1.0 else 0.0)
+        case "speedlimaxis" | "speedlimcheckpoint":
+            return replace(modes, override=0.0)
         case "gripload":
             return replace(modes, grip=load(placed[0] if placed else None))
     if name in BLOCKING:

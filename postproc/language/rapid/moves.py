@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 
+from postproc.files import is_system_module
 from postproc.language.collect import (
     IDENTITY,
     FoundGoal,
@@ -42,7 +43,9 @@ NO_SLOTS = (-1,) * WIDTH
 _ZONE = re.compile(r"z(\d+)$")
 _SPEED = re.compile(r"v(\d+)$")
 USUAL_TURN = np.deg2rad(500.0)  # [rad/s] of the speeds that the controller knows
-_STEM = re.compile(r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search)")
+_STEM = re.compile(
+    r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search|calib|nut)"
+)
 SHORTEST = 0.5  # length of what counts as a quaternion
 Z0 = 0.3  # [mm]
 PLACEHOLDER = 0.01  # [kg] masses up to here, as of tool0, state nothing
@@ -54,7 +57,14 @@ _LEFT_BY = {
     "corr": "a sensor may correct the path (\\Corr)",
     "track": "a sensor may correct the path (\\Track)",
 }
-AT_A_STOP = ("spotl", "spotj", "spotml", "spotmj")  # they weld standing still
+AT_A_STOP = (
+    "spotl",
+    "spotj",
+    "spotml",
+    "spotmj",
+    "calibl",
+    "calibj",
+)  # they weld standing still
 
 
 @dataclass(frozen=True)
@@ -240,7 +250,7 @@ class Goals:
             name=shown,
             aux=aux,
             why=why or ("" if file >= 0 else "it is computed from other data"),
-            pins=self._pinned(name, operand),
+            pins=self._pinned(name, operand) or self._system(file),
         )
 
     def _own_places(
@@ -324,6 +334,12 @@ class Goals:
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
         return ""
+
+    def _system(self, file: int) -> str:
+        """Say that numbers stand in a system module, "" where they do not."""
+        if file < 0 or not is_system_module(self.task.files[file].text.source.name):
+            return ""
+        return "it stands in a system module, which is read and not rewritten"
 
     def _shifted(
         self, name: str, arguments: Sequence[said.Argument], row: int, scope: Scope

@@ -210,7 +210,7 @@ class _Calls:
             )
             if to is None or (signature.via >= 0 and via is None):
                 self._complain(row, "unknown-statement", "has too few positions")
-        elif name not in known_instructions() and name not in self.own:
+        elif known_instructions().get(name, "left") == "left" and name not in self.own:
             what = "is neither a known instruction nor a routine here: it may move"
             self._complain(row, "unknown-instruction", what)
 

@@ -46,11 +46,14 @@ _KINDS: Mapping[Signature, str] = {
         MoveJ MoveL MoveJDO MoveLDO MoveJAO MoveLAO MoveJGO MoveLGO MoveJSync MoveLSync
         TriggJ TriggL TriggJIOs TriggLIOs
         ArcL ArcLStart ArcLEnd ArcMoveJ ArcMoveL
+        ArcL1 ArcL1Start ArcL1End ArcL2 ArcL2Start ArcL2End
+        CalibJ CalibL NutJ NutL
         SpotJ SpotL SpotMJ SpotML PaintL DispL CapL
     """,
     ARC: """
         MoveC MoveCDO MoveCAO MoveCGO MoveCSync TriggC
-        ArcC ArcCStart ArcCEnd ArcMoveC PaintC DispC CapC
+        ArcC ArcCStart ArcCEnd ArcMoveC
+        ArcC1 ArcC1Start ArcC1End ArcC2 ArcC2Start ArcC2End PaintC DispC CapC
     """,
     JOINTS: "MoveAbsJ TriggAbsJ ArcMoveAbsJ",
     Signature(joints=True, reaches=False): "MoveExtJ ArcMoveExtJ",  # the arm stays
@@ -71,7 +74,7 @@ def known_instructions() -> Mapping[str, str]:
 
     Returns:
         By name in lower case: ``still`` changes nothing of a move, ``modal`` changes
-        how the moves after it are carried out.
+        how the moves after it are carried out, ``left`` is not followed: it may move.
 
     >>> known_instructions()["tpwrite"], known_instructions()["pdispon"]
     ('still', 'modal')

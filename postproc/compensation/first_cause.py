@@ -1,0 +1,49 @@
+"""What to declare first in the cell, and how many targets that frees."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.compensation.program import Reading, read_program
+from postproc.language.visits import MOTION_UNKNOWN, Diagnostic, Visits
+from postproc.robot.cell import Cell
+
+FIRST_CAUSE = "first-cause"
+UNKNOWN_ROUTINE = "unknown-routine"
+CAUSES = (MOTION_UNKNOWN, UNKNOWN_ROUTINE)
+
+
+def first_cause(
+    files: Mapping[str, bytes], cell: Cell, reading: Reading
+) -> tuple[Diagnostic, ...]:
+    """Say where a program is first not known, and how many targets that leaves.
+
+    The program is read once more as if all routines that no file holds were still.
+
+    Args:
+        files: As in `read_program`.
+        cell: The cell.
+        reading: The program as the cell describes it.
+    """
+    causes = sorted(one for one in reading.diagnostics if one.code in CAUSES)
+    if not causes or not reading.visits.reason.any():
+        return ()
+    free = replace(cell, still=("*",))
+    freed = _known(read_program(files, free).visits) - _known(reading.visits)
+    if freed <= 0:
+        return ()
+    first, total = causes[0], int((reading.visits.literal >= 0).sum())
+    text = (
+        f"what happens here is not known, and with what follows it leaves {freed} of "
+        f"{total} targets. Say under [routines] of the cell what the routines do that "
+        'no file holds (name = "still" or "moves"), or give their files'
+    )
+    return (Diagnostic(first.file, first.line, FIRST_CAUSE, text),)
+
+
+def _known(visits: Visits) -> int:
+    """Count the targets that nothing unknown leaves."""
+    return int(np.sum((visits.literal >= 0) & (visits.reason == 0)))

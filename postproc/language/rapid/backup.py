@@ -1,0 +1,112 @@
+"""A RobotWare backup: the system modules of a task, and where the arm stands."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.exceptions import ProgramError
+from postproc.files import is_module, read_input
+from postproc.language.rapid.dialect import RAPID_DIALECT
+from postproc.language.rapid.program import read_rapid
+from postproc.language.source import source_from_bytes
+
+PROGRAMS, SYSTEM = "progmod", "sysmod"  # folders of a task
+SETTINGS = ("syspar", "moc.cfg")
+DEPTH = 4  # folders above a program in which the settings of its backup may lie
+_ENTRY = re.compile(r'-(\w+)\s+("[^"]*"|[^\s\\]+)')
+_PLACE = tuple(f"base_frame_pos_{axis}" for axis in "xyz")
+_TURN = tuple(f"base_frame_orient_u{k}" for k in range(4))
+
+
+@dataclass(frozen=True)
+class MountedArm:
+    """An arm as ``MOC.cfg`` describes it.
+
+    Attributes:
+        name: Of the mechanical unit.
+        kind: Its robot type.
+        position: Of its base in the world [mm].
+        quaternion: Its orientation there, scalar first.
+    """
+
+    name: str
+    kind: str
+    position: tuple[float, ...]
+    quaternion: tuple[float, ...]
+
+    @property
+    def pose(self) -> Floats:
+        """Return where the arm stands in the world, (4, 4) [m]."""
+        numbers = (*self.position, *self.quaternion)
+        pose: Floats = RAPID_DIALECT.poses(np.array([numbers]))[0]
+        return pose
+
+
+def system_modules(program: Path) -> tuple[Path, ...]:
+    """Return the system modules of the task of a program in a backup.
+
+    They are read and never rewritten. What is no module that can be read is left out.
+
+    Args:
+        program: A module in ``PROGMOD``.
+    """
+    if program.parent.name.lower() != PROGRAMS or not program.parent.parent.is_dir():
+        return ()
+    folder = _entry(program.parent.parent, SYSTEM)
+    if folder is None or not folder.is_dir():
+        return ()
+    files = (p for p in sorted(folder.iterdir()) if is_module(p.name))
+    return tuple(p for p in files if p.is_file() and _is_readable(p))
+
+
+def mounted_arms(program: Path) -> tuple[MountedArm, ...]:
+    """Return the arms of the backup that a program stands in, none where none is."""
+    for parent in list(program.absolute().parents)[:DEPTH]:
+        folder = _entry(parent, SETTINGS[0])
+        file = None if folder is None else _entry(folder, SETTINGS[1])
+        if file is not None and file.is_file():
+            return read_arms(file.read_text(encoding="latin-1"))
+    return ()
+
+
+def read_arms(text: str) -> tuple[MountedArm, ...]:
+    """Read the arms of ``MOC.cfg``."""
+    body = re.split(r"^ROBOT:", text, maxsplit=1, flags=re.MULTILINE)
+    if len(body) < 2:
+        return ()
+    own = re.split(r"^#", body[1], maxsplit=1, flags=re.MULTILINE)[0]
+    arms = []
+    for part in re.split(r"(?=-name\s)", own)[1:]:
+        said = {key: value.strip('"') for key, value in _ENTRY.findall(part)}
+        try:
+            place = tuple(1000.0 * float(said.get(key, 0.0)) for key in _PLACE)
+            turn = tuple(float(said.get(k, k == _TURN[0])) for k in _TURN)
+        except ValueError:
+            continue
+        kind = said.get("use_robot_type", "")
+        arms.append(MountedArm(said["name"], kind, place, turn))
+    return tuple(arms)
+
+
+def _entry(folder: Path, name: str) -> Path | None:
+    """Find an entry of a folder, whatever its case."""
+    try:
+        found = (p for p in folder.iterdir() if p.name.lower() == name)
+        return next(found, None)
+    except OSError:
+        return None
+
+
+def _is_readable(path: Path) -> bool:
+    """Return True if a module can be read: system modules may be encoded."""
+    try:
+        data = read_input(path)
+        read_rapid(source_from_bytes(path.name, data))
+    except ProgramError:
+        return False
+    return True
