@@ -307,7 +307,18 @@ def _reason(exc: OSError) -> str:
 _PROGRAM, _VARIABLES, _COMPILED = ".pdl", ".lsv", (".cod", ".var")
 MODULES = (".mod", ".modx", ".prg", ".sys", ".sysx")  # programs that hold their values
 KRL_PROGRAMS, KRL_DATA = (".src",), ".dat"  # sources, and the lists of their data
+KRL_SUBMITS = (".sub",)  # programs that run beside the one that moves the arm
 SHARED_LIST, ARCHIVE_DEPTH = "$config.dat", 4
+# Sources of a controller and its packages, and routines that tell them from others.
+_SYSTEM_SOURCES = {
+    "bas": ("bas", "initmov", "frames"),
+    "ir_stopm": ("ir_stopm",),
+    "msglib": ("msgnotify",),
+    "p00": ("p00",),
+    "h50": ("h50",),
+    "user_grp": ("user_grp",),
+    "userspot": ("userspot",),
+}
 LARGEST = 500_000_000  # bytes of a program or variable file; a longer one is neither
 
 _TARGETS = re.compile(
@@ -349,6 +360,41 @@ def is_shared_list(place: str) -> bool:
     return is_data_list(place) and base_name(place).startswith("$")
 
 
+def is_submit(place: str) -> bool:
+    """Tell whether a file is a program that runs beside the one that moves the arm.
+
+    >>> is_submit("R1/System/sps.sub"), is_submit("job.src")
+    (True, False)
+    """
+    return _suffix(place) in KRL_SUBMITS
+
+
+def is_system_source(place: str, text: bytes) -> bool:
+    """Tell whether a source is one of the controller or of its packages.
+
+    >>> is_system_source("IR_STOPM.src", b"DEF  IR_STOPM ( )")
+    True
+    >>> is_system_source("bas.src", b"DEF bas( )")
+    False
+    """
+    names = _SYSTEM_SOURCES.get(base_name(place), ())
+    if not names or _suffix(place) not in KRL_PROGRAMS:
+        return False
+    begin = rb"(?im)^[ \t]*(?:GLOBAL[ \t]+)?DEF[ \t]+"
+    own = (begin + name.encode() + rb"\b" for name in names)
+    return all(re.search(pattern, text) for pattern in own)
+
+
+def is_system_file(path: Path) -> bool:
+    """Tell whether a file on the disk is a source of the controller."""
+    if base_name(path.name) not in _SYSTEM_SOURCES:
+        return False
+    try:
+        return is_system_source(path.name, path.read_bytes())
+    except OSError:
+        return False
+
+
 def data_list_of(program: str) -> str:
     """Name the data list of a source, "" where programs have none.
 
@@ -382,6 +428,24 @@ def find_shared_list(program: Path, within: Path | None = None) -> Path | None:
             break
         found = _beside(folder / "System" / program.name, SHARED_LIST)
     return found
+
+
+def find_shared(program: Path, within: Path | None = None) -> tuple[Path, ...]:
+    """Find what a source shares with others: ``$config.dat``, and submit programs.
+
+    Submit programs stand beside the list; they may change what programs read.
+
+    Args:
+        program: The source.
+        within: A folder that nothing outside of is looked at.
+    """
+    found = find_shared_list(program, within)
+    if not data_list_of(program.name) or not program.parent.is_dir():
+        return ()
+    folders = dict.fromkeys([found.parent] if found else []) | {program.parent: None}
+    files = (p for folder in folders for p in sorted(folder.iterdir()))
+    names = {p.name.lower(): p for p in files if is_submit(p.name) and p.is_file()}
+    return (*(() if found is None else (found,)), *names.values())
 
 
 def _is_below(folder: Path, root: Path) -> bool:

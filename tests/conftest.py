@@ -20,15 +20,17 @@ from postproc.simulation import (
     virtual_arm,
     write_measurements,
 )
+from tests.any_controller import EVERY, any_controller
 from tests.pipes import made_device, made_pipe
 
 ROOT = Path(__file__).parents[1]
 SEED = 4
 POSES = 300
 
-CELL = """
+CELL = f"""
 [robot]
 arm = "nj220-2.7"
+{EVERY}
 [tool]
 xyz_mm = [80.0, -40.0, 150.0]
 [uframe]
@@ -65,7 +67,7 @@ def job_folder(tmp_path_factory):
 @pytest.fixture(scope="session")
 def bench_cell() -> Cell:
     """The cell of the shipped programs, and of those that the bench makes."""
-    return load_cell(ROOT / "programs" / "cell.toml")
+    return any_controller(load_cell(ROOT / "programs" / "cell.toml"))
 
 
 @pytest.fixture(scope="session")

@@ -23,10 +23,11 @@ from postproc.files import (
     TEMPORARY,
     base_name,
     data_list_of,
-    find_shared_list,
+    find_shared,
     holds_targets,
     is_compiled,
     is_program,
+    is_system_file,
     is_variables,
     program_key,
 )
@@ -130,8 +131,10 @@ class _Folder:
 def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
     """Sort the files of one folder into programs, what belongs to them, and others."""
     part = _Folder([], [], {}, [])
-    sources = {data_list_of(place).lower() for place in places}
+    system = {p for p in places if is_system_file(root / p)}
+    sources = {data_list_of(place).lower() for place in places if place not in system}
     ours = [p for p in places if is_program(p) or p.lower() in sources]
+    ours = [p for p in ours if p not in system]
     programs = _by_base(ours, program_key, part)
     variables = _by_base(filter(is_variables, places), base_name, part)
     records = {place + SUFFIX for place in programs.values()}
@@ -154,15 +157,15 @@ def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
     for main, pages in _joined(named, variables, arms).items():
         setup = plan.setup_of(programs[main], arms[main])
         own = [programs[page] for page in pages]
-        reads = _shared_list(root, programs[main])
+        reads = _shared(root, programs[main])
         _add_unit(programs[main], own, reads, variables, setup, part)
     return part
 
 
-def _shared_list(root: Path, program: str) -> tuple[str, ...]:
-    """Return the place of the list that a program shares with others, if it is here."""
-    found = find_shared_list(root / program, within=root)
-    return () if found is None else (found.relative_to(root).as_posix(),)
+def _shared(root: Path, program: str) -> tuple[str, ...]:
+    """Return the places of what a program shares with others, and only reads."""
+    found = find_shared(root / program, within=root)
+    return tuple(path.relative_to(root).as_posix() for path in found)
 
 
 def _by_base(

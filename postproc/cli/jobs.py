@@ -29,12 +29,13 @@ from postproc.files import (
     Content,
     base_name,
     check_places,
-    find_shared_list,
+    find_shared,
     find_variables,
     is_data_list,
     is_program,
     is_shared_list,
     is_stream,
+    is_system_file,
     is_variables,
     name_read,
     program_key,
@@ -86,8 +87,7 @@ def find_pages(program: Path) -> Pages:
         for name, line in outside.items()
     ]
     main = program_key(program.name)
-    shared = find_shared_list(program)
-    reads = (*((shared,) if shared else ()), *_read_elsewhere(program))
+    reads = (*find_shared(program), *_read_elsewhere(program))
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes), reads)
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
@@ -143,7 +143,9 @@ def _is_page(path: Path, outputs: bool) -> bool:
     ours = is_program(path.name) or is_data_list(path.name)
     if not (ours and path.is_file()) or is_shared_list(path.name):
         return False
-    return outputs or not is_output(path)
+    if is_system_file(path):
+        return False
+    return outputs or is_data_list(path.name) or not is_output(path)
 
 
 def _is_output(program: Path) -> bool:

@@ -26,6 +26,7 @@ from postproc.files import check_places
 if TYPE_CHECKING:
     from postproc.batch.check import Current
     from postproc.batch.journal import Summary
+    from postproc.batch.plan import BatchPlan
     from postproc.batch.run import Gather
 
 CellFile = Annotated[
@@ -87,6 +88,8 @@ def batch(
         )
         made = make_plan(plan, cell, model, options)
         check_places([html], [cell, model, plan])
+        for line in _archive_lines(source, made):
+            say(line)
         order = run.Order(source, target, made, log or run.default_log(target), resume)
         with progress_bar(f"{source} -> {target}") as told:
             summary = run.batch(order, _workers(jobs, scheduler, tls), told)
@@ -97,6 +100,20 @@ def batch(
         if summary.stopped:
             say("stopped; nothing is half written. Go on: same command with --resume")
     raise typer.Exit(summary.exit_code)
+
+
+def _archive_lines(source: Path, plan: BatchPlan) -> list[str]:
+    """Return what the archive of a controller gives, and what the cell lacks."""
+    from postproc.batch.archive import missing_in_cell
+    from postproc.language.languages import languages
+
+    cells = [setup.cell for setup in plan.setups]
+    found = []
+    for language in languages() if source.is_dir() else ():
+        ours = [cell for cell in cells if language.controller in cell.controllers]
+        archive = language.read_archive(source) if ours else None
+        found += [] if archive is None else missing_in_cell(archive, ours[0])
+    return found
 
 
 def _workers(jobs: int, scheduler: str | None, tls: Path | None) -> Gather:

@@ -15,6 +15,7 @@ from postproc.compensation.correction import Correction, Draft, correct
 from postproc.compensation.first_cause import first_cause
 from postproc.compensation.notes import (
     assumed_off,
+    controller_unknown,
     flank_steps,
     followed_pages,
     listing_cost,
@@ -54,6 +55,7 @@ from postproc.compensation.rewrite import (
 from postproc.compensation.targets import rounded_points
 from postproc.exceptions import CellError, ProgramError
 from postproc.files import variables_of
+from postproc.language.interface import Language
 from postproc.language.languages import language_of
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
@@ -148,6 +150,7 @@ def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
             place="$.robot.absolute_accuracy",
         )
     language = language_of(next(iter(files)))
+    check_controller(cell, language)
     said = "absolute_accuracy" in cell.file.robot.model_fields_set
     if not (language.tells_accuracy or said):
         raise CellError(
@@ -158,6 +161,25 @@ def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
             place="$.robot.absolute_accuracy",
         )
     model.check_arm(cell.arm)
+
+
+def check_controller(cell: Cell, language: Language) -> None:
+    """Refuse a program that the controller of the arm does not run.
+
+    Raises:
+        CellError: Arm file or cell name another controller.
+    """
+    if not cell.controllers or language.controller in cell.controllers:
+        return
+    own = " or ".join(cell.controllers)
+    raise CellError(
+        cell.path,
+        f"the controller of {cell.arm.name} is of {own}, and {language.name} programs "
+        f"run on those of {language.controller}",
+        "Give the cell of the arm that runs the program; if this one does, write "
+        f'controller = "{language.controller}" under [robot]',
+        place="$.robot.controller" if cell.file.robot.controller else "$.robot.arm",
+    )
 
 
 def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> Outcome:
@@ -228,7 +250,7 @@ def report(
         setting: What it was compensated with.
     """
     kept, output, visits = draft.kept, draft.output, reading.visits
-    off = assumed_off(name, setting.cell)
+    off = (assumed_off(name, setting.cell), *controller_unknown(name, setting.cell))
     return Outcome(
         program=name,
         model=setting.model.id,
@@ -238,7 +260,7 @@ def report(
         decisions=kept.decisions,
         before=ErrorStatistics.of_sizes(kept.before),
         after=ErrorStatistics.of_sizes(kept.after),
-        diagnostics=told_once((*_findings(reading, draft, setting), off)),
+        diagnostics=told_once((*_findings(reading, draft, setting), *off)),
         stages=setting.clock.stages,
         motion=largest_motion(kept.departure),
         position=kept.position,

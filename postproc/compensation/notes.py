@@ -11,10 +11,12 @@ from postproc.compensation.continuity import on_path
 from postproc.compensation.frames import taught_records
 from postproc.files import (
     is_shared_list,
+    is_submit,
     is_system_module,
     is_variables,
     variables_of,
 )
+from postproc.language.languages import language_of
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -32,6 +34,19 @@ def assumed_off(name: str, cell: Cell) -> Diagnostic:
     """State that the controller is taken not to compensate on its own."""
     text = f"the controller's own absolute accuracy is taken to be off ({cell.path})"
     return Diagnostic(name, 1, "absolute-accuracy", text)
+
+
+def controller_unknown(name: str, cell: Cell) -> list[Diagnostic]:
+    """State that the arm is assumed to have a controller that runs the program."""
+    if cell.controllers:
+        return []
+    language = language_of(name)
+    text = (
+        f"neither {cell.path} nor the file of the arm {cell.arm.name} names its "
+        f"controller: it is assumed to run {language.name}. Write "
+        f'controller = "{language.controller}" in the arm file'
+    )
+    return [Diagnostic(name, 1, "controller", text)]
 
 
 def tool_in_metres(visits: Visits) -> list[Diagnostic]:
@@ -61,10 +76,12 @@ def followed_pages(visits: Visits) -> list[Diagnostic]:
         "is followed, and rewritten, as a page of this program",
         "is read, and not rewritten: all programs share it",
     )
+    names = [name for name in visits.files[1:] if not is_variables(name)]
     return [
-        Diagnostic(visits.files[0], 1, "page", f"{name} {texts[is_shared_list(name)]}")
-        for name in visits.files[1:]
-        if not is_variables(name) and not is_system_module(name)
+        Diagnostic(visits.files[0], 1, "page", f"{name} {texts[shared]}")
+        for name in names
+        if not is_system_module(name)
+        for shared in (is_shared_list(name) or is_submit(name),)
     ]
 
 

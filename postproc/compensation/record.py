@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -283,6 +284,7 @@ def restore(data: bytes, record: FileRecord, name: str) -> bytes:
         problem = "its stamp names another source than its record"
         raise ProgramError(name, problem, CURE, line=1)
     if sha256(data) != record.output_sha256.lower():
+        _check_transfer(data, record, name)
         raise ProgramError(
             name,
             f"was changed after it was compensated ({_where(data, record)})",
@@ -298,6 +300,48 @@ def restore(data: bytes, record: FileRecord, name: str) -> bytes:
             name, "the record does not give its source back", "It belongs elsewhere"
         )
     return source
+
+
+LINE_ENDS = (b"\r\n", b"\n", b"\r")
+COUNTED = 200  # times that a controller may have saved a program
+_RELEASE = re.compile(rb"(?m)^(&REL[ \t]+)(\d{1,9})\b")
+
+
+def _check_transfer(data: bytes, record: FileRecord, name: str) -> None:
+    """Refuse a file that differs as a controller or a transfer changes files.
+
+    Raises:
+        ProgramError: It has other line ends, or ``&REL`` was counted up.
+    """
+    wanted = record.output_sha256.lower()
+    plain = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    for text in (data, *(plain.replace(b"\n", end) for end in LINE_ENDS)):
+        ends = "came back with other line ends" if text != data else ""
+        if ends and sha256(text) == wanted:
+            cure = "Transfer it in binary mode, or take the source from your archive"
+            raise ProgramError(name, ends, cure)
+        counted = _counted_back(text, wanted)
+        if counted is not None:
+            now, before = counted
+            problem = (
+                f"its &REL was counted up from {before} to {now} on the controller"
+            )
+            problem = f"{ends}, and {problem}" if ends else problem
+            cure = "Set it back, or take the source from your archive"
+            raise ProgramError(name, problem, cure)
+
+
+def _counted_back(data: bytes, wanted: str) -> tuple[int, int] | None:
+    """Return &REL as it is, and with which the file is what was written, or None."""
+    found = _RELEASE.search(data)
+    if found is None:
+        return None
+    now = int(found[2])
+    for before in range(now - 1, max(now - COUNTED, -1), -1):
+        text = data[: found.start(2)] + str(before).encode() + data[found.end(2) :]
+        if sha256(text) == wanted:
+            return now, before
+    return None
 
 
 def _first_changed_line(data: bytes, record: FileRecord) -> int:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from postproc.arrays import Floats, Ints
+from postproc.language.archive import Archive
 from postproc.language.dialect import Dialect
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import CloneError, Edit, Source
@@ -269,6 +270,7 @@ class Language(ABC):
 
     Attributes:
         name: As its users call it.
+        controller: Whose controllers run it, as arm files and cells name them.
         suffixes: Of program files, in lower case, the usual one first.
         comment: What a comment begins with.
         dialect: What the numbers of its targets mean.
@@ -278,6 +280,7 @@ class Language(ABC):
     """
 
     name: str
+    controller: str
     suffixes: tuple[str, ...]
     comment: str
     dialect: Dialect
@@ -342,6 +345,10 @@ class Language(ABC):
             lines: All of them.
             wanted: 1-based lines, ascending but for 0: those that it does not have.
         """
+
+    def read_archive(self, folder: Path) -> Archive | None:
+        """Return what the archive of a controller gives, None for any other folder."""
+        return None
 
     def reads(self, program: Path) -> tuple[Path, ...]:
         """Return files of an archive that a program reads and that stay as they are."""

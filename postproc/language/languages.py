@@ -6,7 +6,7 @@ import os
 from functools import cache
 from importlib import import_module
 
-from postproc.files import KRL_DATA, KRL_PROGRAMS, MODULES
+from postproc.files import KRL_DATA, KRL_PROGRAMS, KRL_SUBMITS, MODULES
 from postproc.language.interface import Language
 
 # Languages by the suffixes of their files; one is loaded when its first file is read.
@@ -14,7 +14,9 @@ _PLACES = {
     ".pdl": "postproc.language.pdl2.language:Pdl2",
     ".lsv": "postproc.language.pdl2.language:Pdl2",
     **dict.fromkeys(MODULES, "postproc.language.rapid.language:Rapid"),
-    **dict.fromkeys((*KRL_PROGRAMS, KRL_DATA), "postproc.language.krl.language:Krl"),
+    **dict.fromkeys(
+        (*KRL_PROGRAMS, KRL_DATA, *KRL_SUBMITS), "postproc.language.krl.language:Krl"
+    ),
 }
 _USUAL = ".pdl"  # of a file with another suffix
 

@@ -33,6 +33,14 @@ _MODULE = re.compile(  # the whole line with which a module begins
 )
 
 
+_ROUTINE = re.compile(  # .. and with which a source of KRL, or its data list, does
+    rb"(?:\xef\xbb\xbf)?(?:[ \t]*+(?:;[^\r\n]*+)?(?:\r\n?+|\n))*+"
+    rb"[ \t]*+(?:GLOBAL[ \t]++)?DEF(?:DAT[ \t]|FCT[ \t]|[ \t])[^\r\n;]*+(?:;[^\r\n]*+)?"
+    rb"(?:\r\n?+|\n)",
+    re.IGNORECASE,
+)
+
+
 @dataclass(frozen=True)
 class Stamp:
     """What a stamp line says.
@@ -66,11 +74,11 @@ def source_hash(source: Source) -> str:
 def stamp_place(data: bytes) -> int:
     """Return the offset at which a stamp goes into a text.
 
-    It stands behind the line with which a module begins, where the controller keeps
-    comments when it saves; else behind a file header or a byte-order mark.
+    It stands behind the line with which a module or a source begins, where controllers
+    keep comments when they save; else behind a file header or a byte-order mark.
     """
     header = _header_end(data)
-    found = _MODULE.match(data, header) if header else _MODULE.match(data)
+    found = _MODULE.match(data, header) or _ROUTINE.match(data, header)
     return found.end() if found else header
 
 

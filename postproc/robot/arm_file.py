@@ -246,10 +246,15 @@ class OpwSection(Strict):
     flip_axes: Annotated[list[bool], Field(min_length=6, max_length=6)]
 
 
+Controller = Literal["comau", "abb", "kuka", "other"]
+"""Whose controller an arm has; it runs programs of one language."""
+
+
 class ArmFile(Strict):
     """A whole arm file."""
 
     name: str
+    controller: Controller | None = None
     repeatability_mm: PositiveFloat
     dh: DhSection
     joints: ArmJointSection

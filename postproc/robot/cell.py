@@ -20,7 +20,13 @@ from pydantic import (
 from postproc.arrays import Floats
 from postproc.exceptions import CellError
 from postproc.robot.arm import Arm, load_arm
-from postproc.robot.arm_file import Sextuple, Strict, Triple, read_toml
+from postproc.robot.arm_file import (
+    Controller,
+    Sextuple,
+    Strict,
+    Triple,
+    read_toml,
+)
 from postproc.robot.pose import MM, pose_from_record, rotation_from_zyz
 
 Source = Literal["cad", "tracker", "taught"]
@@ -88,6 +94,8 @@ class RobotSection(Strict):
     Attributes:
         arm: Name of a shipped arm, or an arm file.
         arm_number: Which arm of its controller it is.
+        controller: Whose controller runs the programs, or several; default: as the arm
+            file has it.
         absolute_accuracy: Whether the controller compensates the arm itself.
         mounting: Where weight pulls in the arm's base frame: "floor" along -z,
             "ceiling" along +z, "wall" along +x, or a vector of any length. Without it
@@ -96,6 +104,7 @@ class RobotSection(Strict):
 
     arm: str
     arm_number: ArmNumber = 1
+    controller: Controller | list[Controller] | None = None
     absolute_accuracy: bool = False
     mounting: Literal["floor", "ceiling", "wall"] | Triple | None = None
 
@@ -316,6 +325,14 @@ class Cell:
     strict_calls: bool = False
     taught_sides: Mapping[tuple[float, ...], Floats] = field(default_factory=dict)
     probe_names: tuple[str, ...] = ()
+
+    @property
+    def controllers(self) -> tuple[Controller, ...]:
+        """Return whose controllers may run the programs, () where nothing is said."""
+        said = self.file.robot.controller or self.arm.file.controller
+        if isinstance(said, str):
+            return (said,)
+        return tuple(said or ())
 
     @property
     def nests(self) -> Floats | Mapping[str, Floats]:

@@ -233,6 +233,7 @@ def _alpha(data: MachineData, name: str) -> float:
 TEMPLATE = """\
 # {trafo}, from the machine data {file}. Lengths in mm, angles in degrees.
 name = {name}
+controller = "kuka"
 repeatability_mm = {repeatability}
 
 [dh]                          # standard Denavit-Hartenberg

@@ -21,6 +21,7 @@ HOME = np.array([20.0, -60.0, 80.0, -110.0, -70.0, 30.0])
 CELL = """
 [robot]
 arm = "ur10"
+controller = "comau"
 [tool]
 xyz_mm = [80.0, -40.0, 150.0]
 source = "cad"

@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from postproc.robot.cell import Cell, load_cell
+from tests.any_controller import any_controller
 from tests.fuzz.mutation import KRL_KINDS, RAPID_KINDS, mutated
 from tests.language import neutral_job
 from tests.language.pdl2.generator import POINTS, Generator
@@ -120,7 +121,7 @@ ENDMODULE
 @cache
 def cell() -> Cell:
     """Load the cell of the shipped programs, whose arm the drawn jobs are for."""
-    return load_cell(ROOT / "programs" / "cell.toml")
+    return any_controller(load_cell(ROOT / "programs" / "cell.toml"))
 
 
 @cache

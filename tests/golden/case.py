@@ -48,9 +48,11 @@ class Case:
 
 @cache
 def kept() -> Mapping[str, bytes]:
-    """Return all inputs by name: those of the archive, and the shipped programs."""
-    with zipfile.ZipFile(HERE / "inputs.zip") as archive:
-        found = {name: archive.read(name) for name in archive.namelist()}
+    """Return all inputs by name: those of the archives, and the shipped programs."""
+    found = {}
+    for path in sorted(HERE.glob("inputs*.zip")):
+        with zipfile.ZipFile(path) as archive:
+            found |= {name: archive.read(name) for name in archive.namelist()}
     for path in sorted((ROOT / "programs").iterdir()):
         if path.suffix in (".pdl", ".lsv", ".toml"):
             found[f"programs/{path.name}"] = path.read_bytes()

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 
 from tests.golden.case import Case, below, folders, kept
+from tests.golden.krl_cases import krl
 from tests.golden.rapid_cases import rapid
 
 DESK = {"cell.toml": "desk/cell.toml", "model.json": "desk/model.json"}
@@ -40,6 +41,7 @@ def all_cases() -> tuple[Case, ...]:
         small,
         pages,
         refused,
+        krl,
         rapid,
         helps,
     )

@@ -27,6 +27,7 @@ from postproc.compensation.program import read_program
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell
 from postproc.simulation import land, run_program, virtual_arm
+from tests.any_controller import any_controller
 from tests.conftest import ROOT, make_job
 from tests.language.neutral_job import LANGUAGES, NeutralJob, compensated, drawn
 
@@ -97,7 +98,8 @@ def fitted(arm: int, folder: Path, **survey: Any) -> tuple[Cell, Model]:
     """
     text = (ROOT / "programs" / "cell.toml").read_text(encoding="utf-8")
     make_job(folder, text, arm, **survey)
-    return load_cell(folder / "cell.toml"), load_model(folder / "model.json")
+    cell = any_controller(load_cell(folder / "cell.toml"))
+    return cell, load_model(folder / "model.json")
 
 
 def driven(arm: int, cell: Cell) -> Iterator[tuple[int, NeutralJob]]:
@@ -155,7 +157,7 @@ def differing(
     if Path(file).suffix == ".dat" and stamped == old:  # it holds no corrected point
         return None, ()
     header = next((k for k, line in enumerate(stamped) if STAMP.match(line)), -1)
-    if header not in range(4) or len(stamped) != len(old) + 1:
+    if header < 0 or len(stamped) != len(old) + 1:
         return 1, ()
     flags: list[tuple[int, str, str]] = []
     del stamped[header]

@@ -11,7 +11,13 @@ from postproc.language import collect
 from postproc.language.collect import Conditions, FoundGoal, Pose, cell_pose
 from postproc.language.krl.dialect import COMMENTS, KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
-from postproc.language.krl.modes import UNKNOWN, KrlModes, ModeReader
+from postproc.language.krl.modes import (
+    LOST_LOAD,
+    NO_LOAD,
+    UNKNOWN,
+    KrlModes,
+    ModeReader,
+)
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
 from postproc.language.krl.syntax import SplineBlock
 from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
@@ -27,6 +33,10 @@ _UNSIZED = "how early it is blended ($APO) is not known here"
 _IPO = "$IPO_MODE is not known here"
 _STATUS = "bit 2 of S and bit 4 of T disagree, otherwise than at the other points"
 _STILL_TOOL = "$ORI_TYPE = #CONSTANT: the tool keeps the orientation it comes with"
+_SWAPPED = (
+    "$TOOL and $BASE were set with IPO_FRAME #TCP, which swaps them on some "
+    "controllers: set them anew with #BASE"
+)
 _NOT_SET = "an inline setting (WITH) is not known"
 
 
@@ -56,7 +66,7 @@ def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, str]:
         assert isinstance(block, SplineBlock)
         given = [(v.begin, one) for one in block.settings] + given
     for row, setting in given:
-        reader = ModeReader(machine.task, row, v.scope, machine.start.payload_kg)
+        reader = ModeReader(machine.task, row, v.scope)
         after = reader.assigned(modes, setting)
         if after is None:
             return modes, f"{_NOT_SET}: {setting.target.name.upper()}"
@@ -81,10 +91,14 @@ def _conditions(
     modes, unset = _effective(machine, v)
     joint = v.motion == Motion.JOINT
     blending = _blending(v, modes, end)
-    given = (*sorted(modes.blocked), v.why, v.goal.why, unset, modes.tool.why)
+    active = {why for _, why in modes.active}
+    blocked = modes.blocked | active | machine.everywhere
+    given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
     if v.goal.target != Meaning.JOINTS:
         given += (modes.base.why, "" if modes.interpolation else _IPO)
+        given += (_swapped(modes),)
     given += (_STATUS if odd else "", blending.why)
+    given += (NO_LOAD if modes.load == LOST_LOAD else "",)
     return Conditions(
         tool=modes.tool.pose,
         base=base,
@@ -101,7 +115,20 @@ def _conditions(
         override=modes.share if joint else 1.0,
         overlap=blending.overlap,
         exact=blending.exact,
+        load=_load(modes),
     )
+
+
+def _load(modes: KrlModes) -> tuple[float, ...]:
+    """Return what the program states that the arm carries, see `Conditions.load`."""
+    unknown = not modes.load or modes.load == LOST_LOAD
+    return () if unknown else (*modes.load, *(math.nan,) * 3)[:4]
+
+
+def _swapped(modes: KrlModes) -> str:
+    """Return why frames that were set for a fixed tool hold for no other move."""
+    remote = modes.tool.remote or modes.base.remote
+    return _SWAPPED if remote and modes.interpolation != "#tcp" else ""
 
 
 def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
@@ -151,12 +178,20 @@ def _ends(found: Sequence[KrlVisit]) -> Sequence[str]:
 def _end(v: KrlVisit, after: Sequence[KrlVisit]) -> str:
     """Tell whether the arm stops at a visit, by those behind it."""
     stops = [
-        True if one.by_spline_planner != v.by_spline_planner else one.modes.halted
+        True if one.by_spline_planner != v.by_spline_planner else _halted(v, one)
         for one in after
     ]
     if all(stop is True for stop in stops):
         return STOP
     return PASS if all(stop is False for stop in stops) else MAYBE
+
+
+def _halted(v: KrlVisit, after: KrlVisit) -> bool | None:
+    """Return whether the program waits between two moves, None if not known."""
+    if after.modes.ahead != v.modes.ahead and not after.modes.halted:
+        return None
+    halted: bool | None = after.modes.halted
+    return halted
 
 
 def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:

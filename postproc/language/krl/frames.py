@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,12 @@ from postproc.language.collect import IDENTITY, Pose, composed, flat
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import whole
+from postproc.language.krl.store import (
+    CORRECTIONS,
+    NOTHING_SET,
+    KrlStore,
+    entry_name,
+)
 from postproc.language.krl.task import CONFIG, KrlRecord, KrlTask
 from postproc.language.machine import Scope
 
@@ -24,11 +30,14 @@ class KrlFrame:
         pose: Where it is.
         why: Why targets with it cannot be compensated, "" where they can.
         taught: It was taught with the arm, and contains its error.
+        remote: It was set for a tool that stands still; controllers differ in which
+            of the two frames they take for it then.
     """
 
     pose: Pose
     why: str = ""
     taught: bool = False
+    remote: bool = False
 
 
 ZERO = KrlFrame(IDENTITY)
@@ -36,6 +45,12 @@ NUMBERS = {"$tool": "tool_no", "$base": "base_no"}  # in FDAT
 TABLES = {"$tool": "tool_data", "$base": "base_data"}
 _WHICH = "which entry of {} it takes is known only when the program runs"
 _CHAINED = "its base moves with another axis or arm ({})"
+_MAY_BE_ON = (
+    "{} may be TRUE here: BAS links {} to its {} then. Set it to FALSE, or call "
+    "BAS(#INITMOV,0), on every way here"
+)
+_CORRECTED = "{} is linked to its {}, and its value is not known here"
+_DOUBLE = "the program declares a {} of its own: BAS takes that of the controller"
 
 
 @dataclass(frozen=True)
@@ -46,6 +61,7 @@ class FrameReader:
         task: The files of the job.
         row, here: The statement.
         tool, base: What ``$TOOL`` and ``$BASE`` are there.
+        store: What the program has set before.
     """
 
     task: KrlTask
@@ -53,6 +69,7 @@ class FrameReader:
     here: Scope
     tool: KrlFrame
     base: KrlFrame
+    store: KrlStore = NOTHING_SET
 
     def frame(self, operand: said.Operand) -> KrlFrame:
         """Read a frame."""
@@ -84,7 +101,9 @@ class FrameReader:
         value = self.task.value(first, self.row, self.here)
         match name:
             case "stool2" if isinstance(value, KrlRecord):
-                return self.numbered("$tool", value.number("tool_no"))
+                found = self.numbered("$tool", value.number("tool_no"))
+                still = value.get("ipo_frame") != "#base"
+                return replace(found, remote=still) if still else found
             case "stool":
                 return self.numbered(
                     "$tool", self.task.number(first, self.row, self.here)
@@ -98,11 +117,31 @@ class FrameReader:
         return KrlFrame((), f"what {name.upper()} gives is not known")
 
     def numbered(self, name: str, number: float) -> KrlFrame:
-        """Return the tool or the base of a number; 0 is none."""
-        entry = whole(number)
+        """Return the tool or the base that BAS sets for a number; 0 is none."""
+        entry, table = whole(number), TABLES[name]
         if entry is None:
             return KrlFrame((), f"the number of its {name.upper()} is not known")
-        return ZERO if entry == 0 else self.entry(TABLES[name], entry)
+        if not self.task.is_global(table, self.here):
+            return KrlFrame((), _DOUBLE.format(table.upper()))
+        found = ZERO if entry <= 0 else self.entry(table, entry)
+        first, second = (self._correction(name, *pair) for pair in CORRECTIONS[name])
+        return self._product(self._product(first, found), second)
+
+    def _correction(self, name: str, frame: str, switch: str) -> KrlFrame:
+        """Return a frame that BAS links to an entry, no shift where it does not."""
+        on = self._held(switch, switch)
+        if on is None:
+            on = self.task.initial_switch(switch)
+        if on is False:
+            return ZERO
+        shown = name.upper()
+        if on is None:
+            why = _MAY_BE_ON.format(switch.upper(), frame.upper(), shown)
+            return KrlFrame((), why)
+        found = self._held(frame, frame)
+        if isinstance(found, KrlFrame):
+            return found
+        return KrlFrame((), _CORRECTED.format(frame.upper(), shown))
 
     def entry(self, table: str, number: int) -> KrlFrame:
         """Read an entry of TOOL_DATA or BASE_DATA."""
@@ -116,7 +155,10 @@ class FrameReader:
 
     def _element(self, table: str, number: int) -> KrlFrame | None:
         """Read an element of an array of frames, None where it is not known."""
-        if table in self.task.written:
+        held = self._held(table, entry_name(table, number))
+        if isinstance(held, KrlFrame) and self.task.is_global(table, self.here):
+            return held
+        if not self.task.is_steady(table, number):
             return None
         found = self.task.datum(table, self.here, (number,))
         if found is None or found[1].value is None:
@@ -126,6 +168,10 @@ class FrameReader:
         pose = pose_of(self.task.value(datum.value, datum.row, there))
         taught = self.task.is_taught(table, file, datum.row)
         return KrlFrame(pose, taught=taught) if pose else None
+
+    def _held(self, name: str, key: str) -> object | None:
+        """Return what the program has set, unless something beside it may change it."""
+        return None if name in self.task.beside else self.store.get(key)
 
     def _is_chained(self, number: int) -> bool:
         """Tell whether a base hangs on an external axis."""
@@ -166,8 +212,12 @@ class FrameReader:
     def _product(first: KrlFrame, second: KrlFrame) -> KrlFrame:
         if first.why or second.why or not (first.pose and second.pose):
             return KrlFrame((), first.why or second.why)
+        if ZERO in (first, second):
+            return second if first == ZERO else first
         return KrlFrame(
-            composed(first.pose, second.pose), taught=first.taught or second.taught
+            composed(first.pose, second.pose),
+            taught=first.taught or second.taught,
+            remote=first.remote or second.remote,
         )
 
 

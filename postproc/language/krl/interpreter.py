@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from postproc.language.collect import cell_pose
 from postproc.language.flow import HeadedRows
@@ -18,26 +19,34 @@ from postproc.language.krl.modes import (
     ModeReader,
 )
 from postproc.language.krl.moves import KrlGoals
+from postproc.language.krl.program import whole
+from postproc.language.krl.routines import AHEAD, ASSUMED, package_routines
+from postproc.language.krl.statements import KrlText
+from postproc.language.krl.store import HELD
 from postproc.language.krl.task import (
     FUNCTIONS,
     STILL,
     KrlTask,
+    changed_by,
     operands_of,
     parts_of,
 )
 from postproc.language.machine import Arrived, CallContext, Scope, TaskMachine
-from postproc.language.visits import START
+from postproc.language.visits import ASSUMED_STILL, START
 
 _PASSED = (
-    said.AccessHeader, said.KrlDeclaration, said.OutsideName, said.InterruptDeclared,
-    said.SpeedPart,
+    said.AccessHeader, said.KrlDeclaration, said.OutsideName, said.SpeedPart,
 )  # fmt: skip
 _ACTING = (
     said.Assignment, said.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
-    said.ContinueWord, said.InterruptSwitched, said.PathTrigger,
+    said.ContinueWord, said.InterruptSwitched, said.PathTrigger, said.InterruptDeclared,
 )  # fmt: skip
 _INTERRUPT = "an interrupt or a trigger may move the arm, or change its settings"
 _RESUMED = "RESUME or BRAKE may end the way to it anywhere"
+MOVES, BRAKES, RESUMES = "moves", "brake", "resume"
+"""What statements may do to moves that are under way."""
+_Effects = tuple[frozenset[str], list[tuple[int, HeadedRows]]]
+EVERY = -1  # interrupt whose number is not known
 
 
 @dataclass
@@ -51,7 +60,9 @@ class KrlMachine(TaskMachine):
 
     task: KrlTask = field(kw_only=True)
     goals: KrlGoals = field(kw_only=True)
-    _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _known: dict[tuple[int, int], _Effects] = field(default_factory=dict)
+    _met: set[tuple[int, int]] = field(default_factory=set)
+    _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, task: KrlTask, start: Start) -> KrlMachine:
@@ -63,13 +74,12 @@ class KrlMachine(TaskMachine):
     def run(self) -> None:
         """Follow every way from the first routine."""
         modes = KrlModes(tool=_frame(self.start.tool), base=_frame(self.start.uframe))
-        blocked = {_INTERRUPT} if self._interrupted() else set()
-        blocked |= {_RESUMED} if self._resumed() else set()
-        modes = replace(modes, blocked=frozenset(blocked))
         first = self.task.files[0]
         here = Arrived(frozenset([START]), modes)
         self.call(0, first.name, first.routines[0], None, -1, here)
         self.follow_all()
+        for name, (file, row) in self._assumed.items():
+            self.say(file, row, ASSUMED_STILL, f"{name.upper()} {ASSUMED}")
 
     # What a statement is.
 
@@ -99,8 +109,22 @@ class KrlMachine(TaskMachine):
     def act(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
     ) -> Arrived | None:
-        """Carry a statement out; None where it goes on in a routine."""
+        """Carry a statement out; None where it goes on in a routine.
+
+        Behind ON_ERROR_PROCEED an error skips it: both ways go on then.
+        """
+        if not here.modes.perhaps:
+            return self._carry_out(context, row, one, here)
+        here = replace(here, modes=here.modes.with_(perhaps=False))
+        after = self._carry_out(context, row, one, here)
+        return None if after is None else after.joined(here)
+
+    def _carry_out(
+        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+    ) -> Arrived | None:
+        """Carry a statement out without an error."""
         here = self.after_functions(context, row, one, here)
+        here = self._forget(context, row, one, here)
         match one:
             case said.KrlMove():
                 return self._move(context, row, one, here)
@@ -112,10 +136,34 @@ class KrlMachine(TaskMachine):
                 return _halted(here, True)
             case said.ContinueWord():
                 return replace(here, modes=replace(here.modes, goes_on=True))
+            case said.InterruptDeclared():
+                return self._declare(context, row, one, here)
             case said.InterruptSwitched():
-                return _halted(here, None)
+                return self._switch(context, row, one, _halted(here, None))
+            case said.PathTrigger():
+                return self._trigger(context, one, here)
             case _:
                 return here
+
+    def _forget(
+        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+    ) -> Arrived:
+        """Forget what a routine may change of what is handed over to it."""
+        if isinstance(one, said.InterruptDeclared | said.PathTrigger):
+            return here
+        own = one.target if isinstance(one, said.Assignment) else None
+        store = here.modes.store
+        for target in changed_by(one):
+            name = target.name
+            if target is own or not _is_modal(name):
+                continue
+            if name not in HELD:
+                what = f"hands {name.upper()} over, which may be changed"
+                return self.unknown(context, row, here, what)
+            store = store.without(name).with_(name, None)
+        if store == here.modes.store:
+            return here
+        return replace(here, modes=here.modes.with_(store=store))
 
     def _move(
         self, context: CallContext, row: int, one: said.KrlMove, here: Arrived
@@ -129,7 +177,7 @@ class KrlMachine(TaskMachine):
         return replace(after, modes=replace(after.modes, halted=False, goes_on=False))
 
     def _modes(self, context: CallContext, row: int) -> ModeReader:
-        return ModeReader(self.task, row, context.scope, self.start.payload_kg)
+        return ModeReader(self.task, row, context.scope)
 
     def _assign(
         self, context: CallContext, row: int, one: said.Assignment, here: Arrived
@@ -158,13 +206,32 @@ class KrlMachine(TaskMachine):
         if name in self.task.routines:
             return self.unknown(context, row, here, "names several routines")
         if name == "bas":
+            here = _halted(here, None) if _puts_out(one) else here
             modes = self._modes(context, row).bas(here.modes, one.arguments)
             return replace(here, modes=modes)
         if name == "pulse":
             return _halted(here, True)
+        if name == "on_error_proceed":
+            return replace(here, modes=here.modes.with_(perhaps=True))
         if name in STILL or self.said_still(name):
             return _halted(here, None)
+        if name in package_routines() and not self._is_overruled(name):
+            return self._assume(context, row, name, here)
         return self.outside(context, row, name, here)
+
+    def _is_overruled(self, name: str) -> bool:
+        """Return True if the cell says what a routine of a package does."""
+        return self.start.strict_calls or name in self.start.routines
+
+    def _assume(
+        self, context: CallContext, row: int, name: str, here: Arrived
+    ) -> Arrived:
+        """Call a routine of a package, which is known to be still."""
+        if package_routines()[name] == AHEAD:
+            return here
+        place = context.scope.file, row
+        self._assumed[name] = min(self._assumed.get(name, place), place)
+        return _halted(here, None)
 
     def after_functions(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
@@ -196,62 +263,189 @@ class KrlMachine(TaskMachine):
         what = f"calls the function {name}, which is not known: it may move"
         return self.unknown(context, row, here, what)
 
-    # What a routine may do, read off its text.
+    # Interrupts and triggers.
 
-    def _interrupted(self) -> bool:
-        """Tell whether an interrupt or a trigger moves, or sets what moves need."""
-        for file, text in enumerate(self.texts):
+    def _declare(
+        self, context: CallContext, row: int, one: said.InterruptDeclared, here: Arrived
+    ) -> Arrived:
+        """Declare an interrupt; one that nothing switches on may be on already."""
+        self._met.add((context.scope.file, row))
+        effects = self._effects_of(context.scope.file, one.action)
+        modes, number = here.modes, self._number_of(context, row, one.number)
+        others = frozenset(d for d in modes.declared if d[0] != number)
+        modes = replace(modes, declared=others)
+        if RESUMES in effects:
+            return replace(here, modes=modes.with_(blocked=modes.blocked | {_RESUMED}))
+        if effects:
+            own = number, _INTERRUPT if MOVES in effects else _RESUMED
+            modes = replace(modes, declared=others | {own})
+            if not {number, EVERY} & self._switched_on:
+                modes = replace(modes, active=modes.active | {own})
+        return replace(here, modes=modes)
+
+    def _switch(
+        self, context: CallContext, row: int, one: said.InterruptSwitched, here: Arrived
+    ) -> Arrived:
+        """Switch interrupts on or off."""
+        self._met.add((context.scope.file, row))
+        modes, number = here.modes, self._number_of(context, row, one.number)
+        if one.word == "on":
+            meant = {
+                d for d in modes.declared if EVERY in (number, d[0]) or d[0] == number
+            }
+            return replace(here, modes=replace(modes, active=modes.active | meant))
+        if one.word != "off" or (one.number is not None and number == EVERY):
+            return here
+        left = {d for d in modes.active if one.number is not None and d[0] != number}
+        if left == modes.active:
+            return here
+        return replace(here, modes=replace(modes, active=frozenset(left))).lost()
+
+    def _number_of(
+        self, context: CallContext, row: int, operand: said.Operand | None
+    ) -> int:
+        """Return the number of an interrupt, EVERY where it is not known."""
+        number = whole(self.number(operand, row, context.scope))
+        return EVERY if number is None else number
+
+    @cached_property
+    def _switched_on(self) -> set[int]:
+        """Numbers of the interrupts that some statement switches on."""
+        found = set()
+        for file, text in self._robot_texts():
+            here = Scope(file, self.task.files[file].name, "")
             for row in range(len(text)):
                 one = text.statement(row)
-                if isinstance(one, said.InterruptDeclared | said.PathTrigger):
-                    if self._any_moves(file, [one.action]):
-                        return True
-        return False
+                if isinstance(one, said.InterruptSwitched) and one.word == "on":
+                    number = whole(self.task.number(one.number, row, here))
+                    found.add(EVERY if number is None else number)
+        return found
 
-    def _resumed(self) -> bool:
-        """Tell whether an interrupt may end moves before their targets."""
-        said_of = (one for text in self.texts for one in text.said)
-        return any(
-            isinstance(one, said.InterruptSwitched) and one.word in ("brake", "resume")
-            for one in said_of
+    def _trigger(
+        self, context: CallContext, one: said.PathTrigger, here: Arrived
+    ) -> Arrived:
+        """Leave what comes behind a trigger that may set what moves need.
+
+        What it does comes at some time in the next move, when the program is ahead.
+        """
+        if not self._effects_of(context.scope.file, one.action):
+            return here
+        return replace(
+            here, modes=here.modes.with_(blocked=here.modes.blocked | {_INTERRUPT})
         )
+
+    def _robot_texts(self) -> Iterator[tuple[int, KrlText]]:
+        """Yield files and statements, but for those of submit programs."""
+        for file, text in enumerate(self.texts):
+            if not self.task.files[file].is_submit:
+                yield file, text
+
+    @cached_property
+    def everywhere(self) -> frozenset[str]:
+        """Return why no target can be compensated, once all ways are followed.
+
+        An interrupt that no way declares, or that no way switches on, may be on at any
+        time: by a routine that is not followed, or by another program.
+        """
+        found = set()
+        unseen_on = False
+        for file, text in self._robot_texts():
+            for row in range(len(text)):
+                if (file, row) in self._met:
+                    continue
+                one = text.statement(row)
+                if isinstance(one, said.InterruptDeclared):
+                    effects = self._effects_of(file, one.action)
+                    found |= {_INTERRUPT} if MOVES in effects else set()
+                    found |= {_RESUMED} if effects - {MOVES} else set()
+                unseen_on |= (
+                    isinstance(one, said.InterruptSwitched) and one.word == "on"
+                )
+        if unseen_on:
+            found |= {why for v in self.visits for _, why in v.modes.declared}
+        return frozenset(found)
+
+    # What a routine may do, read off its text.
 
     def _moves(self, file: int, routine: HeadedRows) -> bool:
         """Tell whether a routine moves, or changes how moves are carried out."""
+        return bool(self._routine_effects(file, routine))
+
+    def _routine_effects(self, file: int, routine: HeadedRows) -> frozenset[str]:
+        """Collect what a routine may do, and all that it calls."""
+        found: set[str] = set()
+        waiting, seen = [(file, routine)], set[tuple[int, int]]()
+        while waiting:
+            at, one = waiting.pop()
+            if (at, one.first) not in seen:
+                seen.add((at, one.first))
+                effects, called = self._direct(at, one)
+                found |= effects
+                waiting += called
+        return frozenset(found)
+
+    def _direct(self, file: int, routine: HeadedRows) -> _Effects:
+        """Collect what the statements of a routine do, and which routines they call."""
         key = file, routine.first
-        if key not in self._moving:
-            self._moving[key] = False  # of one that calls itself
-            text = self.texts[file]
+        if key not in self._known:
+            text, called = self.texts[file], list[tuple[int, HeadedRows]]()
             rows = range(routine.first + 1, routine.last)
-            self._moving[key] = self._any_moves(file, map(text.statement, rows))
-        return self._moving[key]
+            parts = [self._own(file, text.statement(row), called) for row in rows]
+            self._known[key] = frozenset().union(*parts), called
+        return self._known[key]
 
-    def _any_moves(self, file: int, some: Iterable[said.SourceStatement]) -> bool:
-        """Tell whether some statements may move the arm, or set what moves need."""
+    def _effects_of(self, file: int, one: said.SourceStatement) -> frozenset[str]:
+        """Collect what a statement may do: move or set what moves need, end a move."""
+        called = list[tuple[int, HeadedRows]]()
+        found = [self._own(file, one, called)]
+        found += [self._routine_effects(*routine) for routine in called]
+        return frozenset().union(*found)
+
+    def _own(
+        self,
+        file: int,
+        one: said.SourceStatement,
+        called: list[tuple[int, HeadedRows]],
+    ) -> frozenset[str]:
+        """Collect what a statement does itself, and note the routines that it calls."""
+        match one:
+            case said.KrlMove() | said.SplineBlock() | said.NotUnderstood():
+                return frozenset([MOVES])
+            case said.InterruptSwitched(word=word) if word in (BRAKES, RESUMES):
+                return frozenset([word])
+            case said.PathTrigger(action=action):
+                return self._own(file, action, called)
+        if any(_is_modal(target.name) for target in changed_by(one)):
+            return frozenset([MOVES])
         here = Scope(file, self.task.files[file].name, "")
-        for one in some:
-            if isinstance(one, said.KrlMove | said.SplineBlock | said.NotUnderstood):
-                return True
-            if isinstance(one, said.Assignment) and _is_modal(one.target.name):
-                return True
-            parts = parts_of(operands_of(one))
-            names = [p.name for p in parts if isinstance(p, said.FunctionCall)]
-            if isinstance(one, said.Instruction):
-                names.append(one.name)
-            if any(self._may_move(name, here) for name in names):
-                return True
-        return False
+        parts = parts_of(operands_of(one))
+        names = [p.name for p in parts if isinstance(p, said.FunctionCall)]
+        if isinstance(one, said.Instruction):
+            names.append(one.name)
+        moves = False
+        for name in names:
+            found = self.task.routine(name, here)
+            if found is not None:
+                called.append((found[0], found[2]))
+            moves |= found is None and not self._is_still(name)
+        return frozenset([MOVES]) if moves else frozenset()
 
-    def _may_move(self, name: str, here: Scope) -> bool:
-        found = self.task.routine(name, here)
-        if found is not None:
-            return self._moves(found[0], found[2])
-        return not (name in STILL or name in FUNCTIONS or self.said_still(name))
+    def _is_still(self, name: str) -> bool:
+        """Return True if a routine without a text is known to be still."""
+        known = name in STILL or name in FUNCTIONS or self.said_still(name)
+        listed = name in package_routines() and not self._is_overruled(name)
+        return known or listed
+
+
+def _puts_out(one: said.Instruction) -> bool:
+    """Return True if a call of BAS switches outputs, which may stop the arm."""
+    command = one.arguments[0].value if one.arguments else None
+    return isinstance(command, said.EnumValue) and command.name.startswith("#out_")
 
 
 def _is_modal(name: str) -> bool:
     """Tell whether setting a variable may change how moves are made."""
-    own = name in ("fdat_act", "pdat_act", "ldat_act")
+    own = name in ("fdat_act", "pdat_act", "ldat_act") or name in HELD
     return own or (name.startswith("$") and name not in HALTING | HARMLESS)
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from postproc.exceptions import ProgramError
 from postproc.files import KRL_PROGRAMS
+from postproc.language.archive import Archive
 from postproc.language.grammars import line_parser
 from postproc.language.interface import (
     Cloner,
@@ -18,6 +20,7 @@ from postproc.language.interface import (
     Start,
 )
 from postproc.language.krl import syntax as said
+from postproc.language.krl.archive import read_archive
 from postproc.language.krl.collect import visits_of
 from postproc.language.krl.dialect import KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
@@ -32,7 +35,13 @@ from postproc.language.visits import never_reached
 _BEGIN = re.compile(
     rb"(?:\xef\xbb\xbf)?(?:\s|;[^\r\n]*[\r\n])*(?:&\w|(?:GLOBAL\s+)?DEF\s)", re.I
 )
-_ACCURACY = ("$abs_accur", "$abs_convert")
+# Switches of the controller's own accuracy model, and the words that switch it off.
+_ACCURACY = {
+    "$abs_accur": ("#none", "#off", "false"),
+    "$abs_convert": ("#none", "#off", "false"),
+    "$deactivate_abs_accur": ("true",),
+    "$suppress_abs_accur": ("true",),
+}
 _NOT_CLONED = "points of KRL are not cloned: give the move a point of its own"
 
 
@@ -40,6 +49,7 @@ class Krl(Language):
     """The language of KUKA controllers."""
 
     name = "KRL"
+    controller = "kuka"
     suffixes = KRL_PROGRAMS
     comment = ";"
     dialect = KRL_DIALECT
@@ -58,10 +68,14 @@ class Krl(Language):
     ) -> JobReading:
         """Read the files of a job, the source that runs first; see `Language.read`."""
         files = [read_once(source, known, read_krl) for source in sources]
+        if files[0].is_submit:
+            problem = "is a submit program, which moves no arm"
+            raise ProgramError(sources[0].name, problem, "Give the .src of a program")
         if not files[0].routines:
             problem, cure = "the file holds no routine", "Give the .src of a program"
             raise ProgramError(sources[0].name, problem, cure)
         _refuse_own_accuracy(files)
+        _refuse_doubles(files)
         machine = KrlMachine.of(KrlTask(files, start.taught), start)
         machine.run()
         visits = visits_of(machine)
@@ -88,6 +102,10 @@ class Krl(Language):
     def holds_joints(self, line: str) -> bool:
         """Tell whether a line holds joint angles."""
         return _JOINTS.match(line) is not None
+
+    def read_archive(self, folder: Path) -> Archive | None:
+        """Read ``$config.dat`` and ``$machine.dat`` of an archive."""
+        return read_archive(folder)
 
     def prepare(self) -> None:
         """Load the parser of statements."""
@@ -120,24 +138,59 @@ def skeleton_of(text: KrlText) -> Skeleton:
 
 
 def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:
-    """Refuse a program that switches the controller's own accuracy model.
+    """Refuse a program that switches the controller's own accuracy model on.
 
     Raises:
         ProgramError: It does.
     """
     for file in files:
         for row in range(len(file.text)):
-            one = file.text.statement(row)
-            if isinstance(one, said.Assignment) and one.target.name in _ACCURACY:
-                if not _is_off(one.value):
-                    problem = f"sets {one.target.name.upper()}: the controller "
-                    problem += "compensates on its own, this would do it twice"
-                    cure = "Switch that off, here and on the controller"
-                    line = file.text.line(row)
-                    raise ProgramError(file.text.source.name, problem, cure, line=line)
+            name = _switches_on(file.text.statement(row))
+            if name:
+                problem = f"sets {name.upper()}: the controller "
+                problem += "compensates on its own, this would do it twice"
+                cure = "Switch that off, here and on the controller"
+                line = file.text.line(row)
+                raise ProgramError(file.text.source.name, problem, cure, line=line)
 
 
-def _is_off(value: said.Operand) -> bool:
-    if isinstance(value, said.EnumValue):
-        return value.name in ("#none", "#off")
-    return isinstance(value, said.DataObject) and value.name == "false"
+POINTS = frozenset("e6pos pos e6axis axis frame".split())
+
+
+def _refuse_doubles(files: Sequence[KrlFile]) -> None:
+    """Refuse a data list that declares a point twice, or gives it two values.
+
+    Raises:
+        ProgramError: One does: which of the values holds is not known.
+    """
+    for file in (one for one in files if not one.routines):
+        types = {datum.name: datum.type for datum in file.data if datum.type}
+        first: dict[tuple[str, tuple[int, ...]], int] = {}
+        for datum in file.data:
+            if datum.value is None or types.get(datum.name) not in POINTS:
+                continue
+            row = first.setdefault((datum.name, datum.index), datum.row)
+            if row != datum.row:
+                lines = [file.text.line(at) for at in (row, datum.row)]
+                problem = f"gives {datum.name.upper()} a second value, after line "
+                cure = "Keep the one that the controller has"
+                name, problem = file.text.source.name, f"{problem}{lines[0]}"
+                raise ProgramError(name, problem, cure, line=lines[1])
+
+
+def _switches_on(one: said.SourceStatement) -> str:
+    """Name what a statement switches the accuracy model on with, "" if it does not."""
+    match one:
+        case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
+            return _switches_on(action)
+        case said.Assignment(target=said.DataObject(name=name), value=value):
+            if name in _ACCURACY and not _is_one_of(value, _ACCURACY[name]):
+                return name
+    return ""
+
+
+def _is_one_of(value: said.Operand, words: Sequence[str]) -> bool:
+    match value:
+        case said.EnumValue(name=word) | said.DataObject(name=word, steps=()):
+            return word in words
+    return False

@@ -8,13 +8,24 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from postproc.language.krl import syntax as said
-from postproc.language.krl.frames import NUMBERS, FrameReader, KrlFrame
+from postproc.language.krl.frames import NUMBERS, ZERO, FrameReader, KrlFrame
 from postproc.language.krl.program import whole
-from postproc.language.krl.task import KrlRecord, KrlTask, KrlValue
+from postproc.language.krl.store import (
+    CORRECTION_FRAMES,
+    NOTHING_SET,
+    SWITCHES,
+    TABLES,
+    KrlStore,
+    entry_name,
+)
+from postproc.language.krl.task import KrlRecord, KrlTask, KrlValue, is_word
 from postproc.language.machine import Scope
 from postproc.language.visits import OrientationLaw
+from postproc.robot.pose import MM
 
 UNKNOWN = -1.0  # a number that is not known
+CELL_LOAD: tuple[float, ...] = ()
+LOST_LOAD: tuple[float, ...] = (-1.0,)
 LOST_FRAME = KrlFrame(
     (),
     "which $TOOL and $BASE hold here is not known: set them anew behind what is not "
@@ -40,6 +51,14 @@ class KrlModes:
         fdat, pdat, ldat: ``FDAT_ACT``, ``PDAT_ACT`` and ``LDAT_ACT``.
         halted: The arm has stopped since the last move; None where that is not known.
         goes_on: ``CONTINUE`` stands before.
+        load: What the arm carries, as the program states it: mass [kg], and its centre
+            in the flange frame [m] where that is known; `CELL_LOAD` where it states
+            nothing, `LOST_LOAD` where what it states is not known.
+        store: What the program has set of tables, corrections and switches.
+        perhaps: The next statement is skipped where an error comes up in it.
+        declared: Interrupts that may move the arm or end its moves, by number, and why
+            targets are left while one of them is on.
+        active: Those of them that may be on.
         blocked: Why no target can be compensated; more than one reason.
     """
 
@@ -58,6 +77,11 @@ class KrlModes:
     ldat: KrlValue | None = None
     halted: bool | None = False
     goes_on: bool = False
+    load: tuple[float, ...] = CELL_LOAD
+    store: KrlStore = NOTHING_SET
+    perhaps: bool = False
+    declared: frozenset[tuple[int, str]] = frozenset()
+    active: frozenset[tuple[int, str]] = frozenset()
     blocked: frozenset[str] = frozenset()
 
     def joined(self, other: KrlModes) -> KrlModes:
@@ -67,12 +91,16 @@ class KrlModes:
             for f in fields(self)
             if getattr(self, f.name) != getattr(other, f.name)
         }
-        differing["blocked"] = self.blocked | other.blocked
+        differing["store"] = self.store.joined(other.store)
+        for name in ("declared", "active", "blocked"):
+            differing[name] = getattr(self, name) | getattr(other, name)
         return replace(self, **differing)
 
     def lost(self) -> KrlModes:
         """Forget all but why targets cannot be compensated."""
-        return replace(LOST, blocked=self.blocked)
+        return replace(
+            LOST, declared=self.declared, active=self.active, blocked=self.blocked
+        )
 
     def with_(self, **changed: Any) -> KrlModes:
         """Return it with other values."""
@@ -91,15 +119,25 @@ LOST = KrlModes(
     orientation="",
     ahead=None,
     halted=None,
+    load=LOST_LOAD,
 )
 _LAWS = {
     "#var": OrientationLaw.ONE_AXIS,
     "#constant": OrientationLaw.ONE_AXIS,  # the end is not what is written: see collect
     "#joint": OrientationLaw.WRIST_JOINTS,
 }
+_BOOLS = ("true", "false")
+_SWITCHED_OFF: Sequence[tuple[str, object]] = (
+    *((name, False) for name in sorted(SWITCHES)),
+    *((name, ZERO) for name in sorted(CORRECTION_FRAMES)),
+)
+BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
+"""Commands of BAS that change neither frames nor blending nor speed."""
 INITIAL = "BAS(#INITMOV) may set {} anew: set it behind that"
-PAYLOAD = "$LOAD is not what the cell says that the arm carries"
+NO_LOAD = "which $LOAD holds here is not known: set it again on every way here"
 SOFT = "an axis is soft ($SOFT_PLCL)"
+GENERATOR = "a function generator ($TECH) moves the tool off its path"
+AXIS_LOAD = "the program sets a load on an axis ($LOAD_A1 to $LOAD_A3)"
 MOVED_BASE = "$ROBROOT or $WORLD is set by the program"
 # System variables that change nothing of where targets are and from which side they are
 # reached; those in the first list do not stop what is planned ahead either.
@@ -111,6 +149,7 @@ PLANNED = frozenset(
     $ov_app $torqmon $torqmon_def $torqmon_com $torqmon_com_def $tech $red_vel $spl_tech
     $load_a1 $load_a2 $load_a3 $cp_vel_type $cp_statmon $nullframe $world $ex_ax_ignore
     $spl_ori_joint_auto $eko_mode $gear_jerk_def $abs_accur $abs_convert
+    $deactivate_abs_accur $suppress_abs_accur
     """.split()
 )
 HALTING = frozenset("$out $anout $in $anin $pos_act $axis_act $axis_act_meas".split())
@@ -133,13 +172,11 @@ class ModeReader:
     Attributes:
         task: The files of the job.
         row, here: Where the statement stands.
-        payload_kg: What the cell says that the arm carries, NaN where unknown.
     """
 
     task: KrlTask
     row: int
     here: Scope
-    payload_kg: float
 
     def assigned(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
         """Carry out ``$name = value``, None where nobody knows what that does."""
@@ -163,10 +200,18 @@ class ModeReader:
                 return self._load(modes, one)
             case "$soft_plcl" | "$softn":
                 return replace(modes, blocked=modes.blocked | {SOFT})
+            case "$tech" | "$tech_c":
+                return replace(modes, blocked=modes.blocked | {GENERATOR})
+            case "$load_a1" | "$load_a2" | "$load_a3":
+                return replace(modes, blocked=modes.blocked | {AXIS_LOAD})
             case "$robroot" | "$world":
                 return replace(modes, blocked=modes.blocked | {MOVED_BASE})
             case "fdat_act" | "pdat_act" | "ldat_act":
                 return self._held(modes, one)
+            case _ if name in TABLES:
+                return replace(modes, store=self._entry(modes, one))
+            case _ if name in CORRECTION_FRAMES | SWITCHES:
+                return replace(modes, store=self._correction(modes, one))
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
 
@@ -181,7 +226,42 @@ class ModeReader:
 
     def frames(self, modes: KrlModes) -> FrameReader:
         """Return what reads frames here."""
-        return FrameReader(self.task, self.row, self.here, modes.tool, modes.base)
+        return FrameReader(
+            self.task, self.row, self.here, modes.tool, modes.base, modes.store
+        )
+
+    def _entry(self, modes: KrlModes, one: said.Assignment) -> KrlStore:
+        """``BASE_DATA[20] = {..}``: known where the entry and all of it are known."""
+        table, store = one.target.name, modes.store
+        index = None
+        if one.target.steps:
+            index = self.task.index(one.target.steps[0], self.row, self.here)
+        if index is None or len(index) != 1:
+            return store.without(table)
+        whole_of_it = len(one.target.steps) == 1
+        known = whole_of_it and self.task.is_global(table, self.here)
+        value = self._entry_value(modes, one) if known else None
+        return store.with_(entry_name(table, index[0]), value)
+
+    def _entry_value(self, modes: KrlModes, one: said.Assignment) -> object | None:
+        """Read the frame that an entry gets, or the mass of a load."""
+        if one.target.name == "load_data":
+            load = load_of(self._record(one.value))
+            return None if load == LOST_LOAD else load
+        found = self.frames(modes).frame(one.value)
+        taught = found.taught or one.target.name in self.task.taught
+        return None if found.why or not found.pose else replace(found, taught=taught)
+
+    def _correction(self, modes: KrlModes, one: said.Assignment) -> KrlStore:
+        """``M_BASE_CORR = {..}``, ``M_BAS_COR_ON = TRUE``."""
+        name, value = one.target.name, None
+        if one.target.steps or not self.task.is_global(name, self.here):
+            return modes.store.with_(name, None)
+        if name in SWITCHES:
+            value = next((w == "true" for w in _BOOLS if is_word(one.value, w)), None)
+            return modes.store.with_(name, value)
+        found = self.frames(modes).frame(one.value)
+        return modes.store.with_(name, None if found.why else found)
 
     def _held(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
         """``FDAT_ACT = FP1``; of a component: the others stay what they were."""
@@ -257,9 +337,7 @@ class ModeReader:
         """Read ``SAPO(LCPDAT1)``, ``SAPO_PTP(PPDAT1)`` or ``{CDIS 5.0, ..}``."""
         if isinstance(operand, said.FunctionCall):
             held = self._record(self._argument(operand))
-            share = held.get("apo_mode") == "#cptp"  # then it is no distance
-            size = UNKNOWN if share else known(held.number("apo_dist"))
-            return replace(modes, distance=size)
+            return replace(modes, distance=known(held.number("apo_dist")))
         found = self._record(operand)
         return replace(
             modes,
@@ -268,33 +346,48 @@ class ModeReader:
         )
 
     def _load(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
-        """``$LOAD = LOAD_DATA[n]``: where it is known, the cell must say the same."""
+        """``$LOAD = LOAD_DATA[n]``, ``$LOAD = SLOAD(n)``, ``$LOAD.M = 50``."""
         operand: said.Operand | None = one.value
-        if one.target.steps:
-            return modes
-        if isinstance(operand, said.FunctionCall):
-            number = self._number(self._argument(operand))
-            return self._loaded(modes, number)
-        return self._weighed(modes, self._record(operand).number("m"))
+        match one.target.steps, operand:
+            case ("m",), _:
+                mass, centre = self._number(operand), modes.load[1:]
+                return replace(modes, load=_load_of(mass, centre))
+            case ("cm",), _:
+                centre = _centre_of(self._record(operand))
+                known = centre and modes.load and modes.load != LOST_LOAD
+                load = (modes.load[0], *centre) if known else LOST_LOAD
+                return replace(modes, load=load)
+            case ("cm", *_), _:
+                return replace(modes, load=LOST_LOAD)
+            case (), said.FunctionCall(name="sload"):
+                return self.loaded(modes, self._number(self._argument(operand)))
+            case (), said.DataObject(
+                name="load_data", steps=(said.ElementStep() as step,)
+            ):
+                index = self.task.index(step, self.row, self.here) or (math.nan,)
+                return self.loaded(modes, index[0])
+            case (), _:
+                return replace(modes, load=load_of(self._record(operand)))
+        return modes
 
-    def _loaded(self, modes: KrlModes, number: float) -> KrlModes:
-        """Take the load of a tool's number."""
+    def loaded(self, modes: KrlModes, number: float) -> KrlModes:
+        """Take the load of a tool's number, as BAS and SLOAD do."""
         entry = whole(number)
-        found = entry and self.task.datum("load_data", self.here, (entry,))
-        if not found or "load_data" in self.task.written:
-            return modes
+        if entry is None:
+            return replace(modes, load=LOST_LOAD)
+        held = modes.store.get(entry_name("load_data", entry))
+        if isinstance(held, tuple) and "load_data" not in self.task.beside:
+            return replace(modes, load=held)
+        if not self.task.is_steady("load_data", entry):
+            return replace(modes, load=LOST_LOAD)
+        found = self.task.datum("load_data", self.here, (entry,))
+        if entry <= 0 or found is None:
+            return replace(modes, load=CELL_LOAD)
         file, datum = found
         there = Scope(file, self.task.files[file].name, "")
         value = self.task.value(datum.value, datum.row, there)
-        mass = value.number("m") if isinstance(value, KrlRecord) else math.nan
-        return self._weighed(modes, mass)
-
-    def _weighed(self, modes: KrlModes, mass: float) -> KrlModes:
-        """Leave targets where the arm carries another load than the cell says."""
-        cell, blocked = self.payload_kg, modes.blocked - {PAYLOAD}
-        if mass >= 0 and abs(mass - cell) > max(LOAD_KG, LOAD_SHARE * cell):
-            blocked |= {PAYLOAD}
-        return replace(modes, blocked=blocked)
+        load = load_of(value) if isinstance(value, KrlRecord) else LOST_LOAD
+        return replace(modes, load=load)
 
     # BAS(#command, value), as the controller's bas.src carries it out.
 
@@ -311,6 +404,7 @@ class ModeReader:
             case "#tool" | "#base":
                 name = f"${word[1:]}"
                 found = self.frames(modes).numbered(name, value)
+                modes = self.loaded(modes, value) if word == "#tool" else modes
                 return modes.with_(**{word[1:]: found})
             case "#vel_ptp":
                 return replace(modes, share=_share(value))
@@ -326,13 +420,16 @@ class ModeReader:
             case "#cp_params":
                 changed = self._frames(self._path_data(modes))
                 return replace(changed, speed=known(value))
-        harmless = word in ("#acc_ptp", "#acc_cp", "#acc_gluer", "#ovrd", "#ex_bas")
-        return modes if harmless else modes.lost()
+        return modes if word in BAS_HARMLESS else modes.lost()
 
     def _initial(self, modes: KrlModes) -> KrlModes:
         """Set all to what the controller starts with, as far as that is known."""
+        store = modes.store
+        for name, value in _SWITCHED_OFF:
+            store = store.with_(name, value)
         return replace(
             modes,
+            store=store,
             tool=KrlFrame((), INITIAL.format("$TOOL")),
             base=KrlFrame((), INITIAL.format("$BASE")),
             interpolation="#base",
@@ -354,8 +451,10 @@ class ModeReader:
             for name, field in NUMBERS.items()
         }
         word = held.get("ipo_frame")
-        modes = self._loaded(modes, held.number("tool_no"))
+        modes = self.loaded(modes, held.number("tool_no"))
         frame = word if isinstance(word, str) else ""
+        if frame != "#base":
+            found = {name: replace(one, remote=True) for name, one in found.items()}
         return modes.with_(interpolation=frame, **found)
 
     def _joint_data(self, modes: KrlModes) -> KrlModes:
@@ -377,7 +476,24 @@ class ModeReader:
         )
 
 
-LOAD_KG, LOAD_SHARE = 1.0, 0.1  # that a load may be off what the cell says
+def load_of(record: KrlRecord) -> tuple[float, ...]:
+    """Return the load that a record states, see `KrlModes.load`."""
+    centre = record.get("cm")
+    known = _centre_of(centre) if isinstance(centre, KrlRecord) else ()
+    return _load_of(record.number("m"), known)
+
+
+def _load_of(mass: float, centre: tuple[float, ...]) -> tuple[float, ...]:
+    """Return a load; a negative mass states none, and stands for the arm's default."""
+    if math.isnan(mass):
+        return LOST_LOAD
+    return (mass, *centre) if mass >= 0 else CELL_LOAD
+
+
+def _centre_of(record: KrlRecord) -> tuple[float, ...]:
+    """Return a centre of mass [m], () where it is not known."""
+    found = tuple(record.number(name) * MM for name in ("x", "y", "z"))
+    return () if any(map(math.isnan, found)) else found
 
 
 def known(value: float) -> float:

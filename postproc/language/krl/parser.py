@@ -107,6 +107,16 @@ def _move(c: Children) -> said.KrlMove:
     return said.KrlMove(word, to, via, angle, _blends(c), _settings(c))
 
 
+def _switched(c: Children) -> said.InterruptSwitched:
+    number = next((x for x in c if isinstance(x, said.Operand)), None)
+    return said.InterruptSwitched(_low(c[0]), number)
+
+
+def _trigger(c: Children) -> said.PathTrigger:
+    action = next(x for x in c if isinstance(x, said.SourceStatement))
+    return said.PathTrigger(action, tuple(x for x in c if isinstance(x, said.Operand)))
+
+
 def _blends(c: Children) -> tuple[str, ...]:
     return tuple(str(x) for x in c if isinstance(x, BlendPart))
 
@@ -172,13 +182,11 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "continue_": lambda c: said.ContinueWord(),
     "wait": lambda c: said.Waiting(c[0]),
     "speed_part": lambda c: said.SpeedPart(),
-    "interrupt_declared": lambda c: said.InterruptDeclared(c[-2], c[-1]),
-    "interrupt_switched": lambda c: said.InterruptSwitched(_low(c[0])),
+    "interrupt_declared": lambda c: said.InterruptDeclared(*c[-3:]),
+    "interrupt_switched": _switched,
     "brake": lambda c: said.InterruptSwitched("brake"),
     "resume": lambda c: said.InterruptSwitched("resume"),
-    "trigger": lambda c: said.PathTrigger(
-        next(x for x in c if isinstance(x, said.SourceStatement))
-    ),
+    "trigger": _trigger,
     "move": _move,
     "arc": _move,
     "relative": _move,
@@ -189,6 +197,7 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "settings": lambda c: tuple(c),
     "setting": lambda c: said.Assignment(*c),
     "assignment": lambda c: said.Assignment(*c),
+    "proceed": lambda c: said.Instruction("on_error_proceed", ()),
     "instruction": _called(said.Instruction),
     "arguments": lambda c: tuple(c),
     "argument": lambda c: said.Argument(c[0] if c else None),
@@ -219,7 +228,12 @@ RESERVED = frozenset(
     """.split()
 )
 """Words that name nothing."""
-_NAMES_ONLY = ("ext", "extp", "extfct", "extfctp", "signal", "enum", "struc", "import")
+_NAMES_ONLY = frozenset(
+    """
+    ext extp extfct extfctp signal enum struc import channel confirm anin anout digin
+    """.split()
+)
+"""Words of statements that name something, or read and write in the background."""
 
 _PARSER = FormParser("krl", RULES, RESERVED, LONGEST, DEEPEST)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from postproc.files import base_name
+from postproc.files import base_name, is_submit
 from postproc.language.flow import HeadedRows
 from postproc.language.krl import syntax as said
 from postproc.language.krl.statements import KrlText, read_krl_statements
@@ -76,6 +76,11 @@ class KrlFile:
     def is_system(self) -> bool:
         """Tell whether it is a list of the controller, such as ``$config.dat``."""
         return self.name.startswith("$")
+
+    @property
+    def is_submit(self) -> bool:
+        """Return True if it runs beside the program, and moves no arm."""
+        return is_submit(self.text.source.name)
 
 
 def read_krl(source: Source) -> KrlFile:

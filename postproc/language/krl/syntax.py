@@ -158,22 +158,35 @@ class SpeedPart(SourceStatement):
 class InterruptDeclared(SourceStatement):
     """``INTERRUPT DECL n WHEN condition DO statement``."""
 
+    number: Operand
     condition: Operand
     action: SourceStatement
 
 
 @dataclass(frozen=True, slots=True)
 class InterruptSwitched(SourceStatement):
-    """``INTERRUPT ON n``, ``OFF``, ``ENABLE``, ``DISABLE``; ``BRAKE``; ``RESUME``."""
+    """``INTERRUPT ON n``, ``OFF``, ``ENABLE``, ``DISABLE``; ``BRAKE``; ``RESUME``.
+
+    Attributes:
+        word: Which of them.
+        number: Of the interrupt, None where all are meant.
+    """
 
     word: str
+    number: Operand | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class PathTrigger(SourceStatement):
-    """``TRIGGER WHEN .. DO statement``: it belongs to the move behind it."""
+    """``TRIGGER WHEN .. DO statement``: it belongs to the move behind it.
+
+    Attributes:
+        action: What it does.
+        values: Where on the move, how much later, and with which priority.
+    """
 
     action: SourceStatement
+    values: tuple[Operand, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,12 @@ from postproc.language.flow import HeadedRows
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMMENTS
 from postproc.language.krl.program import KrlDatum, KrlFile, whole
+from postproc.language.krl.routines import package_routines
+from postproc.language.krl.store import TABLES
 from postproc.language.machine import Scope
 
 CONFIG = "$config"
+ANY = -1  # an entry of a table whose number is not known
 DEEPEST = 20  # names that stand for names
 
 
@@ -61,21 +64,35 @@ STILL = frozenset(
     """
     ir_stopm pulse clear_pulse cread cwrite sread swrite copen cclose cioctl cast_to
     cast_from varstate strlen strdeclen strclear stradd strcomp strcopy strfind
-    msgnotify msgquit msgstate msgdialog set_kuka_msg clear_kuka_msg exists_kuka_msg
+    msgnotify msgquit msgstate msgdialog msgloop set_kuka_msg clear_kuka_msg
+    exists_kuka_msg set_krlmsg clear_krlmsg exists_krlmsg set_krldlg exists_krldlg
     mbx_rec on_error_proceed err_clear err_raise timer_limit delete_backward_buffer
     rob_timer get_decl_place m_comment setinfo lock unlock
+    eki_init eki_open eki_close eki_clear eki_clearbuffer eki_checkbuffer eki_send
+    eki_lock eki_unlock eki_setint eki_setreal eki_setbool eki_setstring eki_setframe
+    eki_getint eki_getreal eki_getbool eki_getstring eki_getframe eki_getintarray
+    eki_getrealarray eki_getboolarray eki_getframearray
     """.split()
 )
-WRITING = frozenset("cread sread cast_from mbx_rec strcopy strclear stradd".split())
+WRITING = frozenset(
+    """
+    cread sread cast_from mbx_rec strcopy strclear stradd eki_getint eki_getreal
+    eki_getbool eki_getstring eki_getframe eki_getintarray eki_getrealarray
+    eki_getboolarray eki_getframearray exists_krldlg
+    """.split()
+)
 FUNCTIONS = frozenset(
     """
     abs sqrt sin cos tan acos atan2 frand round trunc b_not inverse forward inv_pos
     strlen strdeclen strcomp strfind varstate cast_from_bits get_system_data
     stool stool2 sbase sipo_mode sload svel_cp svel_joint sacc_cp sacc_joint sapo
     sapo_ptp sori_typ scirc_typ sjerk sgear_jerk use_cm_pro_values exists_kuka_msg
-    ek lk ey euler mat_to_rpy rpy_to_mat
+    ek lk ey euler mat_to_rpy rpy_to_mat scirc_m s_exax_ign s_exax_ign2 k_root k_type
+    k_offs lk_offs k_addr k_name k_shift sync arcgetdelay arcgetpath
     """.split()
 )
+KEEPING = ((STILL - WRITING) | FUNCTIONS | package_routines().keys()) | {"bas"}
+"""Routines that change nothing of what they get."""
 
 
 @dataclass
@@ -113,7 +130,7 @@ class KrlTask:
         """Routines by name: file, place, and whether other files know each."""
         found = defaultdict(list)
         for number, file in enumerate(self.files):
-            for k, scope in enumerate(file.routines):
+            for k, scope in enumerate(() if file.is_submit else file.routines):
                 shared = k == 0 or scope.head.shared
                 found[scope.head.name].append((number, scope, shared))
         return found
@@ -165,22 +182,75 @@ class KrlTask:
         """Names of data that something may change."""
         return self._uses[0]
 
+    def is_global(self, name: str, here: Scope) -> bool:
+        """Return True if a name means data that all programs share."""
+        if name in here.parameters:
+            return False
+        place = self.place(name, here)
+        return place is None or place[0] == CONFIG
+
+    def is_steady(self, table: str, number: int) -> bool:
+        """Return True if no statement of the files may change an entry of a table."""
+        return not ({number, ANY} & self._entries_written[table])
+
+    @cached_property
+    def _entries_written(self) -> Mapping[str, frozenset[int]]:
+        """Collect the entries of tables that statements may change."""
+        found: dict[str, set[int]] = {table: set() for table in TABLES}
+        for number, file in enumerate(self.files):
+            here = Scope(number, file.name, "")
+            for row in range(len(file.text)) if file.routines else ():
+                for target in changed_by(file.text.statement(row)):
+                    if target.name in found:
+                        found[target.name].add(self._entry(target, row, here))
+        return {table: frozenset(numbers) for table, numbers in found.items()}
+
+    def _entry(self, target: said.DataObject, row: int, here: Scope) -> int:
+        """Return the number of an entry, ANY where it is not known."""
+        index = self.index(target.steps[0], row, here) if target.steps else None
+        return index[0] if index is not None and len(index) == 1 else ANY
+
+    def initial_switch(self, name: str) -> bool | None:
+        """Return a switch that the program has not set so far, None if not known.
+
+        A switch that no file sets is FALSE, unless a list declares it TRUE: what ran
+        before may have left it so.
+        """
+        own = [
+            datum for file in self.files for datum in file.data if datum.name == name
+        ]
+        values = [one.value for one in own if one.value is not None]
+        off = all(is_word(value, "false") for value in values)
+        return False if off and name not in self.written else None
+
     @cached_property
     def read(self) -> frozenset[str]:
         """Names of data that something but the destination of a move takes."""
         return self._uses[1]
 
     @cached_property
+    def beside(self) -> frozenset[str]:
+        """Names of data that submit programs may change at any time."""
+        found = set[str]()
+        for file in (f for f in self.files if f.is_submit):
+            own = {datum.name for datum in file.data if not datum.shared}
+            uses = _Uses()
+            for one in file.text.said:
+                uses.note(one)
+            found |= uses.written - own
+        return frozenset(found)
+
+    @cached_property
     def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
         uses = _Uses()
-        for file in self.files:
+        for file in (f for f in self.files if not f.is_submit):
             lists = file.routines == ()
             for one in file.text.said:
                 if not (lists and isinstance(one, said.Assignment)):
                     uses.note(one)
                 else:
                     uses.take(one.value)
-        return frozenset(uses.written), frozenset(uses.read)
+        return frozenset(uses.written) | self.beside, frozenset(uses.read) | self.beside
 
     @cached_property
     def _taught_lines(self) -> list[frozenset[int]]:
@@ -354,10 +424,8 @@ class _Uses:
 
     def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
         """Note arguments: a routine may change them, unless it is known not to."""
+        self.written |= {one.name for one in _changed_arguments(name, arguments)}
         for argument in arguments:
-            if isinstance(argument.value, said.DataObject):
-                if name not in (STILL - WRITING) | FUNCTIONS and name != "bas":
-                    self.written.add(argument.value.name)
             self.take(argument.value)
 
     def _destination(self, operand: said.Operand | None) -> None:
@@ -370,6 +438,36 @@ class _Uses:
                     self._destination(one)
             case _:
                 self.take(operand)
+
+
+def changed_by(one: said.SourceStatement) -> Iterator[said.DataObject]:
+    """Yield data that a statement may change, also what it does later."""
+    match one:
+        case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
+            yield from changed_by(action)
+        case said.Assignment(target=target):
+            yield target
+        case said.Instruction(name=name, arguments=arguments):
+            yield from _changed_arguments(name, arguments)
+    for part in parts_of(operands_of(one)):
+        if isinstance(part, said.FunctionCall):
+            yield from _changed_arguments(part.name, part.arguments)
+
+
+def _changed_arguments(
+    name: str, arguments: Sequence[said.Argument]
+) -> Iterator[said.DataObject]:
+    """Yield the arguments that a routine may change: all, unless it is known."""
+    if name in KEEPING:
+        return
+    for argument in arguments:
+        if isinstance(argument.value, said.DataObject):
+            yield argument.value
+
+
+def is_word(operand: said.Operand | None, word: str) -> bool:
+    """Return True if an operand is a word such as TRUE."""
+    return operand == said.DataObject(word)
 
 
 def operands_of(one: said.SourceStatement) -> Sequence[said.Operand | None]:
@@ -391,6 +489,8 @@ def operands_of(one: said.SourceStatement) -> Sequence[said.Operand | None]:
             return [to, via, angle, *(one.value for one in settings)]
         case said.SplineBlock(settings=settings):
             return [one.value for one in settings]
+        case said.PathTrigger(values=values):
+            return values
         case _:
             return []
 

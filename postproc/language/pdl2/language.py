@@ -43,6 +43,7 @@ class Pdl2(Language):
     """
 
     name = "PDL2"
+    controller = "comau"
     suffixes = (".pdl",)
     comment = "--"
     dialect = PDL2_DIALECT

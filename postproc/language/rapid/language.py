@@ -41,6 +41,7 @@ class Rapid(Language):
     """The language of ABB controllers."""
 
     name = "RAPID"
+    controller = "abb"
     suffixes = MODULES
     comment = "!"
     dialect = RAPID_DIALECT

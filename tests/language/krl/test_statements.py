@@ -128,9 +128,9 @@ X = said.DataObject("x")
             "frame", (said.NamedField("x", said.Num(0)),)))),
         ("x=x:x", said.Assignment(X, said.Operation(":", (X, X)))),
         ("INTERRUPT DECL 3 WHEN x DO f()", said.InterruptDeclared(
-            X, said.Instruction("f"))),
+            said.Num(0), X, said.Instruction("f"))),
         ("TRIGGER WHEN PATH=-20 DELAY=0 DO f() PRIO=-1", said.PathTrigger(
-            said.Instruction("f"))),
+            said.Instruction("f"), (said.Num(0), said.Num(1), said.Num(2)))),
         ("PTP IF", said.NotUnderstood()),
         ("LIN", said.NotUnderstood()),
         ("x = = 1", said.NotUnderstood()),
@@ -155,3 +155,13 @@ def test_programs_of_others_are_read_without_loss():
             at = span.end
         again = skeleton_of(read_krl(Source(path.name, bytes(source.data))).text)
         assert again.shapes == skeleton_of(file.text).shapes
+
+
+@pytest.mark.parametrize(
+    "type_",
+    ["CHAR[128]", "CHAR [128]", "CHAR[]", "REAL[6]", "INT[2,3]", "INT", "E6POS"],
+)
+def test_functions_return_arrays_too(type_):
+    for begin in ("", "GLOBAL "):
+        found = one(f"{begin}DEFFCT {type_} Label(n:IN)")
+        assert found == said.KrlRoutine("deffct", "label", ("n",), bool(begin))

@@ -242,13 +242,15 @@ def test_speeds_and_blending():
 
 
 def test_blending_of_inline_settings():
-    """A distance that its record holds as a share of the way is not known."""
+    """Both functions of bas.src take APO_DIST for it, whatever APO_MODE is."""
     line, joint = "$APO=SAPO(LCPDAT1)", "$APO=SAPO_PTP(PPDAT1)"
     found = job(
         f"SLIN XP1 WITH {line} C_SPL", f"SPTP XP2 WITH {joint} C_SPL", "SLIN XP1"
     )
-    assert found.visits.zone_mm[0] == 12.5 and "$APO" not in reasons(found)[0]
-    assert "$APO" in reasons(found)[1]
+    assert found.visits.zone_mm[:2].tolist() == [12.5, 50.0]
+    assert reasons(found) == [""] * 3
+    lost = job(f"SPTP XP2 WITH {joint} C_SPL", "SLIN XP1", "PPDAT1.APO_DIST=3")
+    assert "$APO" in reasons(lost)[0]
 
 
 @pytest.mark.parametrize(
@@ -376,13 +378,6 @@ def test_home_holds_no_target():
 def test_a_remote_tool():
     found = job("FDAT_ACT=FOUT", "BAS(#FRAMES)", "LIN XP1")
     assert found.visits.tool_remote.tolist() == [True]
-
-
-def test_the_load_must_be_that_of_the_cell():
-    held = ["FDAT_ACT=FP1", "BAS(#FRAMES)", "LIN XP1"]
-    assert "$LOAD" in reasons(job(*held, start=Start(payload_kg=10.0)))[0]
-    assert reasons(job(*held, start=Start(payload_kg=40.5))) == [""]
-    assert reasons(job(*held)) == [""]
 
 
 def test_external_axes_count_where_they_are_not_0_or_the_arm_has_some():
@@ -561,6 +556,17 @@ def test_the_controllers_own_accuracy_is_refused():
     with pytest.raises(ProgramError, match="compensates on its own"):
         job("$ABS_ACCUR=TRUE", "LIN XP1")
     assert reasons(job("$ABS_ACCUR=FALSE", "LIN XP1")) == [""]
+
+
+@pytest.mark.parametrize(
+    "more",
+    ["DECL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 180,S 2,T 35}", "XS[2]={X 5}",
+     "DECL E6AXIS XA={A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}", "XP1={X 1}"],
+)  # fmt: skip
+def test_a_point_with_two_values_in_a_list_is_refused(more):
+    with pytest.raises(ProgramError, match=r"m\.dat:\d+: gives X.* a second value"):
+        job("LIN XP1", data=f"{DATA}{more}\n")
+    assert reasons(job("LIN XP1", data=f"{DATA}INT N=4\nDECL E6POS XNEW\n")) == [""]
 
 
 def test_a_data_list_alone_is_refused():

@@ -1,0 +1,53 @@
+"""What a cell file lacks that the archive of its controller gives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from postproc.language.archive import Archive
+from postproc.robot.cell import Cell
+
+NEAR = 1e-3  # [mm] and [deg]; a smaller frame is none
+
+
+def missing_in_cell(archive: Archive, cell: Cell) -> list[str]:
+    """Return what an archive gives, and lines to paste into the cell file.
+
+    Args:
+        archive: What its lists say.
+        cell: The cell of its programs.
+    """
+    given = [
+        f"{plural} {', '.join(map(str, numbers))}"
+        for plural, numbers in archive.entries.items()
+        if numbers
+    ]
+    found = [f"{archive.place} gives {'; '.join(given) or 'no frames and no loads'}"]
+    lines = list(_lines(archive, cell))
+    if lines:
+        found.append(f"{cell.path} lacks what no program shows. Paste, and check:")
+        found += [f"    {line}" for line in lines]
+    return found
+
+
+def _lines(archive: Archive, cell: Cell) -> Iterator[str]:
+    """Yield lines for the cell file."""
+    file = cell.file
+    if "absolute_accuracy" not in file.robot.model_fields_set:
+        yield "absolute_accuracy = false   # under [robot], if it is off on this arm"
+    if file.base is None and any(abs(v) > NEAR for v in archive.root):
+        numbers = [round(v, 4) for v in archive.root]
+        yield "[base]   # of the arm, by the archive"
+        yield f"xyz_mm = {numbers[:3]}"
+        yield f"euler_zyz_deg = {numbers[3:]}"
+    if file.home is None and archive.home:
+        yield "[home]   # by the archive"
+        yield f"joints_deg = {list(archive.home)}"
+    if file.payload is None and archive.load:
+        mass, *centre = archive.load
+        yield "[payload]   # the first of the archive; that of the survey belongs here"
+        yield f"mass_kg = {mass:g}"
+        yield f"com_mm = {centre}"
+    if archive.external > 0 and not cell.aux:
+        yield f"[aux]   # {archive.external} external axes: gun, track or positioner"
+        yield from (f'{k} = "track"' for k in range(1, archive.external + 1))

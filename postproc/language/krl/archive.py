@@ -1,0 +1,104 @@
+"""What ``$config.dat`` and ``$machine.dat`` of an archive give."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from postproc.exceptions import ProgramError
+from postproc.files import SHARED_LIST, read_input
+from postproc.language.archive import Archive
+from postproc.language.krl.dialect import KRL_DIALECT
+from postproc.language.krl.moves import AXES
+from postproc.language.krl.program import read_krl
+from postproc.language.krl.task import KrlRecord, KrlTask
+from postproc.language.machine import Scope
+from postproc.language.source import source_from_bytes
+from postproc.robot.pose import record_from_pose
+
+MACHINE = "$machine.dat"
+TABLES = {"tool_data": "tools", "base_data": "bases", "load_data": "loads"}
+_PLACE = "XYZABC"
+_ROOT = re.compile(rb"(?im)^[^;\r\n]*\$ROBROOT[ \t]*=[ \t]*(\{[^}\r\n]*\})")
+_AXES = re.compile(rb"(?im)^[^;\r\n]*\$EX_AX_NUM[ \t]*=[ \t]*(\d+)")
+_PART = re.compile(rb"\b([XYZABC])[ \t]+([-+]?[\d.]+(?:E[-+]?\d+)?)", re.IGNORECASE)
+
+
+def read_archive(folder: Path) -> Archive | None:
+    """Read the lists of a controller's archive, None where a folder is none."""
+    lists = [p for p in folder.rglob("*.dat") if p.is_file() and p.name[0] == "$"]
+    named = {path.name.lower(): path for path in sorted(lists, reverse=True)}
+    found, machine = named.get(SHARED_LIST), named.get(MACHINE)
+    if found is None:
+        return None
+    try:
+        task = KrlTask([read_krl(source_from_bytes(found.name, read_input(found)))])
+        text = b"" if machine is None else read_input(machine)
+    except ProgramError:
+        return None  # it is told where a program reads it
+    axes = _AXES.search(text)
+    loads = [_numbers_of_load(one) for _, one in _entries(task, "load_data")]
+    return Archive(
+        found.relative_to(folder).as_posix(),
+        {
+            plural: tuple(k for k, _ in _entries(task, table))
+            for table, plural in TABLES.items()
+        },
+        next(iter(loads), ()),
+        _home(task),
+        _root(text),
+        int(axes[1]) if axes else -1,
+    )
+
+
+def _entries(task: KrlTask, table: str) -> Iterator[tuple[int, KrlRecord]]:
+    """Yield the entries of a table that are set."""
+    here = Scope(0, task.files[0].name, "")
+    for datum in task.files[0].data:
+        if datum.name == table and datum.index:
+            value = task.value(datum.value, datum.row, here)
+            if isinstance(value, KrlRecord) and _is_set(value):
+                yield datum.index[0], value
+
+
+def _is_set(value: KrlRecord) -> bool:
+    """Return True if a frame is not zero, or a load has a mass."""
+    if value.get("m") is not None:
+        return value.number("m") > 0.0
+    return any(abs(value.number(name.lower())) > 0.0 for name in _PLACE)
+
+
+def _numbers_of_load(value: KrlRecord) -> tuple[float, ...]:
+    """Return mass [kg] and centre [mm]; zero where the centre is not known."""
+    centre = value.get("cm")
+    if not isinstance(centre, KrlRecord):
+        centre = KrlRecord(())
+    own = np.array([centre.number(name) for name in ("x", "y", "z")])
+    return (value.number("m"), *np.nan_to_num(own).tolist())
+
+
+def _home(task: KrlTask) -> tuple[float, ...]:
+    """Return the joint angles of XHOME [deg], () where there are none."""
+    here = Scope(0, task.files[0].name, "")
+    for datum in task.files[0].data:
+        if datum.name == "xhome" and datum.value is not None:
+            value = task.value(datum.value, datum.row, here)
+            if isinstance(value, KrlRecord):
+                found = tuple(value.number(axis) for axis in AXES)
+                return () if np.isnan(found).any() else found
+    return ()
+
+
+def _root(text: bytes) -> tuple[float, ...]:
+    """Return ``$ROBROOT`` as a position record, () where it is not there."""
+    found = _ROOT.search(text)
+    if found is None:
+        return ()
+    parts = {p[1].decode().upper(): float(p[2]) for p in _PART.finditer(found[1])}
+    if set(parts) != set(_PLACE):
+        return ()
+    pose = KRL_DIALECT.poses(np.array([*(parts[name] for name in _PLACE), 0.0, 0.0]))
+    return tuple(record_from_pose(pose[None])[0].tolist())

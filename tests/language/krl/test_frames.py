@@ -1,0 +1,252 @@
+"""Frames that BAS links to entries, and entries that the program sets itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.language.krl.test_visits import CONFIG, NEW, frame, job, reasons
+
+SHIFT = "{X 0,Y 0,Z 5,A 0,B 0,C 0}"
+ON = {
+    "tool_corr": ["TOOL_CORR_ON=TRUE", f"TOOL_CORR={SHIFT}"],
+    "tool_corr_w": ["TOOL_CORR_W_ON=TRUE", f"TOOL_CORR_W={SHIFT}"],
+    "base_corr": ["BASE_CORR_ON=TRUE", f"BASE_CORR={SHIFT}"],
+    "m_base_corr": ["M_BAS_COR_ON=TRUE", f"M_BASE_CORR={SHIFT}"],
+}
+TURN = "{X 100,Y 0,Z 0,A 90,B 0,C 0}"
+INIT = "BAS(#INITMOV,0)"
+SETS = {
+    "BAS": ["BAS(#TOOL,1)", "BAS(#BASE,2)", "LIN XP1"],
+    "FRAMES": ["FDAT_ACT=FP1", "BAS(#FRAMES)", "LIN XP1"],
+    "PARAMS": ["FDAT_ACT=FP1", "LDAT_ACT=LCPDAT1", "BAS(#CP_PARAMS,2)", "LIN XP1"],
+    "inline": [f"SLIN XP1{NEW}"],
+}
+
+
+def places(found):
+    return frame(found, "tool")[:3], frame(found, "uframe")[:3]
+
+
+@pytest.mark.parametrize("lines", SETS.values(), ids=SETS)
+def test_corrections_that_are_switched_on_are_linked(lines):
+    given = (
+        (ON["tool_corr"], [10, 20, 305], [1000, 100, 500]),
+        (ON["tool_corr_w"], [10, 20, 305], [1000, 100, 500]),
+        (ON["base_corr"], [10, 20, 300], [1000, 100, 505]),
+        (ON["m_base_corr"], [10, 20, 300], [1000, 100, 505]),
+    )
+    for switched, tool, base in given:
+        found = job(INIT, *switched, *lines)
+        assert reasons(found) == [""]
+        np.testing.assert_allclose(places(found), (tool, base), atol=1e-9)
+
+
+def test_corrections_stand_in_front_of_the_entry_or_behind_it():
+    """The tool looks along a turned axis, so that the side of the link shows."""
+    lines = ["BAS(#TOOL,1)", "BAS(#BASE,2)", "LIN XP1"]
+    front = job(INIT, "TOOL_CORR_W_ON=TRUE", f"TOOL_CORR_W={TURN}", *lines)
+    behind = job(INIT, "TOOL_CORR_ON=TRUE", f"TOOL_CORR={TURN}", *lines)
+    np.testing.assert_allclose(places(front)[0], [80, 10, 300], atol=1e-9)
+    np.testing.assert_allclose(places(behind)[0], [10, 120, 300], atol=1e-9)
+    front = job(INIT, "BASE_CORR_ON=TRUE", f"BASE_CORR={TURN}", *lines)
+    behind = job(INIT, "M_BAS_COR_ON=TRUE", f"M_BASE_CORR={TURN}", *lines)
+    np.testing.assert_allclose(places(front)[1], [0, 1000, 500], atol=1e-9)
+    np.testing.assert_allclose(places(behind)[1], [1100, 100, 500], atol=1e-9)
+
+
+@pytest.mark.parametrize("lines", SETS.values(), ids=SETS)
+@pytest.mark.parametrize(
+    "before",
+    [
+        ["TOOL_CORR_ON=TRUE"],
+        ["TOOL_CORR_ON=$IN[1]"],
+        ["IF $IN[1] THEN", *ON["base_corr"], "ENDIF"],
+        ["BASE_CORR_ON=TRUE", "BASE_CORR.X=N2"],
+        ["BASE_CORR_ON=TRUE", "BASE_CORR=camera( )", "N2=1"],
+        ["M_BAS_COR_ON=TRUE", f"M_BASE_CORR={SHIFT}", "M_BASE_CORR.Z=N2"],
+        ["set_it(TOOL_CORR_ON)"],
+        ["set_it( )"],
+    ],
+)
+def test_switches_and_corrections_that_are_not_known_leave_targets(before, lines):
+    more = (
+        "DEF set_it(a:OUT)\nBOOL a\nTOOL_CORR_ON=$IN[2]\nEND\n"
+        "DEFFCT FRAME camera( )\nRETURN $NULLFRAME\nENDFCT\n"
+    )
+    corrected = job(*before, *lines, more=more)
+    assert reasons(corrected)[-1]
+
+
+@pytest.mark.parametrize("lines", SETS.values(), ids=SETS)
+def test_what_a_list_switches_on_leaves_targets(lines):
+    for switch in ("TOOL_CORR_ON", "TOOL_CORR_W_ON", "BASE_CORR_ON", "M_BAS_COR_ON"):
+        on = CONFIG.replace("ENDDAT", f"BOOL {switch}=TRUE\nENDDAT")
+        assert switch in reasons(job(*lines, config=on))[0]
+        assert reasons(job(INIT, *lines, config=on)) == [""]
+        off = on.replace("=TRUE", "=FALSE")
+        assert reasons(job(*lines, config=off)) == [""]
+
+
+def test_what_a_routine_never_called_may_switch_leaves_targets():
+    more = "DEF other( )\nBASE_CORR_ON=TRUE\nEND\n"
+    assert "BASE_CORR_ON" in reasons(job(*SETS["BAS"], more=more))[0]
+    assert reasons(job(INIT, *SETS["BAS"], more=more)) == [""]
+    assert reasons(job("BASE_CORR_ON=FALSE", *SETS["BAS"], more=more)) == [""]
+
+
+def test_frames_that_are_taken_directly_are_not_corrected():
+    direct = ["$TOOL=TOOL_DATA[1]", "$BASE=BASE_DATA[2]", "LIN XP1"]
+    found = job(*ON["tool_corr"], *ON["base_corr"], *direct)
+    assert reasons(found) == [""]
+    np.testing.assert_allclose(places(found), ([10, 20, 300], [1000, 100, 500]))
+
+
+def test_initial_moves_switch_corrections_off():
+    found = job(*ON["tool_corr"], *ON["m_base_corr"], INIT, *SETS["BAS"])
+    assert reasons(found) == [""]
+    np.testing.assert_allclose(places(found), ([10, 20, 300], [1000, 100, 500]))
+
+
+def test_a_switch_of_the_program_itself_is_not_that_of_the_controller():
+    data = "BOOL TOOL_CORR_ON=FALSE\n"
+    found = job(INIT, "TOOL_CORR_ON=TRUE", *SETS["BAS"][:2],
+                "LIN {X 1,Y 2,Z 3,A 0,B 0,C 0}", data=data)  # fmt: skip
+    assert "TOOL_CORR_ON" in reasons(found)[0]
+
+
+def test_frames_of_a_fixed_tool_hold_for_no_other_move():
+    lines = ["FDAT_ACT=FOUT", "BAS(#FRAMES)", "LIN XP1", "$IPO_MODE=#BASE", "LIN XP1"]
+    assert "IPO_FRAME #TCP" in reasons(job(*lines))[1]
+    again = [*lines, "FDAT_ACT=FP1", "BAS(#FRAMES)", "LIN XP1"]
+    assert reasons(job(*again))[2] == ""
+    inline = "SLIN XP1 WITH $TOOL=STOOL2(FOUT), $BASE=SBASE(2)"
+    assert "IPO_FRAME #TCP" in reasons(job(inline))[0]
+
+
+# Entries of tables that the program sets.
+
+
+def test_entries_that_the_program_sets_are_known_from_there_on():
+    new = "BASE_DATA[20]={FRAME: X 5,Y 6,Z 7,A 0,B 0,C 0}"
+    for use in ("$BASE=BASE_DATA[20]", "BAS(#BASE,20)"):
+        found = job("BAS(#TOOL,1)", new, use, "LIN XP1")
+        assert reasons(found) == [""]
+        np.testing.assert_allclose(places(found)[1], [5, 6, 7])
+    tool = job("TOOL_DATA[1]={X 1,Y 2,Z 3,A 0,B 0,C 0}", "BAS(#TOOL,1)", "LIN XP1")
+    np.testing.assert_allclose(places(tool)[0], [1, 2, 3])
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["$BASE=BASE_DATA[20]", "BASE_DATA[20]={X 5,Y 6,Z 7,A 0,B 0,C 0}"],
+        ["BASE_DATA[2].X=N2", "$BASE=BASE_DATA[2]"],
+        ["BASE_DATA[N2]={X 5,Y 6,Z 7,A 0,B 0,C 0}", "$BASE=BASE_DATA[2]"],
+        ["BASE_DATA[2]={X N2,Y 6,Z 7,A 0,B 0,C 0}", "$BASE=BASE_DATA[2]"],
+        ["IF $IN[1] THEN", "BASE_DATA[2]={X 5,Y 6,Z 7,A 0,B 0,C 0}", "ENDIF",
+         "$BASE=BASE_DATA[2]"],
+        ["BASE_DATA[2]={X 5,Y 6,Z 7,A 0,B 0,C 0}", "camera(BASE_DATA[2])",
+         "$BASE=BASE_DATA[2]"],
+        ["BASE_DATA[2]={X 5,Y 6,Z 7,A 0,B 0,C 0}", "other( )", "$BASE=BASE_DATA[2]"],
+    ],
+)  # fmt: skip
+def test_entries_that_are_not_known_leave_targets(lines):
+    more = "DEF other( )\nBASE_DATA[2]={X N2,Y 0,Z 0,A 0,B 0,C 0}\nEND\n"
+    assert reasons(job(*lines, "LIN XP1", "N2=1", more=more))[0]
+
+
+def test_other_entries_than_those_that_the_program_sets_stay_known():
+    new = "BASE_DATA[20]={X 5,Y 6,Z 7,A 0,B 0,C 0}"
+    found = job("$BASE=BASE_DATA[2]", "LIN XP1", new, "$BASE=BASE_DATA[20]", "LIN XP1")
+    assert reasons(found) == ["", ""]
+    found = job("FOR I=3 TO 4", "BASE_DATA[I]={X 5,Y 6,Z 7,A 0,B 0,C 0}", "ENDFOR",
+                "$BASE=BASE_DATA[3]", "LIN XP1")  # fmt: skip
+    np.testing.assert_allclose(places(found)[1], [5, 6, 7])
+
+
+def test_an_interrupt_that_sets_an_entry_leaves_everything():
+    line = "INTERRUPT DECL 5 WHEN $IN[1] DO camera( )"
+    more = "DEF camera( )\nBASE_DATA[2]={X 5,Y 6,Z 7,A 0,B 0,C 0}\nEND\n"
+    found = job(line, "INTERRUPT ON 5", "$BASE=BASE_DATA[2]", "LIN XP1", more=more)
+    assert reasons(found)[0]
+
+
+# Loads.
+
+
+def loads(found):
+    v = found.visits
+    return v.loads[v.load]
+
+
+LOAD = "{M 90,CM {X 10,Y 20,Z 30,A 0,B 0,C 0},J {X 1,Y 1,Z 1}}"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [f"$LOAD={LOAD}", f"LOAD_DATA[1]={LOAD}\nBAS(#TOOL,1)",
+     f"LOAD_DATA[1]={LOAD}\n$LOAD=SLOAD(1)",
+     f"LOAD_DATA[1]={LOAD}\n$LOAD=LOAD_DATA[1]",
+     f"LOAD_DATA[1]={LOAD}\nFDAT_ACT=FP1\nBAS(#FRAMES)",
+     "$LOAD.M=90\n$LOAD.CM={X 10,Y 20,Z 30,A 0,B 0,C 0}"],
+)  # fmt: skip
+def test_every_form_that_sets_a_load_is_taken(line):
+    found = job("BAS(#TOOL,0)", "LIN XP1", line, "LIN XP1", "LIN XP1")
+    assert reasons(found) == [""] * 3
+    nan, own = [np.nan] * 4, [90.0, 0.01, 0.02, 0.03]
+    np.testing.assert_allclose(loads(found), [nan, own, own])
+
+
+def test_a_move_may_state_its_own_load():
+    found = job("BAS(#TOOL,0)", f"SLIN XP1{NEW}", "SLIN XP1")
+    np.testing.assert_allclose(loads(found)[0], [40.0, 0.0, 0.0, 0.0])
+    assert np.isnan(loads(found)[1]).all()
+
+
+def test_a_mass_alone_keeps_the_centre_that_was_stated():
+    found = job("$LOAD.M=50", "LIN XP1", f"$LOAD={LOAD}", "$LOAD.M=50", "LIN XP1")
+    np.testing.assert_allclose(loads(found)[0], [50, *[np.nan] * 3])
+    np.testing.assert_allclose(loads(found)[1], [50, 0.01, 0.02, 0.03])
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["$LOAD.M=N2", "$LOAD=camera( )", "$LOAD=LOAD_DATA[N2]", "$LOAD=SLOAD(N2)",
+     "LOAD_DATA[1].M=N2\nBAS(#TOOL,1)", "IF $IN[1] THEN\n$LOAD.M=90\nENDIF",
+     f"$LOAD={LOAD}\n$LOAD.CM.X=N2", "$LOAD.CM={X 1,Y N2,Z 3}"],
+)  # fmt: skip
+def test_a_load_that_is_not_known_leaves_targets(line):
+    more = "DEFFCT LOAD camera( )\nRETURN $LOAD\nENDFCT\n"
+    found = job("BAS(#TOOL,0)", line, "LIN XP1", "N2=1", more=more)
+    assert "$LOAD" in reasons(found)[0]
+
+
+@pytest.mark.parametrize("line", ["$LOAD.M=-1", "$LOAD={M -1}", "BAS(#TOOL,0)"])
+def test_a_placeholder_states_no_load(line):
+    found = job(line, "LIN XP1")
+    assert reasons(found) == [""] and np.isnan(loads(found)).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "left"),
+    [("set_it(TOOL_CORR_ON)", True), ("N2=get_it(BASE_CORR_ON)", True),
+     ("set_it(BASE_DATA[2])", True), ("set_it(TOOL_DATA[N2])", True),
+     ("set_it($BASE)", True), ("set_it(XP2)", False), ("set_it($OUT[1])", False)],
+)  # fmt: skip
+def test_what_is_handed_over_may_be_changed(call, left):
+    more = "DEF set_it(a:OUT)\nBOOL a\na=TRUE\nEND\n"
+    more += "DEFFCT BOOL get_it(a:OUT)\nBOOL a\na=TRUE\nRETURN a\nENDFCT\n"
+    known = ["BASE_DATA[2]={X 1,Y 2,Z 3,A 0,B 0,C 0}", INIT, "$IPO_MODE=#BASE"]
+    known.append("TOOL_DATA[1]={X 1,Y 2,Z 3,A 0,B 0,C 0}")
+    lines = ["$BASE=BASE_DATA[2]", call]
+    rest = [] if call == "set_it($BASE)" else ["BAS(#TOOL,1)", "BAS(#BASE,2)"]
+    found = job(*known, *lines, *rest, "LIN XP1", more=more)
+    assert bool(reasons(found)[0]) == left
+
+
+@pytest.mark.parametrize(
+    "line", ["$TECH.MODE=#CYCLE", "$TECH[1].CLASS=#PATH", "$LOAD_A3.M=12"]
+)
+def test_what_moves_or_loads_the_arm_besides_leaves_targets(line):
+    assert reasons(job(line, "LIN XP1"))[0]
