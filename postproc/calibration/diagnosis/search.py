@@ -235,20 +235,22 @@ def needed(name: Score, free: Score) -> float:
 def plainest(best: Score, scores: list[Score]) -> Score:
     """Take the plainest of the cells that explain as much as the best one.
 
-    What a job can read comes before what passes with time, few numbers before many, and
-    of those that are the same a joint before a link.
+    What a job can read comes before what passes with time unless that is clearly ahead,
+    few numbers before many, and of those that are the same a joint before a link.
     """
     if best.family.effect != CELL:
         return best
-    same = [
-        s for s in scores
-        if s.family.effect == CELL and s.evidence > best.evidence - NEAR
-    ]  # fmt: skip
+    cells = [s for s in scores if s.family.effect == CELL]
+    if best.best.effect.belongs_to() == "setup":
+        least = best.evidence - ahead(best.evidence)
+        read = [s for s in cells if s.best.effect.belongs_to() != "setup"]
+        best = next((s for s in read if s.evidence > least), best)
+    same = [s for s in cells if s.evidence > best.evidence - NEAR]
 
     def order(s: Score) -> tuple[bool, int, float]:
         set_up = s.best.effect.belongs_to() == "setup"
-        ahead = s.evidence + (SAME if s.family.joint else 0.0)
-        return set_up, s.best.width, -ahead
+        joints_first = SAME if s.family.joint else 0.0
+        return set_up, s.best.width, -s.evidence - joints_first
 
     return min(same, key=order)
 

@@ -51,6 +51,7 @@ from postproc.model.kinematics import Batch
 
 ORDERS = 8  # waves per turn of an angle's harmonics that are tried
 PLAINER = 3.0  # nats that a law may be behind one with more columns: odds of 20 to 1
+WIDTHS = (0.1, 0.3)  # of bends, in parts of half a range
 FEW_VALUES = 5  # of a driver: what lies between them shows no bend
 LIKELY = 0.25  # part of all families that are looked at closely
 NARROW = 60  # families that a search weighs once it has seen all
@@ -435,13 +436,11 @@ def _laws_of(batch: Batch, driver: str, factor: str) -> list[Law]:
 
     kinds: list[list[Cell | Curve]] = [[cell("linear")]]
     if not driver.startswith("lambda"):
-        places = low + (high - low) * np.arange(1, STEPS + 1) / (STEPS + 1)
-        kinds.append([cell("step", float(at)) for at in places])
+        places = _places(x, alone=not factor)
+        kinds.append([cell("step", at) for at in places])
         if len(np.unique(x)) > FEW_VALUES:
-            bends = product((-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6), (0.1, 0.3))
-            kinds.append(
-                [cell("saturating", middle + a * half, w * half) for a, w in bends]
-            )
+            bends = product(places[::2], WIDTHS)
+            kinds.append([cell("saturating", at, w * half) for at, w in bends])
         kinds.append([Curve("joint 1", (driver,), (low,), (high,), factor)])
     if driver.startswith("joint"):
         kinds.append([cell(f"harmonic {n}") for n in range(1, ORDERS + 1)])
@@ -450,6 +449,20 @@ def _laws_of(batch: Batch, driver: str, factor: str) -> list[Law]:
         for kind in kinds
         for effect in kind
     ]
+
+
+def _places(x: Floats, alone: bool) -> list[float]:
+    """List where a step or a bend is tried: evenly, and evenly among the rows.
+
+    Args:
+        x: The driver, (n,).
+        alone: Whether nothing multiplies it; else fewer are tried.
+    """
+    part = np.arange(1, STEPS + 1) / (STEPS + 1)
+    if not alone:
+        part = part[1::2]
+    even = x.min() + np.ptp(x) * part
+    return sorted({*map(float, even), *map(float, np.quantile(x, part))})
 
 
 def _scaled(effect: Cell | Curve, batch: Batch) -> Floats:
