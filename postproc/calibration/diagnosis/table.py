@@ -51,7 +51,7 @@ from postproc.model.kinematics import Batch
 
 ORDERS = 8  # waves per turn of an angle's harmonics that are tried
 PLAINER = 3.0  # nats that a law may be behind one with more columns: odds of 20 to 1
-WIDTHS = (0.1, 0.3)  # of bends, in parts of half a range
+WIDTHS = (0.1, 0.3, 0.9)  # of bends, in parts of half a range
 FEW_VALUES = 5  # of a driver: what lies between them shows no bend
 LIKELY = 0.25  # part of all families that are looked at closely
 NARROW = 60  # families that a search weighs once it has seen all
