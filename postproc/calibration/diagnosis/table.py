@@ -56,6 +56,7 @@ FEW_VALUES = 5  # of a driver: what lies between them shows no bend
 LIKELY = 0.25  # part of all families that are looked at closely
 NARROW = 60  # families that a search weighs once it has seen all
 TOLD = 10  # families whose scores are told
+NONE = np.zeros(0, dtype=np.int64)
 LEAST_MOMENT = 1.0  # [N m] by which a load varies that may bend anything
 
 
@@ -165,6 +166,39 @@ class Laws:
 
 
 @dataclass(frozen=True, eq=False)
+class CellFamily:
+    """A carrier and a driver, scored.
+
+    Attributes:
+        evidence: Of all its laws together [nats].
+        carrier: What moves.
+        factor: What multiplies the driver, or "".
+        driver: Number of the driver among those of its laws.
+        laws: Laws of the factor.
+        each: Evidence of these by width, with their shares, (c, 1) each.
+    """
+
+    evidence: float
+    carrier: Carrier
+    factor: str
+    driver: int
+    laws: Laws
+    each: tuple[Floats, ...]
+
+    def plainest(self) -> Law:
+        """Take the law with the fewest columns of those that explain as much."""
+        own = [
+            (float(e[i, 0]), law)
+            for e, (some, _, which) in zip(self.each, self.laws.widths, strict=True)
+            for i, law in enumerate(some)
+            if which[i] == self.driver
+        ]
+        least = max(e for e, _ in own) - PLAINER
+        alike = [x for x in own if x[0] >= least]
+        return min(alike, key=lambda x: (x[1].columns, -x[0]))[1]
+
+
+@dataclass(frozen=True, eq=False)
 class Table:
     """All cells that rows can show and that have no name.
 
@@ -216,8 +250,8 @@ class Table:
             view_of: Gives the fit as it is seen along a carrier, with what holds the
                 mean of its motion.
         """
-        found = self._scan(view_of)[:TOLD]
-        return [self._score(view_of, *best) for best in found]
+        best = self._scan(view_of)[:TOLD]
+        return [self._score(view_of(family.carrier), family) for family in best]
 
     def narrowed(
         self, view_of: Callable[[Carrier], Projection], before: Table
@@ -233,9 +267,9 @@ class Table:
         """
         only = dict(before.only or {})
         best = self._likely(view_of)._scan(view_of)[:NARROW]
-        for _, carrier, factor, k, *_ in best:
-            kept = only.get((carrier, factor), np.zeros(0, dtype=np.int64))
-            only[carrier, factor] = np.union1d(kept, [k])
+        for family in best:
+            at = family.carrier, family.factor
+            only[at] = np.union1d(only.get(at, NONE), [family.driver])
         return replace(self, only=only)
 
     def _likely(self, view_of: Callable[[Carrier], Projection]) -> Table:
@@ -257,10 +291,8 @@ class Table:
         kept = {(c, f): np.flatnonzero(x >= least) for c, f, x in asked}
         return replace(self, only={at: k for at, k in kept.items() if len(k)})
 
-    def _scan(
-        self, view_of: Callable[[Carrier], Projection]
-    ) -> list[tuple[float, Carrier, str, int, Laws, list[Floats]]]:
-        """Score the families, a carrier and a driver each, the best first."""
+    def _scan(self, view_of: Callable[[Carrier], Projection]) -> list[CellFamily]:
+        """Score the families that anything speaks for, the best first."""
         found = []
         for carrier in self._carriers():
             view = view_of(carrier)
@@ -268,9 +300,11 @@ class Table:
             scored = self._evidence(view, carrier, view.twice, square)
             for factor, laws, each in scored:
                 whole = _by_driver(laws, [e[:, 0] for e in each])
-                for k in np.flatnonzero(whole > 0.0):
-                    found.append((float(whole[k]), carrier, factor, int(k), laws, each))
-        return sorted(found, key=lambda x: -x[0])
+                found += [
+                    CellFamily(float(whole[k]), carrier, factor, int(k), laws, each)
+                    for k in np.flatnonzero(whole > 0.0)
+                ]
+        return sorted(found, key=lambda family: -family.evidence)
 
     def _carriers(self) -> tuple[Carrier, ...]:
         """List the carriers that are tried."""
@@ -294,32 +328,13 @@ class Table:
         reduced = reduce_some(projection, still)
         return rank(reduced, square, projection.rows, without=known)
 
-    def _score(
-        self,
-        view_of: Callable[[Carrier], Projection],
-        evidence: float,
-        carrier: Carrier,
-        factor: str,
-        k: int,
-        laws: Laws,
-        each: Sequence[Floats],
-    ) -> Score:
-        """Put the best law of one driver on one carrier into a score."""
-        own = [
-            (float(e[i, 0]), law)
-            for e, (some, _, which) in zip(each, laws.widths, strict=True)
-            for i, law in enumerate(some)
-            if which[i] == k
-        ]
-        least = max(e for e, _ in own) - PLAINER
-        _, best = min(
-            (x for x in own if x[0] >= least), key=lambda x: (x[1].columns, -x[0])
-        )
-        view = view_of(carrier)
-        candidate = best.on(carrier, self.revised and not holds_mean(view, carrier))
+    def _score(self, view: Projection, family: CellFamily) -> Score:
+        """Put a family and its plainest law into a score."""
+        loose = self.revised and not holds_mean(view, family.carrier)
+        candidate = family.plainest().on(family.carrier, loose)
         square = float(view.rest @ view.rest)
         score = rank(reduce_some(view, [candidate]), square, view.rows)[0]
-        return replace(score, evidence=evidence)
+        return replace(score, evidence=family.evidence)
 
     def maxima(self, projection: Projection, rows: Floats, square: Floats) -> Floats:
         """Return the largest evidence of any cell for every draw, (draws,).
@@ -339,7 +354,7 @@ class Table:
 
     def _evidence(
         self, view: Projection, carrier: Carrier, rows: Floats, square: Floats
-    ) -> Iterator[tuple[str, Laws, list[Floats]]]:
+    ) -> Iterator[tuple[str, Laws, tuple[Floats, ...]]]:
         """Score all laws of a carrier against rows filtered twice, (3 n, draws).
 
         Yields:
@@ -355,15 +370,14 @@ class Table:
                 evidence += self._shares(carrier, some)[:, None]
                 each.append(evidence)
             if each:
-                yield factor, laws, each
+                yield factor, laws, tuple(each)
 
     def _tried(self, carrier: Carrier, factor: str) -> Laws:
         """Return the laws of a factor that are tried on a carrier."""
         laws = self.laws.get(factor, Laws((), ()))
         if self.only is None:
             return laws
-        none = np.zeros(0, dtype=np.int64)
-        return laws.some(self.only.get((carrier, factor), none))
+        return laws.some(self.only.get((carrier, factor), NONE))
 
     def _shares(self, carrier: Carrier, laws: Sequence[Law]) -> Floats:
         """Return log shares of laws on a carrier, (c,); -inf of those with a name."""
