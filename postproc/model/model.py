@@ -390,14 +390,14 @@ class Model:
         return PredictedReading(error, self.reading_std(at, known))
 
     def reading_std(self, at: Batch, known: Floats) -> Floats:
-        """Standard deviation of one reading, (n, 3) [m].
+        """Standard deviation of one row, the mean of its readings, (n, 3) [m].
 
         Args:
             at: n states, with the kinematics taken at the parameters.
-            known: Variance of the mean of many readings, (n, 3) [m^2].
+            known: Variance of the mean of many arrivals, (n, 3) [m^2].
         """
-        tracker = self.noise.tracker_std(at.tcp)[:, None]
-        scatter = self.noise.arrival_variance(at.jacobian) + tracker**2
+        read = self.noise.tracker_std(at.tcp) ** 2 / at.states.readings
+        scatter = self.noise.arrival_variance(at.jacobian) + read[:, None]
         scatter = scatter + self.noise.rounding_variance(at.states.q, at.jacobian)
         std = np.sqrt(np.maximum(known, 0.0) + scatter)
         return np.asarray(self.reading_spread * std)
