@@ -205,6 +205,45 @@ def test_a_tool_that_never_turned_leaves_its_probe_at_the_prior(  # type: ignore
     assert len(told) == 1 and how in told[0] and "+- 300 mm" in told[0]
 
 
+@pytest.mark.parametrize("wobble", [0.0, 0.003, 0.01])
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("far", [0.0, 0.05, 0.2])
+def test_readings_with_the_tool_turned_otherwise_are_as_unsure_as_the_probe(  # type: ignore[no-untyped-def]
+    cell, tmp_path: Path, wobble: float, free: bool, far: float
+) -> None:
+    """The probe's prior counts beside the survey's orientations, not among them."""
+    rng = np.random.default_rng(2)
+    states = never_turned(120, rng, free)
+    states = states.with_(q=states.q + wobble * rng.standard_normal((120, 6)))
+    arm, R = random_arm(rng), Rotation.from_euler("z", 2.0).as_matrix()
+    tool = TOOL + far * np.eye(3)[2]
+
+    def seen(states):  # type: ignore[no-untyped-def]
+        read, _ = arm.measure(states.with_(tool=np.tile(tool, (len(states), 1))), rng)
+        return survey_of(states, (read - [4.0, -3.0, 1.5]) @ R)
+
+    survey, other = seen(states), seen(random_states(200, rng))
+    found = fit_measurements(
+        survey[np.arange(80)], cell, effects=EFFECTS, frame="tracker", validate=False
+    )
+    found.model.save(tmp_path / "m.json")
+    model = load_model(tmp_path / "m.json")
+
+    def of(rows: Measurements) -> tuple[float, float]:
+        placed = model.registration
+        assert placed is not None
+        states = placed.on_probes(rows.states)
+        read = model.reading(NJ, states)
+        at = placed.to_base(rows.position) - Batch(NJ, states).walk.tcp
+        held = np.abs(at - read.error) < 1.96 * read.std
+        return float(held.mean()), float(read.std.mean())
+
+    alike, unlike = of(survey[np.arange(80, 120)]), of(other)
+    assert alike[0] > 0.9 and alike[1] < 3e-4
+    assert unlike[0] > 0.95
+    assert unlike[1] > (0.1 if wobble == 0.0 else 2e-3)
+
+
 @pytest.mark.parametrize("far", [0.3, 1.0, 2.5])
 @pytest.mark.parametrize("stated", [True, False])
 def test_longer_tools_are_found(far: float, stated: bool) -> None:
