@@ -35,8 +35,8 @@ from postproc.calibration.tables import (
     read_rotation,
     read_tools,
     read_visits,
+    row_names,
     translate,
-    unique_ids,
 )
 from postproc.exceptions import MeasurementError
 from postproc.robot.arm import Arm
@@ -168,7 +168,7 @@ def from_table(
     table.require("id", *JOINTS, *(POSITION if positions else ()))
     table = in_visit_order(table)
     table, references = split_references(table)
-    ids = unique_ids(table)
+    ids = row_names(table)
     q = np.deg2rad(table.block(JOINTS))
     side, travel, inferred, warnings = read_directions(table, arm, q)
     covariates = {
@@ -235,7 +235,7 @@ def concatenate(parts: Sequence[Measurements]) -> Measurements:
     file then has a drift of its own.
 
     Raises:
-        MeasurementError: An id appears in two files, or readings of fixed points tell
+        MeasurementError: A file is there twice, or readings of fixed points tell
             nothing.
     """
     if _moved_between(parts):
@@ -284,14 +284,7 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
     first = parts[0]
     if len(parts) == 1:
         return first
-    seen: dict[str, Path] = {}
-    for part in parts:
-        for name, line in zip(part.ids, part.line, strict=True):
-            if name in seen and seen[name] != part.path:
-                cure = "Give every row its own id"
-                problem = f"id {name!r} is also in {seen[name]}"
-                raise MeasurementError(part.path, problem, cure, line=int(line))
-            seen[name] = part.path
+    _check_given_once(parts)
     names, station = _joined_stations(parts)
     joined = {
         name: np.concatenate([getattr(p.states, name) for p in parts])
@@ -307,7 +300,7 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
         path=first.path,
         states=States(order=order, station=station, **joined),
         position=np.concatenate([p.position for p in parts]),
-        ids=tuple(i for p in parts for i in p.ids),
+        ids=_joined_ids(parts),
         line=np.concatenate([p.line for p in parts]),
         inferred=np.concatenate([p.inferred for p in parts]),
         sha256="+".join(p.sha256 for p in parts),
@@ -323,6 +316,32 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
     if (np.diff(order) > 0).all():
         return joint
     return joint[np.argsort(order, kind="stable")]
+
+
+def _check_given_once(parts: Sequence[Measurements]) -> None:
+    """Refuse a file whose rows another one has.
+
+    Raises:
+        MeasurementError: They would count twice.
+    """
+    first: dict[tuple[object, ...], Path] = {}
+    for part in parts:
+        rows = part.ids, part.position.tobytes(), part.states.q.tobytes()
+        if len(part) and rows in first:
+            problem = f"holds the rows of {first[rows]}, which would count twice"
+            raise MeasurementError(part.path, problem, "Give every file once")
+        first[rows] = part.path
+
+
+def _joined_ids(parts: Sequence[Measurements]) -> tuple[str, ...]:
+    """Name the rows of several files: ids of an earlier file get the file's name."""
+    seen: set[str] = set()
+    names: list[str] = []
+    for part in parts:
+        own = [f"{i} of {part.path.name}" if i in seen else i for i in part.ids]
+        seen.update(part.ids)
+        names += own
+    return tuple(names)
 
 
 def _joined_visits(parts: Sequence[Measurements]) -> Ints | None:

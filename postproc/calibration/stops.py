@@ -148,6 +148,19 @@ def _mean_angles(q: Floats, stop: Ints) -> Floats:
     return np.where(apart > 0.0, mean, q[begins])[label.reshape(-1)]
 
 
+def labels_of(states: States, visit: Ints | None = None) -> Ints:
+    """Number the readings that belong together, (n,): of one stop and probe point."""
+    if len(states) == 0:
+        return np.zeros(0, dtype=np.int64)
+    return _labels(states, stops_of(states, visit))
+
+
+def _labels(states: States, stop: Ints) -> Ints:
+    """Number pairs of stops and probe points, (n,)."""
+    _, label = np.unique(_row_keys(states, stop), axis=0, return_inverse=True)
+    return label.reshape(-1)
+
+
 def _row_keys(states: States, stop: Ints) -> Floats:
     """Tell stops and probe points apart, (n, 5)."""
     point = np.round(states.tool / SAME_POINT)
@@ -180,14 +193,13 @@ def _without_strays(
     Returns:
         The rows that stay, their stops, and which of them are averaged: a label.
     """
-    _, label = np.unique(_row_keys(survey.states, stop), axis=0, return_inverse=True)
-    label = label.reshape(-1)
+    label = _labels(survey.states, stop)
     several = np.bincount(label)[label]
     off = survey.position - _medians(survey.position, label)
     size = np.linalg.norm(off, axis=1)
     far = np.zeros(len(survey), dtype=bool)
     for some in (several >= FEWEST, several == 2):
-        far |= some & (size > _limit(size[some], len(survey)))
+        far |= some & (size > usual_limit(size[some], len(survey)))
     stray = far & (several >= FEWEST)
     gone = tuple(
         DroppedRow(
@@ -201,7 +213,7 @@ def _without_strays(
     return kept, stop[~stray], _in_order(apart[~stray])
 
 
-def _limit(size: Floats, count: int) -> float:
+def usual_limit(size: Floats, count: int) -> float:
     """Return the deviation from a median that no good reading of a survey has [m].
 
     Args:
