@@ -44,7 +44,7 @@ from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.calibration.validation import FitTask, Validated, validate_fit
 from postproc.calibration.weighing import ENOUGH
-from postproc.calibration.weight_direction import direction_warning
+from postproc.calibration.weight_direction import direction_warning, level_warning
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.placement import Placement
@@ -196,6 +196,9 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
     if frame == "tracker":
         points = stated_points(survey)
         survey, placed = into_base_frame(survey, cell.arm)
+        if cell.levelled:
+            level = level_warning(placed, cell.arm.weight)
+            survey = replace(survey, warnings=(*survey.warnings, *level))
         tracker, setup = placed.origin, (Placement.name,)
         monuments = in_base_frame(monuments, placed)
     survey, reversals = split_reversals(survey, cell.arm)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.references import (
+    APART,
     ONE_POINT,
     ReferenceRows,
     TrackerMotion,
@@ -39,6 +40,7 @@ from postproc.calibration.tables import (
     translate,
 )
 from postproc.exceptions import MeasurementError
+from postproc.model.registration import rigid_fit
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States, make_states
@@ -232,14 +234,14 @@ def concatenate(parts: Sequence[Measurements]) -> Measurements:
     """Put several files one after the other, and take the tracker's own drift out.
 
     Fixed points that lie apart from file to file were read from another station: each
-    file then has a drift of its own.
+    file then has a drift of its own, and three points bring it into the first's frame.
 
     Raises:
         MeasurementError: A file is there twice, or readings of fixed points tell
             nothing.
     """
     if _moved_between(parts):
-        return replace(_joined([_steadied(p) for p in parts]), motion=None)
+        return replace(_joined(_tied([steady(p) for p in parts])), motion=None)
     return _steadied(_joined(parts))
 
 
@@ -277,6 +279,81 @@ def _steadied(survey: Measurements) -> Measurements:
         motion=motion,
         warnings=(*survey.warnings, *motion.tell()),
     )
+
+
+# Stations that read the same fixed points.
+
+TIES = 3  # fixed points, not on a line, that tell where another station stood
+LOOSE = 2e-4  # [m] what they may be off by afterwards
+
+
+def _tied(parts: Sequence[Measurements]) -> list[Measurements]:
+    """Bring files into the frame of the first, where they share its fixed points."""
+    name = parts[0].stations[0] or parts[0].path.name
+    first = replace(parts[0], stations=(name, *parts[0].stations[1:]))
+    known, out = places_of_points(first), [first]
+    for part in parts[1:]:
+        seen = places_of_points(part)
+        names = sorted(set(seen) & set(known))
+        there = np.array([known[n] for n in names]).reshape(-1, 3)
+        here = np.array([seen[n] for n in names]).reshape(-1, 3)
+        if len(part.stations) > 1 or not _tell_a_frame(there):
+            out.append(part)
+            continue
+        T = rigid_fit(here, there)
+        left = np.linalg.norm(here @ T[:3, :3].T + T[:3, 3] - there, axis=1)
+        worst = f"{left.max() / MM:.3f} mm"
+        if left.max() > LOOSE:
+            note = (
+                f"{part.path.name}: fixed points lie to each other by up to {worst} "
+                f"otherwise than in {first.path.name}: stations stay apart. Are names "
+                f"exchanged, or was {names[int(left.argmax())]!r} moved?"
+            )
+            out.append(replace(part, warnings=(*part.warnings, note)))
+            continue
+        note = (
+            f"{part.path.name}: in the frame of {first.path.name} by {len(names)} "
+            f"fixed points, {worst} remain there at most"
+        )
+        moved = _in_frame(part, T, name)
+        out.append(replace(moved, warnings=(*part.warnings, note)))
+        known = places_of_points(out[-1]) | known
+    return out
+
+
+def _tell_a_frame(points: Floats) -> bool:
+    """Return True if fixed points (k, 3) tell shift and turn of a frame."""
+    if len(points) < TIES:
+        return False
+    size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(size[1] > APART)
+
+
+def places_of_points(rows: Measurements) -> dict[str, Floats]:
+    """Return where each fixed point was read, the tracker's drift apart, (3,) [m]."""
+    fixed, motion = rows.references, rows.motion
+    if fixed is None:
+        return {}
+    position = fixed.position
+    if motion is not None:
+        passed = fixed.time if motion.drift.clock == "time" else fixed.order
+        position = position - motion.moved(passed, position)
+    own = {n: [m == n for m in fixed.name] for n in set(fixed.name)}
+    return {name: position[rows].mean(axis=0) for name, rows in own.items()}
+
+
+def _in_frame(rows: Measurements, T: Floats, station: str) -> Measurements:
+    """Convert rows and their fixed points by a transform, (4, 4), to a station's."""
+    fixed, R = rows.references, T[:3, :3]
+    assert fixed is not None
+    zeros = np.zeros(len(rows), dtype=np.int64)
+    return replace(
+        rows,
+        states=rows.states.with_(station=zeros), stations=(station,),
+        position=rows.position @ R.T + T[:3, 3],
+        rotation=None if rows.rotation is None else R @ rows.rotation,
+        references=replace(fixed, position=fixed.position @ R.T + T[:3, 3]),
+    )  # fmt: skip
 
 
 def _joined(parts: Sequence[Measurements]) -> Measurements:
