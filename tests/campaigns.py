@@ -307,8 +307,12 @@ def summary(trials: Sequence[Trial]) -> list[str]:
         f"{(loss <= 1.15).mean():.1%} of {len(loss)}."
     )
     large = [t.full.mean / t.best for t in trials if t.full and t.habit.poses >= 60]
-    asked = sum(bool(t.full and t.full.asked) for t in trials)
-    out.append(f"The direction of weight is asked about in {asked}.")
+    asked = sum(ASKED in t.refused or bool(t.full and t.full.asked) for t in trials)
+    untold = sum(t.setup.tilted and t.setup.said == "" for t in trials)
+    out.append(
+        f"The direction of weight is asked about in {asked}; it differs and is not "
+        f"told in {untold}."
+    )
     out.append(
         f"At most 1.5 times the best possible, 60 poses or more: "
         f"{np.mean(np.array(large) <= 1.5):.1%} of {len(large)}."

@@ -108,3 +108,19 @@ def test_a_cell_tells_that_the_tracker_is_levelled(tmp_path, levelled, mounting)
     )  # fmt: skip
     asked = [w for w in found.report.warnings if "is levelled" in w]
     assert len(asked) == (levelled and mounting == "wall")
+
+
+@pytest.mark.parametrize(
+    ("mounting", "refused"), [("", True), ('mounting = "floor"', False),
+                              ('mounting = "wall"', None)],
+)  # fmt: skip
+def test_no_model_is_written_where_only_the_user_knows(tmp_path, mounting, refused):
+    states, position = survey(11, WALL, Planted("compliance", 2, peak_mm=0.5))
+    path = tmp_path / "cell.toml"
+    path.write_text(f'[robot]\narm = "{ARM.name}"\n{mounting}\n')
+    found = fit_measurements(
+        survey_of(states, position), load_cell(path), effects=("geometry", "backlash")
+    )
+    said = [w for w in found.report.warnings if "weight pulls along [1, 0, 0]" in w]
+    assert len(said) == (refused is not None)
+    assert ("weight pulls along [1, 0, 0]" in found.rejected) == (refused is True)
