@@ -57,7 +57,7 @@ KNOWING = {
     "calibration.diagnosis.refit": {"joint_offset"},
     "calibration.diagnosis.search": {"joint_offset"},
     # A registration is what that effect fits, by the rigid motions of a base.
-    "calibration.registration": {"base_shift", "placement"},
+    "calibration.registration": {"placement"},
     # A tracker that drifts moves fixed points rigidly.
     "calibration.references": {"base_shift", "tracker_drift"},
     "calibration.selection": {"probe_turn", "tool_shift"},

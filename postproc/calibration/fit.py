@@ -44,7 +44,7 @@ from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.calibration.validation import FitTask, Validated, validate_fit
 from postproc.calibration.weighing import ENOUGH
-from postproc.calibration.weight_direction import direction_warning
+from postproc.calibration.weight_direction import direction_warning, level_warning
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.placement import Placement
@@ -173,6 +173,7 @@ class PreparedRows:
         points: Where the cell has the nests, flange frame, (k, 3) [m], or None.
         monuments: Fixed points, in the base frame as far as it is known.
         reversals: Steps behind reversals, taken out of the survey.
+        mounted: Whether the cell states the mounting in so many words.
     """
 
     survey: Measurements
@@ -182,6 +183,7 @@ class PreparedRows:
     points: Floats | None
     monuments: tuple[Monument, ...]
     reversals: Reversals | None
+    mounted: bool = False
 
 
 def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
@@ -196,6 +198,9 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
     if frame == "tracker":
         points = stated_points(survey)
         survey, placed = into_base_frame(survey, cell.arm)
+        if cell.levelled:
+            level = level_warning(placed, cell.arm.weight)
+            survey = replace(survey, warnings=(*survey.warnings, *level))
         tracker, setup = placed.origin, (Placement.name,)
         monuments = in_base_frame(monuments, placed)
     survey, reversals = split_reversals(survey, cell.arm)
@@ -205,7 +210,10 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
     survey = check_orientations(survey, cell.arm)
     notes = (*survey.warnings, *lost_without(cell.arm, survey))
     survey = replace(survey, warnings=notes)
-    return PreparedRows(survey, tracker, setup, placed, points, monuments, reversals)
+    mounted = cell.file.robot.mounting is not None
+    return PreparedRows(
+        survey, tracker, setup, placed, points, monuments, reversals, mounted
+    )
 
 
 def _published(rows: PreparedRows, arm: Arm, method: Method, seed: int) -> Calibration:
@@ -219,8 +227,14 @@ def _published(rows: PreparedRows, arm: Arm, method: Method, seed: int) -> Calib
 
 
 def _conclude(rows: PreparedRows, found: Validated, arm: Arm) -> Calibration:
-    """Make the model of a fit and its report."""
+    """Make the model of a fit and its report.
+
+    Where the cell does not state the mounting, and the rows contradict what follows
+    from that, nobody but the user knows: no model is to be used.
+    """
     fitted, survey = found.fit, rows.survey
+    direction = direction_warning(fitted)
+    asked = "" if rows.mounted or found.error is None else "".join(direction)
     model = model_of(fitted, survey, found.widening)
     model = replace(model, registration=rows.placed, monuments=rows.monuments)
     widths = newer_widths((), model, arm, rows.reversals)
@@ -232,12 +246,12 @@ def _conclude(rows: PreparedRows, found: Validated, arm: Arm) -> Calibration:
         *wrong_nests(fitted, rows.points),
         *_rounding(model, fitted),
         *found.notes,
-        *direction_warning(fitted),
+        *direction,
         *file_steps(fitted, survey),
     )
     survey = replace(survey, warnings=notes)
     report = report_fit(fitted, survey, model)
-    report = replace(report, held_out=found.error, rejected=found.rejected)
+    report = replace(report, held_out=found.error, rejected=found.rejected or asked)
     return Calibration(model, report, survey.with_states(fitted.batch.states))
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.references import (
+    APART,
     ONE_POINT,
     ReferenceRows,
     TrackerMotion,
@@ -35,10 +36,11 @@ from postproc.calibration.tables import (
     read_rotation,
     read_tools,
     read_visits,
+    row_names,
     translate,
-    unique_ids,
 )
 from postproc.exceptions import MeasurementError
+from postproc.model.registration import rigid_fit
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States, make_states
@@ -168,7 +170,7 @@ def from_table(
     table.require("id", *JOINTS, *(POSITION if positions else ()))
     table = in_visit_order(table)
     table, references = split_references(table)
-    ids = unique_ids(table)
+    ids = row_names(table)
     q = np.deg2rad(table.block(JOINTS))
     side, travel, inferred, warnings = read_directions(table, arm, q)
     covariates = {
@@ -232,14 +234,14 @@ def concatenate(parts: Sequence[Measurements]) -> Measurements:
     """Put several files one after the other, and take the tracker's own drift out.
 
     Fixed points that lie apart from file to file were read from another station: each
-    file then has a drift of its own.
+    file then has a drift of its own, and three points bring it into the first's frame.
 
     Raises:
-        MeasurementError: An id appears in two files, or readings of fixed points tell
+        MeasurementError: A file is there twice, or readings of fixed points tell
             nothing.
     """
     if _moved_between(parts):
-        return replace(_joined([_steadied(p) for p in parts]), motion=None)
+        return replace(_joined(_tied([steady(p) for p in parts])), motion=None)
     return _steadied(_joined(parts))
 
 
@@ -279,19 +281,87 @@ def _steadied(survey: Measurements) -> Measurements:
     )
 
 
+# Stations that read the same fixed points.
+
+TIES = 3  # fixed points, not on a line, that tell where another station stood
+LOOSE = 2e-4  # [m] what they may be off by afterwards
+
+
+def _tied(parts: Sequence[Measurements]) -> list[Measurements]:
+    """Bring files into the frame of the first, where they share its fixed points."""
+    name = parts[0].stations[0] or parts[0].path.name
+    first = replace(parts[0], stations=(name, *parts[0].stations[1:]))
+    known, out = places_of_points(first), [first]
+    for part in parts[1:]:
+        seen = places_of_points(part)
+        names = sorted(set(seen) & set(known))
+        there = np.array([known[n] for n in names]).reshape(-1, 3)
+        here = np.array([seen[n] for n in names]).reshape(-1, 3)
+        if len(part.stations) > 1 or not _tell_a_frame(there):
+            out.append(part)
+            continue
+        T = rigid_fit(here, there)
+        left = np.linalg.norm(here @ T[:3, :3].T + T[:3, 3] - there, axis=1)
+        worst = f"{left.max() / MM:.3f} mm"
+        if left.max() > LOOSE:
+            note = (
+                f"{part.path.name}: fixed points lie to each other by up to {worst} "
+                f"otherwise than in {first.path.name}: stations stay apart. Are names "
+                f"exchanged, or was {names[int(left.argmax())]!r} moved?"
+            )
+            out.append(replace(part, warnings=(*part.warnings, note)))
+            continue
+        note = (
+            f"{part.path.name}: in the frame of {first.path.name} by {len(names)} "
+            f"fixed points, {worst} remain there at most"
+        )
+        moved = _in_frame(part, T, name)
+        out.append(replace(moved, warnings=(*part.warnings, note)))
+        known = places_of_points(out[-1]) | known
+    return out
+
+
+def _tell_a_frame(points: Floats) -> bool:
+    """Return True if fixed points (k, 3) tell shift and turn of a frame."""
+    if len(points) < TIES:
+        return False
+    size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(size[1] > APART)
+
+
+def places_of_points(rows: Measurements) -> dict[str, Floats]:
+    """Return where each fixed point was read, the tracker's drift apart, (3,) [m]."""
+    fixed, motion = rows.references, rows.motion
+    if fixed is None:
+        return {}
+    position = fixed.position
+    if motion is not None:
+        passed = fixed.time if motion.drift.clock == "time" else fixed.order
+        position = position - motion.moved(passed, position)
+    own = {n: [m == n for m in fixed.name] for n in set(fixed.name)}
+    return {name: position[rows].mean(axis=0) for name, rows in own.items()}
+
+
+def _in_frame(rows: Measurements, T: Floats, station: str) -> Measurements:
+    """Convert rows and their fixed points by a transform, (4, 4), to a station's."""
+    fixed, R = rows.references, T[:3, :3]
+    assert fixed is not None
+    zeros = np.zeros(len(rows), dtype=np.int64)
+    return replace(
+        rows,
+        states=rows.states.with_(station=zeros), stations=(station,),
+        position=rows.position @ R.T + T[:3, 3],
+        rotation=None if rows.rotation is None else R @ rows.rotation,
+        references=replace(fixed, position=fixed.position @ R.T + T[:3, 3]),
+    )  # fmt: skip
+
+
 def _joined(parts: Sequence[Measurements]) -> Measurements:
     """Put several files one after the other."""
     first = parts[0]
     if len(parts) == 1:
         return first
-    seen: dict[str, Path] = {}
-    for part in parts:
-        for name, line in zip(part.ids, part.line, strict=True):
-            if name in seen and seen[name] != part.path:
-                cure = "Give every row its own id"
-                problem = f"id {name!r} is also in {seen[name]}"
-                raise MeasurementError(part.path, problem, cure, line=int(line))
-            seen[name] = part.path
+    _check_given_once(parts)
     names, station = _joined_stations(parts)
     joined = {
         name: np.concatenate([getattr(p.states, name) for p in parts])
@@ -307,7 +377,7 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
         path=first.path,
         states=States(order=order, station=station, **joined),
         position=np.concatenate([p.position for p in parts]),
-        ids=tuple(i for p in parts for i in p.ids),
+        ids=_joined_ids(parts),
         line=np.concatenate([p.line for p in parts]),
         inferred=np.concatenate([p.inferred for p in parts]),
         sha256="+".join(p.sha256 for p in parts),
@@ -323,6 +393,32 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
     if (np.diff(order) > 0).all():
         return joint
     return joint[np.argsort(order, kind="stable")]
+
+
+def _check_given_once(parts: Sequence[Measurements]) -> None:
+    """Refuse a file whose rows another one has.
+
+    Raises:
+        MeasurementError: They would count twice.
+    """
+    first: dict[tuple[object, ...], Path] = {}
+    for part in parts:
+        rows = part.ids, part.position.tobytes(), part.states.q.tobytes()
+        if len(part) and rows in first:
+            problem = f"holds the rows of {first[rows]}, which would count twice"
+            raise MeasurementError(part.path, problem, "Give every file once")
+        first[rows] = part.path
+
+
+def _joined_ids(parts: Sequence[Measurements]) -> tuple[str, ...]:
+    """Name the rows of several files: ids of an earlier file get the file's name."""
+    seen: set[str] = set()
+    names: list[str] = []
+    for part in parts:
+        own = [f"{i} of {part.path.name}" if i in seen else i for i in part.ids]
+        seen.update(part.ids)
+        names += own
+    return tuple(names)
 
 
 def _joined_visits(parts: Sequence[Measurements]) -> Ints | None:

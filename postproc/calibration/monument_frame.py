@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.calibration.measurements import Measurements
+from postproc.calibration.measurements import Measurements, places_of_points
 from postproc.calibration.references import APART
 from postproc.model.model import Monument
 from postproc.model.registration import rigid_fit
@@ -26,24 +25,10 @@ def monuments_of(survey: Measurements) -> tuple[Monument, ...]:
     fixed = survey.references
     if fixed is None or len(survey.stations) > 1:
         return ()
-    names = sorted(set(fixed.name))
-    places = [_place_of(survey, name) for name in names]
     return tuple(
         (name, (float(x), float(y), float(z)))
-        for name, (x, y, z) in zip(names, places, strict=True)
+        for name, (x, y, z) in sorted(places_of_points(survey).items())
     )
-
-
-def _place_of(survey: Measurements, name: str) -> Floats:
-    """Return where a fixed point was read, the tracker's drift apart, (3,) [m]."""
-    rows, motion = survey.references, survey.motion
-    assert rows is not None
-    position = rows.position
-    if motion is not None:
-        passed = rows.time if motion.drift.clock == "time" else rows.order
-        position = position - motion.moved(passed, position)
-    own = [n == name for n in rows.name]
-    return np.asarray(position[own].mean(axis=0))
 
 
 def at_monuments(
@@ -65,7 +50,8 @@ def at_monuments(
     names = sorted(set(fixed.name if fixed is not None else ()) & set(there))
     if fixed is None or not names:
         return rows, ""
-    seen = np.stack([_place_of(rows, name) for name in names])
+    places = places_of_points(rows)
+    seen = np.stack([places[name] for name in names])
     known = np.array([there[name] for name in names])
     size = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
     turns = len(names) >= WHOLE and size[1] > APART

@@ -10,8 +10,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats
 from postproc.model.combination import Combination
-from postproc.model.effects.base_shift import rigid_motions
-from postproc.model.effects.placement import Placement
+from postproc.model.effects.placement import POINT, Placement, unseen_axes
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, PredictedReading
 from postproc.model.registration import Registration, rigid_fit
@@ -21,11 +20,13 @@ from postproc.robot.state import States
 PASSES = 200
 SETTLED = 1e-9  # [m]
 ROBUST = 3.0  # residuals beyond this many typical ones count less
-NEAR_POINT, NEAR_FLANGE = 0.3, 1.0  # [m] prior of a probe: round its point, the flange
+NEAR_POINT, NEAR_FLANGE = (
+    POINT,
+    1.0,
+)  # [m] prior of a probe: round its point, the flange
 LEAST_GAP = 1e-7  # [m] what a perfect arm leaves
 STOPS = 6  # poses from which a tracker and a probe are found
 SPREAD = 0.05  # [m] that poses spread across the line that fits them best
-TURNED = 0.03  # [rad] rms turn of the tool from which a probe's place shows
 
 
 def register(
@@ -128,16 +129,9 @@ def undetermined_axes(placed: Registration, arm: Arm, states: States) -> Floats:
     Returns:
         Unit vectors in the flange frame.
     """
-    batch = Batch(arm, placed.on_probes(states))
-    R, left = batch.walk.flange, []
-    for s in range(len(placed.stations)):
-        rows = states.station == s
-        rigid = rigid_motions(batch.walk.tcp[rows]).reshape(-1, 6)
-        own = R[rows].reshape(-1, 3)
-        left.append(own - rigid @ np.linalg.lstsq(rigid, own)[0])
-    shown = np.concatenate(left)
-    size, axes = np.linalg.eigh(shown.T @ shown / max(len(states), 1))
-    return np.asarray(axes.T[np.sqrt(np.maximum(size, 0.0)) < TURNED])
+    walk = Batch(arm, placed.on_probes(states)).walk
+    hidden = unseen_axes(walk.flange, walk.tcp, states.station)
+    return np.array([unseen.axis for unseen in hidden]).reshape(-1, 3)
 
 
 def covers_a_plane(arm: Arm, states: States) -> bool:

@@ -22,6 +22,7 @@ from postproc.model.whitening import Whitener, Whitening
 # What a fit has found, with all that tests of further effects need.
 
 HELD, WITHIN = 0.95, 1.96  # share of normal deviates, within as many sigma
+HARDLY = 0.01  # effective parameters a coordinate, which two rows hardly share
 LEAST = 0.1  # of its noise that is left at least of a row that tells of itself alone
 
 
@@ -89,6 +90,15 @@ class Fit:
     def poses(self) -> int:
         """Number of poses: what no effect describes of one all its rows share."""
         return len(np.unique(self.pose))
+
+    @property
+    def shared(self) -> Floats | None:
+        """Covariance of the parameters that rows of a pose share, (p, p).
+
+        None where few parameters are fitted to many rows, and it is next to nothing.
+        """
+        few = self.effective < HARDLY * self.residual.size
+        return None if few else self.covariance
 
     def moved(self, part: slice) -> Floats:
         """Move the positions by some of the parameters alone, (n, 3) [m]."""
@@ -324,7 +334,7 @@ def _weighed(state: Fit, heavy: bool) -> Fit:
         rows = judge(distance, residual, batch.states.q, batch.jacobian, state.pose)
     spread = design.variance(state.covariance)
     noise = estimate_noise(state.whitener, turned**2 + spread, rows.weight, state.noise,
-        [_products(design, turned, block.rows, state.covariance)
+        [_products(design, turned, block.rows, spread, state.shared)
          for block in state.whitener.blocks],
     )  # fmt: skip
     turns = state.turns
@@ -336,7 +346,11 @@ def _weighed(state: Fit, heavy: bool) -> Fit:
 
 
 def _products(
-    design: DesignMatrix, rotated: Floats, rows: Ints, covariance: Floats
+    design: DesignMatrix,
+    rotated: Floats,
+    rows: Ints,
+    spread_of_rows: Floats,
+    covariance: Floats | None,
 ) -> Floats:
     """Expected products of the residuals of poses, (groups, 3 m, 3 m) [m^2].
 
@@ -344,11 +358,17 @@ def _products(
         design: Rotated columns.
         rotated: Rotated residuals, (n, 3) [m].
         rows: Rows of every pose, (groups, m).
-        covariance: Of the parameters, (p, p).
+        spread_of_rows: Variance that the parameters give each component, (n, 3) [m^2].
+        covariance: Of the parameters, (p, p); None where it is left out what two rows
+            share of it.
     """
     count, m = rows.shape
     left = rotated[rows].reshape(count, 3 * m)
     out = left[:, :, None] * left[:, None]
+    if covariance is None:
+        k = np.arange(3 * m)
+        out[:, k, k] += spread_of_rows[rows].reshape(count, 3 * m)
+        return out
     at_once = max(1, ROWS_AT_ONCE // m)
     for first in range(0, count, at_once):
         some = rows[first : first + at_once]

@@ -20,6 +20,9 @@ SAME_POINT = 1e-7  # [m] probe points that are one
 FALSE_ALARMS = 0.01  # readings that are dropped per survey of good ones
 FEWEST = 3  # readings of one stop of which one may disagree with the others
 FINEST = 3e-6  # [m] least scatter of readings, which are written with few decimals
+RESTLESS = np.deg2rad(0.05)  # most that angles of one stop differ, read back [rad]
+CLEARLY = 100.0  # times as far as these differ the arm goes from pose to pose
+JOINTS = 3  # that differ at least where angles are read back: a step turns one
 
 
 def stops_of(states: States, visit: Ints | None = None) -> Ints:
@@ -27,7 +30,8 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
 
     A stop is a run of rows with equal commanded angles, directions and payload, in
     which, if there is a clock, no gap is as long as the arm needs to leave and return.
-    Readings of two tracker stations are of two stops.
+    Readings of two tracker stations are of two stops. Angles that were read back from
+    the controller may differ within a stop, see `restless`.
 
     Args:
         states: The rows.
@@ -41,7 +45,8 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
     if visit is None:
         return run
     known = visit >= 0
-    parts = known, np.where(known, visit, run), poses_of(states), states.station
+    pose = np.where(known, poses_of(states, RESTLESS), -1)
+    parts = known, np.where(known, visit, run), pose, states.station
     key = np.column_stack([*parts, states.direction])
     _, label = np.unique(key, axis=0, return_inverse=True)
     return _in_order(label.reshape(-1))
@@ -49,12 +54,38 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
 
 def _commanded_elsewhere(states: States) -> Bools:
     """Find the rows that another pose, direction or payload precedes, (n - 1,)."""
-    moved = (np.abs(np.diff(states.q, axis=0)) > SAME_POSE).any(axis=1)
+    step = np.abs(np.diff(states.q, axis=0))
+    moved = (step > max(SAME_POSE, restless(step))).any(axis=1)
     turned = (np.diff(states.direction, axis=0) != 0).any(axis=1)
     loaded = np.diff(np.nan_to_num(states.payload)) != 0
     seen = np.diff(states.station) != 0
     moving = ~np.isnan(states.heading[1:, 0])
     return np.asarray(moved | turned | loaded | seen | moving)
+
+
+def restless(step: Floats) -> float:
+    """Return by how much angles differ from row to row while the arm stands [rad].
+
+    Angles that are read back differ in their last digits. Such differences are told
+    from moves by their size, where nothing lies between them and what is `CLEARLY`
+    larger, and by several joints that differ at once.
+
+    Args:
+        step: Of every joint from row to row, (n - 1, 6) [rad].
+
+    Returns:
+        0 where no row differs from the one before by so little.
+    """
+    size = step.max(axis=1, initial=0.0)
+    still, moves = size <= RESTLESS, size[size > RESTLESS]
+    differ = still & (size > SAME_POSE)
+    if not differ.any() or not len(moves):
+        return 0.0
+    most = float(size[differ].max())
+    several = (step[differ] > size[differ, None] / CLEARLY).sum(axis=1) >= JOINTS
+    if moves.min() < CLEARLY * most or several.mean() < 0.5:
+        return 0.0
+    return most
 
 
 def _long_gaps(time: Floats, begins: Bools) -> Bools:
@@ -76,9 +107,9 @@ def pool_readings(survey: Measurements) -> Measurements:
         survey: Rows in visit order.
 
     Returns:
-        Rows with the mean position; `readings` and `scatter` of their states say how
-        many readings there were and how they scatter. Rows of one stop have the same
-        `order`.
+        Rows with the mean position and mean angles; `readings` and `scatter` of their
+        states say how many readings there were and how they scatter. Rows of one stop
+        have the same `order`.
     """
     stop = stops_of(survey.states, survey.visit)
     if len(np.unique(stop)) == len(survey):
@@ -92,6 +123,7 @@ def pool_readings(survey: Measurements) -> Measurements:
     order = survey.states.order[begins[np.searchsorted(np.unique(stop), stop[first])]]
     pooled = survey[first]
     states = pooled.states.with_(
+        q=_mean_angles(survey.states.q, stop)[first],
         readings=count, scatter=np.bincount(label, square), order=order,
         time=means(survey.states.time[:, None], label)[:, 0],
         temperature=means(survey.states.temperature[:, None], label)[:, 0],
@@ -104,6 +136,29 @@ def pool_readings(survey: Measurements) -> Measurements:
         pooled, states=states, position=mean, rotation=rotation,
         warnings=(*survey.warnings, note),
     )  # fmt: skip
+
+
+def _mean_angles(q: Floats, stop: Ints) -> Floats:
+    """Average angles (n, 6) over each stop; those that are equal stay as they are."""
+    _, begins, label = np.unique(stop, return_index=True, return_inverse=True)
+    first = q[begins][label.reshape(-1)]
+    apart = np.zeros((len(begins), q.shape[1]))
+    np.maximum.at(apart, label.reshape(-1), np.abs(q - first))
+    mean = means(q, label.reshape(-1))
+    return np.where(apart > 0.0, mean, q[begins])[label.reshape(-1)]
+
+
+def labels_of(states: States, visit: Ints | None = None) -> Ints:
+    """Number the readings that belong together, (n,): of one stop and probe point."""
+    if len(states) == 0:
+        return np.zeros(0, dtype=np.int64)
+    return _labels(states, stops_of(states, visit))
+
+
+def _labels(states: States, stop: Ints) -> Ints:
+    """Number pairs of stops and probe points, (n,)."""
+    _, label = np.unique(_row_keys(states, stop), axis=0, return_inverse=True)
+    return label.reshape(-1)
 
 
 def _row_keys(states: States, stop: Ints) -> Floats:
@@ -138,14 +193,13 @@ def _without_strays(
     Returns:
         The rows that stay, their stops, and which of them are averaged: a label.
     """
-    _, label = np.unique(_row_keys(survey.states, stop), axis=0, return_inverse=True)
-    label = label.reshape(-1)
+    label = _labels(survey.states, stop)
     several = np.bincount(label)[label]
     off = survey.position - _medians(survey.position, label)
     size = np.linalg.norm(off, axis=1)
     far = np.zeros(len(survey), dtype=bool)
     for some in (several >= FEWEST, several == 2):
-        far |= some & (size > _limit(size[some], len(survey)))
+        far |= some & (size > usual_limit(size[some], len(survey)))
     stray = far & (several >= FEWEST)
     gone = tuple(
         DroppedRow(
@@ -159,7 +213,7 @@ def _without_strays(
     return kept, stop[~stray], _in_order(apart[~stray])
 
 
-def _limit(size: Floats, count: int) -> float:
+def usual_limit(size: Floats, count: int) -> float:
     """Return the deviation from a median that no good reading of a survey has [m].
 
     Args:

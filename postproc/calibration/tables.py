@@ -380,6 +380,7 @@ TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
 ROTATION = ("rx_deg", "ry_deg", "rz_deg")
 JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
 JOINT = re.compile(r"^q\d+_deg$")
+RADIANS = re.compile(r"^q(\d+)[ _]*[\[(]?rad[\])]?$", re.I)
 DETOURS = 0.05  # share of other sides from which rows do not follow straight ways
 MOST_RESTARTS = 4  # of a clock in one file: rows that step back more often are sorted
 OPPOSED = 60  # directions that are opposite to the rows by no accident
@@ -387,24 +388,17 @@ MANY = 20  # rows that are in order of a column by no accident
 TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 
 
-def unique_ids(table: TextTable) -> tuple[str, ...]:
-    """Read the ids and refuse duplicates.
+def row_names(table: TextTable) -> tuple[str, ...]:
+    """Read the ids; one that has been there before is named with its line.
 
-    Raises:
-        MeasurementError: An id appears twice.
+    A point that is read several times often has one id.
     """
-    ids = table.text("id")
-    first: dict[str, int] = {}
-    for i, name in enumerate(ids):
-        if name in first:
-            raise MeasurementError(
-                table.path,
-                f"id {name!r} appears twice (first in line {table.line[first[name]]})",
-                "Give every row its own id",
-                line=int(table.line[i]),
-            )
-        first[name] = i
-    return tuple(ids)
+    seen: set[str] = set()
+    names = []
+    for name, line in zip(table.text("id"), table.line.tolist(), strict=True):
+        names.append(f"{name} (line {line})" if name in seen else name)
+        seen.add(name)
+    return tuple(names)
 
 
 CLOCKS = ("order", "time_s")  # columns that put rows in the order of visits
@@ -959,11 +953,26 @@ def read_foreign(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
         table = read_headed(path, **{**form.reading, **reading.given})
         table.require(*form.sources)
         return translate(table, form)
-    table = read_headed(path, **reading.given)
+    table = in_degrees(read_headed(path, **reading.given))
     for form in KNOWN:
         if form.fits(table):
             return translate(table, form)
     return from_robodk(table) if is_robodk(table) else table
+
+
+def in_degrees(table: TextTable) -> TextTable:
+    """Convert joint angles whose header says radians: `q1_rad`, `q1 [rad]`."""
+    found = {k: RADIANS.match(name) for k, name in enumerate(table.columns)}
+    columns, cells = list(table.columns), table.cells.copy()
+    for k, match in found.items():
+        name = f"q{match.group(1)}_deg" if match else ""
+        if not match or name in table.columns:
+            continue
+        degrees = table.numbers(table.columns[k]) * DEGREES
+        texts = [_plain(float(v)) for v in degrees]
+        cells[:, k] = [t.replace(".", table.decimal) for t in texts]
+        columns[k] = name
+    return replace(table, columns=tuple(columns), cells=cells)
 
 
 def translate(table: TextTable, form: Format) -> TextTable:

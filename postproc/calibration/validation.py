@@ -21,10 +21,11 @@ from postproc.calibration.cross_validation import (
     regions_of,
     summarise,
 )
+from postproc.calibration.diagnosis.search import with_effects
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
 from postproc.calibration.selection import Progress, fit_survey, model_of, silent
-from postproc.calibration.weighing import SURE, worth
+from postproc.calibration.weighing import SURE, keep_needed, worth
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.placement import Placement
@@ -34,6 +35,7 @@ from postproc.robot.pose import MM
 
 FEW_POSES = 300  # at the most: effects are chosen again without each part
 FEWEST_POSES = 6  # that a part of the rows can be predicted from
+HARDLY_CHANCE = 10.0  # nats that an effect must be worth in so few poses
 SEED = 0
 DETERMINED = 0.5  # effective parameters a coordinate, from which on rows are few
 GOOD = 2.0  # times the repeatability: errors of an arm that needs no model
@@ -154,7 +156,25 @@ def validate_fit(task: FitTask, fitted: Fit) -> Validated:
     rung, rows, notes = _choose(task, effects, part, used)
     if rung != task.rung:
         fitted = task.fit(rung)
+    if rung.effects is None:
+        fitted = _without_doubtful(fitted)
     return replace(_conclude(task, fitted, rows, chosen=True), notes=notes)
+
+
+def _without_doubtful(fitted: Fit) -> Fit:
+    """Drop effects that few poses hardly call for: held-out poses chose all or none.
+
+    Many causes and joints are tried, and one of them is worth some nats by chance. Most
+    joints of most arms yield to the weight: of these no more is asked than of all.
+    """
+    effects = fitted.combination.effects
+    always = tuple(
+        e for e in effects
+        if e.name in BASE_EFFECTS or e.belongs_to() == "setup"
+        or e.driven_by == "torque"
+    )  # fmt: skip
+    needed = keep_needed(fitted, always, enough=HARDLY_CHANCE)
+    return fitted if len(needed) == len(effects) else with_effects(fitted, needed)
 
 
 def _choose(

@@ -13,6 +13,7 @@ from postproc.calibration.regression import NEARLY, Fit, beside, fit_effects
 from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.effect import Effect
 from postproc.model.kinematics import Batch
+from postproc.model.registration import Registration
 
 CLEARLY = 10.0  # nats by which another direction must be better, and than none
 REVERSED = 10.0  # nats besides for the opposite one, of which signs alone speak
@@ -24,6 +25,7 @@ DIRECTIONS = {
     "a frame tilted towards x": (1, 0, -1), "a frame tilted towards -x": (-1, 0, -1),
     "a frame tilted towards y": (0, 1, -1), "a frame tilted towards -y": (0, -1, -1),
 }  # fmt: skip
+LEVEL = 2.0  # [deg] that a levelled tracker may seem to lean, and an arm on its foot
 SAME = 25.0  # [deg] within which a direction is the stated one
 
 
@@ -53,14 +55,34 @@ def direction_warning(fitted: Fit) -> tuple[str, ...]:
     gain, (name, along) = float(gains[best]), _unit_directions()[best]
     if gain < CLEARLY:
         return ()
-    x, y, z = (round(float(v), 2) + 0.0 for v in along)
-    stated_as = ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in arm.weight)
     return (
-        f"the rows say that weight pulls along [{x:g}, {y:g}, {z:g}] in the base frame "
-        f"of the arm, as on {name}, by {gain:.0f} nats more than along [{stated_as}], "
-        "as the cell has it. Check how the arm is mounted, and state it: mounting "
-        "under [robot], or [base]",
+        f"the rows say that weight pulls along {_listed(along)} in the base frame of "
+        f"the arm, as on {name}, by {gain:.0f} nats more than along "
+        f"{_listed(arm.weight)}, as the cell has it. Check how the arm is mounted, "
+        "and state it: mounting under [robot], or [base]",
     )
+
+
+def level_warning(placed: Registration, weight: Floats) -> tuple[str, ...]:
+    """Return a warning where weight pulls otherwise than a levelled tracker says.
+
+    Args:
+        placed: The registration of a survey whose trackers' z points up.
+        weight: Direction in which weight pulls by the cell, (3,), base frame.
+    """
+    for name, T in zip(placed.stations, placed.transforms, strict=True):
+        along = -T[:3, 2]
+        apart = _degrees(along, weight)
+        if apart > LEVEL:
+            at = f" at {name}" if len(placed.stations) > 1 else ""
+            return (
+                f"the tracker{at} is levelled, and its z says that weight pulls along "
+                f"{_listed(along)} in the base frame of the arm, {apart:.0f} deg from "
+                f"{_listed(weight)}, as the cell has it. Check how the arm is mounted, "
+                "and state it: mounting under [robot], or [base]; or is z of these "
+                "rows not up? Then leave levelled under [survey] out",
+            )
+    return ()
 
 
 def _gains(fitted: Fit, others: tuple[Effect, ...]) -> list[float]:
@@ -134,6 +156,15 @@ def _unit_directions() -> list[tuple[str, Floats]]:
     """List the directions with their names, as unit vectors."""
     vectors = {name: np.array(v, dtype=float) for name, v in DIRECTIONS.items()}
     return [(name, v / np.linalg.norm(v)) for name, v in vectors.items()]
+
+
+def _listed(direction: Floats) -> str:
+    """Write a direction.
+
+    >>> _listed(np.array([0.0, -0.0, -1.0]))
+    '[0, 0, -1]'
+    """
+    return "[" + ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in direction) + "]"
 
 
 def _degrees(a: Floats, b: Floats) -> float:

@@ -40,6 +40,7 @@ from postproc.calibration.tables import DETECT, TableFormat, read_foreign
 from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program, tell_directions
 from postproc.cli.readings import Readings, read_setup, rows_of
+from postproc.cli.residuals import beside_all
 from postproc.exceptions import PostprocError
 from postproc.files import spreadsheet_text, write_all
 from postproc.model.model import (
@@ -503,6 +504,7 @@ def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
         parts.append(left)
         header += RESIDUAL
         summary += f"\nresidual {_tell(ErrorStatistics.of(left))}"
+        summary += beside_all(measured, left)
     return written(table, measured, header, parts, predicted), summary
 
 
@@ -542,7 +544,7 @@ def predict_readings(
         held = float((np.abs(left) < WITHIN * read.std).mean())
         summary += f"\nresidual {_tell(ErrorStatistics.of(left))}"
         summary += f"\n95 % intervals of a reading hold {held:.1%} of {left.size} "
-        summary += "coordinates" + _apart(left, read.std)
+        summary += "coordinates" + _apart(left, read.std) + beside_all(rows, left)
     return written(table, rows, header, parts, predicted), summary
 
 

@@ -35,6 +35,7 @@ from postproc.model.variance import (
     moment_variance,
     parameter_variance,
     side_variance,
+    unknown_variance,
 )
 from postproc.robot.arm import FLOOR, Arm
 from postproc.robot.pose import MM
@@ -340,8 +341,8 @@ class Model:
     ) -> Floats:
         """Variance that the parameters' covariance does not hold, (n, 3) [m^2].
 
-        Unknown directions, free forms beyond their range, and what no effect describes
-        of a pose that was not measured.
+        Unknown directions, free forms beyond their range, what no effect describes of a
+        pose that was not measured, and what no row shows of the set-up.
 
         Args:
             effects: All effects, or those that may be compensated.
@@ -354,7 +355,7 @@ class Model:
         beyond = beyond_variance(effects, at, prior_std)
         if self.noise.pose_joint or self.noise.pose:
             beyond = beyond + self.noise.pose_variance(at.jacobian)
-        beyond += moment_variance(effects, at, values)
+        beyond += moment_variance(effects, at, values) + unknown_variance(effects, at)
         return side_variance(effects, at, values) + np.square(self.spread) + beyond
 
     def without_clock(self, known: Collection[str]) -> Model:
@@ -390,14 +391,14 @@ class Model:
         return PredictedReading(error, self.reading_std(at, known))
 
     def reading_std(self, at: Batch, known: Floats) -> Floats:
-        """Standard deviation of one reading, (n, 3) [m].
+        """Standard deviation of one row, the mean of its readings, (n, 3) [m].
 
         Args:
             at: n states, with the kinematics taken at the parameters.
-            known: Variance of the mean of many readings, (n, 3) [m^2].
+            known: Variance of the mean of many arrivals, (n, 3) [m^2].
         """
-        tracker = self.noise.tracker_std(at.tcp)[:, None]
-        scatter = self.noise.arrival_variance(at.jacobian) + tracker**2
+        read = self.noise.tracker_std(at.tcp) ** 2 / at.states.readings
+        scatter = self.noise.arrival_variance(at.jacobian) + read[:, None]
         scatter = scatter + self.noise.rounding_variance(at.states.q, at.jacobian)
         std = np.sqrt(np.maximum(known, 0.0) + scatter)
         return np.asarray(self.reading_spread * std)

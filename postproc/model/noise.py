@@ -97,11 +97,15 @@ def tracker_shape(
     return np.asarray(TRACKER_FIXED + TRACKER_RANGE * reach)
 
 
-def poses_of(states: States) -> Ints:
+def poses_of(states: States, same: float = SAME_POSE) -> Ints:
     """Number the commanded poses, (n,): rows of one pose have equal joint angles.
 
     Angles that were read back differ in their last digit, and count as equal. A row
     that was read in motion is a pose of its own.
+
+    Args:
+        states: The rows.
+        same: What angles of one pose differ by [rad].
     """
     from scipy.sparse import coo_array  # slow to load, and for fits alone
     from scipy.sparse.csgraph import connected_components
@@ -110,11 +114,9 @@ def poses_of(states: States) -> Ints:
     moving = ~np.isnan(states.heading[:, 0])
     payload = np.nan_to_num(states.payload)[:, None]
     own = np.where(moving, np.arange(1, len(states) + 1), 0)[:, None]
-    key = np.concatenate([np.round(states.q / SAME_POSE), payload, own], axis=1)
+    key = np.concatenate([np.round(states.q / same), payload, own], axis=1)
     cells, first, label = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    near = cKDTree(states.q[first]).query_pairs(
-        SAME_POSE, np.inf, output_type="ndarray"
-    )
+    near = cKDTree(states.q[first]).query_pairs(same, np.inf, output_type="ndarray")
     near = near[(cells[near[:, 0], 6:] == cells[near[:, 1], 6:]).all(axis=1)]
     if len(near):  # readings of one pose on both sides of a step of the rounding
         pair, count = (near[:, 0], near[:, 1]), len(cells)

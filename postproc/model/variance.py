@@ -90,3 +90,13 @@ def moment_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
         if spread is not None:
             out += spread
     return out
+
+
+def unknown_variance(effects: Combination, at: Batch) -> Floats:
+    """Variance that what no row of the survey shows gives, (n, 3) [m^2]."""
+    out = np.zeros((len(at), 3))
+    for effect in effects.effects:
+        unknown = effect.unknown_variance(at)
+        if unknown is not None:
+            out += unknown
+    return out

@@ -159,11 +159,13 @@ class SurveySection(Strict):
         points_mm: The points, tool_id 0, 1, ..
         points: The points by name, instead.
         euler_zyz_deg: Orientation of a 6D probe.
+        levelled: Whether z of the tracker's frame points up, set by its level.
     """
 
     points_mm: list[Triple] = Field(default_factory=list)
     points: dict[str, Triple] = Field(default_factory=dict)
     euler_zyz_deg: Triple | None = None
+    levelled: bool = False
 
 
 Limits = Annotated[list[PositiveFloat], Field(min_length=6, max_length=6)]
@@ -333,6 +335,11 @@ class Cell:
         if isinstance(said, str):
             return (said,)
         return tuple(said or ())
+
+    @property
+    def levelled(self) -> bool:
+        """Whether z of the tracker's own frame points up."""
+        return self.file.survey is not None and self.file.survey.levelled
 
     @property
     def nests(self) -> Floats | Mapping[str, Floats]:

@@ -10,11 +10,13 @@ from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.registration import predict_registered
 from postproc.calibration.selection import fit_survey
+from postproc.calibration.stops import pool_readings
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell
 from tests.calibration.simulator import NJ, random_arm, random_states, survey_of
+from tests.campaign_rows import Habit, measure
 from tests.written import cli
 
 ROWS = 600
@@ -61,6 +63,16 @@ def test_intervals_hold_rows_that_no_fit_has_seen(cell: Cell, frame: str) -> Non
     model = fit_measurements(rows[every], cell, effects=BASE_EFFECTS, frame=frame).model  # type: ignore[arg-type]
     # 600 coordinates: 0.95 +- 3 binomial standard deviations
     assert 0.923 < held(model, rows[~every]) < 0.977
+
+
+def test_means_of_several_readings_scatter_less(cell: Cell) -> None:
+    rng = np.random.default_rng(6)
+    arm = random_arm(rng)
+    habit = Habit(300, 5, 1, 1, 1, 5, 0.0, 0.0, 4e-5, clock=False)
+    rows = pool_readings(measure(arm, habit, rng))
+    every = np.arange(300) % 3 > 0
+    model = fit_measurements(rows[every], cell, effects=BASE_EFFECTS).model
+    assert 0.92 < held(model, rows[~every]) < 0.98
 
 
 def test_a_drift_of_the_tracker_is_part_of_a_reading(cell: Cell) -> None:

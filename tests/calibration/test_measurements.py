@@ -116,7 +116,6 @@ def spoiled(place: int, cell: int, text: str) -> list[str]:
 @pytest.mark.parametrize(
     ("lines", "line", "match"),
     [
-        (spoiled(3, 0, "2"), 5, "id '2' appears twice .first in line 3"),
         (spoiled(3, 13, "NaN"), 5, "'NaN' in column x_mm is not a number"),
         (spoiled(3, 2, ""), 5, "'' in column q2_deg is not a number"),
         (spoiled(3, 8, "2"), 5, "wrong lambda"),
@@ -170,9 +169,34 @@ def test_files_follow_each_other(tmp_path: Path) -> None:
     b = read_measurements(write(tmp_path / "b.csv", later), NJ, TOOL[None])
     both = concatenate([a, b])
     assert len(both) == 60 and both.states.order[-1] == 59
-    with pytest.raises(MeasurementError, match=r"id '1' is also in"):
+    with pytest.raises(MeasurementError, match=r"c\.csv: holds the rows of .*a\.csv"):
         again = read_measurements(write(tmp_path / "c.csv", rows()), NJ, TOOL[None])
         concatenate([a, again])
+
+
+def test_ids_that_repeat_are_named_with_line_or_file(tmp_path: Path) -> None:
+    a = read_measurements(write(tmp_path / "a.csv", spoiled(3, 0, "2")), NJ, TOOL[None])
+    assert a.ids[1:4] == ("2", "3", "2 (line 5)")
+    b = read_measurements(write(tmp_path / "b.csv", rows(seed=1)), NJ, TOOL[None])
+    assert concatenate([a, b]).ids[30:32] == ("1 of b.csv", "2 of b.csv")
+
+
+@pytest.mark.parametrize("name", ["q{}_rad", "Q{} [rad]", "q{} (rad)", "q{} rad"])
+def test_joint_angles_whose_header_says_radians_are_converted(
+    tmp_path: Path, name: str
+) -> None:
+    header, lines = HEADER + SIDES + ",x_mm,y_mm,z_mm", []
+    for j in range(1, 7):
+        header = header.replace(f"q{j}_deg", name.format(j))
+    first = HEADER.split(",").index("q1_deg")
+    for line in rows():
+        cells = line.split(",")
+        for k in range(first, first + 6):
+            cells[k] = repr(float(np.deg2rad(float(cells[k]))))
+        lines.append(",".join(cells))
+    found = read_measurements(write(tmp_path / "r.csv", lines, header), NJ, TOOL[None])
+    there = read_measurements(write(tmp_path / "d.csv", rows()), NJ, TOOL[None])
+    np.testing.assert_allclose(found.states.q, there.states.q, rtol=0, atol=1e-14)
 
 
 def test_implausible_surveys_are_refused_with_the_reason(tmp_path: Path) -> None:

@@ -196,3 +196,21 @@ def test_an_empty_combination_predicts_nothing() -> None:
     batch = Batch(NJ, states)
     assert nothing.columns(batch).shape == (5, 3, 0)
     assert np.abs(nothing.error(batch, np.zeros(0))).max() == 0
+
+
+def test_what_rows_of_a_pose_share_of_the_parameters_is_little_of_the_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Left out where parameters are few; here they are three times as many."""
+    rng = np.random.default_rng(7)
+    states = random_states(300, rng)
+    both = states[np.repeat(np.arange(300), 2)]
+    side = np.where(np.arange(600) % 2 == 0, 1.0, -1.0)[:, None]
+    both = both.with_(direction=both.direction * side, order=np.arange(600.0))
+    seen = random_arm(rng).measure(both, rng)[0]
+    survey, sizes = survey_of(both, seen), []
+    for limit in (0.0, 1.0):
+        monkeypatch.setattr(regression, "HARDLY", limit)
+        noise = fit_survey(survey, NJ, ("geometry", "backlash_profile"), None).noise
+        sizes.append([noise.tracker, noise.joint])
+    np.testing.assert_allclose(*sizes, rtol=0.05)

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from postproc.calibration.fit import fit_measurements, into_base_frame
 from postproc.calibration.measurements import Measurements, concatenate
 from postproc.calibration.plausibility import check_stops
+from postproc.calibration.references import ReferenceRows
 from postproc.exceptions import MeasurementError
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.station_shift import StationShift
@@ -205,6 +206,45 @@ def test_a_tool_that_never_turned_leaves_its_probe_at_the_prior(  # type: ignore
     assert len(told) == 1 and how in told[0] and "+- 300 mm" in told[0]
 
 
+@pytest.mark.parametrize("wobble", [0.0, 0.003, 0.01])
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("far", [0.0, 0.05, 0.2])
+def test_readings_with_the_tool_turned_otherwise_are_as_unsure_as_the_probe(  # type: ignore[no-untyped-def]
+    cell, tmp_path: Path, wobble: float, free: bool, far: float
+) -> None:
+    """The probe's prior counts beside the survey's orientations, not among them."""
+    rng = np.random.default_rng(2)
+    states = never_turned(120, rng, free)
+    states = states.with_(q=states.q + wobble * rng.standard_normal((120, 6)))
+    arm, R = random_arm(rng), Rotation.from_euler("z", 2.0).as_matrix()
+    tool = TOOL + far * np.eye(3)[2]
+
+    def seen(states):  # type: ignore[no-untyped-def]
+        read, _ = arm.measure(states.with_(tool=np.tile(tool, (len(states), 1))), rng)
+        return survey_of(states, (read - [4.0, -3.0, 1.5]) @ R)
+
+    survey, other = seen(states), seen(random_states(200, rng))
+    found = fit_measurements(
+        survey[np.arange(80)], cell, effects=EFFECTS, frame="tracker", validate=False
+    )
+    found.model.save(tmp_path / "m.json")
+    model = load_model(tmp_path / "m.json")
+
+    def of(rows: Measurements) -> tuple[float, float]:
+        placed = model.registration
+        assert placed is not None
+        states = placed.on_probes(rows.states)
+        read = model.reading(NJ, states)
+        at = placed.to_base(rows.position) - Batch(NJ, states).walk.tcp
+        held = np.abs(at - read.error) < 1.96 * read.std
+        return float(held.mean()), float(read.std.mean())
+
+    alike, unlike = of(survey[np.arange(80, 120)]), of(other)
+    assert alike[0] > 0.9 and alike[1] < 3e-4
+    assert unlike[0] > 0.95
+    assert unlike[1] > (0.1 if wobble == 0.0 else 2e-3)
+
+
 @pytest.mark.parametrize("far", [0.3, 1.0, 2.5])
 @pytest.mark.parametrize("stated", [True, False])
 def test_longer_tools_are_found(far: float, stated: bool) -> None:
@@ -219,3 +259,59 @@ def test_longer_tools_are_found(far: float, stated: bool) -> None:
     placed, found = into_base_frame(survey_of(states, moved), NJ)
     assert np.linalg.norm(found.probes[0] - there.tool[0]) < 5e-3
     assert not any("the tool" in w for w in placed.warnings)
+
+
+# Fixed points that several stations have read.
+
+PILLARS = np.array([[2.0, 2.0, 0.5], [-1.5, 2.5, 1.5], [1.0, -2.5, 1.0], [0.0, 3.0, 2]])
+
+
+def with_pillars(
+    rows: tuple[int, ...], pillars: int, apart: float = 0.0
+) -> list[Measurements]:
+    """Measure in several files, each of a station that read fixed points once."""
+    rng, parts = np.random.default_rng(9), []
+    for k, part in enumerate(files(rows, moved=True)[0]):
+        at, turn = PLACES[k]
+        R = Rotation.from_euler("ZYX", [turn, 0.05, -0.1]).as_matrix()
+        there = np.array(PILLARS[:pillars])
+        there[0, 0] += apart * k
+        seen = (there - np.array(at)) @ R + 1e-5 * rng.standard_normal(there.shape)
+        fixed = ReferenceRows(
+            part.path, tuple(f"p{i}" for i in range(pillars)), seen,
+            np.full(pillars, np.nan), np.arange(pillars) - 0.5, np.arange(pillars),
+        )  # fmt: skip
+        parts.append(replace(part, references=fixed))
+    return parts
+
+
+@pytest.mark.parametrize("rows", [(90, 90), (120, 4), (60, 5, 60)])
+@pytest.mark.parametrize("pillars", [3, 4])
+def test_fixed_points_tie_stations(cell, rows: tuple[int, ...], pillars: int) -> None:  # type: ignore[no-untyped-def]
+    """Even those of which too few stops were read for a registration of their own."""
+    survey = concatenate(with_pillars(rows, pillars))
+    assert survey.stations == ("0.csv",)
+    assert (
+        sum("in the frame of 0.csv by" in w for w in survey.warnings) == len(rows) - 1
+    )
+    found = fit_measurements(
+        survey, cell, effects=EFFECTS, frame="tracker", validate=False
+    )
+    placed = found.model.registration
+    assert placed is not None and len(placed.transforms) == 1
+    assert found.report.after.mean_mm < 0.06
+    assert len(found.model.monuments) == pillars
+    there = np.array([xyz for _, xyz in found.model.monuments])
+    assert np.linalg.norm(there - PILLARS[:pillars], axis=1).max() < 0.03
+
+
+def test_two_fixed_points_leave_stations_apart() -> None:
+    survey = concatenate(with_pillars((60, 60), 2))
+    assert len(survey.stations) == 2
+
+
+def test_a_fixed_point_that_was_moved_ties_nothing() -> None:
+    survey = concatenate(with_pillars((60, 60), 4, apart=2e-3))
+    assert len(survey.stations) == 2
+    (said,) = [w for w in survey.warnings if "stations stay apart" in w]
+    assert "1.csv" in said and "otherwise than in 0.csv" in said

@@ -195,3 +195,71 @@ def test_a_refusal_counts_rows_as_the_file_has_them() -> None:
     _, survey = repeated(1, 30)
     with pytest.raises(MeasurementError, match="30 rows at 1 poses"):
         fit_measurements(survey, CELL)
+
+
+# Angles that were read back from the controller.
+
+
+def read_back(  # type: ignore[no-untyped-def]
+    jitter_deg: float, poses: int = 30, repeats: int = 4, nests: int = 1
+):
+    """Read poses whose angles come back a little different each time."""
+    rng = np.random.default_rng(12)
+    arm, states = random_arm(rng), random_states(poses, rng)
+    rows = np.repeat(np.arange(poses), repeats * nests)
+    nest = np.tile(np.repeat(np.arange(nests), repeats), poses)
+    states = states[rows].with_(
+        tool=PLATE[nest], tool_id=nest, order=np.arange(len(rows), dtype=float)
+    )
+    true = arm.tcp(states.q, states.direction, states.tool)
+    off = np.deg2rad(jitter_deg) * rng.uniform(-1.0, 1.0, states.q.shape)
+    back = states.with_(q=states.q + off)
+    return states.q, survey_of(back, true + 1e-5 * rng.standard_normal(true.shape))
+
+
+@pytest.mark.parametrize("jitter_deg", [0.0005, 0.002, 0.005, 0.02])
+@pytest.mark.parametrize("nests", [1, 3])
+def test_angles_that_are_read_back_are_of_one_stop(
+    jitter_deg: float, nests: int
+) -> None:
+    commanded, survey = read_back(jitter_deg, nests=nests)
+    found = pool_readings(survey)
+    assert len(found) == 30 * nests and (found.states.readings == 4.0).all()
+    assert len(np.unique(poses_of(found.states))) == 30
+    off = np.abs(found.states.q - commanded[::4][: len(found)])
+    assert off.max() < 0.75 * np.deg2rad(jitter_deg) + 1e-12
+    assert (found.states.q[::nests] == found.states.q[nests - 1 :: nests]).all()
+
+
+@pytest.mark.parametrize("jitter_deg", [0.005, 0.02])
+def test_a_visit_column_decides_where_angles_are_read_back(jitter_deg: float) -> None:
+    _, survey = read_back(jitter_deg)
+    visit = np.repeat(np.arange(60), 2)
+    found = pool_readings(replace(survey, visit=visit))
+    assert len(found) == 60 and (found.states.readings == 2.0).all()
+
+
+@pytest.mark.parametrize("step_deg", [0.005, 0.01, 0.04])
+def test_small_steps_of_one_joint_are_poses_of_their_own(step_deg: float) -> None:
+    states = random_states(20, np.random.default_rng(0))
+    rows = np.repeat(np.arange(20), 5)
+    q = np.array(states.q[rows])
+    q[:, 2] += np.deg2rad(step_deg) * np.tile(np.arange(5), 20)
+    assert len(np.unique(stops_of(states[rows].with_(q=q)))) == 100
+
+
+@pytest.mark.parametrize("away_deg", [0.05, 0.2, 0.4])
+def test_poses_that_lie_near_each_other_stay_apart(away_deg: float) -> None:
+    """Nothing parts the differences of readings from those of neighbouring poses."""
+    rng = np.random.default_rng(1)
+    near = random_states(1, rng)[np.zeros(40, dtype=np.int64)]
+    q = near.q + np.deg2rad(away_deg) * rng.uniform(-1.0, 1.0, near.q.shape)
+    assert len(np.unique(stops_of(near.with_(q=q)))) == 40
+    steps = q + np.deg2rad(0.02) * rng.uniform(-1.0, 1.0, near.q.shape)
+    both = near[np.arange(40).repeat(2)].with_(q=np.stack([q, steps], 1).reshape(80, 6))
+    assert len(np.unique(stops_of(both))) == 80
+
+
+def test_readings_whose_angles_are_equal_keep_them_to_the_last_bit() -> None:
+    _, survey = repeated(8, 3)
+    assert (pool_readings(survey).states.q == survey.states.q[::3]).all()

@@ -20,7 +20,8 @@ from postproc.calibration.fit import fit_measurements
 from postproc.calibration.validation import ASKED, FitTask, Rung
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import random_arm, random_states, survey_of
-from tests.campaigns import Habit, draw_habit, judge, measure, unseen
+from tests.campaign_rows import Habit, draw_habit, measure, unseen
+from tests.campaigns import judge
 
 CELL = load_cell("programs/cell.toml")
 PLAIN = ("geometry", "backlash")

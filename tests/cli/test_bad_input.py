@@ -213,8 +213,6 @@ def spoilt(rows, name):
             return [*rows[:3], dict(rows[3], y_mm="NaN"), *rows[4:]]
         case "empty cell":
             return [*rows[:3], dict(rows[3], q2_deg=""), *rows[4:]]
-        case "twice":
-            return [*rows[:3], dict(rows[3], id=rows[1]["id"]), *rows[4:]]
         case "metres":
             mm = ("x_mm", "y_mm", "z_mm")
             return [{**r, **{k: str(float(r[k]) / 1e3) for k in mm}} for r in rows]
@@ -232,7 +230,6 @@ def spoilt(rows, name):
         ("all zero", r"0 rows .*determine"),
         ("nan", r"bad\.csv:5: 'NaN' in column y_mm is not a number\. Correct"),
         ("empty cell", r"bad\.csv:5: .*q2_deg"),
-        ("twice", r"bad\.csv:5: id '2' appears twice \(first in line 3\)\. Give"),
         ("metres", r"bad\.csv: .*look like metres: write millimetres"),
         ("no column", r"bad\.csv:1: column q4_deg is missing\. The header has"),
     ],

@@ -7,7 +7,7 @@ deviations that the arm was drawn with as the prior.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,11 +65,11 @@ def _shifted(x: float, y: float, z: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Scatter:
-    """True standard deviations, see `tests.campaigns.Habit`."""
+    """True standard deviations, see `tests.campaign_rows.Habit`; tracker (n,)."""
 
     joint: float
     shift: float
-    tracker: float
+    tracker: np.ndarray
     rounding: float
 
 
@@ -97,14 +97,82 @@ def jacobian(arm: Arm, states: States) -> np.ndarray:
     return out
 
 
+@dataclass(frozen=True)
+class Columns:
+    """Further linear effects of rows.
+
+    Attributes:
+        of: Derivatives of the rows by their parameters, (n, 3, k).
+        prior: Standard deviations of these beforehand, (k,).
+    """
+
+    of: np.ndarray
+    prior: np.ndarray
+
+    def beside(self, other: Columns) -> Columns:
+        """Put others beside them."""
+        of = np.concatenate([self.of, other.of], axis=2)
+        return Columns(of, np.concatenate([self.prior, other.prior]))
+
+
+def yielding(arm: Arm, states: States, torque: np.ndarray, soft: float) -> Columns:
+    """Return the columns of joints that yield, one for each joint.
+
+    Args:
+        arm: The nominal arm.
+        states: The rows.
+        torque: Of the weight about every joint, (n, 6) [N m].
+        soft: Standard deviation of a joint error at its largest torque [rad].
+    """
+    size = np.maximum(np.abs(torque).max(axis=0, initial=0.0), 1e-9)
+    return Columns(jacobian(arm, states) * torque[:, None], soft / size)
+
+
+def set_up(
+    arm: Arm, states: States, stations: int, nests: int, far: float, reach: float
+) -> Columns:
+    """Return the columns of trackers whose place, and nests that, nobody knows.
+
+    Args:
+        arm: The nominal arm.
+        states: The rows, with `station` and `tool_id`.
+        stations: Number of stations.
+        nests: Number of nests.
+        far: Standard deviation of a place and a turn [m], [rad].
+        reach: Standard deviation of a nest [m].
+    """
+    here = states.q, states.direction
+    none, n = np.zeros(len(PRIOR)), len(states)
+    tcp = place(arm, *here, states.tool, none)
+    of = np.zeros((n, 3, 6 * stations + 3 * nests))
+    for k in range(3):
+        axis = np.eye(3)[k]
+        turned = np.cross(axis, tcp)
+        moved = place(arm, *here, states.tool + axis, none) - tcp
+        for s in range(stations):
+            own = states.station == s
+            of[own, :, 6 * s + k], of[own, :, 6 * s + 3 + k] = axis, turned[own]
+        for m in range(nests):
+            own = states.tool_id == m
+            of[own, :, 6 * stations + 3 * m + k] = moved[own]
+    prior = np.r_[np.full(6 * stations, far), np.full(3 * nests, reach)]
+    return Columns(of, prior)
+
+
+def no_columns(states: States) -> Columns:
+    """Return none."""
+    return Columns(np.zeros((len(states), 3, 0)), np.zeros(0))
+
+
 def solve(
     arm: Arm,
     states: States,
     position: np.ndarray,
     stop: np.ndarray,
     scatter: Scatter,
+    more: Columns | None = None,
 ) -> np.ndarray:
-    """Estimate the parameters, (57,).
+    """Estimate the parameters, (57 + k,).
 
     Args:
         arm: The nominal arm.
@@ -112,17 +180,20 @@ def solve(
         position: What was read, (n, 3) [m].
         stop: Number of the stop of every row, (n,).
         scatter: What the rows really scatter by.
+        more: Further effects, k parameters.
     """
     none = np.zeros(len(PRIOR))
     nominal = place(arm, states.q, states.direction, states.tool, none)
-    X, error = columns(arm, states), position - nominal
+    all_of = Columns(columns(arm, states), PRIOR).beside(more or no_columns(states))
+    X, prior, error = all_of.of, all_of.prior, position - nominal
     J = jacobian(arm, states)
     _, pose = np.unique(states.q, axis=0, return_inverse=True)
-    gram, moment = np.diag(1.0 / PRIOR**2), np.zeros(len(PRIOR))
+    gram, moment = np.diag(1.0 / prior**2), np.zeros(len(prior))
     for k in np.unique(pose):
         rows = np.flatnonzero(pose.reshape(-1) == k)
-        V = _covariance(J[rows], stop[rows], scatter)
-        flat = X[rows].reshape(-1, len(PRIOR))
+        some = replace(scatter, tracker=scatter.tracker[rows])
+        V = _covariance(J[rows], stop[rows], some)
+        flat = X[rows].reshape(-1, len(prior))
         whitened = np.linalg.solve(V, flat)
         gram += flat.T @ whitened
         moment += whitened.T @ error[rows].reshape(-1)
@@ -136,4 +207,5 @@ def _covariance(J: np.ndarray, stop: np.ndarray, scatter: Scatter) -> np.ndarray
     stacked, shared = J.reshape(-1, 6), np.tile(np.eye(3), (m, m))
     turned = stacked @ stacked.T
     V = same * (scatter.joint**2 * turned + scatter.shift**2 * shared)
-    return V + scatter.rounding**2 * turned + scatter.tracker**2 * np.eye(3 * m)
+    own = np.diag(np.repeat(scatter.tracker**2, 3))
+    return V + scatter.rounding**2 * turned + own

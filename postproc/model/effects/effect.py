@@ -241,6 +241,17 @@ class Effect(ABC):
         """
         return self
 
+    def unknown_variance(self, at: Batch) -> Floats | None:
+        """Variance of readings by what no row of the survey shows, (n, 3) [m^2].
+
+        Args:
+            at: n states, with the kinematics taken at the parameters.
+
+        Returns:
+            None where the parameters' covariance has it all.
+        """
+        return None
+
     def moment_variance(self, batch: Batch, p: Floats) -> Floats | None:
         """Give the variance that an unknown moment brings, (n, 3) [m^2], None for 0.
 
