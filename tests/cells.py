@@ -27,7 +27,7 @@ from postproc.calibration.selection import told_apart
 from postproc.exceptions import PostprocError
 from postproc.model.effects import BY_NAME
 from postproc.model.effects.effect import Family
-from postproc.simulation.cell import Cell
+from postproc.simulation.part_motion import PlantedMotion
 from tests.calibration.planted import campaign
 from tests.undeclared_trial import true_errors
 
@@ -86,7 +86,7 @@ def draw_cell(rng: np.random.Generator) -> str:
         )
         if rng.random() < 0.2 and driver.split()[0] in ("joint", "temperature"):
             driver = f"{rng.choice(['lambda', 'torque'])} {link} * {driver}"
-        cell = Cell.parse(f"{motion}:{body}:{axis} by {driver} {law}")
+        cell = PlantedMotion.parse(f"{motion}:{body}:{axis} by {driver} {law}")
         if not _known(cell) and _may_be_the_arms(cell):
             return str(cell)
 
@@ -112,7 +112,7 @@ def _law(rng: np.random.Generator, driver: str) -> str:
     return str(rng.choice(laws))
 
 
-def _known(cell: Cell) -> bool:
+def _known(cell: PlantedMotion) -> bool:
     """Tell whether the library has it, or comes so close that it has its name."""
     kind, _, which = cell.drivers[-1].partition(" ")
     if cell.motion == "rotation" and cell.axis == "z" and cell.body != "tool":
@@ -125,14 +125,14 @@ def _known(cell: Cell) -> bool:
     return bends or (cell.body == "base" and kind in ("moment", "torque", "payload"))
 
 
-def _may_be_the_arms(cell: Cell) -> bool:
+def _may_be_the_arms(cell: PlantedMotion) -> bool:
     """Leave out what is told and not compensated: base motions a tracker may follow."""
     return cell.body != "base" or cell.drivers[-1].split()[0] in (
         "lambda", "travel", "speed",
     )  # fmt: skip
 
 
-def place(cell: Cell) -> tuple[int, str]:
+def place(cell: PlantedMotion) -> tuple[int, str]:
     """Return link and driver that a finding must tell."""
     link = {"base": 1, "tool": 7}.get(cell.body, cell.link)
     return link, " x ".join(cell.drivers).replace("travel", "way")
@@ -169,7 +169,7 @@ def run(job: tuple[int, float, int]) -> str:
     seconds = time.process_time() - start
     families = [f.family for f in traced.findings]
     groups = [(f.family, *f.rivals) for f in traced.findings]
-    asked = [place(Cell.parse(t)) for t in texts]
+    asked = [place(PlantedMotion.parse(t)) for t in texts]
     first = {told(f) for f in families if f is not None}
     every = {told(f) for group in groups for f in group if f is not None}
     kept = told_apart(traced.search.fit, None)
@@ -177,7 +177,7 @@ def run(job: tuple[int, float, int]) -> str:
     named = [
         str(f.family)
         for f in traced.findings
-        if f.effect != "cell" and not BY_NAME[f.effect].free
+        if f.effect != "part_motion" and not BY_NAME[f.effect].free
     ]
     trial = CellTrial(
         seed, size, texts, traced.verdict,

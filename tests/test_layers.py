@@ -56,6 +56,8 @@ KNOWING = {
     # The given model's zero of a joint holds the mean of what the model lacks.
     "calibration.diagnosis.refit": {"joint_offset"},
     "calibration.diagnosis.search": {"joint_offset"},
+    # What has no name is a motion of a part, by a law or by a free curve.
+    "calibration.diagnosis.table": {"curve", "part_motion"},
     # A registration is what that effect fits, by the rigid motions of a base.
     "calibration.registration": {"placement"},
     # A tracker that drifts moves fixed points rigidly.

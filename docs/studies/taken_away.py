@@ -32,7 +32,7 @@ KINDS = {
     "waves": ("transmission", "drive_transmission"),
     "backlash": ("backlash", "backlash_profile", "load_backlash", "drive_backlash"),
 }
-FREE = ("joint_spline", "joint_map", "cell", "curve", "elm_map")
+FREE = ("joint_spline", "joint_map", "part_motion", "curve", "elm_map")
 BLOCK = 20  # consecutive rows
 MOST = 900  # rows of a part
 

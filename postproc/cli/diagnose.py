@@ -35,7 +35,7 @@ from postproc.calibration.tables import DETECT, TableFormat
 from postproc.cli.jobs import read_files
 from postproc.compensation.program import Planned, plan_visits, read_program, states_of
 from postproc.exceptions import MeasurementError
-from postproc.model.effects.effect import CELL
+from postproc.model.effects.effect import PART_MOTION
 from postproc.model.effects.placement import Placement
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, load_model
@@ -382,7 +382,7 @@ def _finding_row(found: Diagnosis, number: int) -> tuple[str, ...]:
     others = ", ".join(
         effect + (f" {joint}" if joint else "") for effect, joint in f.confusable_with
     )
-    cells = ", ".join(str(r) for r in f.rivals if r.effect == CELL)
+    cells = ", ".join(str(r) for r in f.rivals if r.effect == PART_MOTION)
     others = "; ".join(filter(None, (others, cells)))
     return (
         f.effect, str(f.joint or ""), f.source or "", f"{f.p_value:.1e}",

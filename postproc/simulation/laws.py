@@ -11,7 +11,6 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
-from postproc.simulation.cell import TEXT, Cell
 from postproc.simulation.kinematics import (
     LinkMasses,
     bending_moment,
@@ -19,6 +18,7 @@ from postproc.simulation.kinematics import (
     payload_torque,
     total_torque,
 )
+from postproc.simulation.part_motion import TEXT, PlantedMotion
 from postproc.simulation.reference import (
     DURATION,
     WORKING_RANGE,
@@ -590,7 +590,7 @@ USUAL_CELL = 0.05, 0.5  # [mm]
 
 def cell(draw: Draw, text: str) -> Law:
     """A link, the base or the tool moves a little by what the text says."""
-    asked = Cell.parse(text)
+    asked = PlantedMotion.parse(text)
     drive = asked.drawn(draw.rng, draw.body, reference_arrivals(draw.rows))
     place, link = asked.place, asked.link
 
@@ -715,8 +715,8 @@ def _read(item: str) -> Planted:
 def _read_cell(item: str) -> Planted:
     """Read a cell, the size in mm behind it where there is one."""
     if TEXT.fullmatch(item):
-        return Planted(str(Cell.parse(item)))
+        return Planted(str(PlantedMotion.parse(item)))
     text, _, size = item.replace("=", " ").rpartition(" ")
     if re.fullmatch(r"\d+\.?\d*|\.\d+", size) is None:
         text = item  # refused as it stands
-    return Planted(str(Cell.parse(text)), 0, float(size))
+    return Planted(str(PlantedMotion.parse(text)), 0, float(size))

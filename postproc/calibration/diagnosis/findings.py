@@ -11,7 +11,7 @@ from postproc.calibration.diagnosis.result import Finding
 from postproc.calibration.diagnosis.search import Addition, JudgedAddition, Search
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import SHOWN_UNITS, impossible
-from postproc.model.effects.effect import CELL, Effect
+from postproc.model.effects.effect import PART_MOTION, Effect
 from postproc.robot.pose import MM
 
 
@@ -39,16 +39,18 @@ def _describe(
     part = fit.combination.slices[found.place(number)]
     moved = np.linalg.norm(fit.moved(part), axis=1)
     rivals = tuple(s.family for s in standing.confusable)
-    confusable = [(r.effect, r.joint) for r in rivals if r.effect != CELL]
+    confusable = [(r.effect, r.joint) for r in rivals if r.effect != PART_MOTION]
     tied = [name for name in effect.tied(fit.batch) if name not in found.causes.without]
     named = {name for name, _ in confusable}
     confusable += [(name, None) for name in tied if name not in named]
+    own = family.effect == PART_MOTION
+    source = family.driver if own else addition.candidate.source
     return Finding(
         effect=family.effect,
         joint=family.joint,
         nameless=effect.nameless,
         of_setup=effect.belongs_to() == "setup",
-        source=family.driver if family.effect == CELL else addition.candidate.source,
+        source=source,
         p_value=standing.p_value,
         evidence=standing.evidence,
         share=share,

@@ -13,7 +13,7 @@ from postproc.calibration.diagnosis.library import (
     Projection,
     ReducedCandidates,
 )
-from postproc.model.effects.effect import CELL, Candidate, Family
+from postproc.model.effects.effect import PART_MOTION, Candidate, Family
 
 # How strongly a candidate's block of columns is called for.
 #
@@ -192,7 +192,7 @@ class Null:
         """
         if self.cells is None:
             return self.p_value(score.evidence)
-        own = self.cells if score.family.effect == CELL else self
+        own = self.cells if score.family.effect == PART_MOTION else self
         return min(2.0 * own.p_value(score.evidence), 1.0)
 
     @property

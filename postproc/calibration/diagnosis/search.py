@@ -16,21 +16,19 @@ from postproc.calibration.diagnosis.held_out import (
 from postproc.calibration.diagnosis.library import Projection, reduce_some
 from postproc.calibration.diagnosis.refit import Revision
 from postproc.calibration.diagnosis.score import Null, Score, rank
-from postproc.calibration.diagnosis.table import Causes, holds_mean
+from postproc.calibration.diagnosis.table import Causes, loosened
 from postproc.calibration.regression import Fit, beside, fit_effects
 from postproc.model.carrier import Carrier, carrier
 from postproc.model.covariate import JOINTS
-from postproc.model.effects.cell import Cell
 from postproc.model.effects.effect import (
-    CELL,
     FREE,
     NAMED,
+    PART_MOTION,
     Candidate,
     Effect,
     Family,
 )
 from postproc.model.effects.joint_offset import JointOffset
-from postproc.model.effects.step import CampaignStep
 
 # Finer settings around a candidate that a grid found.
 
@@ -193,17 +191,6 @@ def opened(projection: Projection, joint: int) -> Projection:
     return Projection.leaving(laid, np.array(out, dtype=np.int64))
 
 
-def loosened(projection: Projection, moved: Carrier) -> Projection:
-    """Return a filter that takes a constant motion of a carrier out of the rows too."""
-    if holds_mean(projection, moved):
-        return projection
-    fit, still = projection.fit, Cell(str(moved), law="constant")
-    laid = beside(fit, (*fit.combination.effects, still))
-    left = {n for n in fit.combination.names if n not in projection.names}
-    out = [k for k, n in enumerate(laid.combination.names) if n in left]
-    return Projection.leaving(laid, np.array(out, dtype=np.int64))
-
-
 def choose(scores: list[Score]) -> Score:
     """Take the best name, unless a free form is clearly ahead of it.
 
@@ -225,9 +212,9 @@ def needed(name: Score, free: Score) -> float:
     step happens at one row: what varies smoothly and explains the rows as well, does.
     """
     effect = free.best.effect
-    if not isinstance(effect, Cell):
+    if free.family.effect != PART_MOTION or effect.free:
         return ahead(name.evidence)
-    if isinstance(name.best.effect, CampaignStep) and effect.law != "step":
+    if name.best.effect.at_one_row and not effect.at_one_row:
         return 0.0
     return max(CLEARLY[0], LAWFUL * name.evidence)
 
@@ -238,9 +225,9 @@ def plainest(best: Score, scores: list[Score]) -> Score:
     What a job can read comes before what passes with time unless that is clearly ahead,
     few numbers before many, and of those that are the same a joint before a link.
     """
-    if best.family.effect != CELL:
+    if best.family.effect != PART_MOTION:
         return best
-    cells = [s for s in scores if s.family.effect == CELL]
+    cells = [s for s in scores if s.family.effect == PART_MOTION]
     if best.best.effect.belongs_to() == "setup":
         least = best.evidence - ahead(best.evidence)
         read = [s for s in cells if s.best.effect.belongs_to() != "setup"]
@@ -355,7 +342,7 @@ def names_instead(
 
 def _of_one_cause(score: Score) -> bool:
     """Tell whether it is one cause: several names must explain more than it."""
-    return score.family.effect == CELL
+    return score.family.effect == PART_MOTION
 
 
 def _best_name(scores: list[Score], joint: int | None) -> Score | None:
@@ -642,15 +629,15 @@ def stand(found: Search, number: int) -> JudgedAddition:
 
 def _told(own: Family, rivals: Sequence[Score]) -> tuple[Score, ...]:
     """Choose those that are told: names first, and more cells with a cell."""
-    cells = [s for s in rivals if s.family.effect == CELL]
-    others = [s for s in rivals if s.family.effect != CELL][:MOST_OTHERS]
-    most = MOST_CELLS - len(others) if own.effect == CELL else MOST_OTHERS
+    cells = [s for s in rivals if s.family.effect == PART_MOTION]
+    others = [s for s in rivals if s.family.effect != PART_MOTION][:MOST_OTHERS]
+    most = MOST_CELLS - len(others) if own.effect == PART_MOTION else MOST_OTHERS
     return (*others, *cells[:most])
 
 
 def _name(family: Family) -> tuple[str | int | None, ...]:
     """Return what a person tells a cause by: of a cell its place and what drives it."""
-    if family.effect == CELL:
+    if family.effect == PART_MOTION:
         return family.joint, family.along, family.driver
     return family.effect, family.joint
 

@@ -34,7 +34,7 @@ from postproc.calibration.diagnosis.score import (
     log_evidence,
     rank,
 )
-from postproc.calibration.regression import Fit
+from postproc.calibration.regression import Fit, beside
 from postproc.model.carrier import Carrier, every_carrier
 from postproc.model.covariate import (
     JOINTS,
@@ -44,9 +44,9 @@ from postproc.model.covariate import (
     varies_enough,
 )
 from postproc.model.effects import EFFECTS
-from postproc.model.effects.cell import PASSING, STEPS, Cell
 from postproc.model.effects.curve import Curve
-from postproc.model.effects.effect import CELL, FREE, Candidate, Family
+from postproc.model.effects.effect import FREE, PART_MOTION, Candidate, Family
+from postproc.model.effects.part_motion import PASSING, STEPS, PartMotion
 from postproc.model.kinematics import Batch
 
 ORDERS = 8  # waves per turn of an angle's harmonics that are tried
@@ -61,7 +61,7 @@ LEAST_MOMENT = 1.0  # [N m] by which a load varies that may bend anything
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
+class MotionLaw:
     """A function of the rows, as an effect of the first joint.
 
     Attributes:
@@ -69,7 +69,7 @@ class Law:
         log_prior: Log of its share of what its driver may do.
     """
 
-    effect: Cell | Curve
+    effect: PartMotion | Curve
     log_prior: float
 
     @cached_property
@@ -99,29 +99,29 @@ class Law:
             loose: Whether a model is given that may have its mean otherwise.
         """
         along = None if carrier.joint is not None else str(carrier)
-        family = Family(CELL, carrier.joint, self.driver, FREE, along)
+        family = Family(PART_MOTION, carrier.joint, self.driver, FREE, along)
         more = loose and carrier.joint is None
         effect = replace(self.effect, direction=str(carrier), loose=more)
         return Candidate(family, effect, self.driver, self.log_prior)
 
 
 @dataclass(frozen=True, eq=False)
-class Laws:
-    """Laws of one factor.
+class MotionLaws:
+    """MotionLaws of one factor.
 
     Attributes:
         drivers: Names of what drives them, (d,).
-        widths: Laws of one number of columns k: the laws (c), their functions over
+        widths: Those of one number of columns k: the laws (c), their functions over
             prior scales, (c, k, n), and which of the drivers each has, (c,).
     """
 
     drivers: tuple[str, ...]
-    widths: tuple[tuple[tuple[Law, ...], Floats, Ints], ...]
+    widths: tuple[tuple[tuple[MotionLaw, ...], Floats, Ints], ...]
 
     @classmethod
-    def of(cls, batch: Batch, drivers: Sequence[str], factor: str) -> Laws:
+    def of(cls, batch: Batch, drivers: Sequence[str], factor: str) -> MotionLaws:
         """Evaluate all laws of some drivers, multiplied by a factor if there is one."""
-        alike: dict[int, list[tuple[Law, Floats, int]]] = defaultdict(list)
+        alike: dict[int, list[tuple[MotionLaw, Floats, int]]] = defaultdict(list)
         for k, driver in enumerate(drivers):
             for law in _laws_of(batch, driver, factor):
                 values = _scaled(law.effect, batch)
@@ -149,7 +149,7 @@ class Laws:
             np.maximum.at(most, which, share)
         return most
 
-    def some(self, drivers: Ints) -> Laws:
+    def some(self, drivers: Ints) -> MotionLaws:
         """Return the laws of some of the drivers, by their numbers."""
         widths = []
         for laws, values, which in self.widths:
@@ -159,14 +159,14 @@ class Laws:
                 widths.append((own, values[kept], which[kept]))
         return replace(self, widths=tuple(widths))
 
-    def at_rows(self, rows: Ints) -> Laws:
+    def at_rows(self, rows: Ints) -> MotionLaws:
         """Return them at some of the rows."""
         widths = tuple((law, v[:, :, rows], which) for law, v, which in self.widths)
         return replace(self, widths=widths)
 
 
 @dataclass(frozen=True, eq=False)
-class CellFamily:
+class MotionFamily:
     """A carrier and a driver, scored.
 
     Attributes:
@@ -174,7 +174,7 @@ class CellFamily:
         carrier: What moves.
         factor: What multiplies the driver, or "".
         driver: Number of the driver among those of its laws.
-        laws: Laws of the factor.
+        laws: MotionLaws of the factor.
         each: Evidence of these by width, with their shares, (c, 1) each.
     """
 
@@ -182,10 +182,10 @@ class CellFamily:
     carrier: Carrier
     factor: str
     driver: int
-    laws: Laws
+    laws: MotionLaws
     each: tuple[Floats, ...]
 
-    def plainest(self) -> Law:
+    def plainest(self) -> MotionLaw:
         """Take the law with the fewest columns of those that explain as much."""
         own = [
             (float(e[i, 0]), law)
@@ -204,13 +204,13 @@ class Table:
 
     Attributes:
         revised: Whether rows revise a given model, which may have means otherwise.
-        laws: Laws by the factor that multiplies them, "" without one.
+        laws: MotionLaws by the factor that multiplies them, "" without one.
         named: (driver, law) of cells that named effects are, by carrier.
         only: Numbers of the drivers that are tried, by carrier and factor; None: all.
     """
 
     revised: bool
-    laws: dict[str, Laws]
+    laws: dict[str, MotionLaws]
     named: dict[str, frozenset[tuple[str, str]]]
     only: dict[tuple[Carrier, str], Ints] | None = None
 
@@ -228,10 +228,10 @@ class Table:
             drivers = [d for d in drivers if d not in PASSING]
         factors = [f"lambda {j}" for j in JOINTS if f"lambda {j}" in drivers]
         factors += [f"torque {j}" for j in JOINTS if f"torque {j}" in drivers]
-        laws = {"": Laws.of(batch, drivers, "")}
+        laws = {"": MotionLaws.of(batch, drivers, "")}
         for factor in factors:
             other = [d for d in drivers if _may_multiply(factor, d)]
-            laws[factor] = Laws.of(batch, other, factor)
+            laws[factor] = MotionLaws.of(batch, other, factor)
         named: dict[str, set[tuple[str, str]]] = defaultdict(set)
         for kind in EFFECTS:
             for carrier, *cell in kind.cells():
@@ -291,7 +291,7 @@ class Table:
         kept = {(c, f): np.flatnonzero(x >= least) for c, f, x in asked}
         return replace(self, only={at: k for at, k in kept.items() if len(k)})
 
-    def _scan(self, view_of: Callable[[Carrier], Projection]) -> list[CellFamily]:
+    def _scan(self, view_of: Callable[[Carrier], Projection]) -> list[MotionFamily]:
         """Score the families that anything speaks for, the best first."""
         found = []
         for carrier in self._carriers():
@@ -301,7 +301,7 @@ class Table:
             for factor, laws, each in scored:
                 whole = _by_driver(laws, [e[:, 0] for e in each])
                 found += [
-                    CellFamily(float(whole[k]), carrier, factor, int(k), laws, each)
+                    MotionFamily(float(whole[k]), carrier, factor, int(k), laws, each)
                     for k in np.flatnonzero(whole > 0.0)
                 ]
         return sorted(found, key=lambda family: -family.evidence)
@@ -318,17 +318,19 @@ class Table:
         if not self.revised:
             return []
         still = [
-            Candidate(Family(CELL, None, None, FREE, str(c)), cell, "joint 1", 0.0)
+            Candidate(
+                Family(PART_MOTION, None, None, FREE, str(c)), cell, "joint 1", 0.0
+            )
             for c in every_carrier()
             if c.part == "link"
-            for cell in [Cell(str(c), law="constant")]
+            for cell in [PartMotion(str(c), law="constant")]
         ]
         square = float(projection.rest @ projection.rest)
         known = frozenset(projection.names)
         reduced = reduce_some(projection, still)
         return rank(reduced, square, projection.rows, without=known)
 
-    def _score(self, view: Projection, family: CellFamily) -> Score:
+    def _score(self, view: Projection, family: MotionFamily) -> Score:
         """Put a family and its plainest law into a score."""
         loose = self.revised and not holds_mean(view, family.carrier)
         candidate = family.plainest().on(family.carrier, loose)
@@ -354,7 +356,7 @@ class Table:
 
     def _evidence(
         self, view: Projection, carrier: Carrier, rows: Floats, square: Floats
-    ) -> Iterator[tuple[str, Laws, tuple[Floats, ...]]]:
+    ) -> Iterator[tuple[str, MotionLaws, tuple[Floats, ...]]]:
         """Score all laws of a carrier against rows filtered twice, (3 n, draws).
 
         Yields:
@@ -372,14 +374,14 @@ class Table:
             if each:
                 yield factor, laws, tuple(each)
 
-    def _tried(self, carrier: Carrier, factor: str) -> Laws:
+    def _tried(self, carrier: Carrier, factor: str) -> MotionLaws:
         """Return the laws of a factor that are tried on a carrier."""
-        laws = self.laws.get(factor, Laws((), ()))
+        laws = self.laws.get(factor, MotionLaws((), ()))
         if self.only is None:
             return laws
         return laws.some(self.only.get((carrier, factor), NONE))
 
-    def _shares(self, carrier: Carrier, laws: Sequence[Law]) -> Floats:
+    def _shares(self, carrier: Carrier, laws: Sequence[MotionLaw]) -> Floats:
         """Return log shares of laws on a carrier, (c,); -inf of those with a name."""
         named = self.named.get(str(carrier), frozenset())
         return np.array(
@@ -389,9 +391,20 @@ class Table:
 
 def holds_mean(projection: Projection, carrier: Carrier) -> bool:
     """Tell whether a filter takes out a constant motion of a carrier for a cell."""
-    begins = tuple(f"{kind}.{carrier} by " for kind in (Cell.name, Curve.name))
+    begins = tuple(f"{kind}.{carrier} by " for kind in (PartMotion.name, Curve.name))
     mean = [n for n in projection.names if n.endswith((" mean", " constant"))]
     return any(n.startswith(begins) for n in mean)
+
+
+def loosened(projection: Projection, moved: Carrier) -> Projection:
+    """Return a filter that takes a constant motion of a carrier out of the rows too."""
+    if holds_mean(projection, moved):
+        return projection
+    fit, still = projection.fit, PartMotion(str(moved), law="constant")
+    laid = beside(fit, (*fit.combination.effects, still))
+    left = {n for n in fit.combination.names if n not in projection.names}
+    out = [k for k, n in enumerate(laid.combination.names) if n in left]
+    return Projection.leaving(laid, np.array(out, dtype=np.int64))
 
 
 def _factors(carrier: Carrier) -> tuple[str, str, str]:
@@ -400,7 +413,7 @@ def _factors(carrier: Carrier) -> tuple[str, str, str]:
     return "", f"lambda {own}", f"torque {own}"
 
 
-def _by_driver(laws: Laws, each: Sequence[Floats]) -> Floats:
+def _by_driver(laws: MotionLaws, each: Sequence[Floats]) -> Floats:
     """Sum the evidence of all laws of each driver, (d,) or (d, draws) [nats]."""
     total = np.full((len(laws.drivers), *each[0].shape[1:]), -np.inf)
     for evidence, (_, _, which) in zip(each, laws.widths, strict=True):
@@ -438,17 +451,17 @@ def _may_multiply(factor: str, driver: str) -> bool:
     return kind in ("joint", "temperature", "way")
 
 
-def _laws_of(batch: Batch, driver: str, factor: str) -> list[Law]:
+def _laws_of(batch: Batch, driver: str, factor: str) -> list[MotionLaw]:
     """List the laws that a driver may act by, each kind with the same share."""
     x = covariate(batch, driver)
     low, high = float(x.min()), float(x.max())
     middle, half = (low + high) / 2, (high - low) / 2
     size = float(np.abs(covariate(batch, factor)).max()) if factor else 1.0
 
-    def cell(law: str, at: float = middle, over: float = half) -> Cell:
-        return Cell("joint 1", driver, factor, law, at, over, size)
+    def cell(law: str, at: float = middle, over: float = half) -> PartMotion:
+        return PartMotion("joint 1", driver, factor, law, at, over, size)
 
-    kinds: list[list[Cell | Curve]] = [[cell("linear")]]
+    kinds: list[list[PartMotion | Curve]] = [[cell("linear")]]
     if not driver.startswith("lambda"):
         places = _places(x, alone=not factor)
         kinds.append([cell("step", at) for at in places])
@@ -459,7 +472,7 @@ def _laws_of(batch: Batch, driver: str, factor: str) -> list[Law]:
     if driver.startswith("joint"):
         kinds.append([cell(f"harmonic {n}") for n in range(1, ORDERS + 1)])
     return [
-        Law(effect, -float(np.log(len(kinds) * len(kind))))
+        MotionLaw(effect, -float(np.log(len(kinds) * len(kind))))
         for kind in kinds
         for effect in kind
     ]
@@ -479,7 +492,7 @@ def _places(x: Floats, alone: bool) -> list[float]:
     return sorted({*map(float, even), *map(float, np.quantile(x, part))})
 
 
-def _scaled(effect: Cell | Curve, batch: Batch) -> Floats:
+def _scaled(effect: PartMotion | Curve, batch: Batch) -> Floats:
     """Evaluate the functions of an effect over their relative prior scales, (k, n)."""
     scale = np.array([p.scale for p in effect.parameters()])
     values: Floats = (effect.turning(batch) * (scale / scale.max())).T

@@ -45,7 +45,7 @@ PLACES = {
     "azimuth": "azimuth.Azimuth",
     "refraction": "refraction.Refraction",
     "joint_map": "joint_map.JointMap",
-    "cell": "cell.Cell",
+    "part_motion": "part_motion.PartMotion",
     "curve": "curve.Curve",
     "probe": "probe.Probe",
     "probe_turn": "probe_turn.ProbeTurn",

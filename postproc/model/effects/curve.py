@@ -12,8 +12,8 @@ from numpy.polynomial.legendre import legvander
 from postproc.arrays import Floats
 from postproc.model.carrier import carrier
 from postproc.model.covariate import JOINTS, covariate
-from postproc.model.effects.cell import CarriedEffect
 from postproc.model.effects.effect import FREE, Candidate, Family, Parameter, fade
+from postproc.model.effects.part_motion import CarriedEffect
 from postproc.model.kinematics import Batch
 
 TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 8, 3, 5

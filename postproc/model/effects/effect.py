@@ -27,7 +27,7 @@ Unasked = Literal["always", "weighed", "last", "seen"]
 Sought = Literal["always", "alone", "rival"]
 
 Cells = tuple[tuple[str, str, str], ...]  # carrier, driver and law of each
-CELL = "cell"  # what has no name but its place, its driver and its law
+PART_MOTION = "part_motion"  # what has no name but its place, its driver and its law
 ANY = ("linear", "step", "saturating", "curve", "harmonic")
 
 FAR = 1e3  # [rad] a joint angle that no arm reaches: no range is known
@@ -77,6 +77,7 @@ class Effect(ABC):
         acts: What it moves and what drives that, in the words of the table of causes,
             where it is more than `cells`, several of them at once say.
         nameless: True where finding it says no more than that something is there.
+        at_one_row: True for what happens once, or at one place of what drives it.
         free: True for a function that may have any shape: what no law predicts.
         everywhere: True for what is the same at all poses, unseen ones too.
         published: True for what a method of the literature trains: no fit of effects
@@ -91,6 +92,7 @@ class Effect(ABC):
     variation_of: ClassVar[str | None] = None
     acts: ClassVar[tuple[tuple[str, str], ...]] = ()
     nameless: ClassVar[bool] = False
+    at_one_row: ClassVar[bool] = False
     free: ClassVar[bool] = False
     everywhere: ClassVar[bool] = False
     published: ClassVar[bool] = False
@@ -474,7 +476,7 @@ class Family:
     along: str | None = None
 
     def __str__(self) -> str:
-        if self.effect == CELL:
+        if self.effect == PART_MOTION:
             by = "" if self.driver is None else f" by {self.driver}"
             return f"{self.along or f'joint {self.joint}'}{by}"
         where = "" if self.joint is None else f" of joint {self.joint}"

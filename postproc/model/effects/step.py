@@ -48,6 +48,7 @@ class CampaignStep(Effect):
     """
 
     driven_by: ClassVar[str] = "order"
+    at_one_row: ClassVar[bool] = True
 
     row: float = 0.0
 

@@ -11,8 +11,8 @@ from postproc.calibration.diagnosis.search import Search, ranking, search
 from postproc.calibration.diagnosis.table import Causes, Table
 from postproc.calibration.diagnosis.trace import Investigation, silent, trace
 from postproc.calibration.regression import Fit
-from postproc.model.effects.cell import Cell
-from postproc.model.effects.effect import CELL
+from postproc.model.effects.effect import PART_MOTION
+from postproc.model.effects.part_motion import PartMotion
 from tests.calibration.planted import campaign
 
 BENDS = "rotation:link3:x by temperature linear"
@@ -43,7 +43,7 @@ def test_a_cell_is_scored_as_its_own_candidate_is(base: Fit, table: Table) -> No
 def test_the_cell_that_was_planted_comes_first(base: Fit, table: Table) -> None:
     view = Projection.of(base)
     best = table.scores(lambda _: view)[0].best.effect
-    assert isinstance(best, Cell)
+    assert isinstance(best, PartMotion)
     assert (best.direction, best.source) == ("link 3 turn x", "temperature")
 
 
@@ -73,7 +73,7 @@ def traced(base: Fit) -> Investigation:
 def test_it_is_told_by_place_driver_law_and_size(traced: Investigation) -> None:
     assert traced.verdict == "effect"
     (finding,) = traced.findings
-    assert finding.effect == CELL
+    assert finding.effect == PART_MOTION
     assert finding.told.startswith(
         "link 3 turns about the x of its frame by temperature, "
     )
@@ -92,8 +92,8 @@ def test_a_threshold_holds_for_names_and_cells_together(base: Fit) -> None:
     both = Causes.of(base).null(view, seed=0)
     assert both.cells is not None
     scores = ranking(view, Causes.of(base))
-    cell = next(s for s in scores if s.family.effect == CELL)
-    name = next(s for s in scores if s.family.effect != CELL)
+    cell = next(s for s in scores if s.family.effect == PART_MOTION)
+    name = next(s for s in scores if s.family.effect != PART_MOTION)
     assert both.p_of(cell) == min(2.0 * both.cells.p_value(cell.evidence), 1.0)
     assert both.p_of(name) == min(2.0 * both.p_value(name.evidence), 1.0)
 

@@ -1,4 +1,4 @@
-"""Cell: any small motion of a part by any law of what drives it."""
+"""Part motion: any small motion of a part by any law of what drives it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.carrier import Carrier, carrier
 from postproc.model.covariate import covariate, unit
-from postproc.model.effects.effect import CELL, Effect, Origin, Parameter
+from postproc.model.effects.effect import PART_MOTION, Effect, Origin, Parameter
 from postproc.model.kinematics import Batch
 
 TURN, SHIFT = 1e-4, 1e-4  # [rad], [m] prior size of a motion
@@ -130,7 +130,7 @@ class CarriedEffect(Effect):
 
 
 @dataclass(frozen=True)
-class Cell(CarriedEffect):
+class PartMotion(CarriedEffect):
     """A carrier moves by a law of one covariate, perhaps times another one.
 
     "linear": k (x - middle) / half; "harmonic n": a cos(n x) + b sin(n x); "step":
@@ -145,7 +145,7 @@ class Cell(CarriedEffect):
         size: Largest value of the factor in the survey.
     """
 
-    name: ClassVar[str] = CELL
+    name: ClassVar[str] = PART_MOTION
 
     source: str = "joint 1"
     factor: str = ""
@@ -153,6 +153,11 @@ class Cell(CarriedEffect):
     middle: float = 0.0
     half: float = 1.0
     size: float = 1.0
+
+    @property
+    def at_one_row(self) -> bool:  # type: ignore[override]
+        """Whether it is a step."""
+        return self.law == "step"
 
     def covariates(self) -> tuple[str, ...]:
         """Name the source and the factor."""

@@ -7,7 +7,7 @@ import pytest
 
 from postproc.exceptions import PostprocError
 from postproc.simulation import Planted, parse_effects, virtual_arm
-from postproc.simulation.cell import Cell
+from postproc.simulation.part_motion import PlantedMotion
 from postproc.simulation.reference import reference_arrivals
 from postproc.simulation.state import VirtualArrivals
 
@@ -26,7 +26,7 @@ def test_a_cell_is_read_from_its_text_with_and_without_a_size() -> None:
     harmonic = "shift:tool:z by lambda 4 * joint 5 harmonic 2"
     assert parse_effects(f"{harmonic} 0.1")[0] == Planted(harmonic, 0, 0.1)
     assert parse_effects(harmonic)[0] == Planted(harmonic)
-    assert str(Cell.parse(harmonic)) == harmonic
+    assert str(PlantedMotion.parse(harmonic)) == harmonic
 
 
 @pytest.mark.parametrize(

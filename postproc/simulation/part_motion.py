@@ -49,7 +49,7 @@ HOW = (
 
 
 @dataclass(frozen=True)
-class Cell:
+class PlantedMotion:
     """One small motion of a link as a function of what drives it.
 
     Attributes:
@@ -68,10 +68,10 @@ class Cell:
     law: str
 
     @classmethod
-    def parse(cls, text: str) -> Cell:
+    def parse(cls, text: str) -> PlantedMotion:
         """Read its text.
 
-        >>> Cell.parse("rotation:link3:x by temperature linear").drivers
+        >>> PlantedMotion.parse("rotation:link3:x by temperature linear").drivers
         ('temperature',)
 
         Raises:
