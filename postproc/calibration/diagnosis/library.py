@@ -29,6 +29,7 @@ from postproc.model.whitening import Whitener, Whitening
 # Directions of which the rows tell less than what sums over them are rounded by are not
 # in U.
 
+NOTHING = 1e-9  # part of a column that is left of it where the model takes it up
 ROUNDED = float(np.finfo(float).eps)
 
 
@@ -44,6 +45,8 @@ class Projection:
         root: r, (k,).
         axes: V, (p, k).
         rest: Filtered residual, (3 n,): N(0, I) if the model is complete.
+        free: A filtered column of unit length that may have any size, (3 n,), or None:
+            what lies along it is taken out too.
         seen: The joint last asked for: its axes, and U along them, (n, k).
     """
 
@@ -54,6 +57,7 @@ class Projection:
     root: Floats
     axes: Floats
     rest: Floats
+    free: Floats | None = None
     seen: dict[int, tuple[JointAxes, Floats]] = field(default_factory=dict)
 
     @classmethod
@@ -86,12 +90,44 @@ class Projection:
         """Take the model out of whitened columns, (3 n,) or (3 n, k)."""
         along = (self.taken.T @ whitened).T * (self.root / (self.root + 1.0))
         left: Floats = whitened - self.taken @ along.T
+        if self.free is not None:
+            left -= np.multiply.outer(self.free, self.free @ left)
         return left
+
+    def beside(self, whitened: Floats) -> Projection:
+        """Take one more column, (3 n,), of any size out of the rows."""
+        column = self.filter(whitened)
+        size = float(np.linalg.norm(column))
+        if size <= NOTHING * float(np.linalg.norm(whitened)):
+            return self
+        free = column / size
+        rest = self.rest - free * (free @ self.rest)
+        return replace(self, rest=rest, free=free, seen={})
+
+    @cached_property
+    def squares(self) -> Floats:
+        """All that is taken out twice: I - F F = S S^T, (3 n, k)."""
+        if self.free is None:
+            return self.taken
+        along = (self.taken.T @ self.free) * (self.root / (self.root + 1.0))
+        column = self.free - self.taken @ along
+        return np.column_stack([self.taken, column])
 
     @cached_property
     def twice(self) -> Floats:
         """Residual filtered twice, as columns are that are not, (3 n, 1)."""
-        return self.filter(self.rest[:, None])
+        return self.again(self.rest[:, None])
+
+    def again(self, filtered: Floats) -> Floats:
+        """Filter rows that are filtered, (3 n, k), as columns are that are not.
+
+        Of a free column v that is F (I - v v^T): the transposed filter.
+        """
+        if self.free is not None:
+            filtered = filtered - np.outer(self.free, self.free @ filtered)
+        along = (self.taken.T @ filtered).T * (self.root / (self.root + 1.0))
+        left: Floats = filtered - self.taken @ along.T
+        return left
 
     def view(self, joint: int | None, rows: Floats) -> View:
         """See twice filtered rows (3 n, draws) and the model along columns of a shelf.
@@ -101,11 +137,11 @@ class Projection:
             rows: The rows.
         """
         if joint is None:
-            return View(ColumnWhitening.of(self.fit.whitening), self.taken, rows)
+            return View(ColumnWhitening.of(self.fit.whitening), self.squares, rows)
         if joint not in self.seen:
             self.seen.clear()  # a search asks again and again for one joint
             axes = JointAxes.of(self.fit, self.at.jacobian[:, :, joint])
-            self.seen[joint] = axes, axes.along(self.taken)
+            self.seen[joint] = axes, axes.along(self.squares)
         axes, taken = self.seen[joint]
         return View(axes.size, taken, axes.along(rows))
 
@@ -362,7 +398,7 @@ class Library:
         self, projection: Projection, rows: Floats
     ) -> tuple[ReducedCandidates, ...]:
         """Filter all candidates and reduce them against filtered rows (3 n, draws)."""
-        return _reduced(projection, self.shelves, projection.filter(rows))
+        return _reduced(projection, self.shelves, projection.again(rows))
 
 
 def candidates(

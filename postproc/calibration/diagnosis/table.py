@@ -34,7 +34,7 @@ from postproc.calibration.diagnosis.score import (
     log_evidence,
     rank,
 )
-from postproc.calibration.regression import Fit, beside
+from postproc.calibration.regression import Fit
 from postproc.model.carrier import Carrier, every_carrier
 from postproc.model.covariate import (
     JOINTS,
@@ -346,7 +346,7 @@ class Table:
             rows: Draws, (3 n, draws), filtered once.
             square: |z|^2 of every draw, (draws,).
         """
-        twice = projection.filter(rows)
+        twice = projection.again(rows)
         best = np.zeros(rows.shape[1])
         for carrier in every_carrier():
             scored = self._evidence(projection, carrier, twice, square)
@@ -363,7 +363,7 @@ class Table:
             A factor, its laws, and by width their evidence and share, (c, draws).
         """
         axes = JointAxes.of(view.fit, carrier.moved(view.at))
-        along = View(axes.size, axes.along(view.taken), axes.along(rows))
+        along = View(axes.size, axes.along(view.squares), axes.along(rows))
         for factor in _factors(carrier):
             laws, each = self._tried(carrier, factor), []
             for some, values, _ in laws.widths:
@@ -400,11 +400,7 @@ def loosened(projection: Projection, moved: Carrier) -> Projection:
     """Return a filter that takes a constant motion of a carrier out of the rows too."""
     if holds_mean(projection, moved):
         return projection
-    fit, still = projection.fit, PartMotion(str(moved), law="constant")
-    laid = beside(fit, (*fit.combination.effects, still))
-    left = {n for n in fit.combination.names if n not in projection.names}
-    out = [k for k, n in enumerate(laid.combination.names) if n in left]
-    return Projection.leaving(laid, np.array(out, dtype=np.int64))
+    return projection.beside(projection.fit.whiten(moved.moved(projection.at)))
 
 
 def _factors(carrier: Carrier) -> tuple[str, str, str]:

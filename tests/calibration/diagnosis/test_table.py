@@ -11,6 +11,7 @@ from postproc.calibration.diagnosis.search import Search, ranking, search
 from postproc.calibration.diagnosis.table import Causes, Table
 from postproc.calibration.diagnosis.trace import Investigation, silent, trace
 from postproc.calibration.regression import Fit
+from postproc.model.carrier import carrier
 from postproc.model.effects.effect import PART_MOTION
 from postproc.model.effects.part_motion import PartMotion
 from tests.calibration.planted import campaign
@@ -79,6 +80,23 @@ def test_it_is_told_by_place_driver_law_and_size(traced: Investigation) -> None:
     )
     assert finding.told.endswith("urad/deg C")
     assert finding.to_dict()["told"] == finding.told
+
+
+def test_a_free_column_is_taken_out_as_one_of_any_size_is(base: Fit) -> None:
+    """(I + X X^T + s^2 c c^T)^-1 for s to infinity, by its definition."""
+    view = Projection.of(base)
+    column = base.whiten(carrier("link 3 turn x").moved(view.at))
+    loose = view.beside(column)
+    n = len(view.rest)
+    once = view.filter(np.eye(n))
+    wanted = once @ once
+    along = wanted @ column
+    wanted -= np.outer(along, along) / (column @ along)
+    np.testing.assert_allclose(
+        np.eye(n) - loose.squares @ loose.squares.T, wanted, atol=1e-8
+    )
+    np.testing.assert_allclose(loose.twice[:, 0], wanted @ base.target, atol=1e-6)
+    assert loose.rest @ loose.rest == pytest.approx(base.target @ wanted @ base.target)
 
 
 def test_an_empty_campaign_adds_no_cell() -> None:
