@@ -336,14 +336,7 @@ def tell_arrivals(
         files: Names of the files that are written.
     """
     v, d = visits, decisions
-    has = v.literal >= 0
-    literal = np.where(has, v.literal, 0)
-    file, line = v.file, v.line
-    if len(v.literals):
-        written = np.isin(v.literals.file, [v.files.index(f) for f in files])
-        has &= written[literal]
-        file = np.where(has, v.literals.file[literal], v.file)
-        line = np.where(has, v.literals.line[literal], v.line)
+    file, line = _written_lines(v, files)
     size = np.linalg.norm(d.correction, axis=1) / MM
     told = {}
     for name in files:
@@ -361,6 +354,44 @@ def tell_arrivals(
             "reasons": [d.reasons[k] for k in codes[order].tolist()],
         }
     return told
+
+
+def _written_lines(v: Visits, files: Sequence[str]) -> tuple[Ints, Ints]:
+    """Return file and line that tell of every visit: of its numbers, or its move."""
+    has = v.literal >= 0
+    literal = np.where(has, v.literal, 0)
+    file, line = v.file, v.line
+    if len(v.literals):
+        written = np.isin(v.literals.file, [v.files.index(f) for f in files])
+        has &= written[literal]
+        file = np.where(has, v.literals.file[literal], v.file)
+        line = np.where(has, v.literals.line[literal], v.line)
+    return file, line
+
+
+def written_directions(visits: Visits, record: Sidecar) -> Signs | None:
+    """Return the directions that visits were corrected for, as the record tells them.
+
+    Args:
+        visits: Every arrival of the source.
+        record: Of its output.
+
+    Returns:
+        (n, 6), or None where the record is of other visits: of clones, or older.
+    """
+    files = [name for name in record.files if name in visits.files]
+    file, line = _written_lines(visits, files)
+    out = np.zeros((len(visits), 6), dtype=np.int8)
+    for name in files:
+        told, rows = (
+            record.files[name].targets,
+            np.flatnonzero(file == visits.files.index(name)),
+        )
+        if not np.array_equal(np.asarray(told.get("line", ())), line[rows]):
+            return None
+        sides = _places(str(told["direction"]), SIGNS) - 1
+        out[rows] = sides.reshape(len(rows), 6)
+    return out
 
 
 def left_elsewhere(
