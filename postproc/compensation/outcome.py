@@ -33,6 +33,7 @@ from postproc.robot.pose import MM
 if TYPE_CHECKING:  # it loads all of the planning, which a record does not want
     from postproc.compensation.arrivals import ArrivalStates
     from postproc.compensation.in_time import InTime
+    from postproc.verify.opinion import Opinion
 
 # What came of a program: every visit with its status, and the exit code.
 
@@ -116,6 +117,7 @@ class Outcome:
         arrivals: The states that the visits are corrected for, with the shares of the
             effects in their errors; None where nobody knows.
         in_time: The program run in time, before and after; None where nobody asked.
+        opinion: A second opinion on it; None where nobody asked.
     """
 
     program: str
@@ -133,6 +135,7 @@ class Outcome:
     sources: Mapping[str, bytes] = field(default_factory=dict)
     arrivals: ArrivalStates | None = None
     in_time: InTime | None = None
+    opinion: Opinion | None = None
 
     @property
     def sidecar(self) -> str:
@@ -152,11 +155,13 @@ class Outcome:
     def exit_code(self) -> int:
         """Return 1 where a target could have been compensated and was not.
 
-        Also where the compensated program does not run as the original does.
+        Also where the compensated program does not run as the original does, or a
+        second opinion disagrees.
         """
         left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
         missed = any(d.code in NOT_FOLLOWED for d in self.diagnostics)
         missed |= self.in_time is not None and self.in_time.falls_short
+        missed |= self.opinion is not None and not self.opinion.agrees
         return NOT_ALL if missed or np.isin(self.decisions.status, left).any() else DONE
 
     def summary(self) -> str:

@@ -17,6 +17,8 @@ from postproc.language.visits import Visits
 from postproc.motion.planner import plan
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
+from postproc.verify.directions import SECONDS
+from postproc.verify.extra import require
 from postproc.verify.judge import judge
 from postproc.verify.opinion import ArmFacts, Claim, Opinion
 
@@ -26,6 +28,7 @@ def second_opinion(
     output: Mapping[str, bytes],
     cell: Cell,
     record: Sidecar,
+    seconds: float = SECONDS,
 ) -> Opinion:
     """Let Pinocchio, toppra and ruckig judge a compensated program.
 
@@ -34,15 +37,17 @@ def second_opinion(
         output: The same files as they were written.
         cell: The cell, with the play that the correction used.
         record: What the targets were corrected for.
+        seconds: Time for directions.
 
     Raises:
         ProgramError: A file cannot be read as a program.
-        PlanError: pin or toppra is not installed.
+        PostprocError: A library is not installed.
     """
+    require()
     before = _claim("source", read_program(source, cell).visits, cell)
     after = _claim("output", read_program(output, cell).visits, cell)
     after = _corrected_for(after, before.visits, record)
-    return judge(next(iter(source)), facts_of(cell), before, after)
+    return judge(next(iter(source)), facts_of(cell), before, after, seconds)
 
 
 def facts_of(cell: Cell) -> ArmFacts:

@@ -192,7 +192,7 @@ def _compare_ends(
     return OpinionRow(
         f"{claim.label}: end of the way", "rad", len(ends),
         sum(off > END_RAD for off, _ in ends), worst, END_RAD,
-        claim.place(i) if i >= 0 else "", +skipped,
+        claim.place(i) if i >= 0 else "", dict(+skipped),
     )  # fmt: skip
 
 
@@ -202,7 +202,7 @@ def _compare_times(
     """Say how many runs have a time law of toppra or ruckig."""
     skipped = Counter({NO_TIME: len(runs) - len(arrived)})
     what = f"{claim.label}: runs in time"
-    return OpinionRow(what, "", len(arrived), 0, 0.0, 0.0, "", +skipped)
+    return OpinionRow(what, "", len(arrived), 0, 0.0, 0.0, "", dict(+skipped))
 
 
 def _compare_directions(
@@ -225,5 +225,5 @@ def _compare_directions(
         differ += [f"{claim.place(i)} axis {j + 1}" for j in np.flatnonzero(other)]
     return OpinionRow(
         f"{claim.label}: approach directions", "lambda", compared, len(differ),
-        2.0 * bool(differ), 0.0, next(iter(differ), ""), +skipped,
+        2.0 * bool(differ), 0.0, next(iter(differ), ""), dict(+skipped),
     )  # fmt: skip

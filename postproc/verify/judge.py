@@ -21,7 +21,13 @@ from postproc.verify.positions import (
 from postproc.verify.ways import WayMaker
 
 
-def judge(program: str, facts: ArmFacts, source: Claim, output: Claim) -> Opinion:
+def judge(
+    program: str,
+    facts: ArmFacts,
+    source: Claim,
+    output: Claim,
+    seconds: float = SECONDS,
+) -> Opinion:
     """Judge what a planner says of a program and of its output.
 
     Args:
@@ -29,6 +35,7 @@ def judge(program: str, facts: ArmFacts, source: Claim, output: Claim) -> Opinio
         facts: The arm.
         source: What is said of the program as it was.
         output: Of what was written.
+        seconds: Time for directions.
     """
     begun = monotonic()
     arm = PinocchioArm.build(facts)
@@ -41,7 +48,7 @@ def judge(program: str, facts: ArmFacts, source: Claim, output: Claim) -> Opinio
     if len(output.own) == len(source):
         rows += judge_motion(source, output, facts, *postures)
     maker = WayMaker(arm, output.visits, goals, confirmed(output, goals, at))
-    rows += judge_directions(output, maker, facts, begun + SECONDS)
+    rows += judge_directions(output, maker, facts, begun + seconds)
     return Opinion(program, tuple(rows), monotonic() - begun)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -94,6 +95,17 @@ class OpinionRow:
     where: str
     skipped: Mapping[str, int] = field(default_factory=dict)
 
+    def with_more(self, row: OpinionRow) -> OpinionRow:
+        """Add what was compared in another program."""
+        worst = max(self, row, key=lambda r: (r.beyond > 0, r.largest))
+        skipped = Counter(self.skipped) + Counter(row.skipped)
+        return replace(
+            worst,
+            compared=self.compared + row.compared,
+            beyond=self.beyond + row.beyond,
+            skipped=dict(skipped),
+        )
+
 
 @dataclass(frozen=True)
 class Opinion:
@@ -113,6 +125,15 @@ class Opinion:
     def agrees(self) -> bool:
         """Return True where no difference is beyond its bound."""
         return not any(row.beyond for row in self.rows)
+
+    @classmethod
+    def joined(cls, name: str, opinions: Sequence[Opinion]) -> Self:
+        """Put the tables of several programs into one."""
+        found: dict[str, OpinionRow] = {}
+        for row in (row for opinion in opinions for row in opinion.rows):
+            old = found.get(row.what)
+            found[row.what] = row if old is None else old.with_more(row)
+        return cls(name, tuple(found.values()), sum(o.seconds for o in opinions))
 
     def told(self) -> dict[str, Any]:
         """Return it for JSON."""
