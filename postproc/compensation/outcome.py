@@ -374,7 +374,7 @@ def _written_lines(v: Visits, files: Sequence[str]) -> tuple[Ints, Ints]:
     return file, line
 
 
-def written_directions(visits: Visits, record: Sidecar) -> Signs | None:
+def corrected_directions(visits: Visits, record: Sidecar) -> Floats | None:
     """Return the directions that visits were corrected for, as the record tells them.
 
     Args:
@@ -382,20 +382,20 @@ def written_directions(visits: Visits, record: Sidecar) -> Signs | None:
         record: Of its output.
 
     Returns:
-        (n, 6), or None where the record is of other visits: of clones, or older.
+        (n, 6), NaN where the target was left; None where the record is of other visits:
+        of clones, or of an older version.
     """
     files = [name for name in record.files if name in visits.files]
     file, line = _written_lines(visits, files)
-    out = np.zeros((len(visits), 6), dtype=np.int8)
+    out = np.full((len(visits), 6), np.nan)
     for name in files:
-        told, rows = (
-            record.files[name].targets,
-            np.flatnonzero(file == visits.files.index(name)),
-        )
+        told = record.files[name].targets
+        rows = np.flatnonzero(file == visits.files.index(name))
         if not np.array_equal(np.asarray(told.get("line", ())), line[rows]):
             return None
-        sides = _places(str(told["direction"]), SIGNS) - 1
-        out[rows] = sides.reshape(len(rows), 6)
+        sides = _places(str(told["direction"]), SIGNS) - 1.0
+        corrected = _places(str(told["status"]), DIGIT) == Status.SAFE
+        out[rows[corrected]] = sides.reshape(len(rows), 6)[corrected]
     return out
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.compensation.outcome import written_directions
+from postproc.compensation.outcome import corrected_directions
 from postproc.compensation.payload import payload_of
 from postproc.compensation.program import read_program
 from postproc.compensation.record import Sidecar
@@ -103,7 +103,10 @@ def _corrected_for(output: Claim, source: Visits, record: Sidecar) -> Claim:
 
     They are those of the corrected program, so that the correction has not turned them.
     """
-    told = written_directions(source, record)
+    told = corrected_directions(source, record)
     if len(output) != len(source):
         return replace(output, own=np.empty(0, dtype=np.int64))
-    return output if told is None else replace(output, direction=told.astype(float))
+    if told is None:
+        return output
+    direction = np.where(np.isnan(told), output.direction, told)
+    return replace(output, direction=direction)
