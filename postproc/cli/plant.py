@@ -22,6 +22,7 @@ from postproc.cli.common import (
     write_text,
 )
 from postproc.compensation.options import AS_USUAL
+from postproc.exceptions import PostprocError
 from postproc.files import check_places
 
 if TYPE_CHECKING:
@@ -220,7 +221,15 @@ def _second_opinion(
     from postproc.batch.second_opinion import judge_tree
 
     own = (None, None) if cell is None and plan is not None else (cell, model)
-    return judge_tree(folder, make_plan(plan, *own, AS_USUAL))
+    made = make_plan(plan, *own, AS_USUAL)
+    try:
+        return judge_tree(folder, made)
+    except ImportError as exc:
+        problem = f"no second opinion: a library is broken ({exc}): {INSTALL}"
+        if asked:
+            raise PostprocError(problem) from None
+        say(problem)
+        return None
 
 
 def _print_opinion(judged: TreeOpinion) -> None:

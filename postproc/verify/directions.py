@@ -13,7 +13,7 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.robot.arm_file import ArmFile
 from postproc.robot.trajectory import Motion
-from postproc.verify.opinion import ArmFacts, Claim, OpinionRow
+from postproc.verify.opinion import COUNTED, ArmFacts, Claim, OpinionRow
 from postproc.verify.play_memory import PlayMemory
 from postproc.verify.ruckig_move import move_in_time
 from postproc.verify.toppra_run import run_in_time
@@ -202,7 +202,7 @@ def _compare_times(
     """Say how many runs have a time law of toppra or ruckig."""
     skipped = Counter({NO_TIME: len(runs) - len(arrived)})
     what = f"{claim.label}: runs in time"
-    return OpinionRow(what, "", len(arrived), 0, 0.0, 0.0, "", dict(+skipped))
+    return OpinionRow(what, COUNTED, len(arrived), 0, 0.0, 0.0, "", dict(+skipped))
 
 
 def _compare_directions(

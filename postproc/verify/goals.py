@@ -59,6 +59,10 @@ def _rotations(v: Visits) -> Floats:
     numbers = v.values[:, 3 : 3 + width]
     rows = ~np.isnan(numbers).any(axis=1) & np.isin(v.target, POSES)
     if width == 4:
+        rows &= np.linalg.norm(numbers, axis=1) > 0
+    if not rows.any():
+        return out
+    if width == 4:
         turned = Rotation.from_quat(numbers[rows], scalar_first=True)
     else:
         axes = "ZYX" if "A" in v.dialect.heads else "ZYZ"

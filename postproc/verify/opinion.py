@@ -13,6 +13,8 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import Visits
 from postproc.robot.arm_file import ArmFile
 
+COUNTED = "counted"  # unit of a row that compares nothing
+
 
 @dataclass(frozen=True)
 class ArmFacts:

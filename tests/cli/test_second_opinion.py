@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -111,6 +112,15 @@ def test_without_its_libraries_there_is_a_note(desk, tree, nothing_installed):
     quiet = run("check", tree, "--accept-left", *given(desk), "--no-second-opinion")
     assert quiet.exit_code == 0 and "opinion" not in quiet.stderr
     asked = run("check", tree, "--accept-left", *given(desk), "--second-opinion")
+    assert asked.exit_code == 2 and "pip install pin toppra" in asked.stderr
+
+
+def test_a_broken_library_is_none(desk, tree, monkeypatch):
+    monkeypatch.setattr(extra, "find_spec", str)
+    monkeypatch.setitem(sys.modules, "pinocchio", None)
+    done = run("check", tree, "--accept-left", *given(desk))
+    assert done.exit_code == 0 and "a library is broken" in done.stderr
+    asked = run("check", tree, "--second-opinion", *given(desk))
     assert asked.exit_code == 2 and "pip install pin toppra" in asked.stderr
 
 
