@@ -238,7 +238,10 @@ def _print_opinion(judged: TreeOpinion) -> None:
 
     for place, why in judged.skipped:
         say(f"{place}: no second opinion: {why}")
-    print_opinion(judged.opinion)
+    if judged.programs:
+        print_opinion(judged.opinion)
+    else:
+        say("no second opinion: no program could be judged")
 
 
 def _current_model(folder: Path, model: Path | None, plan: Path | None) -> Current:

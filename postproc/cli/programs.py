@@ -89,7 +89,6 @@ def compensate(
     from postproc.compensation import parallel
     from postproc.compensation.options import Options
     from postproc.report.json import report_text
-    from postproc.verify.extra import require
 
     given = None if is_stream(program) else Path(program)
     with explained(given, lsv):
@@ -113,6 +112,8 @@ def compensate(
         if lsv_out is not None:
             _check_values(lsv_out, job)
         if job.wants_opinion:
+            from postproc.verify.extra import require
+
             require()
         crowd = processes or min(parallel.available(), CROWD)
         with stages() as progress:

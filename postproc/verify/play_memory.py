@@ -9,7 +9,10 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats
 
-SURE = 2.0  # plays behind a reversal from which on a direction is compared
+# Plays behind a reversal from which on a direction is compared. A blend takes half of a
+# way at most: so what went back by two plays on the exact way goes back by one at least
+# on any blend, and no play operator calls that the old direction.
+SURE = 2.0
 
 
 @dataclass(frozen=True)

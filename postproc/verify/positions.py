@@ -139,7 +139,7 @@ def branch_bits(at: Posture, file: ArmFile) -> tuple[Ints, Bools]:
     shoulder, elbow, wrist = origin[:, 1], origin[:, 2], origin[:, 4]
     across = way[1] * axis[:, 1]
     ahead = np.cross(across, [0.0, 0.0, 1.0])
-    fore = _unit(wrist - elbow - _along(wrist - elbow, across, 1.0))
+    fore = _unit(wrist - elbow - _along(wrist - elbow, across))
     roll = axis[:, 3] * np.sign(np.sum(axis[:, 3] * fore, axis=1))[:, None]
     hand, bend = _unit(origin[:, 6] - wrist), _unit(elbow - shoulder)
     heights = np.stack(
@@ -153,9 +153,9 @@ def branch_bits(at: Posture, file: ArmFile) -> tuple[Ints, Bools]:
     return (heights < 0).astype(np.int64), np.abs(heights) > BORDER
 
 
-def _along(vector: Floats, unit: Floats, share: float) -> Floats:
+def _along(vector: Floats, unit: Floats) -> Floats:
     """Return the part of vectors (n, 3) along unit vectors (n, 3)."""
-    return np.asarray(share * np.sum(vector * unit, axis=1)[:, None] * unit)
+    return np.asarray(np.sum(vector * unit, axis=1)[:, None] * unit)
 
 
 def _unit(vector: Floats) -> Floats:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from tests.verify.judged import compensated, row
+from postproc.robot.arm import load_arm
+from tests.verify.judged import compensated, model_of, row
 
 EMPTY = b"PROGRAM e\r\nBEGIN\r\nEND e\r\n"
 UNKNOWN = (
@@ -38,3 +41,21 @@ def test_it_ends_in_a_table(name, source, bench_cell, bench_model) -> None:
         told = found.compared + places.compared
         lost = sum(found.skipped.values()) + sum(places.skipped.values())
         assert told + lost == len(job.outcome.visits)
+
+
+LINES = (
+    b"PROGRAM u\r\nBEGIN\r\nMOVE JOINT TO {0, -60, 90, 0, 60, 0}\r\n"
+    b"MOVE JOINT TO {10, -55, 85, 5, 60, 0}\r\n"
+    b"MOVE LINEAR TO POS(500, 100, 600, 0, 120, 0, '')\r\n"
+    b"MOVE JOINT TO {0, -60, 90, 0, 60, 0}\r\nEND u\r\n"
+)
+
+
+def test_an_arm_whose_branches_nobody_names(bench_cell, bench_model) -> None:
+    cell = replace(bench_cell, arm=load_arm("ur10"))
+    job = compensated({"u.pdl": LINES}, cell, model_of(cell, bench_model))
+    opinion = job.opinion()
+    assert opinion.agrees, opinion.told()
+    assert not [r.what for r in opinion.rows if "branch" in r.what]
+    assert row(opinion, "output: joint targets").compared == 3
+    assert row(opinion, "output: approach directions").compared > 5
