@@ -8,7 +8,7 @@ from pathlib import Path
 
 from postproc.cli.jobs import read_files
 from postproc.compensation.compensate import compensate
-from postproc.compensation.options import AS_USUAL
+from postproc.compensation.options import AS_USUAL, Options
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import prepared
 from postproc.compensation.second_opinion import second_opinion
@@ -53,22 +53,25 @@ def model_of(cell: Cell, model: Model) -> Model:
     )
 
 
-def compensated(files: Mapping[str, bytes], cell: Cell, model: Model) -> Compensated:
+def compensated(
+    files: Mapping[str, bytes], cell: Cell, model: Model, options: Options = AS_USUAL
+) -> Compensated:
     """Compensate a program, the files of which begin with the program itself."""
     name, source = next(iter(files.items()))
     rest = {k: v for k, v in files.items() if k not in (name, variables_of(name))}
     values = files.get(variables_of(name))
     outcome = compensate(
-        source, cell, model, name=name, variables=values, pages=rest
-    )  # fmt: skip
-    own = prepared(cell, model, AS_USUAL)
+        source, cell, model, name=name, variables=values, pages=rest, options=options
+    )
+    own = prepared(cell, model, options)
     return Compensated(own, files, {**files, **outcome.outputs}, outcome)
 
 
-def shipped(name: str, model: Model) -> Compensated:
+def shipped(name: str, model: Model, options: Options = AS_USUAL) -> Compensated:
     """Compensate one of `programs/`."""
     cell = load_cell(PROGRAMS / SHIPPED[name])
-    return compensated(read_files(PROGRAMS / name), cell, model_of(cell, model))
+    files = read_files(PROGRAMS / name)
+    return compensated(files, cell, model_of(cell, model), options)
 
 
 def row(opinion: Opinion, what: str) -> OpinionRow:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.compensation.options import Options
 from postproc.verify.directions import MOVES, draw
 from postproc.verify.ruckig_move import move_in_time
 from postproc.verify.toppra_run import run_in_time
@@ -77,3 +78,19 @@ def test_the_same_program_is_drawn_from_alike(bench_model) -> None:
     rows = [draw(Long(seed)) for seed in (1, 1, 2)]  # type: ignore[arg-type]
     assert len(rows[0]) == MOVES
     assert np.array_equal(rows[0], rows[1]) and not np.array_equal(rows[0], rows[2])
+
+
+def test_clones_are_judged_by_what_they_are_corrected_for(bench_model) -> None:
+    opinion = shipped("handling.pdl", bench_model, Options(clone=True)).opinion()
+    assert opinion.agrees, opinion.told()
+    assert row(opinion, "output: approach directions").compared > 400
+
+
+def test_points_on_ways_are_visits_of_the_output_alone(bench_model) -> None:
+    options = Options(path_mm=0.05, max_inserted=50)
+    job = shipped("drilling.pdl", bench_model, options)
+    opinion = job.opinion()
+    assert opinion.agrees, opinion.told()
+    before, after = (row(opinion, f"{k}: place").compared for k in ("source", "output"))
+    assert before < after <= before + 50
+    assert not [r.what for r in opinion.rows if "swing" in r.what]
