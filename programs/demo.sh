@@ -40,6 +40,15 @@ for job in $jobs; do
     echo "  ... all of it in demo/$job.diff"
 done
 
+title "Before an upload: a second opinion, by Pinocchio, toppra and ruckig"
+mkdir demo/upload
+for job in $jobs; do
+    cp demo/$job.pdl demo/$job.pdl.postproc.json demo/upload
+done
+cp demo/spot.lsv demo/upload
+run postproc check demo/upload --cell $cell --model demo/model.json --accept-left \
+    --second-opinion
+
 title "What the tool really misses by: programs as written, and compensated"
 for job in $jobs; do
     for state in written compensated; do

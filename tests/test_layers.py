@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import subprocess
 import sys
 from collections import defaultdict
 from pathlib import Path
@@ -18,6 +19,7 @@ LAYERS = (
     ("files",),
     ("robot",),
     ("language", "motion", "model"),
+    ("verify",),
     ("compensation", "calibration", "simulation"),
     ("report",),
     ("batch",),
@@ -31,6 +33,8 @@ ONLY = {
     "language": LEAVES | {"_native", "robot.pose", "robot.trajectory"},
     # Its truth would prove nothing if it used the kinematics under test.
     "simulation": LEAVES | {"language", "robot.trajectory"},
+    # A second opinion by the code that is judged would be the first one again.
+    "verify": LEAVES | {"language", "robot.arm_file", "robot.trajectory"},
 }
 
 # Which modules know one effect in particular: all others take effects as they come.
@@ -183,7 +187,18 @@ def test_each_foreign_library_is_imported_in_one_module() -> None:
     # Grammars have one door, and every language one to what comes of its own.
     doors = {name.split(".")[-1] for name in spread.pop("lark", [])}
     assert doors == {"grammars", "parser"}
+    # The second opinion shares no way of calling it with what it judges.
+    assert spread.pop("ruckig", []) == ["motion.ruckig", "verify.ruckig_move"]
     assert not spread, spread
+
+
+def test_the_second_opinion_loads_its_libraries_where_it_needs_them() -> None:
+    """No command is slower for it, and without the extra nothing else changes."""
+    code = "import sys, postproc.verify.judge; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert not {"pinocchio", "toppra", "ruckig", "matplotlib"} & set(loaded)
 
 
 def test_a_language_knows_no_other() -> None:

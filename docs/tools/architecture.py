@@ -27,26 +27,28 @@ PICTURE = ROOT / "docs/pictures/architecture.svg"
 LAYERS = (
     ("robot",),
     ("language", "motion", "model"),
+    ("verify",),
     ("compensation", "calibration", "simulation"),
     ("report",),
     ("batch",),
     ("cli",),
 )
-WIDTH, HEIGHT = 860, 610
+WIDTH, HEIGHT = 860, 700
 BOXES = {  # x, y, width, height
     "cli": (20, 15, 820, 48),
     "batch": (500, 95, 250, 62),
     "report": (180, 120, 270, 62),
     "calibration": (20, 225, 200, 105),
-    "compensation": (290, 225, 300, 105),
+    "compensation": (290, 225, 345, 105),
     "simulation": (660, 225, 180, 105),
-    "model": (150, 385, 200, 80),
-    "motion": (375, 385, 180, 80),
-    "language": (580, 385, 260, 80),
-    "robot": (150, 515, 500, 48),
+    "verify": (600, 360, 170, 85),
+    "model": (150, 475, 200, 80),
+    "motion": (375, 475, 180, 80),
+    "language": (580, 475, 260, 80),
+    "robot": (150, 605, 500, 48),
 }
 STEPS = ("Visits", "Targets", "Plan", "States", "Decisions", "Outcome")
-FILES = {"survey.csv": (20, 425), "job.pdl": (711, 526)}
+FILES = {"survey.csv": (20, 515), "job.pdl": (711, 616)}
 
 
 @dataclass(frozen=True)
@@ -62,16 +64,18 @@ class Arrow:
 
 
 FLOW = (
-    Arrow("Measurements", "survey.csv", "calibration", (55, 423), (55, 330)),
-    Arrow("bytes", "job.pdl", "language", (750, 524), (750, 465)),
-    Arrow("Arm, States", "robot", "model", (230, 515), (230, 465)),
-    Arrow("Arm", "robot", "motion", (467, 515), (467, 465)),
-    Arrow("Effect", "model", "calibration", (190, 385), (190, 330)),
-    Arrow("States", "compensation", "model", (310, 330), (310, 385), left=True),
-    Arrow("Targets", "compensation", "motion", (410, 330), (410, 385), left=True),
-    Arrow("Plan", "motion", "compensation", (500, 385), (500, 330), left=True),
-    Arrow("Visits", "language", "compensation", (585, 385), (585, 330), left=True),
-    Arrow("Visits", "language", "simulation", (750, 385), (750, 330)),
+    Arrow("Measurements", "survey.csv", "calibration", (55, 513), (55, 330)),
+    Arrow("bytes", "job.pdl", "language", (750, 614), (750, 555)),
+    Arrow("Arm, States", "robot", "model", (230, 605), (230, 555)),
+    Arrow("Arm", "robot", "motion", (467, 605), (467, 555)),
+    Arrow("Effect", "model", "calibration", (190, 475), (190, 330)),
+    Arrow("States", "compensation", "model", (310, 330), (310, 475), left=True),
+    Arrow("Targets", "compensation", "motion", (410, 330), (410, 475), left=True),
+    Arrow("Plan", "motion", "compensation", (500, 475), (500, 330), left=True),
+    Arrow("Visits", "language", "compensation", (585, 475), (585, 330), left=True),
+    Arrow("Claim", "compensation", "verify", (618, 330), (618, 360)),
+    Arrow("Visits", "language", "verify", (690, 475), (690, 445)),
+    Arrow("Visits", "language", "simulation", (785, 475), (785, 330)),
     Arrow("Model", "calibration", "compensation", (220, 290), (290, 290)),
     Arrow("Measurements", "calibration", "report", (200, 225), (200, 182)),
     Arrow("Outcome", "compensation", "report", (370, 225), (370, 182)),
@@ -82,7 +86,7 @@ FLOW = (
 LINES = {  # grey: upper chapter, lower chapter, from, to
     ("cli", "report"): ((315, 63), (315, 120)),
     ("cli", "simulation"): ((795, 63), (795, 225)),
-    ("language", "robot"): ((615, 465), (615, 515)),
+    ("language", "robot"): ((615, 555), (615, 605)),
 }
 
 

@@ -79,10 +79,13 @@ class Checked:
         kept = tuple(f for f in self.findings if f.code != LEFT)
         return Checked(self.programs, kept)
 
-    def to_json(self) -> str:
-        """Return it as JSON text."""
+    def to_json(self, opinion: Mapping[str, Any] | None = None) -> str:
+        """Return it as JSON text, with a second opinion where there is one."""
         rows = [asdict(finding) for finding in self.findings]
-        return json.dumps({"programs": self.programs, "findings": rows}) + "\n"
+        told = {"programs": self.programs, "findings": rows}
+        if opinion is not None:
+            told["second_opinion"] = opinion
+        return json.dumps(told) + "\n"
 
 
 def check(

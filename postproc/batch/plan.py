@@ -37,7 +37,7 @@ class JobSetup:
         """
         parts = {
             "version": __version__,
-            "cell": self.cell.file.model_dump(mode="json"),
+            "cell": self.cell.file.model_dump(mode="json", exclude={"verify"}),
             "arm": self.cell.arm.file.model_dump(mode="json"),
             "model": self.model.id,
             "options": self.options.told(),

@@ -49,6 +49,14 @@ OrientationOption = Annotated[
     bool,
     typer.Option("--orientation", help="Correct orientations too, not only places."),
 ]
+SecondOpinionOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--second-opinion/--no-second-opinion",
+        help="Let Pinocchio, toppra and ruckig judge it too.",
+        show_default=False,
+    ),
+]
 StrictCallsOption = Annotated[
     bool,
     typer.Option(

@@ -258,6 +258,22 @@ class Job:
             path, name, source, values, pages, reads, notes, loaded, fitted, inputs
         )
 
+    @property
+    def wants_opinion(self) -> bool:
+        """Tell whether the cell asks for a second opinion."""
+        return self.cell.file.verify.second_opinion
+
+    def judged(self, outcome: Outcome, options: Options) -> Outcome:
+        """Add a second opinion on what came of the program."""
+        from postproc.compensation.program import prepared
+        from postproc.compensation.second_opinion import second_opinion
+
+        source = dict(outcome.sources)
+        output = source | dict(outcome.outputs)
+        cell = prepared(self.cell, self.model, options)
+        opinion = second_opinion(source, output, cell, outcome.record)
+        return replace(outcome, opinion=opinion)
+
     def run(
         self, options: Options, progress: Progress = silent, processes: int = 1
     ) -> Outcome:

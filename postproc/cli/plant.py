@@ -13,6 +13,7 @@ from postproc.cli.common import (
     HtmlOption,
     JsonOption,
     OrientationOption,
+    SecondOpinionOption,
     StrictCallsOption,
     TemperatureOption,
     app,
@@ -21,6 +22,7 @@ from postproc.cli.common import (
     write_text,
 )
 from postproc.compensation.options import AS_USUAL
+from postproc.exceptions import PostprocError
 from postproc.files import check_places
 
 if TYPE_CHECKING:
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from postproc.batch.journal import Summary
     from postproc.batch.plan import BatchPlan
     from postproc.batch.run import Gather
+    from postproc.batch.second_opinion import TreeOpinion
 
 CellFile = Annotated[
     Path | None, typer.Option("--cell", help="Cell of programs that no rule fits.")
@@ -165,11 +168,14 @@ def check(
     ] = False,
     strict_calls: StrictCallsOption = False,
     json: JsonOption = None,
+    cell: CellFile = None,
+    second_opinion: SecondOpinionOption = None,
 ) -> None:
     """Tell whether a tree may be uploaded: exit 0 yes, 1 no, 2 trouble.
 
     Every program must be compensated, with all its targets, with the current model,
-    from the source as it is now, and unchanged since.
+    from the source as it is now, and unchanged since. Where pin and toppra are
+    installed, and cells and models given, these and ruckig judge it too.
     """
     from postproc.batch.check import check as look
 
@@ -178,12 +184,64 @@ def check(
         found = look(folder, current, source, strict_calls)
         if accept_left:
             found = found.accepting_left()
+        judged = _second_opinion(folder, (cell, model, plan), second_opinion)
         if json:
-            write_text(json, found.to_json())
+            write_text(json, found.to_json(None if judged is None else judged.told()))
         for finding in found.findings:
             say(f"{finding.place}: {finding.code}: {finding.message}")
+        if judged is not None:
+            _print_opinion(judged)
         say(f"{folder}: {found.programs} programs, {len(found.findings)} findings")
-    raise typer.Exit(found.exit_code)
+    raise typer.Exit(max(found.exit_code, 0 if judged is None else judged.exit_code))
+
+
+Places = tuple[Path | None, Path | None, Path | None]  # of cell, model, plan
+
+
+def _second_opinion(
+    folder: Path, places: Places, asked: bool | None
+) -> TreeOpinion | None:
+    """Judge a tree by other libraries; None where they or cells and models lack.
+
+    Raises:
+        PostprocError: Somebody asked for it, and it cannot be given.
+    """
+    from postproc.verify.extra import INSTALL, missing
+
+    if asked is False:
+        return None
+    if not asked and (lacks := missing()):
+        say(f"no second opinion: {' and '.join(lacks)} not installed ({INSTALL})")
+        return None
+    cell, model, plan = places
+    if not asked and plan is None and None in (cell, model):
+        say("no second opinion: it takes --cell and --model, or --plan")
+        return None
+    from postproc.batch.plan import make_plan
+    from postproc.batch.second_opinion import judge_tree
+
+    own = (None, None) if cell is None and plan is not None else (cell, model)
+    made = make_plan(plan, *own, AS_USUAL)
+    try:
+        return judge_tree(folder, made)
+    except ImportError as exc:
+        problem = f"no second opinion: a library is broken ({exc}): {INSTALL}"
+        if asked:
+            raise PostprocError(problem) from None
+        say(problem)
+        return None
+
+
+def _print_opinion(judged: TreeOpinion) -> None:
+    """Print the table of a second opinion, and which programs have none."""
+    from postproc.report.second_opinion import print_opinion
+
+    for place, why in judged.skipped:
+        say(f"{place}: no second opinion: {why}")
+    if judged.programs:
+        print_opinion(judged.opinion)
+    else:
+        say("no second opinion: no program could be judged")
 
 
 def _current_model(folder: Path, model: Path | None, plan: Path | None) -> Current:

@@ -111,9 +111,15 @@ def compensate(
         job = jobs.Job.open(program, cell, model, lsv)
         if lsv_out is not None:
             _check_values(lsv_out, job)
+        if job.wants_opinion:
+            from postproc.verify.extra import require
+
+            require()
         crowd = processes or min(parallel.available(), CROWD)
         with stages() as progress:
             outcome = job.run(options, progress, crowd)
+            if job.wants_opinion:
+                outcome = job.judged(outcome, options)
         if strict and outcome.exit_code:
             _print_outcome(outcome)
             raise PostprocError(
@@ -159,6 +165,10 @@ def _print_outcome(outcome: Outcome) -> None:
     say(outcome.summary())
     if outcome.in_time is not None:
         say(outcome.in_time.summary(outcome.visits))
+    if outcome.opinion is not None:
+        from postproc.report.second_opinion import print_opinion
+
+        print_opinion(outcome.opinion)
 
 
 @app.command()

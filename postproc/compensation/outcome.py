@@ -33,6 +33,7 @@ from postproc.robot.pose import MM
 if TYPE_CHECKING:  # it loads all of the planning, which a record does not want
     from postproc.compensation.arrivals import ArrivalStates
     from postproc.compensation.in_time import InTime
+    from postproc.verify.opinion import Opinion
 
 # What came of a program: every visit with its status, and the exit code.
 
@@ -116,6 +117,7 @@ class Outcome:
         arrivals: The states that the visits are corrected for, with the shares of the
             effects in their errors; None where nobody knows.
         in_time: The program run in time, before and after; None where nobody asked.
+        opinion: A second opinion on it; None where nobody asked.
     """
 
     program: str
@@ -133,6 +135,7 @@ class Outcome:
     sources: Mapping[str, bytes] = field(default_factory=dict)
     arrivals: ArrivalStates | None = None
     in_time: InTime | None = None
+    opinion: Opinion | None = None
 
     @property
     def sidecar(self) -> str:
@@ -152,11 +155,13 @@ class Outcome:
     def exit_code(self) -> int:
         """Return 1 where a target could have been compensated and was not.
 
-        Also where the compensated program does not run as the original does.
+        Also where the compensated program does not run as the original does, or a
+        second opinion disagrees.
         """
         left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
         missed = any(d.code in NOT_FOLLOWED for d in self.diagnostics)
         missed |= self.in_time is not None and self.in_time.falls_short
+        missed |= self.opinion is not None and not self.opinion.agrees
         return NOT_ALL if missed or np.isin(self.decisions.status, left).any() else DONE
 
     def summary(self) -> str:
@@ -336,14 +341,7 @@ def tell_arrivals(
         files: Names of the files that are written.
     """
     v, d = visits, decisions
-    has = v.literal >= 0
-    literal = np.where(has, v.literal, 0)
-    file, line = v.file, v.line
-    if len(v.literals):
-        written = np.isin(v.literals.file, [v.files.index(f) for f in files])
-        has &= written[literal]
-        file = np.where(has, v.literals.file[literal], v.file)
-        line = np.where(has, v.literals.line[literal], v.line)
+    file, line = _written_lines(v, files)
     size = np.linalg.norm(d.correction, axis=1) / MM
     told = {}
     for name in files:
@@ -361,6 +359,44 @@ def tell_arrivals(
             "reasons": [d.reasons[k] for k in codes[order].tolist()],
         }
     return told
+
+
+def _written_lines(v: Visits, files: Sequence[str]) -> tuple[Ints, Ints]:
+    """Return file and line that tell of every visit: of its numbers, or its move."""
+    has = v.literal >= 0
+    literal = np.where(has, v.literal, 0)
+    file, line = v.file, v.line
+    if len(v.literals):
+        written = np.isin(v.literals.file, [v.files.index(f) for f in files])
+        has &= written[literal]
+        file = np.where(has, v.literals.file[literal], v.file)
+        line = np.where(has, v.literals.line[literal], v.line)
+    return file, line
+
+
+def corrected_directions(visits: Visits, record: Sidecar) -> Floats | None:
+    """Return the directions that visits were corrected for, as the record tells them.
+
+    Args:
+        visits: Every arrival of the source.
+        record: Of its output.
+
+    Returns:
+        (n, 6), NaN where the target was left; None where the record is of other visits:
+        of clones, or of an older version.
+    """
+    files = [name for name in record.files if name in visits.files]
+    file, line = _written_lines(visits, files)
+    out = np.full((len(visits), 6), np.nan)
+    for name in files:
+        told = record.files[name].targets
+        rows = np.flatnonzero(file == visits.files.index(name))
+        if not np.array_equal(np.asarray(told.get("line", ())), line[rows]):
+            return None
+        sides = _places(str(told["direction"]), SIGNS) - 1.0
+        corrected = _places(str(told["status"]), DIGIT) == Status.SAFE
+        out[rows[corrected]] = sides.reshape(len(rows), 6)[corrected]
+    return out
 
 
 def left_elsewhere(

@@ -48,6 +48,11 @@ def report_pieces(outcome: Outcome) -> Iterator[bytes]:
         "predicted": {"before": asdict(outcome.before), "after": asdict(outcome.after)},
         "motion": {key: round(size, 5) for key, size in outcome.motion.items()},
         **in_time_of(outcome),
+        **(
+            {}
+            if outcome.opinion is None
+            else {"second_opinion": outcome.opinion.told()}
+        ),
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
         "stages_s": dict(outcome.stages),
     }

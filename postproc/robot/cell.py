@@ -172,6 +172,12 @@ Limits = Annotated[list[PositiveFloat], Field(min_length=6, max_length=6)]
 JOINT_DEG = [5.0, 5.0, 5.0, 10.0, 10.0, 10.0]
 
 
+class VerifySection(Strict):
+    """Whether `compensate` asks for a second opinion on what it writes."""
+
+    second_opinion: bool = False
+
+
 class VariablesSection(Strict):
     """What other programs do to variables that they share with ours."""
 
@@ -240,6 +246,7 @@ class CellFile(Strict):
     routines: dict[str, Effect | list[str]] = Field(default_factory=dict)
     frames: FramesSection = FramesSection()
     variables: VariablesSection = VariablesSection()
+    verify: VerifySection = VerifySection()
     taught: list[str] = Field(default_factory=list)
 
     @field_validator("routines")

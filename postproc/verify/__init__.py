@@ -1,0 +1,1 @@
+"""Verify: a second opinion by Pinocchio, toppra and ruckig."""

@@ -1,0 +1,168 @@
+"""What is judged, and what comes of it: claims of the planner, rows of a table."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.language.visits import Visits
+from postproc.robot.arm_file import ArmFile
+
+COUNTED = "counted"  # unit of a row that compares nothing
+
+
+@dataclass(frozen=True)
+class ArmFacts:
+    """What the second opinion takes from arm file and cell, as numbers.
+
+    Attributes:
+        file: The arm file.
+        weight: Direction in which weight pulls, unit vector, (3,), base frame.
+        play: Of every joint on the drive side, (6,) [rad].
+        home, calibration: Joint angles, (6,) [rad], or None.
+        elbow, wrist_centre: Most that they may move by a correction [m].
+    """
+
+    file: ArmFile
+    weight: Floats
+    play: Floats
+    home: Floats | None
+    calibration: Floats | None
+    elbow: float
+    wrist_centre: float
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What the planner says of the n visits of a program.
+
+    Attributes:
+        label: "source" or "output".
+        visits: The program, as the language reads it.
+        q: Joint angles at the targets themselves, (n, 6) [rad], NaN where not known.
+        direction: lambda that the targets are corrected for, (n, 6).
+        slot: Branch 4 W + 2 S + E, (n,), -1 where it was not looked up.
+        singular: Smallest singular value of the flange's Jacobian, (n,).
+        payload: Mass [kg] and centre in the flange frame [m], (n, 4); mass 0: none.
+        torque: Gravity torques, (n, 6) [N m]; empty where no link has a mass.
+        own: Visits that the source makes too, (k,).
+    """
+
+    label: str
+    visits: Visits
+    q: Floats
+    direction: Floats
+    slot: Ints
+    singular: Floats
+    payload: Floats
+    torque: Floats
+    own: Ints
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return len(self.visits)
+
+    def place(self, visit: int) -> str:
+        """Name the line of a visit's move."""
+        v = self.visits
+        return f"{self.label} {v.files[v.file[visit]]}:{int(v.line[visit])}"
+
+
+@dataclass(frozen=True)
+class OpinionRow:
+    """One row of the table.
+
+    Attributes:
+        what: What was compared.
+        unit: Of `largest` and `bound`.
+        compared: How many values.
+        beyond: How many of them differ by more than the bound.
+        largest: The largest difference.
+        bound: What differs by more disagrees.
+        where: The place of the largest difference, or "".
+        skipped: How many values were not compared, by reason.
+    """
+
+    what: str
+    unit: str
+    compared: int
+    beyond: int
+    largest: float
+    bound: float
+    where: str
+    skipped: Mapping[str, int] = field(default_factory=dict)
+
+    def with_more(self, row: OpinionRow) -> OpinionRow:
+        """Add what was compared in another program."""
+        worst = max(self, row, key=lambda r: (r.beyond > 0, r.largest))
+        skipped = Counter(self.skipped) + Counter(row.skipped)
+        return replace(
+            worst,
+            compared=self.compared + row.compared,
+            beyond=self.beyond + row.beyond,
+            skipped=dict(skipped),
+        )
+
+
+@dataclass(frozen=True)
+class Opinion:
+    """What the second opinion says of a program.
+
+    Attributes:
+        program: Its name.
+        rows: What was compared.
+        seconds: Time that it took.
+    """
+
+    program: str
+    rows: tuple[OpinionRow, ...]
+    seconds: float
+
+    @property
+    def agrees(self) -> bool:
+        """Return True where no difference is beyond its bound."""
+        return not any(row.beyond for row in self.rows)
+
+    @classmethod
+    def joined(cls, name: str, opinions: Sequence[Opinion]) -> Self:
+        """Put the tables of several programs into one."""
+        found: dict[str, OpinionRow] = {}
+        for row in (row for opinion in opinions for row in opinion.rows):
+            old = found.get(row.what)
+            found[row.what] = row if old is None else old.with_more(row)
+        return cls(name, tuple(found.values()), sum(o.seconds for o in opinions))
+
+    def told(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        rows = [asdict(row) for row in self.rows]
+        return {"program": self.program, "agrees": self.agrees, "rows": rows}
+
+
+def compare(
+    what: str, unit: str, bound: float, claim: Claim, size: Floats, why: Bools | None
+) -> OpinionRow:
+    """Make a row from the differences at the visits, NaN where there is none.
+
+    Args:
+        what: What was compared.
+        unit: Of the differences.
+        bound: What differs by more disagrees.
+        claim: Names the places.
+        size: Differences, (n,).
+        why: Visits of which nothing is expected, (n,): not counted as skipped.
+    """
+    known = ~np.isnan(size)
+    lost = ~known if why is None else ~known & ~why
+    skipped = {"not known to the planner, or no pose": int(lost.sum())}
+    worst = int(np.nanargmax(size)) if known.any() else -1
+    return OpinionRow(
+        what, unit, int(known.sum()), int((size[known] > bound).sum()),
+        float(size[worst]) if worst >= 0 else 0.0, bound,
+        claim.place(worst) if worst >= 0 else "",
+        {reason: n for reason, n in skipped.items() if n},
+    )  # fmt: skip

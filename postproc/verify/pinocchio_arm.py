@@ -1,0 +1,145 @@
+"""The arm as Pinocchio sees it. The only importer of pinocchio."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.robot.arm_file import ArmFile
+from postproc.verify.opinion import ArmFacts
+
+GRAVITY = 9.80665  # [m/s^2], standard gravity
+CLOSE = 1e-10  # [m] and [rad] to the pose that Newton's method goes to
+ROUNDS = 12  # of it: one is enough between samples of a path
+
+
+class PinocchioArm:
+    """Frames, Jacobians and gravity torques of one arm with one load.
+
+    The angles of its joints are the controller's, but for the share of axis 2 that a
+    parallelogram keeps out of axis 3 (`mix`).
+    """
+
+    def __init__(self, model: Any, pin: Any, mix: Floats) -> None:
+        """Take a model of which the last frame is the flange."""
+        self._pin, self._model, self._data = pin, model, model.createData()
+        self._flange, self._mix = model.nframes - 1, mix
+
+    @classmethod
+    def build(cls, facts: ArmFacts, load: Floats | None = None) -> Self:
+        """Build the chain from the D-H parameters of an arm file.
+
+        Args:
+            facts: The arm.
+            load: Mass [kg] and centre in the flange frame [m], (4,).
+        """
+        import pinocchio as pin
+
+        model, here = pin.Model(), pin.SE3.Identity()
+        model.gravity.linear = GRAVITY * facts.weight
+        for k in range(6):
+            joint, link = _add_joint(pin, model, facts.file, k, here)
+            here = link
+        if load is not None and load[0] > 0:
+            weight = pin.Inertia(float(load[0]), load[1:], np.zeros((3, 3)))
+            model.appendBodyToJoint(joint, weight, here)
+        model.addFrame(pin.Frame("flange", joint, 0, here, pin.FrameType.OP_FRAME))
+        return cls(model, pin, _mix(facts.file))
+
+    def flange(self, q: Floats) -> Floats:
+        """Place the flange for joint angles (6,) [rad]: (4, 4) [m]."""
+        self._pin.framesForwardKinematics(self._model, self._data, self._mix @ q)
+        return np.array(self._data.oMf[self._flange].homogeneous)
+
+    def joints(self, q: Floats) -> tuple[Floats, Floats]:
+        """Place the joints and the flange.
+
+        Returns:
+            Origins of the joints' frames and of the flange, (7, 3) [m], and axes of
+            positive rotation, (6, 3).
+        """
+        end = self.flange(q)[:3, 3]
+        frames = [self._data.oMi[k + 1] for k in range(6)]
+        axes = [
+            self._data.oMi[k + 1].rotation @ self._axis(k) for k in range(6)
+        ]  # fmt: skip
+        return np.array([*(f.translation for f in frames), end]), np.array(axes)
+
+    def _axis(self, k: int) -> Floats:
+        """Return the axis of joint k in its own frame, (3,)."""
+        return np.array(self._model.joints[k + 1].extract().axis)
+
+    def jacobian(self, q: Floats) -> Floats:
+        """Differentiate the flange: (6, 6), linear rows first, base frame."""
+        pin = self._pin
+        world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        geometric = self._mix @ q
+        J = pin.computeFrameJacobian(
+            self._model, self._data, geometric, self._flange, world
+        )
+        return np.asarray(J @ self._mix)
+
+    def torque(self, q: Floats) -> Floats:
+        """Return the torque that gravity exerts about every joint, (6,) [N m]."""
+        held = self._pin.computeGeneralizedGravity(
+            self._model, self._data, self._mix @ q
+        )
+        return np.asarray(-self._mix.T @ held)
+
+    def turn(self, start: Floats, end: Floats) -> Floats:
+        """Return the rotation vector from one rotation to another, base frame."""
+        return np.asarray(self._pin.log3(end[:3, :3] @ start[:3, :3].T))
+
+    def between(self, start: Floats, end: Floats, u: float) -> Floats:
+        """Turn from one rotation (3, 3) to another about one axis, by a share u."""
+        return np.asarray(self._pin.exp3(u * self.turn(start, end)) @ start[:3, :3])
+
+    def reach(self, flange: Floats, near: Floats) -> Floats | None:
+        """Go to a flange pose (4, 4) by Jacobian steps, None where they do not lead."""
+        q = np.array(near)
+        for _ in range(ROUNDS):
+            here = self.flange(q)
+            off = np.append(flange[:3, 3] - here[:3, 3], self.turn(here, flange))
+            if np.abs(off).max() < CLOSE:
+                return q
+            try:
+                step = np.linalg.solve(self.jacobian(q), off)
+            except np.linalg.LinAlgError:
+                return None
+            if np.abs(step).max() > 0.5:  # [rad]: it leaves the branch
+                return None
+            q = q + step
+        return None
+
+
+def _add_joint(
+    pin: Any, model: Any, file: ArmFile, k: int, before: Any
+) -> tuple[int, Any]:
+    """Add joint k behind the D-H frame before it; return its number and its frame."""
+    dh = file.dh
+    zero = np.deg2rad(dh.offset_deg[k] + dh.sense[k] * dh.shift_deg[k])
+    placed = before * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, zero), np.zeros(3))
+    about = pin.JointModelRevoluteUnaligned(np.array([0.0, 0.0, float(dh.sense[k])]))
+    joint = model.addJoint(k, about, placed, f"joint{k + 1}")
+    tilt = pin.rpy.rpyToMatrix(np.deg2rad(dh.alpha_deg[k]), 0.0, 0.0)
+    link = pin.SE3(tilt, np.array([dh.a_mm[k], 0.0, dh.d_mm[k]]) / 1e3)
+    if file.links is not None:
+        centre = np.array(file.links.com_mm[k]) / 1e3
+        mass = pin.Inertia(file.links.mass_kg[k], centre, np.zeros((3, 3)))
+        model.appendBodyToJoint(joint, mass, link)
+    return joint, link
+
+
+def _mix(file: ArmFile) -> Floats:
+    """Return the angles of the chain from the controller's, (6, 6).
+
+    A parallelogram keeps the forearm's direction while axis 2 turns alone: the two
+    turns are about parallel axes, the same way or the other, and cancel.
+    """
+    dh, mix = file.dh, np.eye(6)
+    if dh.axis3_adds_axis2:
+        same = dh.sense[1] * dh.sense[2] * np.cos(np.deg2rad(dh.alpha_deg[1]))
+        mix[2, 1] = -np.sign(same)
+    return mix

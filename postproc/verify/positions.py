@@ -1,0 +1,186 @@
+"""Targets judged by Pinocchio: place, branch, singularity, swing, gravity, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.robot.arm_file import ArmFile
+from postproc.verify.goals import WrittenGoals, written_branches
+from postproc.verify.opinion import ArmFacts, Claim, OpinionRow, compare
+from postproc.verify.pinocchio_arm import PinocchioArm
+
+POSITION_MM, TURN_RAD, JOINT_RAD = 1e-3, 1e-5, 1e-6
+SINGULAR = 1e-6  # of a Jacobian in m and rad
+TORQUE = 0.01  # [N m]
+BORDER = 1e-4  # of a bit of the branch: nearer to its border it may be either
+MM = 1e-3
+
+LoadedArms = Mapping[tuple[float, ...], PinocchioArm]
+"""The arm with every load: mass [kg] and centre [m]."""
+
+
+@dataclass(frozen=True)
+class Posture:
+    """The arm at the n visits of a claim, as Pinocchio places it.
+
+    Attributes:
+        flange: (n, 4, 4) [m], NaN where no joint angles are claimed.
+        points: Origins of the joints and of the flange, (n, 7, 3) [m].
+        axes: Axes of the joints, (n, 6, 3).
+        singular: Smallest singular value of the Jacobian, (n,).
+    """
+
+    flange: Floats
+    points: Floats
+    axes: Floats
+    singular: Floats
+
+
+def posture_of(arm: PinocchioArm, q: Floats) -> Posture:
+    """Place the arm for joint angles (n, 6) [rad]."""
+    n = len(q)
+    flange, points = np.full((n, 4, 4), np.nan), np.full((n, 7, 3), np.nan)
+    axes, singular = np.full((n, 6, 3), np.nan), np.full(n, np.nan)
+    for i in np.flatnonzero(~np.isnan(q).any(axis=1)).tolist():
+        flange[i] = arm.flange(q[i])
+        points[i], axes[i] = arm.joints(q[i])
+        singular[i] = np.linalg.svd(arm.jacobian(q[i]), compute_uv=False)[-1]
+    return Posture(flange, points, axes, singular)
+
+
+def misses(
+    claim: Claim, goals: WrittenGoals, at: Posture
+) -> tuple[Floats, Floats, Floats]:
+    """Return how far claimed joint angles are from what is written.
+
+    Returns:
+        Of poses [m] and [rad], of joint targets [rad], (n,) each; NaN elsewhere.
+    """
+    tcp = at.flange @ goals.tool
+    place = np.linalg.norm(tcp[:, :3, 3] - goals.tcp[:, :3, 3], axis=1)
+    apart = np.linalg.norm(tcp[:, :3, :3] - goals.tcp[:, :3, :3], axis=(1, 2))
+    turn = 2 * np.arcsin(np.minimum(apart / np.sqrt(8), 1.0))
+    return place, turn, np.abs(claim.q - goals.joints).max(axis=1)
+
+
+def confirmed(claim: Claim, goals: WrittenGoals, at: Posture) -> Floats:
+    """Return the joint angles that are where the text says, (n, 6), NaN elsewhere."""
+    place, turn, joints = misses(claim, goals, at)
+    there = (place / MM <= POSITION_MM) & (turn <= TURN_RAD) | (joints <= JOINT_RAD)
+    return np.where(there[:, None], claim.q, np.nan)
+
+
+def judge_positions(
+    claim: Claim,
+    goals: WrittenGoals,
+    at: Posture,
+    arms: LoadedArms,
+) -> list[OpinionRow]:
+    """Compare targets, branches, singular values and torques of one program."""
+    place, turn, joints = misses(claim, goals, at)
+    poses = np.asarray(np.isnan(goals.joints).any(axis=1))
+    named = claim.label
+    rows = [
+        compare(f"{named}: place", "mm", POSITION_MM, claim, place / MM, ~poses),
+        compare(f"{named}: orientation", "rad", TURN_RAD, claim, turn, ~poses),
+        compare(f"{named}: joint targets", "rad", JOINT_RAD, claim, joints, poses),
+    ]
+    off = np.abs(at.singular - claim.singular)
+    rows.append(compare(f"{named}: singular value", "", SINGULAR, claim, off, None))
+    if len(claim.torque):
+        off = torque_misses(claim, arms)
+        rows.append(
+            compare(f"{named}: gravity torque", "N m", TORQUE, claim, off, None)
+        )
+    return rows
+
+
+def torque_misses(claim: Claim, arms: LoadedArms) -> Floats:
+    """Return how far claimed gravity torques are from Pinocchio's, (n,) [N m]."""
+    out = np.full(len(claim), np.nan)
+    for i in np.flatnonzero(~np.isnan(claim.q).any(axis=1)).tolist():
+        arm = arms[tuple(claim.payload[i].tolist())]
+        out[i] = np.abs(arm.torque(claim.q[i]) - claim.torque[i]).max()
+    return out
+
+
+def judge_branches(claim: Claim, file: ArmFile, at: Posture) -> list[OpinionRow]:
+    """Compare the branches with what the planner and the text name."""
+    if file.opw is None:
+        return []
+    bits, sure = branch_bits(at, file)
+    rows = []
+    written = written_branches(claim.visits)
+    for what, slot in (("planner", claim.slot), ("flags", written)):
+        named = (slot[:, None] >> np.array([2, 1, 0])) & 1
+        other = ((bits != named) & sure).any(axis=1).astype(float)
+        other[(slot < 0) | np.isnan(at.singular)] = np.nan
+        text = f"{claim.label}: branch, {what}"
+        rows.append(compare(text, "", 0.0, claim, other, slot < 0))
+    return rows
+
+
+def branch_bits(at: Posture, file: ArmFile) -> tuple[Ints, Bools]:
+    """Tell the bits W, S, E of branches by where the joints are.
+
+    W: on which side of the forearm's line the flange is; S: the wrist centre behind
+    axis 1; E: the side of the upper arm on which the forearm is bent.
+
+    Returns:
+        The bits, and which of them are beyond a border, (n, 3) each.
+    """
+    assert file.opw is not None
+    way = np.where(file.opw.flip_axes, -1.0, 1.0)
+    origin, axis = at.points, at.axes
+    shoulder, elbow, wrist = origin[:, 1], origin[:, 2], origin[:, 4]
+    across = way[1] * axis[:, 1]
+    ahead = np.cross(across, [0.0, 0.0, 1.0])
+    fore = _unit(wrist - elbow - _along(wrist - elbow, across))
+    roll = axis[:, 3] * np.sign(np.sum(axis[:, 3] * fore, axis=1))[:, None]
+    hand, bend = _unit(origin[:, 6] - wrist), _unit(elbow - shoulder)
+    heights = np.stack(
+        [
+            np.sum(np.cross(roll, hand) * axis[:, 4] * way[4], axis=1),
+            np.sum((wrist - origin[:, 0]) * ahead, axis=1),
+            np.sum(np.cross(bend, fore) * across, axis=1),
+        ],
+        axis=1,
+    )
+    return (heights < 0).astype(np.int64), np.abs(heights) > BORDER
+
+
+def _along(vector: Floats, unit: Floats) -> Floats:
+    """Return the part of vectors (n, 3) along unit vectors (n, 3)."""
+    return np.asarray(np.sum(vector * unit, axis=1)[:, None] * unit)
+
+
+def _unit(vector: Floats) -> Floats:
+    """Scale vectors (n, 3) to length 1."""
+    return np.asarray(vector / np.linalg.norm(vector, axis=1)[:, None])
+
+
+def judge_motion(
+    source: Claim, output: Claim, facts: ArmFacts, before: Posture, after: Posture
+) -> list[OpinionRow]:
+    """Judge how far a correction swings elbow and wrist centre, and joint limits."""
+    own = output.own
+    moved = np.linalg.norm(after.points[own] - before.points, axis=2) / MM
+    limits = ((2, "elbow", facts.elbow), (4, "wrist centre", facts.wrist_centre))
+    rows = [
+        compare(f"swing of the {name}", "mm", most / MM, source, moved[:, k], None)
+        for k, name, most in limits
+    ]
+    beyond = _beyond(output.q[own], facts.file) - _beyond(source.q, facts.file)
+    text = "beyond a joint limit by correction"
+    over = np.maximum(beyond, 0.0)
+    return [*rows, compare(text, "rad", JOINT_RAD, source, over, None)]
+
+
+def _beyond(q: Floats, file: ArmFile) -> Floats:
+    """Return how far joints (n, 6) [rad] are beyond their limits, (n,) [rad]."""
+    low, high = np.deg2rad(file.joints.lower_deg), np.deg2rad(file.joints.upper_deg)
+    return np.asarray(np.maximum(np.maximum(low - q, q - high), 0.0).max(axis=1))

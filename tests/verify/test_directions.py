@@ -1,0 +1,96 @@
+"""Directions read off trajectories of toppra and ruckig."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.compensation.options import Options
+from postproc.verify.directions import MOVES, draw
+from postproc.verify.ruckig_move import move_in_time
+from postproc.verify.toppra_run import run_in_time
+from tests.verify.judged import SHIPPED, row, shipped
+
+LIMITS = np.array([[2.0] * 6, [5.0] * 6, [50.0] * 6])
+
+
+def test_a_run_is_timed_and_goes_its_way() -> None:
+    u = np.linspace(0.0, 1.0, 40)[:, None]
+    way = np.sin(u * np.arange(1, 7))
+    found = run_in_time(way, LIMITS[0], LIMITS[1])
+    assert found is not None
+    np.testing.assert_allclose(found[[0, -1]], way[[0, -1]], atol=1e-6)
+    apart = np.abs(found[:, None] - way).max(axis=2).min(axis=1)
+    assert apart.max() < np.abs(np.diff(way, axis=0)).max()
+
+
+def test_a_run_of_no_length_needs_no_time() -> None:
+    still = run_in_time(np.zeros((5, 6)), LIMITS[0], LIMITS[1])
+    assert still is not None and np.abs(still).max() == 0.0
+
+
+def test_toppra_may_fail() -> None:
+    way = np.linspace(0.0, 1.0, 9)[:, None] * np.ones(6)
+    way[4] = np.nan
+    assert run_in_time(way, LIMITS[0], LIMITS[1]) is None
+
+
+def test_a_joint_move_is_timed() -> None:
+    end = np.arange(1.0, 7.0)
+    found = move_in_time(np.zeros(6), end, LIMITS)
+    assert found is not None
+    np.testing.assert_allclose(found[[0, -1]], [np.zeros(6), end], atol=1e-9)
+    assert move_in_time(np.zeros(6), end, 0 * LIMITS) is None
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_shipped_programs_agree(name: str, bench_model) -> None:
+    job = shipped(name, bench_model)
+    opinion = job.opinion()
+    assert opinion.agrees, opinion.told()
+    ends = row(opinion, "output: end of the way")
+    assert 0.9 < ends.compared / min(len(job.outcome.visits), MOVES)
+    assert ends.largest < 1e-8  # [rad]
+    found = row(opinion, "output: approach directions")
+    stops = 6 * int((~job.outcome.visits.fly & ~job.outcome.visits.via).sum())
+    skipped = {why: n for why, n in found.skipped.items() if "blend" not in why}
+    assert found.compared + sum(skipped.values()) == stops
+    assert found.compared > 0.7 * stops
+
+
+def test_long_programs_are_drawn_from_in_blocks(bench_model) -> None:
+    opinion = shipped("milling.pdl", bench_model).opinion()
+    ends = row(opinion, "output: end of the way")
+    assert ends.compared + sum(ends.skipped.values()) == 5171
+    assert MOVES - 250 < ends.compared <= MOVES
+    assert opinion.seconds < 60
+
+
+def test_the_same_program_is_drawn_from_alike(bench_model) -> None:
+    class Long:
+        def __init__(self, seed: int) -> None:
+            self.visits = self
+            self.values = np.random.default_rng(seed).random((20_000, 6))
+
+        def __len__(self) -> int:
+            return 20_000
+
+    rows = [draw(Long(seed)) for seed in (1, 1, 2)]  # type: ignore[arg-type]
+    assert len(rows[0]) == MOVES
+    assert np.array_equal(rows[0], rows[1]) and not np.array_equal(rows[0], rows[2])
+
+
+def test_clones_are_judged_by_what_they_are_corrected_for(bench_model) -> None:
+    opinion = shipped("handling.pdl", bench_model, Options(clone=True)).opinion()
+    assert opinion.agrees, opinion.told()
+    assert row(opinion, "output: approach directions").compared > 400
+
+
+def test_points_on_ways_are_visits_of_the_output_alone(bench_model) -> None:
+    options = Options(path_mm=0.05, max_inserted=50)
+    job = shipped("drilling.pdl", bench_model, options)
+    opinion = job.opinion()
+    assert opinion.agrees, opinion.told()
+    before, after = (row(opinion, f"{k}: place").compared for k in ("source", "output"))
+    assert before < after <= before + 50
+    assert not [r.what for r in opinion.rows if "swing" in r.what]
