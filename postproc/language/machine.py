@@ -89,14 +89,14 @@ class CallContext:
             return (*self.caller.way(), self.back - 1)
         return (self.scope.file, self.routine.first)
 
-    def is_within(self, file: int, routine: HeadedRows) -> bool:
-        """Tell whether a routine is being run here."""
+    def running(self, file: int, routine: HeadedRows) -> CallContext | None:
+        """Return the call of a routine that is being run here, None without one."""
         at: CallContext | None = self
         while at is not None:
-            if at.scope.file == file and at.routine is routine:
-                return True
+            if at.scope.file == file and at.routine is routine and at.outer is None:
+                return at
             at = at.caller if at.outer is None else at.outer
-        return False
+        return None
 
 
 @dataclass(frozen=True)
@@ -198,6 +198,10 @@ class TaskMachine(ABC):
     ) -> None:
         """Go on behind a statement that only this language has."""
         self.enter(context, row + 1, self.unknown(context, row, here))
+
+    def counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
+        """Return True if nothing but the loop itself changes its variable."""
+        return True
 
     def raise_error(  # noqa: B027 - most languages have no such statement
         self, context: CallContext, row: int, one: said.Leave, here: Arrived
@@ -334,6 +338,8 @@ class TaskMachine(ABC):
     ) -> tuple[float, ...] | None:
         """Return the values of a loop's variable, None where they are not known."""
         scope = context.scope
+        if not self.counts_alone(context, row, one):
+            return None
         first, last = (self.number(x, row, scope) for x in (one.first, one.last))
         step = self.usual_step(first, last)
         if one.step is not None:
@@ -442,9 +448,15 @@ class TaskMachine(ABC):
         self, context: CallContext, row: int, found: tuple[int, str, HeadedRows],
         here: Arrived,
     ) -> Arrived | None:  # fmt: skip
-        """Go on in a routine, but for one that is being run."""
+        """Go on in a routine; one that is being run begins again as well.
+
+        What holds behind such a call is not known.
+        """
         file, module, routine = found
-        if context.is_within(file, routine) or context.depth > DEEPEST:
+        running = context.running(file, routine)
+        if running is not None:
+            self.enter(running, running.flow.first, self.at_call(running, here))
+        if running is not None or context.depth > DEEPEST:
             return self.unknown(context, row, here, "calls itself: it is not followed")
         self.call(file, module, routine, context, row + 1, here)
         return None

@@ -51,7 +51,8 @@ def visits_of(machine: KrlMachine) -> Visits:
 
     def conditions(v: KrlVisit) -> Conditions:
         at = number[id(v)]
-        return _conditions(machine, v, base, ends[at], at in odd)
+        early = machine.early.get(at, frozenset())
+        return _conditions(machine, v, base, ends[at], at in odd, early)
 
     moves = {k: file.moves for k, file in enumerate(machine.task.files)}
     return collect.visits_of(machine, KRL_DIALECT, conditions, COMMENTS, moves)
@@ -85,14 +86,19 @@ class _Blending:
 
 
 def _conditions(
-    machine: KrlMachine, v: KrlVisit, base: Pose, end: str, odd: bool
+    machine: KrlMachine,
+    v: KrlVisit,
+    base: Pose,
+    end: str,
+    odd: bool,
+    early: frozenset[str],
 ) -> Conditions:
     """Say what an arrival is carried out with."""
     modes, unset = _effective(machine, v)
     joint = v.motion == Motion.JOINT
     blending = _blending(v, modes, end)
     active = {why for _, why in modes.active}
-    blocked = modes.blocked | active | machine.everywhere
+    blocked = modes.blocked | active | machine.everywhere | early
     given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
     if v.goal.target != Meaning.JOINTS:
         given += (modes.base.why, "" if modes.interpolation else _IPO)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -47,6 +48,7 @@ MOVES, BRAKES, RESUMES = "moves", "brake", "resume"
 """What statements may do to moves that are under way."""
 _Effects = tuple[frozenset[str], list[tuple[int, HeadedRows]]]
 EVERY = -1  # interrupt whose number is not known
+FURTHEST_AHEAD = 5  # moves, by $ADVANCE
 
 
 @dataclass
@@ -63,6 +65,7 @@ class KrlMachine(TaskMachine):
     _known: dict[tuple[int, int], _Effects] = field(default_factory=dict)
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
+    _before: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
 
     @classmethod
     def of(cls, task: KrlTask, start: Start) -> KrlMachine:
@@ -99,6 +102,43 @@ class KrlMachine(TaskMachine):
         """Return where the statements of a routine stand."""
         return self.task.scope_of(file, module, routine)
 
+    def counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
+        """Return True if only the loop changes its variable, see `TaskMachine`.
+
+        A variable that is not the routine's own may be changed by routines that the
+        loop calls, and by what runs beside it.
+        """
+        rows = range(row + 1, context.flow.loops.get(row, row))
+        text = self.texts[context.scope.file]
+        inside = [text.statement(k) for k in rows]
+        if any(one.name in self._sets(other) for other in inside):
+            return False
+        scope = context.scope
+        if self.task.place(one.name, scope) == (scope.module, scope.routine):
+            return True
+        others = self.task.counted[one.name] > 1 or one.name in self.task.assigned
+        return not (others and (self._has_interrupts or self._calls_own(inside)))
+
+    def _sets(self, one: said.SourceStatement) -> set[str]:
+        """Return the names of data that a statement sets, also as a loop."""
+        named = {one.name} if isinstance(one, said.ForLoop) else set()
+        return named | {data.name for data in changed_by(one, self.task.routines)}
+
+    def _calls_own(self, statements: Sequence[said.SourceStatement]) -> bool:
+        """Return True if a statement calls a routine of the files."""
+        called = {one.name for one in statements if isinstance(one, said.Instruction)}
+        for part in parts_of([x for one in statements for x in operands_of(one)]):
+            if isinstance(part, said.FunctionCall):
+                called.add(part.name)
+        return not called.isdisjoint(self.task.routines)
+
+    @cached_property
+    def _has_interrupts(self) -> bool:
+        """Return True if interrupts or triggers may call routines."""
+        kinds = said.InterruptDeclared | said.PathTrigger
+        said_ones = (one for text in self.texts for one in text.said)
+        return any(isinstance(one, kinds) for one in said_ones)
+
     @staticmethod
     def usual_step(first: float, last: float) -> float:
         """Count by 1: a loop downwards needs STEP."""
@@ -117,7 +157,10 @@ class KrlMachine(TaskMachine):
             return self._carry_out(context, row, one, here)
         here = replace(here, modes=here.modes.with_(perhaps=False))
         after = self._carry_out(context, row, one, here)
-        return None if after is None else after.joined(here)
+        if after is None:
+            self.enter(context, row + 1, here)
+            return None
+        return after.joined(here)
 
     def _carry_out(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
@@ -153,7 +196,7 @@ class KrlMachine(TaskMachine):
             return here
         own = one.target if isinstance(one, said.Assignment) else None
         store = here.modes.store
-        for target in changed_by(one):
+        for target in changed_by(one, self.task.routines):
             name = target.name
             if target is own or not _is_modal(name):
                 continue
@@ -275,11 +318,13 @@ class KrlMachine(TaskMachine):
         others = frozenset(d for d in modes.declared if d[0] != number)
         modes = replace(modes, declared=others)
         if RESUMES in effects:
+            self._begin_early(_RESUMED, here)
             return replace(here, modes=modes.with_(blocked=modes.blocked | {_RESUMED}))
         if effects:
             own = number, _INTERRUPT if MOVES in effects else _RESUMED
             modes = replace(modes, declared=others | {own})
             if not {number, EVERY} & self._switched_on:
+                self._begin_early(own[1], here)
                 modes = replace(modes, active=modes.active | {own})
         return replace(here, modes=modes)
 
@@ -293,6 +338,8 @@ class KrlMachine(TaskMachine):
             meant = {
                 d for d in modes.declared if EVERY in (number, d[0]) or d[0] == number
             }
+            for _, why in meant:
+                self._begin_early(why, here)
             return replace(here, modes=replace(modes, active=modes.active | meant))
         if one.word != "off" or (one.number is not None and number == EVERY):
             return here
@@ -300,6 +347,31 @@ class KrlMachine(TaskMachine):
         if left == modes.active:
             return here
         return replace(here, modes=replace(modes, active=frozenset(left))).lost()
+
+    def _begin_early(self, why: str, here: Arrived) -> None:
+        """Note that an interrupt may come in moves before it is switched on.
+
+        The program is ahead of the arm, unless it has waited for it.
+        """
+        if not here.modes.halted:
+            self._before[why] |= here.origins
+
+    @cached_property
+    def early(self) -> Mapping[int, frozenset[str]]:
+        """Return visits on whose way an interrupt may come that is switched on later.
+
+        The program is ahead by `FURTHEST_AHEAD` moves at most.
+        """
+        found: dict[int, frozenset[str]] = {}
+        for why, origins in self._before.items():
+            reached = set(origins)
+            for _ in range(FURTHEST_AHEAD):
+                behind = [self.visits[k] for k in reached if k >= 0]
+                before = [v.origins for v in behind if not v.modes.halted]
+                reached = reached.union(*before)
+            for k in reached:
+                found[k] = found.get(k, frozenset()) | {why}
+        return found
 
     def _number_of(
         self, context: CallContext, row: int, operand: said.Operand | None
@@ -415,7 +487,8 @@ class KrlMachine(TaskMachine):
                 return frozenset([word])
             case said.PathTrigger(action=action):
                 return self._own(file, action, called)
-        if any(_is_modal(target.name) for target in changed_by(one)):
+        changed = changed_by(one, self.task.routines)
+        if any(_is_modal(target.name) for target in changed):
             return frozenset([MOVES])
         here = Scope(file, self.task.files[file].name, "")
         parts = parts_of(operands_of(one))

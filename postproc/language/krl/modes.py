@@ -18,7 +18,7 @@ from postproc.language.krl.store import (
     KrlStore,
     entry_name,
 )
-from postproc.language.krl.task import KrlRecord, KrlTask, KrlValue, is_word
+from postproc.language.krl.task import KrlRecord, KrlTask, KrlValue, is_word, parts_of
 from postproc.language.machine import Scope
 from postproc.language.visits import OrientationLaw
 from postproc.robot.pose import MM
@@ -180,6 +180,9 @@ class ModeReader:
 
     def assigned(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
         """Carry out ``$name = value``, None where nobody knows what that does."""
+        own = self._own_function(one.value)
+        if own:
+            one = replace(one, value=said.FunctionCall(f"{own} of the files", ()))
         name, value = one.target.name, one.value
         match name:
             case "$tool" | "$base":
@@ -214,6 +217,12 @@ class ModeReader:
                 return replace(modes, store=self._correction(modes, one))
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
+
+    def _own_function(self, operand: said.Operand) -> str:
+        """Name a function of the files that gives a value; it is not followed."""
+        parts = parts_of([operand])
+        called = (one.name for one in parts if isinstance(one, said.FunctionCall))
+        return next((name for name in called if name in self.task.routines), "")
 
     def _frame(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
         """``$TOOL = ..``, ``$BASE = ..``; of a component: nobody knows all of it."""
