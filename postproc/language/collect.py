@@ -187,7 +187,10 @@ def visits_of(
     texts, n = machine.texts, len(found)
     tables = _Tables(Interned(), Interned([""]), Interned([""]))
     loads = Interned[tuple[float, ...]]([NO_LOAD])
-    literals, literal, follows = _literals(found, machine, dialect.width, comments)
+    other = _reached_beside(machine, moves)
+    literals, literal, follows = _literals(
+        found, machine, dialect.width, comments, other
+    )
     reasons = [_reason(c, machine.exhausted) for c in held]
     for k in np.flatnonzero(follows == _NO_LITERAL).tolist():
         reasons[k] = reasons[k] or ONLY_SHIFTED
@@ -313,6 +316,9 @@ def _aux(found: Sequence[FoundVisit]) -> np.ndarray:
 # Where the numbers stand.
 
 _NO_LITERAL = -2  # follows numbers that are no literal
+BESIDE = (
+    "the move in line {} of {} goes there too: how it is reached there is not followed"
+)
 
 
 def _literals(
@@ -320,8 +326,17 @@ def _literals(
     machine: TaskMachine,
     width: int,
     comments: Comments,
+    other: Mapping[tuple[int, int], str],
 ) -> tuple[Literals, Ints, Ints]:
-    """Find the distinct literals; also those of visits, and those they follow."""
+    """Find the distinct literals; also those of visits, and those they follow.
+
+    Args:
+        found: The visits.
+        machine: It has followed all ways.
+        width: Numbers of a target.
+        comments: How the language writes them.
+        other: Why literals stay that moves beside go to, by file and first number.
+    """
     index: dict[tuple[int, int], int] = {}
     rows: list[FoundVisit] = []
     literal = np.full(len(found), -1, dtype=np.int64)
@@ -333,7 +348,7 @@ def _literals(
                 rows.append(v)
             literal[k] = index[key]
     follows = np.full(len(found), -1, dtype=np.int64)
-    pinned = [""] * len(rows)
+    pinned = [other.get((v.goal.file, v.goal.slots[0]), "") for v in rows]
     for k, v in enumerate(found):
         key = v.goal.file, max(v.goal.slots[0], v.goal.follows[0])
         at = index.get(key, -1)
@@ -343,6 +358,20 @@ def _literals(
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
     return _places(rows, machine, pinned, width, comments), literal, follows
+
+
+def _reached_beside(
+    machine: TaskMachine, moves: Mapping[int, Sequence[int]]
+) -> dict[tuple[int, int], str]:
+    """Find the literals that moves go to which run in ways that are not followed."""
+    known = {(file, row) for file, rows in moves.items() for row in rows}
+    found: dict[tuple[int, int], str] = {}
+    for file, row in sorted(known.intersection(machine.rows_beside())):
+        text = machine.texts[file]
+        why = BESIDE.format(text.line(row), text.source.name)
+        for goal in machine.goals_of(file, row):
+            found.setdefault((goal.file, max(goal.slots[0], goal.follows[0])), why)
+    return found
 
 
 def _places(

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from typing import Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from postproc.language.flow import EXIT, HeadedRows, RoutineFlow, flow_of
 from postproc.language.interface import Start
 from postproc.language.statements import StatementText
 from postproc.language.visits import ELSEWHERE, MOTION_UNKNOWN, Diagnostic
+
+if TYPE_CHECKING:
+    from postproc.language.collect import FoundGoal
 
 MOST_STEPS = 4_000_000  # statements run, all in all
 MOST_ROUNDS = 10_000  # rounds of a loop that are followed one by one
@@ -143,6 +146,8 @@ class TaskMachine(ABC):
         diagnostics: What else was found.
         reached: Moves that some way leads to: file and row.
         exhausted: It has too many ways to be followed.
+        beside: Statements that run in ways that are not followed: file, first row, and
+            the row behind the last.
     """
 
     texts: Sequence[StatementText[Any]]
@@ -152,6 +157,7 @@ class TaskMachine(ABC):
     diagnostics: set[Diagnostic] = field(default_factory=set)
     reached: set[tuple[int, int]] = field(default_factory=set)
     exhausted: bool = False
+    beside: set[tuple[int, int, int]] = field(default_factory=set)
     _numbers: dict[tuple[CallContext, int], list[int]] = field(default_factory=dict)
     _entered: dict[Place, Arrived] = field(default_factory=dict)
     _left: dict[Place, Arrived] = field(default_factory=dict)
@@ -192,6 +198,16 @@ class TaskMachine(ABC):
     @abstractmethod
     def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
         """Return where the statements of a routine stand."""
+
+    @abstractmethod
+    def calls_of(
+        self, file: int, one: said.SourceStatement
+    ) -> Iterable[tuple[int, HeadedRows]]:
+        """Yield the routines that a statement calls: their files and places."""
+
+    @abstractmethod
+    def goals_of(self, file: int, row: int) -> Iterable[FoundGoal]:
+        """Yield where a move goes that is not followed."""
 
     def part_otherwise(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
@@ -525,6 +541,25 @@ class TaskMachine(ABC):
         text = self.texts[file]
         message = f"{text.shown(row)} {what}" if quote else what
         self.diagnostics.add(text.diagnostic(row, code, message))
+
+    # What runs, and is not followed.
+
+    def run_beside(self, file: int, routine: HeadedRows) -> None:
+        """Note a routine that runs at a time, or in a way, that is not followed."""
+        self.beside.add((file, routine.first, routine.last))
+
+    def rows_beside(self) -> Iterator[tuple[int, int]]:
+        """Yield statements that run in ways that are not followed: file and row."""
+        waiting, seen = sorted(self.beside), set(self.beside)
+        while waiting:
+            file, first, behind = waiting.pop()
+            for row in range(first, behind):
+                yield file, row
+                for at, one in self.calls_of(file, self.texts[file].statement(row)):
+                    key = at, one.first, one.last
+                    if key not in seen:
+                        seen.add(key)
+                        waiting.append(key)
 
     def missed(self, moves: Mapping[int, Iterable[int]]) -> dict[str, Ints]:
         """Return the lines of moves that no way leads to, by file.

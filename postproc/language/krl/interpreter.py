@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from postproc.language.collect import cell_pose
+from postproc.language.collect import FoundGoal, cell_pose
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
 from postproc.language.krl import syntax as said
@@ -247,6 +247,8 @@ class KrlMachine(TaskMachine):
         if found is not None:
             return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
+            for file, routine, _ in self.task.routines[name]:
+                self.run_beside(file, routine)
             return self.unknown(context, row, here, "names several routines")
         if name == "bas":
             here = _halted(here, None) if _puts_out(one) else here
@@ -299,6 +301,7 @@ class KrlMachine(TaskMachine):
         if found is not None:
             if not self._moves(found[0], found[2]):
                 return _halted(here, None)
+            self.run_beside(found[0], found[2])
             what = f"calls the function {name}, which moves: it is not followed"
             return self.unknown(context, row, here, what)
         if name in FUNCTIONS or name in STILL or self.said_still(name):
@@ -314,6 +317,7 @@ class KrlMachine(TaskMachine):
         """Declare an interrupt; one that nothing switches on may be on already."""
         self._met.add((context.scope.file, row))
         effects = self._effects_of(context.scope.file, one.action)
+        self._call_beside(context.scope.file, one.action)
         modes, number = here.modes, self._number_of(context, row, one.number)
         others = frozenset(d for d in modes.declared if d[0] != number)
         modes = replace(modes, declared=others)
@@ -402,9 +406,33 @@ class KrlMachine(TaskMachine):
         """
         if not self._effects_of(context.scope.file, one.action):
             return here
+        self._call_beside(context.scope.file, one.action)
         return replace(
             here, modes=here.modes.with_(blocked=here.modes.blocked | {_INTERRUPT})
         )
+
+    def _call_beside(self, file: int, action: said.SourceStatement) -> None:
+        """Note the routines that an interrupt or a trigger calls."""
+        for called in self.calls_of(file, action):
+            self.run_beside(*called)
+
+    def calls_of(
+        self, file: int, one: said.SourceStatement
+    ) -> list[tuple[int, HeadedRows]]:
+        """Return the routines that a statement calls, see `TaskMachine`."""
+        called = list[tuple[int, HeadedRows]]()
+        self._own(file, one, called)
+        return called
+
+    def goals_of(self, file: int, row: int) -> Iterator[FoundGoal]:
+        """Yield where a move goes, see `TaskMachine`."""
+        one, source = self.texts[file].statement(row), self.task.files[file]
+        around = (r for r in source.routines if r.first < row < r.last)
+        routine = next(around, None)
+        if routine is not None and isinstance(one, said.KrlMove):
+            scope = self.task.scope_of(file, source.name, routine)
+            for visit in self.goals.visits(one, row, scope, None):
+                yield visit.goal
 
     def _robot_texts(self) -> Iterator[tuple[int, KrlText]]:
         """Yield files and statements, but for those of submit programs."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeGuard
 
+from postproc.language.collect import FoundGoal
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
 from postproc.language.machine import (
@@ -47,6 +49,7 @@ from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
 SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
+BY_NAME = "callbyvar"
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (
@@ -178,7 +181,10 @@ class RapidMachine(TaskMachine):
                 return key_of(operand, self.task.number(operand, row, scope))
 
             clauses = clauses_of(text, context.flow, read)
-            moves = self._any_moves(scope, context.flow.handlers, (EXIT_CYCLE,))
+            rows = context.flow.handlers
+            moves = self._any_moves(scope, rows, (EXIT_CYCLE,))
+            if moves:
+                self.beside.add((scope.file, rows.start, rows.stop))
             self._handlers[key] = ErrorHandlers(clauses, moves)
         return self._handlers[key]
 
@@ -247,7 +253,54 @@ class RapidMachine(TaskMachine):
             self.enter(context, row + 1, here)
             self._compact(context, row, one.statement, here)
         else:
+            self._bind_late(one)
             super().part_otherwise(context, row, one, here)
+
+    def _bind_late(self, one: said.RapidStatement) -> None:
+        """Note the procedures that ``%name%`` may call."""
+        if not isinstance(one, said.LateCall):
+            return
+        if _is_text(one.procedure):
+            self._run_named_beside(_called(one.procedure))
+        else:
+            self._run_all_beside()
+
+    def _run_named_beside(self, name: str) -> None:
+        """Note all routines of a name."""
+        for file, _, routine in self.task.routines.get(name, []):
+            self.run_beside(file, routine)
+
+    def _run_all_beside(self) -> None:
+        """Note that every procedure may be called."""
+        for file, _, routine in self._procedures():
+            self.run_beside(file, routine)
+
+    def calls_of(
+        self, file: int, one: said.RapidStatement
+    ) -> list[tuple[int, HeadedRows]]:
+        """Return the routines that a statement calls, see `TaskMachine`."""
+        inner = inside(one)
+        names = {*functions_in(one)}
+        if isinstance(inner, said.LateCall) or getattr(inner, "name", "") == BY_NAME:
+            return [(at, routine) for at, _, routine in self._procedures()]
+        if isinstance(inner, said.Instruction):
+            texts = [a.value for a in inner.arguments if _is_text(a.value)]
+            late = inner.name in SYNCHRONOUS
+            names |= {inner.name, *(_called(text) for text in texts if late)}
+        found = [one for name in names for one in self.task.routines.get(name, [])]
+        return [(at, routine) for at, _, routine in found]
+
+    def goals_of(self, file: int, row: int) -> Iterator[FoundGoal]:
+        """Yield where a move goes, see `TaskMachine`."""
+        one = inside(self.texts[file].statement(row))
+        routines = (one for found in self.task.routines.values() for one in found)
+        around = (r for r in routines if r[0] == file and r[2].first < row < r[2].last)
+        place = next(around, None)
+        signature = MOTIONS.get(getattr(one, "name", ""))
+        if place and signature and isinstance(one, said.Instruction):
+            scope = self.task.scope_of(*place)
+            for visit in self.goals.visits(one, signature, row, scope, AT_START):
+                yield visit.goal
 
     def _compact(
         self, context: CallContext, row: int, inside: said.RapidStatement, here: Arrived
@@ -277,6 +330,7 @@ class RapidMachine(TaskMachine):
             self.reached.add((scope.file, row))
             return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
+            self._run_named_beside(name)
             return self.unknown(context, row, here, "names several routines")
         kind = known_instructions().get(name)
         if name == EXIT_CYCLE:
@@ -289,6 +343,8 @@ class RapidMachine(TaskMachine):
             return replace(here, modes=changed.allowing())
         if kind in ("still", "modal") or self.said_still(name):
             return here
+        if name == BY_NAME:
+            self._run_all_beside()
         if kind == "left" and name not in self.start.routines:
             return self.unknown(context, row, here, _LEFT)
         return self.outside(context, row, name, here)
@@ -327,12 +383,13 @@ class RapidMachine(TaskMachine):
         """Allow for the procedure that a move calls while the program runs ahead."""
         placed = [argument.value for argument in one.arguments if not argument.name]
         called = placed[-1] if placed else None
-        name = called.text.strip('"').lower() if _is_text(called) else ""
+        name = _called(called) if _is_text(called) else ""
         if self.said_still(name) and name not in self.task.routines:
             return here
         found = self.task.routine(name.split(":")[-1], context.scope)
         given = None if found is None else self._given(*found)
         if given is None:
+            self._run_named_beside(name.split(":")[-1])
             what = "calls a procedure on its way that may move the arm"
             what = what if found else f"{what}: it is in no file of the task"
             here = self.unknown(context, row, here, what)
@@ -382,6 +439,7 @@ class RapidMachine(TaskMachine):
                 what = f"calls the function {name}, which is not known: it may move"
                 here = self.unknown(context, row, here, what)
             elif self._moves(*found):
+                self.run_beside(found[0], found[2])
                 what = f"calls the function {name}, which moves: it is not followed"
                 here = self.unknown(context, row, here, what)
         return here
@@ -434,6 +492,11 @@ _HANDLER = "the error handler of its routine may move the arm, or change its set
 
 def _is_text(operand: said.Operand | None) -> TypeGuard[said.StringLiteral]:
     return isinstance(operand, said.StringLiteral)
+
+
+def _called(text: said.StringLiteral) -> str:
+    """Return the procedure that a text names."""
+    return text.text.strip('"').lower()
 
 
 def _kind(routine: HeadedRows) -> str:
