@@ -33,6 +33,12 @@ _UNSIZED = "how early it is blended ($APO) is not known here"
 _IPO = "$IPO_MODE is not known here"
 _STATUS = "bit 2 of S and bit 4 of T disagree, otherwise than at the other points"
 _STILL_TOOL = "$ORI_TYPE = #CONSTANT: the tool keeps the orientation it comes with"
+_NOT_TURNED = {
+    "#constant": _STILL_TOOL,
+    "#ignore": "$ORI_TYPE = #IGNORE: the tool does not turn to the point",
+}
+_MAY_NOT_TURN = "which orientation the tool takes is not known here ($ORI_TYPE)"
+TURNING = ("#var", "#joint")  # ways to the orientation of a point
 _SWAPPED = (
     "$TOOL and $BASE were set with IPO_FRAME #TCP, which swaps them on some "
     "controllers: set them anew with #BASE"
@@ -204,10 +210,10 @@ def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
     """Forget targets whose orientation the tool does not take."""
     for v in found:
         modes, _ = _effective(machine, v)
-        if modes.orientation == "#constant" and v.motion != Motion.JOINT:
+        if modes.orientation not in TURNING and v.motion != Motion.JOINT:
             v.goal = FoundGoal(
                 Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, name=v.goal.name,
-                why=v.goal.why or _STILL_TOOL,
+                why=v.goal.why or _not_turned(modes),
             )  # fmt: skip
 
 
@@ -226,6 +232,12 @@ def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
             lost |= own is None or any(_frames(machine, one) != own for one in before)
         if lost:
             v.goal = FoundGoal(Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, why=PARTIAL)
+
+
+def _not_turned(modes: KrlModes) -> str:
+    """Say why the tool need not turn to a point; frames that are lost come first."""
+    lost = modes.tool.why or modes.base.why
+    return _NOT_TURNED.get(modes.orientation, lost or _MAY_NOT_TURN)
 
 
 def _frames(machine: KrlMachine, v: KrlVisit) -> tuple[Pose, Pose, str] | None:

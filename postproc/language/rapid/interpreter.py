@@ -27,6 +27,7 @@ from postproc.language.rapid.errors import (
     clauses_of,
     common,
     key_of,
+    may_be_skipped,
     may_raise,
     numbers_of,
 )
@@ -72,8 +73,8 @@ class RapidMachine(TaskMachine):
 
     task: RapidTask = field(kw_only=True)
     goals: Goals = field(kw_only=True)
-    ends: list[Modes] = field(default_factory=list)
-    restarts: list[Modes] = field(default_factory=list)
+    ends: list[Arrived] = field(default_factory=list)
+    restarts: list[Arrived] = field(default_factory=list)
     _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
     _exits: dict[CallContext, tuple[ErrorExit, ...]] = field(default_factory=dict)
     _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
@@ -107,18 +108,18 @@ class RapidMachine(TaskMachine):
             self.follow_all()
 
     def _next_cycle(self, here: Arrived) -> Arrived:
-        """Return how main begins again: with the modes that hold where a cycle ends.
+        """Return how main begins again: from where, and with what, a cycle ends.
 
-        What an unknown call leaves unknown there does not count:
+        The controller sets modes to what it starts with only where the program is
+        started from its beginning. What an unknown call leaves unknown does not count:
         it would leave whole programs.
         """
         modes, displaced = here.modes, "pdispon" in self.task.called
-        for end in self.ends:
-            modes = modes.continued(end, ("shift", "blocked", "grip"), displaced)
-        for end in self.restarts:
-            modes = modes.continued(end, modes.names(), displaced)
-        origins = here.origins | (NOWHERE if self.restarts else frozenset())
-        return Arrived(origins, modes)
+        for end in (*self.ends, *self.restarts):
+            modes = modes.continued(end.modes, modes.names(), displaced)
+        found = [here.origins, *(end.origins for end in self.ends)]
+        found += [NOWHERE] if self.restarts else []
+        return Arrived(frozenset().union(*found), modes)
 
     def _procedures(self) -> list[tuple[int, str, HeadedRows]]:
         routines = (one for found in self.task.routines.values() for one in found)
@@ -166,7 +167,7 @@ class RapidMachine(TaskMachine):
     def at_return(self, context: CallContext, here: Arrived) -> Arrived:
         """Note the end of a cycle; forget what a handler may have changed."""
         if context.caller is None:
-            self.ends.append(here.modes)
+            self.ends.append(here)
         return here.lost() if self._handlers_of(context).moves else here
 
     # Errors.
@@ -199,13 +200,17 @@ class RapidMachine(TaskMachine):
     ) -> None:
         """Allow for an error that a statement raises and another routine handles.
 
-        The routine's own handler that goes on behind the statement, or with it again,
-        changes nothing of how the arm comes there.
+        The routine's own handler may skip a statement whose operands are not known
+        before it runs. Otherwise it changes nothing of how the arm comes there.
         """
         for way in self._exits_of(context):
             beside = way.own and way.context is context
-            if not beside and self._may_raise(one, way.numbers):
+            if not self._may_raise(one, way.numbers):
+                continue
+            if not beside:
                 self._handled(context, row, way, replace(here, origins=NOWHERE))
+            elif way.row and may_be_skipped(one):
+                self._handled(context, row, way, here)
 
     def _may_raise(self, one: said.RapidStatement, numbers: Numbers) -> bool:
         return may_raise(one, numbers, self.task.routines, self.task.declared)
@@ -230,9 +235,9 @@ class RapidMachine(TaskMachine):
         elif way.context is not None:
             self.enter(way.context, way.row, here)
         elif way.restarts:
-            self.restarts.append(here.modes)
+            self.restarts.append(here)
         else:
-            self.ends.append(here.modes)
+            self.ends.append(here)
 
     def raise_error(
         self, context: CallContext, row: int, one: said.Leave, here: Arrived
@@ -334,7 +339,7 @@ class RapidMachine(TaskMachine):
             return self.unknown(context, row, here, "names several routines")
         kind = known_instructions().get(name)
         if name == EXIT_CYCLE:
-            self.restarts.append(here.modes)
+            self.restarts.append(here)
             return None
         if name in STOPPED:
             return here.lost()
@@ -386,10 +391,10 @@ class RapidMachine(TaskMachine):
         name = _called(called) if _is_text(called) else ""
         if self.said_still(name) and name not in self.task.routines:
             return here
-        found = self.task.routine(name.split(":")[-1], context.scope)
+        found = self.task.routine(name, context.scope)
         given = None if found is None else self._given(*found)
         if given is None:
-            self._run_named_beside(name.split(":")[-1])
+            self._run_named_beside(name)
             what = "calls a procedure on its way that may move the arm"
             what = what if found else f"{what}: it is in no file of the task"
             here = self.unknown(context, row, here, what)
@@ -405,6 +410,8 @@ class RapidMachine(TaskMachine):
         scope, found = self.task.scope_of(file, module, routine), set[tuple[str, Any]]()
         for row in range(routine.first + 1, routine.last):
             one = inside(self.texts[file].statement(row))
+            if self._asks_moving(scope, self.texts[file].statement(row)):
+                return None
             own = isinstance(one, said.Instruction) and one.name in self.task.routines
             if isinstance(one, said.Instruction) and not own:
                 kind = known_instructions().get(one.name)
@@ -433,7 +440,7 @@ class RapidMachine(TaskMachine):
         for name in functions_in(one):
             found = self.task.routine(name, context.scope)
             own = name in self.task.routines
-            if not own and (name in STILL_FUNCTIONS or self.said_still(name)):
+            if not own and self._is_still_function(name):
                 continue
             if found is None:
                 what = f"calls the function {name}, which is not known: it may move"
@@ -471,6 +478,8 @@ class RapidMachine(TaskMachine):
             one = inside(text.statement(row))
             if isinstance(one, said.LateCall | said.NotUnderstood):
                 return True
+            if self._asks_moving(scope, text.statement(row)):
+                return True
             if isinstance(one, said.Instruction) and one.name not in passed:
                 found = self.task.routine(one.name, scope)
                 if found is not None:
@@ -479,6 +488,20 @@ class RapidMachine(TaskMachine):
                 elif not self._is_still(one.name):
                     return True
         return False
+
+    def _asks_moving(self, scope: Scope, one: said.RapidStatement) -> bool:
+        """Return True if a function of a statement may move the arm or set modes."""
+        for name in functions_in(one):
+            found = self.task.routine(name, scope)
+            own = name in self.task.routines
+            if found is not None and self._moves(*found):
+                return True
+            if found is None and (own or not self._is_still_function(name)):
+                return True
+        return False
+
+    def _is_still_function(self, name: str) -> bool:
+        return name in STILL_FUNCTIONS or self.said_still(name)
 
     def _is_still(self, name: str) -> bool:
         still = known_instructions().get(name) == "still" or name in HARMLESS
@@ -495,8 +518,8 @@ def _is_text(operand: said.Operand | None) -> TypeGuard[said.StringLiteral]:
 
 
 def _called(text: said.StringLiteral) -> str:
-    """Return the procedure that a text names."""
-    return text.text.strip('"').lower()
+    """Return the procedure that a text names, without its module."""
+    return text.text.strip('"').lower().rpartition(":")[2]
 
 
 def _kind(routine: HeadedRows) -> str:

@@ -213,7 +213,9 @@ class Goals:
             case said.Composite() | said.DataObject():
                 return self._point(operand, signature.joints, row, scope)
             case said.FunctionCall(name=name, arguments=arguments) if (
-                name in SHIFTS and not signature.joints
+                name in SHIFTS
+                and name not in self.task.routines
+                and not signature.joints
             ):
                 return self._shifted(name, arguments, row, scope)
             case _:
