@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from postproc.language.flow import EXIT, HeadedRows, RoutineFlow, flow_of
 from postproc.language.interface import Start
 from postproc.language.statements import StatementText
 from postproc.language.visits import ELSEWHERE, MOTION_UNKNOWN, Diagnostic
-
-if TYPE_CHECKING:
-    from postproc.language.collect import FoundGoal
 
 MOST_STEPS = 4_000_000  # statements run, all in all
 MOST_ROUNDS = 10_000  # rounds of a loop that are followed one by one
@@ -58,6 +55,22 @@ class VisitLike(Protocol):
 
     modes: Any
     origins: frozenset[int]
+
+
+class GoalLike(Protocol):
+    """Where a move goes: the file and the places of its numbers."""
+
+    @property
+    def file(self) -> int:
+        """Return the index of the file that holds them."""
+
+    @property
+    def slots(self) -> tuple[int, ...]:
+        """Return which numbers of that file they are."""
+
+    @property
+    def follows(self) -> tuple[int, ...]:
+        """Return those of the point that it is shifted from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +219,7 @@ class TaskMachine(ABC):
         """Yield the routines that a statement calls: their files and places."""
 
     @abstractmethod
-    def goals_of(self, file: int, row: int) -> Iterable[FoundGoal]:
+    def goals_of(self, file: int, row: int) -> Iterable[GoalLike]:
         """Yield where a move goes that is not followed."""
 
     def part_otherwise(

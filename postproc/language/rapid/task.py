@@ -165,7 +165,7 @@ class RapidTask:
 
     @cached_property
     def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
-        uses = _Uses(self.routines)
+        uses = _NamesUsed(self.routines)
         for file in self.files:
             for statement in file.text.said:
                 uses.note(statement)
@@ -290,7 +290,7 @@ def _computed(operator: str, parts: Sequence[float]) -> float:
 
 
 @dataclass
-class _Uses:
+class _NamesUsed:
     """Names that statements may change, and those that they take.
 
     Attributes:
