@@ -485,6 +485,8 @@ class TaskMachine(ABC):
         running = context.running(file, routine)
         if running is not None:
             self.enter(running, running.flow.first, self.at_call(running, here))
+        elif context.depth > DEEPEST:
+            self.run_beside(file, routine)
         if running is not None or context.depth > DEEPEST:
             return self.unknown(context, row, here, "calls itself: it is not followed")
         self.call(file, module, routine, context, row + 1, here)

@@ -318,6 +318,7 @@ class RapidMachine(TaskMachine):
         elif isinstance(inside, said.JumpTo | said.Leave | said.CompactIf):
             self.part(context, row, inside, here)
         elif type(inside) not in _PASSED:
+            self._bind_late(inside)
             self.enter(context, row + 1, self.unknown(context, row, here))
 
     # What instructions do.

@@ -101,6 +101,7 @@ SUB = routine("sub1", P1)
 BESIDE = {
     "text": ([P1, SET, '%"sub1"%;'], ""),
     "text-with-module": ([P1, SET, '%"m:sub1"%;'], ""),
+    "compact": ([P1, SET, 'IF di1=1 %"sub1"%;'], ""),
     "late": ([P1, SET, '%"sub"+"1"%;'], ""),
     "by-number": ([P1, SET, 'CallByVar "sub",k;'], ""),
     "called-too": (["sub1;", SET, '%"sub1"%;'], ""),
