@@ -96,7 +96,8 @@ CHECKS = {
     '`%"name"%`, `CallByVar`': lambda: (
         anywhere('%"sub"%;') and anywhere('CallByVar "sub",n;')),
     "a function that moves or changes modes": lambda: (
-        anywhere("n:=moving();") and left("TRAP", more="TRAP x\nn:=moving();\nENDTRAP")),
+        anywhere("n:=moving();")
+        and left("TRAP", more="TRAP x\nn:=moving();\nENDTRAP")),
     "a routine that calls itself": lambda: (
         anywhere("again;", more="PROC again()\nagain;\nENDPROC")),
     "a routine of the task named like an instruction or function": lambda: left(
