@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -187,7 +187,7 @@ def visits_of(
     texts, n = machine.texts, len(found)
     tables = _Tables(Interned(), Interned([""]), Interned([""]))
     loads = Interned[tuple[float, ...]]([NO_LOAD])
-    other = _reached_beside(machine, moves)
+    other = [*_goals_beside(machine, moves)]
     literals, literal, follows = _literals(
         found, machine, dialect.width, comments, other
     )
@@ -316,6 +316,7 @@ def _aux(found: Sequence[FoundVisit]) -> np.ndarray:
 # Where the numbers stand.
 
 _NO_LITERAL = -2  # follows numbers that are no literal
+ANY_ELEMENT = "a move goes to an element of {} that only the run tells"
 BESIDE = (
     "the move in line {} of {} goes there too: how it is reached there is not followed"
 )
@@ -326,7 +327,7 @@ def _literals(
     machine: TaskMachine,
     width: int,
     comments: Comments,
-    other: Mapping[tuple[int, int], str],
+    other: Sequence[tuple[FoundGoal, str]],
 ) -> tuple[Literals, Ints, Ints]:
     """Find the distinct literals; also those of visits, and those they follow.
 
@@ -335,7 +336,7 @@ def _literals(
         machine: It has followed all ways.
         width: Numbers of a target.
         comments: How the language writes them.
-        other: Why literals stay that moves beside go to, by file and first number.
+        other: Where moves go that run beside, and why their literals stay.
     """
     index: dict[tuple[int, int], int] = {}
     rows: list[FoundVisit] = []
@@ -348,7 +349,14 @@ def _literals(
                 rows.append(v)
             literal[k] = index[key]
     follows = np.full(len(found), -1, dtype=np.int64)
-    pinned = [other.get((v.goal.file, v.goal.slots[0]), "") for v in rows]
+    goals = [(v.goal, ANY_ELEMENT.format(v.goal.name)) for v in found]
+    elements = {goal.name: why for goal, why in (*goals, *other) if _is_loose(goal)}
+    stays = {(g.file, max(g.slots[0], g.follows[0])): why for g, why in other}
+    pinned = [
+        stays.get((v.goal.file, v.goal.slots[0]), "")
+        or elements.get(_array_of(v.goal.name), "")
+        for v in rows
+    ]
     for k, v in enumerate(found):
         key = v.goal.file, max(v.goal.slots[0], v.goal.follows[0])
         at = index.get(key, -1)
@@ -360,18 +368,32 @@ def _literals(
     return _places(rows, machine, pinned, width, comments), literal, follows
 
 
-def _reached_beside(
+def _goals_beside(
     machine: TaskMachine, moves: Mapping[int, Sequence[int]]
-) -> dict[tuple[int, int], str]:
-    """Find the literals that moves go to which run in ways that are not followed."""
+) -> Iterator[tuple[FoundGoal, str]]:
+    """Yield where moves go that run in ways that are not followed, and say so."""
     known = {(file, row) for file, rows in moves.items() for row in rows}
-    found: dict[tuple[int, int], str] = {}
     for file, row in sorted(known.intersection(machine.rows_beside())):
         text = machine.texts[file]
         why = BESIDE.format(text.line(row), text.source.name)
         for goal in machine.goals_of(file, row):
-            found.setdefault((goal.file, max(goal.slots[0], goal.follows[0])), why)
-    return found
+            yield goal, why
+
+
+def _is_loose(goal: FoundGoal) -> bool:
+    """Return True if a move goes to an element of an array that is not known."""
+    known = max(goal.slots[0], goal.follows[0]) >= 0
+    return not known and bool(goal.name) and not _array_of(goal.name)
+
+
+def _array_of(name: str) -> str:
+    """Return the array of an element, "" for other data.
+
+    >>> _array_of("xs[1]"), _array_of("list{1,2}"), _array_of("p1")
+    ('xs', 'list', '')
+    """
+    array, *index = re.split(r"[{\[]", name, maxsplit=1)
+    return array if index else ""
 
 
 def _places(

@@ -57,22 +57,6 @@ class VisitLike(Protocol):
     origins: frozenset[int]
 
 
-class GoalLike(Protocol):
-    """Where a move goes: the file and the places of its numbers."""
-
-    @property
-    def file(self) -> int:
-        """Return the index of the file that holds them."""
-
-    @property
-    def slots(self) -> tuple[int, ...]:
-        """Return which numbers of that file they are."""
-
-    @property
-    def follows(self) -> tuple[int, ...]:
-        """Return those of the point that it is shifted from."""
-
-
 @dataclass(frozen=True, eq=False)
 class CallContext:
     """A call of a routine, or a round of one of its loops.
@@ -219,7 +203,7 @@ class TaskMachine(ABC):
         """Yield the routines that a statement calls: their files and places."""
 
     @abstractmethod
-    def goals_of(self, file: int, row: int) -> Iterable[GoalLike]:
+    def goals_of(self, file: int, row: int) -> Iterable[Any]:
         """Yield where a move goes that is not followed."""
 
     def part_otherwise(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from postproc.language.visits import ELSEWHERE, START
@@ -106,6 +107,30 @@ def test_an_error_may_skip_a_call_that_sets_frames():
     assert "which $TOOL and $BASE" in reasons(found)[0]
 
 
+# Moves that run beside what is followed.
+
+THERE = f"DEF there( )\n{THIRD}\nLIN XP1\nEND\n"
+BESIDE = {
+    "interrupt": ["INTERRUPT DECL 5 WHEN $IN[1] DO there( )", "LIN XP1", "WAIT SEC 0",
+                  "INTERRUPT ON 5", "LIN XP2", "INTERRUPT OFF 5"],
+    "trigger": ["LIN XP1", "TRIGGER WHEN DISTANCE=0 DELAY=0 DO there( )", "LIN XP2"],
+    "function": ["LIN XP1", "N2=asks( )"],
+    "called-too": ["there( )", "N2=asks( )"],
+}  # fmt: skip
+ASKS = "DEFFCT INT asks( )\nthere( )\nRETURN 1\nENDFCT\n"
+
+
+@pytest.mark.parametrize("kind", BESIDE)
+def test_a_target_of_moves_that_run_beside_keeps_its_numbers(kind):
+    found = job(*FRAMES, *BESIDE[kind], more=THERE + ASKS)
+    pins = found.visits.literals.pins
+    assert any("goes there too" in why and 0 in pins[why].tolist() for why in pins)
+
+
+def test_a_routine_that_nothing_calls_pins_nothing():
+    assert not job("LIN XP1", more=THERE).visits.literals.pins
+
+
 # Points that shift others.
 
 
@@ -117,6 +142,22 @@ def test_a_point_that_shifts_another_keeps_its_numbers():
 def test_a_frame_that_shifts_a_point_leaves_it():
     data = DATA + "DECL FRAME F={X 1,Y 0,Z 0,A 0,B 0,C 0}\n"
     assert not job("LIN F:XP1", "LIN XP1", data=data).visits.literals.pins
+
+
+# Elements that only the run tells.
+
+
+@pytest.mark.parametrize(
+    "line", ["LIN XS[N2]", "LIN BASE_DATA[3]:XS[N2]", "PTP XS[N2]"]
+)
+def test_an_element_that_only_the_run_tells_may_be_any(line):
+    pins = job(*FRAMES, "LIN XS[1]", THIRD, line, "LIN XP1").visits.literals.pins
+    (why,) = pins
+    assert "element of xs" in why and pins[why].tolist() == [0]
+
+
+def test_elements_that_are_known_are_no_others():
+    assert not job("LIN XS[1]", "LIN XS[2]", "LIN XA").visits.literals.pins
 
 
 # Routines of the files that have the name of one of the controller.
@@ -145,6 +186,22 @@ def test_a_routine_of_the_files_may_change_what_that_of_the_controller_keeps():
     more = "DEF USERSPOT(a:OUT)\nINT a\na=2\nEND\n"
     found = job("USERSPOT(N)", "LIN XS[N]", more=more)
     assert "no value that is known" in reasons(found)[0]
+
+
+# Settings that are not those of the controller, and orientations.
+
+
+@pytest.mark.parametrize("declared", ["DECL FDAT FDAT_ACT", ""])
+def test_bas_takes_the_settings_of_the_controller(declared):
+    lines = [declared, "FDAT_ACT=FP1", "BAS(#FRAMES)", "LIN XP1"]
+    found = job(*(one for one in lines if one))
+    assert bool(reasons(found)[0]) is bool(declared)
+
+
+@pytest.mark.parametrize("word", ["#CONSTANT", "#IGNORE", "N2"])
+def test_where_the_tool_need_not_turn_to_a_point_nothing_follows_from_it(word):
+    found = job(f"$ORI_TYPE={word}", "LIN XP1", "PTP XP2")
+    assert "$ORI_TYPE" in reasons(found)[0] and np.isnan(found.visits.values[0]).all()
 
 
 # Home positions.
