@@ -173,6 +173,27 @@ def test_plain_moves_and_modes_are_not_skipped():
     assert reasons(found) == ["", ""] and origins(found) == [[START], [0]]
 
 
+# Couplings of which there may be several.
+
+COUPLED = {
+    "same": (["CorrCon a;", "CorrDiscon a;"], ""),
+    "other": (["CorrCon a;", "CorrCon b;", "CorrDiscon a;"], "sensor"),
+    "both": (["CorrCon a;", "CorrCon b;", "CorrDiscon b;", "CorrDiscon a;"], ""),
+    "all": (["CorrCon a;", "CorrCon b;", "CorrClear;"], ""),
+    "element": (["CorrCon a{n};", "CorrDiscon a{n};"], "sensor"),
+    "conveyors": (["WaitWObj wa;", "WaitWObj wb;", "DropWObj wa;"], "conveyor"),
+    "conveyor": (["WaitWObj wa;", "DropWObj wa;"], ""),
+    "axes": (["SoftAct 1,20;", "SoftAct 2,20;", "SoftDeact;"], ""),
+}
+
+
+@pytest.mark.parametrize("kind", COUPLED)
+def test_a_coupling_ends_where_all_of_them_have_ended(kind):
+    lines, why = COUPLED[kind]
+    found = reasons(once(*lines, P1))[0]
+    assert (why in found) if why else found == ""
+
+
 # The next cycle of main.
 
 
