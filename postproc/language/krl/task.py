@@ -221,9 +221,10 @@ class KrlTask:
         found: dict[str, set[int]] = {table: set() for table in TABLES}
         for number, file in enumerate(self.files):
             here = Scope(number, file.name, "")
-            for row in range(len(file.text)) if file.routines else ():
+            for row in range(len(file.text)):
                 for target in changed_by(file.text.statement(row), self.routines):
-                    if target.name in found:
+                    given = not (file.routines or _is_of_part(target))
+                    if target.name in found and not given:
                         found[target.name].add(self._entry(target, row, here))
         return {table: frozenset(numbers) for table, numbers in found.items()}
 
@@ -270,8 +271,10 @@ class KrlTask:
             for one in file.text.said:
                 if not (lists and isinstance(one, said.Assignment)):
                     uses.note(one)
-                else:
-                    uses.take(one.value)
+                    continue
+                uses.take(one.value)
+                if _is_of_part(one.target):
+                    uses.written.add(one.target.name)
         return frozenset(uses.written) | self.beside, frozenset(uses.read) | self.beside
 
     @cached_property
@@ -518,6 +521,11 @@ def _changed_arguments(
     for argument in arguments:
         if isinstance(argument.value, said.DataObject):
             yield argument.value
+
+
+def _is_of_part(target: said.DataObject) -> bool:
+    """Return True if a component is meant: a list that sets one is not followed."""
+    return any(isinstance(step, str) for step in target.steps)
 
 
 def is_word(operand: said.Operand | None, word: str) -> bool:

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from postproc.language.visits import ELSEWHERE, START
-from tests.language.krl.test_visits import DATA, frame, job, names, origins, reasons
+from tests.language.krl.test_visits import (
+    CONFIG,
+    DATA,
+    frame,
+    job,
+    names,
+    origins,
+    reasons,
+)
 
 FRAMES = ["BAS(#TOOL,1)", "BAS(#BASE,2)"]
 THIRD = "$BASE=BASE_DATA[3]"
@@ -158,6 +166,30 @@ def test_an_element_that_only_the_run_tells_may_be_any(line):
 
 def test_elements_that_are_known_are_no_others():
     assert not job("LIN XS[1]", "LIN XS[2]", "LIN XA").visits.literals.pins
+
+
+# Lists that set a component.
+
+
+@pytest.mark.parametrize(("line", "point"), [
+    ("XP1.Z=70", "XP1"), ("XS[1].Z=70", "XS[1]"), ("xp1.z=70", "XP1"),
+])  # fmt: skip
+def test_a_point_whose_component_a_list_sets_is_left(line, point):
+    found = job(*FRAMES, f"LIN {point}", data=DATA + line + "\n")
+    assert "may be changed" in reasons(found)[0]
+
+
+@pytest.mark.parametrize("line", ["BASE_DATA[2].Z=7", "TOOL_DATA[1].X=7"])
+def test_a_frame_whose_component_a_list_sets_is_not_known(line):
+    config = CONFIG.replace("ENDDAT", f"{line}\nENDDAT")
+    assert reasons(job(*FRAMES, "LIN XP1", config=config))[0]
+    other = job("BAS(#TOOL,0)", "BAS(#BASE,3)", "LIN XP1", config=config)
+    assert reasons(other) == [""]
+
+
+def test_settings_whose_component_a_list_sets_are_not_known():
+    lines = ["FDAT_ACT=FP1", "BAS(#FRAMES)", "LIN XP1"]
+    assert reasons(job(*lines, data=DATA + "FP1.BASE_NO=3\n"))[0]
 
 
 # Routines of the files that have the name of one of the controller.
