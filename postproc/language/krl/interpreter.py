@@ -116,6 +116,8 @@ class KrlMachine(TaskMachine):
         scope = context.scope
         if self.task.place(one.name, scope) == (scope.module, scope.routine):
             return True
+        if one.name in self.task.beside:
+            return False
         others = self.task.counted[one.name] > 1 or one.name in self.task.assigned
         return not (others and (self._has_interrupts or self._calls_own(inside)))
 

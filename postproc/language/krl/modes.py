@@ -275,7 +275,8 @@ class ModeReader:
     def _held(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
         """``FDAT_ACT = FP1``; of a component: the others stay what they were."""
         name = one.target.name.removesuffix("_act")
-        if one.target.steps or not self.task.is_global(one.target.name, self.here):
+        own = not self.task.is_global(one.target.name, self.here)
+        if one.target.steps or own or one.target.name in self.task.beside:
             return modes.with_(**{name: None})
         found = self.task.value(one.value, self.row, self.here)
         return modes.with_(**{name: found})

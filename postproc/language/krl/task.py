@@ -254,14 +254,20 @@ class KrlTask:
     @cached_property
     def beside(self) -> frozenset[str]:
         """Names of data that submit programs may change at any time."""
-        found = set[str]()
+        return self._uses_beside[0]
+
+    @cached_property
+    def _uses_beside(self) -> tuple[frozenset[str], frozenset[str]]:
+        """Collect the names that submit programs may change, and those they take."""
+        written, read = set[str](), set[str]()
         for file in (f for f in self.files if f.is_submit):
             own = {datum.name for datum in file.data if not datum.shared}
             uses = _Uses(self.routines, self._points)
             for one in file.text.said:
                 uses.note(one)
-            found |= uses.written - own
-        return frozenset(found)
+            written |= uses.written - own
+            read |= uses.read - own
+        return frozenset(written), frozenset(read)
 
     @cached_property
     def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
@@ -275,7 +281,8 @@ class KrlTask:
                 uses.take(one.value)
                 if _is_of_part(one.target):
                     uses.written.add(one.target.name)
-        return frozenset(uses.written) | self.beside, frozenset(uses.read) | self.beside
+        written, read = self._uses_beside
+        return written | uses.written, read | written | uses.read
 
     @cached_property
     def _points(self) -> frozenset[str]:
