@@ -65,6 +65,7 @@ class KrlMachine(TaskMachine):
     _known: dict[tuple[int, int], _Effects] = field(default_factory=dict)
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
+    _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
     _before: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
 
     @classmethod
@@ -108,6 +109,13 @@ class KrlMachine(TaskMachine):
         A variable that is not the routine's own may be changed by routines that the
         loop calls, and by what runs beside it.
         """
+        key = context.scope.file, row
+        if key not in self._alone:
+            self._alone[key] = self._counts_alone(context, row, one)
+        return self._alone[key]
+
+    def _counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
+        """Read a loop once for `counts_alone`."""
         rows = range(row + 1, context.flow.loops.get(row, row))
         text = self.texts[context.scope.file]
         inside = [text.statement(k) for k in rows]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, TypeGuard
 
 from postproc.language.collect import FoundGoal
@@ -57,6 +58,7 @@ _PLAIN = (
     said.FileHeader, said.DataDeclaration, said.ConnectTrap, said.Assignment,
     said.TypeAlias,
 )  # fmt: skip
+_Place = tuple[int, str, HeadedRows]  # file, module and rows of a routine
 _PASSED = (*_PLAIN, said.RapidStatement, said.LabelMark)
 
 
@@ -78,6 +80,9 @@ class RapidMachine(TaskMachine):
     _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
     _exits: dict[CallContext, tuple[ErrorExit, ...]] = field(default_factory=dict)
     _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _direct: dict[tuple[int, int], tuple[bool, list[_Place]]] = field(
+        default_factory=dict
+    )
 
     @classmethod
     def of(cls, task: RapidTask, start: Start) -> RapidMachine:
@@ -298,14 +303,22 @@ class RapidMachine(TaskMachine):
     def goals_of(self, file: int, row: int) -> Iterator[FoundGoal]:
         """Yield where a move goes, see `TaskMachine`."""
         one = inside(self.texts[file].statement(row))
-        routines = (one for found in self.task.routines.values() for one in found)
-        around = (r for r in routines if r[0] == file and r[2].first < row < r[2].last)
+        around = (r for r in self._by_file[file] if r[2].first < row < r[2].last)
         place = next(around, None)
         signature = MOTIONS.get(getattr(one, "name", ""))
         if place and signature and isinstance(one, said.Instruction):
             scope = self.task.scope_of(*place)
             for visit in self.goals.visits(one, signature, row, scope, AT_START):
                 yield visit.goal
+
+    @cached_property
+    def _by_file(self) -> Mapping[int, list[tuple[int, str, HeadedRows]]]:
+        """Return the routines of every file."""
+        found = defaultdict[int, list[tuple[int, str, HeadedRows]]](list)
+        for routines in self.task.routines.values():
+            for one in routines:
+                found[one[0]].append(one)
+        return found
 
     def _compact(
         self, context: CallContext, row: int, inside: said.RapidStatement, here: Arrived
@@ -458,10 +471,7 @@ class RapidMachine(TaskMachine):
         """Tell whether a routine moves, or changes how moves are carried out."""
         key = file, routine.first
         if key not in self._moving:
-            self._moving[key] = False  # of one that calls itself
-            scope = self.task.scope_of(file, module, routine)
-            rows = range(routine.first + 1, routine.last)
-            self._moving[key] = self._any_moves(scope, rows)
+            self._moving[key] = self._reach_moves([(file, module, routine)])
         return self._moving[key]
 
     def _any_moves(
@@ -474,21 +484,48 @@ class RapidMachine(TaskMachine):
             rows: Their rows.
             passed: Instructions that do not count.
         """
-        text = self.texts[scope.file]
+        moves, called = self._read_rows(scope, rows, passed)
+        return moves or self._reach_moves(called)
+
+    def _reach_moves(self, waiting: list[_Place]) -> bool:
+        """Return True if routines, or those that they call, may move the arm."""
+        waiting, seen = [*waiting], set[tuple[int, int]]()
+        while waiting:
+            file, module, routine = waiting.pop()
+            key = file, routine.first
+            if key in seen:
+                continue
+            seen.add(key)
+            if key not in self._direct:
+                scope = self.task.scope_of(file, module, routine)
+                rows = range(routine.first + 1, routine.last)
+                self._direct[key] = self._read_rows(scope, rows)
+            moves, called = self._direct[key]
+            if moves:
+                return True
+            waiting += called
+        return False
+
+    def _read_rows(
+        self, scope: Scope, rows: range, passed: tuple[str, ...] = ()
+    ) -> tuple[bool, list[_Place]]:
+        """Say whether statements may move the arm themselves, and what they call."""
+        text, called = self.texts[scope.file], list[_Place]()
         for row in rows:
             one = inside(text.statement(row))
             if isinstance(one, said.LateCall | said.NotUnderstood):
-                return True
-            if self._asks_moving(scope, text.statement(row)):
-                return True
+                return True, []
+            names = [*functions_in(text.statement(row))]
+            still = [self._is_still_function(name) for name in names]
             if isinstance(one, said.Instruction) and one.name not in passed:
-                found = self.task.routine(one.name, scope)
-                if found is not None:
-                    if self._moves(*found):
-                        return True
-                elif not self._is_still(one.name):
-                    return True
-        return False
+                names.append(one.name)
+                still.append(self._is_still(one.name))
+            for name, harmless in zip(names, still, strict=True):
+                found = self.task.routine(name, scope)
+                called += [] if found is None else [found]
+                if found is None and (name in self.task.routines or not harmless):
+                    return True, []
+        return False, called
 
     def _asks_moving(self, scope: Scope, one: said.RapidStatement) -> bool:
         """Return True if a function of a statement may move the arm or set modes."""

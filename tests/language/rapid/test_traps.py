@@ -84,6 +84,17 @@ def test_a_function_that_asks_another_which_sets_modes():
     assert "displacement" in reasons(found)[0]
 
 
+def test_a_function_that_calls_itself_by_another_which_sets_modes():
+    one = "FUNC num one()\nIF two()=1 n:=2;\nPDispSet d;\nRETURN 1;\nENDFUNC\n"
+    two = "FUNC num two()\nIF n=1 n:=one();\nRETURN 1;\nENDFUNC\n"
+    more = MORE + one + two
+    for line in ("n:=one();", "n:=two();"):
+        trap = routine("t1", line, kind="TRAP", given="")
+        lines = ["n:=one();", "PDispOff;", "n:=two();", P1]
+        assert "displacement" in reasons(once(*lines, more=more))[0]
+        assert "TRAP" in reasons(once(P1, more=more + trap))[0]
+
+
 def test_a_procedure_on_the_way_that_asks_a_function_which_sets_modes():
     move = 'MoveLSync p1,v200,z10,t\\WObj:=w,"my";'
     found = once(move, P2, more=MORE + FUNCTION + routine("my", "n:=asks();"))
