@@ -83,6 +83,20 @@ class FoundGoal:
     shared: bool = False
 
 
+def not_reached(goal: FoundGoal, why: str) -> FoundGoal:
+    """Return the goal of a move that need not reach it: its numbers stay.
+
+    Args:
+        goal: What the move names.
+        why: Why it need not reach it.
+    """
+    numbers = (max(goal.slots[0], goal.follows[0]),)
+    return FoundGoal(
+        Meaning.UNKNOWN, tuple(math.nan for _ in goal.values), goal.file,
+        follows=numbers, name=goal.name, why=why, pins=goal.pins or why,
+    )  # fmt: skip
+
+
 @dataclass
 class FoundVisit:
     """One arrival, as it is found.

@@ -8,7 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from postproc.language import collect
-from postproc.language.collect import Conditions, FoundGoal, Pose, cell_pose
+from postproc.language.collect import (
+    Conditions,
+    FoundGoal,
+    Pose,
+    cell_pose,
+    not_reached,
+)
 from postproc.language.krl.dialect import COMMENTS, KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.modes import (
@@ -211,10 +217,7 @@ def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
     for v in found:
         modes, _ = _effective(machine, v)
         if modes.orientation not in TURNING and v.motion != Motion.JOINT:
-            v.goal = FoundGoal(
-                Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, name=v.goal.name,
-                why=v.goal.why or _not_turned(modes),
-            )  # fmt: skip
+            v.goal = not_reached(v.goal, v.goal.why or _not_turned(modes))
 
 
 def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:

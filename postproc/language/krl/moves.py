@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.language.collect import FoundGoal, FoundVisit
+from postproc.language.collect import FoundGoal, FoundVisit, not_reached
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import (
     COMPONENTS,
@@ -110,7 +110,7 @@ class KrlGoals:
             move, given = self._in_block(move, row, here, block)
         in_joints = block is not None and self._is_in_joints(block, here)
         if kind not in _POINTS[block is not None, in_joints]:
-            goal = FoundGoal(Meaning.UNKNOWN, NOTHING, why=SPLINE)
+            goal = not_reached(_Goal(self, move, row, here).end(move.to), SPLINE)
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
         reader = _Goal(self, move, row, here)
@@ -123,7 +123,7 @@ class KrlGoals:
             )
         goal = reader.end(move.to)
         if why:
-            goal = FoundGoal(Meaning.UNKNOWN, NOTHING, name=goal.name, why=ANGLE)
+            goal = not_reached(goal, ANGLE)
         yield KrlVisit(
             here, row, motion, False, goal, modes, why=SPLINE if in_joints else "",
             arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,

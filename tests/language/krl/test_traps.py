@@ -236,6 +236,19 @@ def test_where_the_tool_need_not_turn_to_a_point_nothing_follows_from_it(word):
     assert "$ORI_TYPE" in reasons(found)[0] and np.isnan(found.visits.values[0]).all()
 
 
+@pytest.mark.parametrize("lines", [
+    ["$ORI_TYPE=#CONSTANT", "LIN XP1", "$ORI_TYPE=#VAR"],
+    ["SLIN XP1 WITH $ORI_TYPE=#IGNORE"],
+    ["CIRC XP2,XP1,CA N2"],
+    ["PTP_SPLINE", "SLIN XP1", "ENDSPLINE"],
+])  # fmt: skip
+def test_a_point_that_a_move_need_not_reach_keeps_its_numbers(lines):
+    found = job(*FRAMES, *lines, "LIN XP1")
+    assert reasons(found)[-1] == ""
+    last = int(found.visits.literal[-1])
+    assert any(last in rows.tolist() for rows in found.visits.literals.pins.values())
+
+
 # Home positions.
 
 

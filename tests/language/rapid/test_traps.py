@@ -146,6 +146,18 @@ def test_an_element_that_only_the_run_tells_may_be_any(end):
     assert "element of list" in why and pins[why].tolist() == [0]
 
 
+# Moves that do not reach their target.
+
+
+@pytest.mark.parametrize("end", ["p1", "Offs(p1,0,0,5)"])
+def test_a_target_that_a_search_goes_towards_keeps_its_numbers(end):
+    search = f"SearchL di1,q,{end},v50,t\\WObj:=w;"
+    more = MORE + f"VAR robtarget q:=[[0,0,0],[1,0,0,0],{END};\n"
+    found = once(search, P1, more=more)
+    (why,) = found.visits.literals.pins
+    assert "search" in why
+
+
 # An own handler that skips a statement.
 
 
