@@ -11,7 +11,7 @@ import tempfile
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import FrameType
 from typing import IO, BinaryIO, NoReturn, Self
 
@@ -581,7 +581,7 @@ def spreadsheet_text(text: str) -> str:
 SYSTEM_MODULES = "SYSMOD/"
 
 
-def name_read(path: Path) -> str:
+def name_read(path: PurePath) -> str:
     """Return the name of a file that a job reads and never rewrites.
 
     >>> name_read(Path("RAPID/TASK1/SYSMOD/user.sys")), name_read(Path("a/$config.dat"))

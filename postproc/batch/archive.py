@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from postproc.language.archive import Archive
 from postproc.robot.cell import Cell
+from postproc.robot.pose import record_from_pose
 
-NEAR = 1e-3  # [mm] and [deg]; a smaller frame is none
+NEAR = 1e-3  # [mm] and [deg]; frames that are nearer are the same
+NO_SHIFT = (0.0,) * 6
 
 
 def missing_in_cell(archive: Archive, cell: Cell) -> list[str]:
@@ -30,12 +34,20 @@ def missing_in_cell(archive: Archive, cell: Cell) -> list[str]:
     return found
 
 
+def _placed(cell: Cell, archive: Archive) -> np.ndarray:
+    """Return where the cell places the arm, as a position record."""
+    if not archive.root:
+        return np.array(NO_SHIFT)
+    return np.asarray(record_from_pose(cell.base.pose[None])[0])
+
+
 def _lines(archive: Archive, cell: Cell) -> Iterator[str]:
     """Yield lines for the cell file."""
     file = cell.file
     if "absolute_accuracy" not in file.robot.model_fields_set:
         yield "absolute_accuracy = false   # under [robot], if it is off on this arm"
-    if file.base is None and any(abs(v) > NEAR for v in archive.root):
+    apart = np.abs(np.subtract(archive.root or NO_SHIFT, _placed(cell, archive)))
+    if apart.max() > NEAR:
         numbers = [round(v, 4) for v in archive.root]
         yield "[base]   # of the arm, by the archive"
         yield f"xyz_mm = {numbers[:3]}"

@@ -31,6 +31,7 @@ from postproc.files import (
     is_variables,
     program_key,
 )
+from postproc.language.languages import language_of
 
 # The files of a tree, sorted folder by folder.
 
@@ -83,12 +84,15 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
         sizes[place] = size
     found = [_sort(root, names, plan) for names in folders.values()]
     units = [unit for part in found for unit in part.units]
+    only_read = {place for unit in units for place in unit.reads}
+    kept = [p for unit in units if unit.program in only_read for p in unit.own]
+    units = [unit for unit in units if unit.program not in only_read]
     # The largest first: no worker is left alone with one at the end.
     units.sort(key=lambda u: (u.setup, -sum(sizes[f] for f in u.files), u.program))
     return Tree(
         root,
         tuple(units),
-        tuple(copy for part in found for copy in part.copies),
+        tuple(copy for part in found for copy in part.copies) + tuple(kept),
         refused | {k: v for part in found for k, v in part.refused.items()},
         tuple(note for part in found for note in part.notes),
         sum(sizes.values()),
@@ -164,8 +168,11 @@ def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
 
 def _shared(root: Path, program: str) -> tuple[str, ...]:
     """Return the places of what a program shares with others, and only reads."""
-    found = find_shared(root / program, within=root)
-    return tuple(path.relative_to(root).as_posix() for path in found)
+    path = root / program
+    found = find_shared(path, within=root)
+    if is_program(program):
+        found += language_of(program).reads(path)
+    return tuple(one.relative_to(root).as_posix() for one in found)
 
 
 def _by_base(

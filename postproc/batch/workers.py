@@ -18,6 +18,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, replace
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerContext
+from pathlib import PurePosixPath
 from time import perf_counter
 from typing import Any, Protocol
 
@@ -30,7 +31,7 @@ from postproc.compensation.parallel import end_with_parent
 from postproc.compensation.record import SUFFIX
 from postproc.compensation.together import Given, compensate_batch
 from postproc.exceptions import PostprocError
-from postproc.files import variables_of
+from postproc.files import name_read, variables_of
 from postproc.robot.pose import MM
 
 # Tasks in chunks that last about a second each.
@@ -250,11 +251,13 @@ def _compensated(tasks: Sequence[Task], setup: JobSetup) -> list[Outcome | Excep
 def _given(task: Task) -> Given:
     """Name the files of a task as its programs name each other."""
     unit, sources = task.unit, task.files
+    pages = {_file_name(page): sources[page] for page in unit.pages}
+    reads = {name_read(PurePosixPath(one)): sources[one] for one in unit.reads}
     return Given(
         name=_file_name(unit.program),
         source=task.sources[0],
         variables=None if unit.variables is None else sources[unit.variables],
-        pages={_file_name(page): sources[page] for page in (*unit.pages, *unit.reads)},
+        pages=pages | reads,
     )
 
 

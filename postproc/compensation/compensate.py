@@ -12,7 +12,7 @@ from postproc.arrays import give_back
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.base import contradicted_base
 from postproc.compensation.correction import Correction, Draft, correct
-from postproc.compensation.first_cause import first_cause
+from postproc.compensation.first_cause import read_with_cause
 from postproc.compensation.notes import (
     assumed_off,
     controller_unknown,
@@ -105,9 +105,7 @@ def compensate(
     cell = prepared(cell, model, options)
     setting = Setting(cell, model, options, Clock(progress), processes)
     with setting.clock("parse"):
-        reading = read_program(files, cell)
-        cause = first_cause(files, cell, reading)
-        reading = replace(reading, diagnostics=(*cause, *reading.diagnostics))
+        reading = read_with_cause(files, cell)
         give_back(len(reading.visits))
     reading, kept = correct(reading, setting)
     return finish(name, reading, kept, setting)

@@ -16,6 +16,21 @@ UNKNOWN_ROUTINE = "unknown-routine"
 CAUSES = (MOTION_UNKNOWN, UNKNOWN_ROUTINE)
 
 
+def read_with_cause(files: Mapping[str, bytes], cell: Cell) -> Reading:
+    """Read a program, and say first where it is first not known.
+
+    Args:
+        files: As in `read_program`.
+        cell: The cell.
+
+    Raises:
+        ProgramError: A file is no program text.
+    """
+    reading = read_program(files, cell)
+    cause = first_cause(files, cell, reading)
+    return replace(reading, diagnostics=(*cause, *reading.diagnostics))
+
+
 def first_cause(
     files: Mapping[str, bytes], cell: Cell, reading: Reading
 ) -> tuple[Diagnostic, ...]:

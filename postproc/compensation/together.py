@@ -18,9 +18,10 @@ import numpy as np
 
 from postproc.compensation.compensate import finish, name_files, refuse
 from postproc.compensation.correction import Correction, correct
+from postproc.compensation.first_cause import read_with_cause
 from postproc.compensation.options import Clock, Options, Setting, silent
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.program import Reading, prepared, read_program
+from postproc.compensation.program import Reading, prepared
 from postproc.compensation.windows import concatenate, first_visits, offsets
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
@@ -78,7 +79,7 @@ def _read(given: Given, setting: Setting) -> Reading:
     files = name_files(given.name, given.source, given.variables, given.pages)
     refuse(files, setting.cell, setting.model)
     with setting.clock("parse"):
-        return read_program(files, setting.cell)
+        return read_with_cause(files, setting.cell)
 
 
 def _corrected(

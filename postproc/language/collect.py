@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -81,6 +81,20 @@ class FoundGoal:
     why: str = ""
     pins: str = ""
     shared: bool = False
+
+
+def not_reached(goal: FoundGoal, why: str) -> FoundGoal:
+    """Return the goal of a move that need not reach it: its numbers stay.
+
+    Args:
+        goal: What the move names.
+        why: Why it need not reach it.
+    """
+    numbers = (max(goal.slots[0], goal.follows[0]),)
+    return FoundGoal(
+        Meaning.UNKNOWN, tuple(math.nan for _ in goal.values), goal.file,
+        follows=numbers, name=goal.name, why=why, pins=goal.pins or why,
+    )  # fmt: skip
 
 
 @dataclass
@@ -187,7 +201,10 @@ def visits_of(
     texts, n = machine.texts, len(found)
     tables = _Tables(Interned(), Interned([""]), Interned([""]))
     loads = Interned[tuple[float, ...]]([NO_LOAD])
-    literals, literal, follows = _literals(found, machine, dialect.width, comments)
+    other = [*_goals_beside(machine, moves)]
+    literals, literal, follows = _literals(
+        found, machine, dialect.width, comments, other
+    )
     reasons = [_reason(c, machine.exhausted) for c in held]
     for k in np.flatnonzero(follows == _NO_LITERAL).tolist():
         reasons[k] = reasons[k] or ONLY_SHIFTED
@@ -313,6 +330,10 @@ def _aux(found: Sequence[FoundVisit]) -> np.ndarray:
 # Where the numbers stand.
 
 _NO_LITERAL = -2  # follows numbers that are no literal
+ANY_ELEMENT = "a move goes to an element of {} that only the run tells"
+BESIDE = (
+    "the move in line {} of {} goes there too: how it is reached there is not followed"
+)
 
 
 def _literals(
@@ -320,8 +341,17 @@ def _literals(
     machine: TaskMachine,
     width: int,
     comments: Comments,
+    other: Sequence[tuple[FoundGoal, str]],
 ) -> tuple[Literals, Ints, Ints]:
-    """Find the distinct literals; also those of visits, and those they follow."""
+    """Find the distinct literals; also those of visits, and those they follow.
+
+    Args:
+        found: The visits.
+        machine: It has followed all ways.
+        width: Numbers of a target.
+        comments: How the language writes them.
+        other: Where moves go that run beside, and why their literals stay.
+    """
     index: dict[tuple[int, int], int] = {}
     rows: list[FoundVisit] = []
     literal = np.full(len(found), -1, dtype=np.int64)
@@ -333,7 +363,14 @@ def _literals(
                 rows.append(v)
             literal[k] = index[key]
     follows = np.full(len(found), -1, dtype=np.int64)
-    pinned = [""] * len(rows)
+    goals = [(v.goal, ANY_ELEMENT.format(v.goal.name)) for v in found]
+    elements = {goal.name: why for goal, why in (*goals, *other) if _is_loose(goal)}
+    stays = {(g.file, max(g.slots[0], g.follows[0])): why for g, why in other}
+    pinned = [
+        stays.get((v.goal.file, v.goal.slots[0]), "")
+        or elements.get(_array_of(v.goal.name), "")
+        for v in rows
+    ]
     for k, v in enumerate(found):
         key = v.goal.file, max(v.goal.slots[0], v.goal.follows[0])
         at = index.get(key, -1)
@@ -343,6 +380,34 @@ def _literals(
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
     return _places(rows, machine, pinned, width, comments), literal, follows
+
+
+def _goals_beside(
+    machine: TaskMachine, moves: Mapping[int, Sequence[int]]
+) -> Iterator[tuple[FoundGoal, str]]:
+    """Yield where moves go that run in ways that are not followed, and say so."""
+    known = {(file, row) for file, rows in moves.items() for row in rows}
+    for file, row in sorted(known.intersection(machine.rows_beside())):
+        text = machine.texts[file]
+        why = BESIDE.format(text.line(row), text.source.name)
+        for goal in machine.goals_of(file, row):
+            yield goal, why
+
+
+def _is_loose(goal: FoundGoal) -> bool:
+    """Return True if a move goes to an element of an array that is not known."""
+    known = max(goal.slots[0], goal.follows[0]) >= 0
+    return not known and bool(goal.name) and not _array_of(goal.name)
+
+
+def _array_of(name: str) -> str:
+    """Return the array of an element, "" for other data.
+
+    >>> _array_of("xs[1]"), _array_of("list{1,2}"), _array_of("p1")
+    ('xs', 'list', '')
+    """
+    array, *index = re.split(r"[{\[]", name, maxsplit=1)
+    return array if index else ""
 
 
 def _places(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Any, Protocol, Self
@@ -89,14 +89,14 @@ class CallContext:
             return (*self.caller.way(), self.back - 1)
         return (self.scope.file, self.routine.first)
 
-    def is_within(self, file: int, routine: HeadedRows) -> bool:
-        """Tell whether a routine is being run here."""
+    def running(self, file: int, routine: HeadedRows) -> CallContext | None:
+        """Return the call of a routine that is being run here, None without one."""
         at: CallContext | None = self
         while at is not None:
-            if at.scope.file == file and at.routine is routine:
-                return True
+            if at.scope.file == file and at.routine is routine and at.outer is None:
+                return at
             at = at.caller if at.outer is None else at.outer
-        return False
+        return None
 
 
 @dataclass(frozen=True)
@@ -143,6 +143,8 @@ class TaskMachine(ABC):
         diagnostics: What else was found.
         reached: Moves that some way leads to: file and row.
         exhausted: It has too many ways to be followed.
+        beside: Statements that run in ways that are not followed: file, first row, and
+            the row behind the last.
     """
 
     texts: Sequence[StatementText[Any]]
@@ -152,6 +154,7 @@ class TaskMachine(ABC):
     diagnostics: set[Diagnostic] = field(default_factory=set)
     reached: set[tuple[int, int]] = field(default_factory=set)
     exhausted: bool = False
+    beside: set[tuple[int, int, int]] = field(default_factory=set)
     _numbers: dict[tuple[CallContext, int], list[int]] = field(default_factory=dict)
     _entered: dict[Place, Arrived] = field(default_factory=dict)
     _left: dict[Place, Arrived] = field(default_factory=dict)
@@ -193,11 +196,25 @@ class TaskMachine(ABC):
     def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
         """Return where the statements of a routine stand."""
 
+    @abstractmethod
+    def calls_of(
+        self, file: int, one: said.SourceStatement
+    ) -> Iterable[tuple[int, HeadedRows]]:
+        """Yield the routines that a statement calls: their files and places."""
+
+    @abstractmethod
+    def goals_of(self, file: int, row: int) -> Iterable[Any]:
+        """Yield where a move goes that is not followed."""
+
     def part_otherwise(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
     ) -> None:
         """Go on behind a statement that only this language has."""
         self.enter(context, row + 1, self.unknown(context, row, here))
+
+    def counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
+        """Return True if nothing but the loop itself changes its variable."""
+        return True
 
     def raise_error(  # noqa: B027 - most languages have no such statement
         self, context: CallContext, row: int, one: said.Leave, here: Arrived
@@ -334,6 +351,8 @@ class TaskMachine(ABC):
     ) -> tuple[float, ...] | None:
         """Return the values of a loop's variable, None where they are not known."""
         scope = context.scope
+        if not self.counts_alone(context, row, one):
+            return None
         first, last = (self.number(x, row, scope) for x in (one.first, one.last))
         step = self.usual_step(first, last)
         if one.step is not None:
@@ -442,9 +461,17 @@ class TaskMachine(ABC):
         self, context: CallContext, row: int, found: tuple[int, str, HeadedRows],
         here: Arrived,
     ) -> Arrived | None:  # fmt: skip
-        """Go on in a routine, but for one that is being run."""
+        """Go on in a routine; one that is being run begins again as well.
+
+        What holds behind such a call is not known.
+        """
         file, module, routine = found
-        if context.is_within(file, routine) or context.depth > DEEPEST:
+        running = context.running(file, routine)
+        if running is not None:
+            self.enter(running, running.flow.first, self.at_call(running, here))
+        elif context.depth > DEEPEST:
+            self.run_beside(file, routine)
+        if running is not None or context.depth > DEEPEST:
             return self.unknown(context, row, here, "calls itself: it is not followed")
         self.call(file, module, routine, context, row + 1, here)
         return None
@@ -513,6 +540,25 @@ class TaskMachine(ABC):
         text = self.texts[file]
         message = f"{text.shown(row)} {what}" if quote else what
         self.diagnostics.add(text.diagnostic(row, code, message))
+
+    # What runs, and is not followed.
+
+    def run_beside(self, file: int, routine: HeadedRows) -> None:
+        """Note a routine that runs at a time, or in a way, that is not followed."""
+        self.beside.add((file, routine.first, routine.last))
+
+    def rows_beside(self) -> Iterator[tuple[int, int]]:
+        """Yield statements that run in ways that are not followed: file and row."""
+        waiting, seen = sorted(self.beside), set(self.beside)
+        while waiting:
+            file, first, behind = waiting.pop()
+            for row in range(first, behind):
+                yield file, row
+                for at, one in self.calls_of(file, self.texts[file].statement(row)):
+                    key = at, one.first, one.last
+                    if key not in seen:
+                        seen.add(key)
+                        waiting.append(key)
 
     def missed(self, moves: Mapping[int, Iterable[int]]) -> dict[str, Ints]:
         """Return the lines of moves that no way leads to, by file.

@@ -153,7 +153,7 @@ def rapid(job: NeutralJob) -> bytes:
           for m in {m.zone_mm: m for m in job.moves if m.zone_mm}.values()),
         *dict.fromkeys(named),
         "  PROC main()", "    CirPathMode\\CirPointOri;",
-        *(_rapid_move(job, m) for m in job.moves), "  ENDPROC",
+        *(_rapid_move(job, m) for m in job.moves), "    EXIT;", "  ENDPROC",
         "ENDMODULE",
     ]  # fmt: skip
     return "\n".join(lines).encode() + b"\n"

@@ -8,7 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from postproc.language import collect
-from postproc.language.collect import Conditions, FoundGoal, Pose, cell_pose
+from postproc.language.collect import (
+    Conditions,
+    FoundGoal,
+    Pose,
+    cell_pose,
+    not_reached,
+)
 from postproc.language.krl.dialect import COMMENTS, KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.modes import (
@@ -33,6 +39,12 @@ _UNSIZED = "how early it is blended ($APO) is not known here"
 _IPO = "$IPO_MODE is not known here"
 _STATUS = "bit 2 of S and bit 4 of T disagree, otherwise than at the other points"
 _STILL_TOOL = "$ORI_TYPE = #CONSTANT: the tool keeps the orientation it comes with"
+_NOT_TURNED = {
+    "#constant": _STILL_TOOL,
+    "#ignore": "$ORI_TYPE = #IGNORE: the tool does not turn to the point",
+}
+_MAY_NOT_TURN = "which orientation the tool takes is not known here ($ORI_TYPE)"
+TURNING = ("#var", "#joint")  # ways to the orientation of a point
 _SWAPPED = (
     "$TOOL and $BASE were set with IPO_FRAME #TCP, which swaps them on some "
     "controllers: set them anew with #BASE"
@@ -51,7 +63,8 @@ def visits_of(machine: KrlMachine) -> Visits:
 
     def conditions(v: KrlVisit) -> Conditions:
         at = number[id(v)]
-        return _conditions(machine, v, base, ends[at], at in odd)
+        early = machine.early.get(at, frozenset())
+        return _conditions(machine, v, base, ends[at], at in odd, early)
 
     moves = {k: file.moves for k, file in enumerate(machine.task.files)}
     return collect.visits_of(machine, KRL_DIALECT, conditions, COMMENTS, moves)
@@ -85,14 +98,19 @@ class _Blending:
 
 
 def _conditions(
-    machine: KrlMachine, v: KrlVisit, base: Pose, end: str, odd: bool
+    machine: KrlMachine,
+    v: KrlVisit,
+    base: Pose,
+    end: str,
+    odd: bool,
+    early: frozenset[str],
 ) -> Conditions:
     """Say what an arrival is carried out with."""
     modes, unset = _effective(machine, v)
     joint = v.motion == Motion.JOINT
     blending = _blending(v, modes, end)
     active = {why for _, why in modes.active}
-    blocked = modes.blocked | active | machine.everywhere
+    blocked = modes.blocked | active | machine.everywhere | early
     given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
     if v.goal.target != Meaning.JOINTS:
         given += (modes.base.why, "" if modes.interpolation else _IPO)
@@ -198,11 +216,8 @@ def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
     """Forget targets whose orientation the tool does not take."""
     for v in found:
         modes, _ = _effective(machine, v)
-        if modes.orientation == "#constant" and v.motion != Motion.JOINT:
-            v.goal = FoundGoal(
-                Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, name=v.goal.name,
-                why=v.goal.why or _STILL_TOOL,
-            )  # fmt: skip
+        if modes.orientation not in TURNING and v.motion != Motion.JOINT:
+            v.goal = not_reached(v.goal, v.goal.why or _not_turned(modes))
 
 
 def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
@@ -220,6 +235,12 @@ def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
             lost |= own is None or any(_frames(machine, one) != own for one in before)
         if lost:
             v.goal = FoundGoal(Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, why=PARTIAL)
+
+
+def _not_turned(modes: KrlModes) -> str:
+    """Say why the tool need not turn to a point; frames that are lost come first."""
+    lost = modes.tool.why or modes.base.why
+    return _NOT_TURNED.get(modes.orientation, lost or _MAY_NOT_TURN)
 
 
 def _frames(machine: KrlMachine, v: KrlVisit) -> tuple[Pose, Pose, str] | None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from postproc.language.collect import cell_pose
+from postproc.language.collect import FoundGoal, cell_pose
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
 from postproc.language.krl import syntax as said
@@ -47,6 +48,7 @@ MOVES, BRAKES, RESUMES = "moves", "brake", "resume"
 """What statements may do to moves that are under way."""
 _Effects = tuple[frozenset[str], list[tuple[int, HeadedRows]]]
 EVERY = -1  # interrupt whose number is not known
+FURTHEST_AHEAD = 5  # moves, by $ADVANCE
 
 
 @dataclass
@@ -63,6 +65,8 @@ class KrlMachine(TaskMachine):
     _known: dict[tuple[int, int], _Effects] = field(default_factory=dict)
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
+    _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _before: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
 
     @classmethod
     def of(cls, task: KrlTask, start: Start) -> KrlMachine:
@@ -99,6 +103,52 @@ class KrlMachine(TaskMachine):
         """Return where the statements of a routine stand."""
         return self.task.scope_of(file, module, routine)
 
+    def counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
+        """Return True if only the loop changes its variable, see `TaskMachine`.
+
+        A variable that is not the routine's own may be changed by routines that the
+        loop calls, and by what runs beside it.
+        """
+        key = context.scope.file, row
+        if key not in self._alone:
+            self._alone[key] = self._counts_alone(context, row, one)
+        return self._alone[key]
+
+    def _counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
+        """Read a loop once for `counts_alone`."""
+        rows = range(row + 1, context.flow.loops.get(row, row))
+        text = self.texts[context.scope.file]
+        inside = [text.statement(k) for k in rows]
+        if any(one.name in self._sets(other) for other in inside):
+            return False
+        scope = context.scope
+        if self.task.place(one.name, scope) == (scope.module, scope.routine):
+            return True
+        if one.name in self.task.beside:
+            return False
+        others = self.task.counted[one.name] > 1 or one.name in self.task.assigned
+        return not (others and (self._has_interrupts or self._calls_own(inside)))
+
+    def _sets(self, one: said.SourceStatement) -> set[str]:
+        """Return the names of data that a statement sets, also as a loop."""
+        named = {one.name} if isinstance(one, said.ForLoop) else set()
+        return named | {data.name for data in changed_by(one, self.task.routines)}
+
+    def _calls_own(self, statements: Sequence[said.SourceStatement]) -> bool:
+        """Return True if a statement calls a routine of the files."""
+        called = {one.name for one in statements if isinstance(one, said.Instruction)}
+        for part in parts_of([x for one in statements for x in operands_of(one)]):
+            if isinstance(part, said.FunctionCall):
+                called.add(part.name)
+        return not called.isdisjoint(self.task.routines)
+
+    @cached_property
+    def _has_interrupts(self) -> bool:
+        """Return True if interrupts or triggers may call routines."""
+        kinds = said.InterruptDeclared | said.PathTrigger
+        said_ones = (one for text in self.texts for one in text.said)
+        return any(isinstance(one, kinds) for one in said_ones)
+
     @staticmethod
     def usual_step(first: float, last: float) -> float:
         """Count by 1: a loop downwards needs STEP."""
@@ -117,7 +167,10 @@ class KrlMachine(TaskMachine):
             return self._carry_out(context, row, one, here)
         here = replace(here, modes=here.modes.with_(perhaps=False))
         after = self._carry_out(context, row, one, here)
-        return None if after is None else after.joined(here)
+        if after is None:
+            self.enter(context, row + 1, here)
+            return None
+        return after.joined(here)
 
     def _carry_out(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
@@ -153,7 +206,7 @@ class KrlMachine(TaskMachine):
             return here
         own = one.target if isinstance(one, said.Assignment) else None
         store = here.modes.store
-        for target in changed_by(one):
+        for target in changed_by(one, self.task.routines):
             name = target.name
             if target is own or not _is_modal(name):
                 continue
@@ -204,6 +257,8 @@ class KrlMachine(TaskMachine):
         if found is not None:
             return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
+            for file, routine, _ in self.task.routines[name]:
+                self.run_beside(file, routine)
             return self.unknown(context, row, here, "names several routines")
         if name == "bas":
             here = _halted(here, None) if _puts_out(one) else here
@@ -256,6 +311,7 @@ class KrlMachine(TaskMachine):
         if found is not None:
             if not self._moves(found[0], found[2]):
                 return _halted(here, None)
+            self.run_beside(found[0], found[2])
             what = f"calls the function {name}, which moves: it is not followed"
             return self.unknown(context, row, here, what)
         if name in FUNCTIONS or name in STILL or self.said_still(name):
@@ -271,15 +327,18 @@ class KrlMachine(TaskMachine):
         """Declare an interrupt; one that nothing switches on may be on already."""
         self._met.add((context.scope.file, row))
         effects = self._effects_of(context.scope.file, one.action)
+        self._call_beside(context.scope.file, one.action)
         modes, number = here.modes, self._number_of(context, row, one.number)
         others = frozenset(d for d in modes.declared if d[0] != number)
         modes = replace(modes, declared=others)
         if RESUMES in effects:
+            self._begin_early(_RESUMED, here)
             return replace(here, modes=modes.with_(blocked=modes.blocked | {_RESUMED}))
         if effects:
             own = number, _INTERRUPT if MOVES in effects else _RESUMED
             modes = replace(modes, declared=others | {own})
             if not {number, EVERY} & self._switched_on:
+                self._begin_early(own[1], here)
                 modes = replace(modes, active=modes.active | {own})
         return replace(here, modes=modes)
 
@@ -293,6 +352,8 @@ class KrlMachine(TaskMachine):
             meant = {
                 d for d in modes.declared if EVERY in (number, d[0]) or d[0] == number
             }
+            for _, why in meant:
+                self._begin_early(why, here)
             return replace(here, modes=replace(modes, active=modes.active | meant))
         if one.word != "off" or (one.number is not None and number == EVERY):
             return here
@@ -300,6 +361,31 @@ class KrlMachine(TaskMachine):
         if left == modes.active:
             return here
         return replace(here, modes=replace(modes, active=frozenset(left))).lost()
+
+    def _begin_early(self, why: str, here: Arrived) -> None:
+        """Note that an interrupt may come in moves before it is switched on.
+
+        The program is ahead of the arm, unless it has waited for it.
+        """
+        if not here.modes.halted:
+            self._before[why] |= here.origins
+
+    @cached_property
+    def early(self) -> Mapping[int, frozenset[str]]:
+        """Return visits on whose way an interrupt may come that is switched on later.
+
+        The program is ahead by `FURTHEST_AHEAD` moves at most.
+        """
+        found: dict[int, frozenset[str]] = {}
+        for why, origins in self._before.items():
+            reached = set(origins)
+            for _ in range(FURTHEST_AHEAD):
+                behind = [self.visits[k] for k in reached if k >= 0]
+                before = [v.origins for v in behind if not v.modes.halted]
+                reached = reached.union(*before)
+            for k in reached:
+                found[k] = found.get(k, frozenset()) | {why}
+        return found
 
     def _number_of(
         self, context: CallContext, row: int, operand: said.Operand | None
@@ -330,9 +416,33 @@ class KrlMachine(TaskMachine):
         """
         if not self._effects_of(context.scope.file, one.action):
             return here
+        self._call_beside(context.scope.file, one.action)
         return replace(
             here, modes=here.modes.with_(blocked=here.modes.blocked | {_INTERRUPT})
         )
+
+    def _call_beside(self, file: int, action: said.SourceStatement) -> None:
+        """Note the routines that an interrupt or a trigger calls."""
+        for called in self.calls_of(file, action):
+            self.run_beside(*called)
+
+    def calls_of(
+        self, file: int, one: said.SourceStatement
+    ) -> list[tuple[int, HeadedRows]]:
+        """Return the routines that a statement calls, see `TaskMachine`."""
+        called = list[tuple[int, HeadedRows]]()
+        self._own(file, one, called)
+        return called
+
+    def goals_of(self, file: int, row: int) -> Iterator[FoundGoal]:
+        """Yield where a move goes, see `TaskMachine`."""
+        one, source = self.texts[file].statement(row), self.task.files[file]
+        around = (r for r in source.routines if r.first < row < r.last)
+        routine = next(around, None)
+        if routine is not None and isinstance(one, said.KrlMove):
+            scope = self.task.scope_of(file, source.name, routine)
+            for visit in self.goals.visits(one, row, scope, None):
+                yield visit.goal
 
     def _robot_texts(self) -> Iterator[tuple[int, KrlText]]:
         """Yield files and statements, but for those of submit programs."""
@@ -415,7 +525,8 @@ class KrlMachine(TaskMachine):
                 return frozenset([word])
             case said.PathTrigger(action=action):
                 return self._own(file, action, called)
-        if any(_is_modal(target.name) for target in changed_by(one)):
+        changed = changed_by(one, self.task.routines)
+        if any(_is_modal(target.name) for target in changed):
             return frozenset([MOVES])
         here = Scope(file, self.task.files[file].name, "")
         parts = parts_of(operands_of(one))

@@ -18,7 +18,7 @@ from postproc.language.krl.store import (
     KrlStore,
     entry_name,
 )
-from postproc.language.krl.task import KrlRecord, KrlTask, KrlValue, is_word
+from postproc.language.krl.task import KrlRecord, KrlTask, KrlValue, is_word, parts_of
 from postproc.language.machine import Scope
 from postproc.language.visits import OrientationLaw
 from postproc.robot.pose import MM
@@ -180,6 +180,9 @@ class ModeReader:
 
     def assigned(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
         """Carry out ``$name = value``, None where nobody knows what that does."""
+        own = self._own_function(one.value)
+        if own:
+            one = replace(one, value=said.FunctionCall(f"{own} of the files", ()))
         name, value = one.target.name, one.value
         match name:
             case "$tool" | "$base":
@@ -214,6 +217,12 @@ class ModeReader:
                 return replace(modes, store=self._correction(modes, one))
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
+
+    def _own_function(self, operand: said.Operand) -> str:
+        """Name a function of the files that gives a value; it is not followed."""
+        parts = parts_of([operand])
+        called = (one.name for one in parts if isinstance(one, said.FunctionCall))
+        return next((name for name in called if name in self.task.routines), "")
 
     def _frame(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
         """``$TOOL = ..``, ``$BASE = ..``; of a component: nobody knows all of it."""
@@ -266,7 +275,8 @@ class ModeReader:
     def _held(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
         """``FDAT_ACT = FP1``; of a component: the others stay what they were."""
         name = one.target.name.removesuffix("_act")
-        if one.target.steps:
+        own = not self.task.is_global(one.target.name, self.here)
+        if one.target.steps or own or one.target.name in self.task.beside:
             return modes.with_(**{name: None})
         found = self.task.value(one.value, self.row, self.here)
         return modes.with_(**{name: found})

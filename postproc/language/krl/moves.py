@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.language.collect import FoundGoal, FoundVisit
+from postproc.language.collect import FoundGoal, FoundVisit, not_reached
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import (
     COMPONENTS,
@@ -23,6 +23,7 @@ from postproc.language.krl.dialect import (
 from postproc.language.krl.frames import FrameReader, KrlFrame
 from postproc.language.krl.program import whole
 from postproc.language.krl.task import (
+    POSITIONS,
     KrlNumber,
     KrlRecord,
     KrlTask,
@@ -39,8 +40,9 @@ AXES = ("a1", "a2", "a3", "a4", "a5", "a6")
 OUTSIDE = ("e1", "e2", "e3", "e4", "e5", "e6")
 PLACE = COMPONENTS[:6]
 RUN_TIME = "it is known only when the program runs"
-HOMES = ("xhome", "home", "xhome1", "xhome2", "xhome3", "xhome4", "xhome5",
-         "$h_pos", "$axis_home")  # fmt: skip
+HOME = ("xhome", "home", "$h_pos")  # that of the cell, where no file says more
+HOMES = (*HOME, "xhome1", "xhome2", "xhome3", "xhome4", "xhome5", "$axis_home")
+AT_HOME = f"{NO_TARGET}: it is a home position"
 PRESENT = ("$pos_act", "$axis_act")
 BEFORE = ("$axis_act_meas", "$axis_int", "$pos_int")  # where it was, or nearly is
 SPLINE = "a point of a spline of joint moves: how the arm goes there is not known"
@@ -108,7 +110,7 @@ class KrlGoals:
             move, given = self._in_block(move, row, here, block)
         in_joints = block is not None and self._is_in_joints(block, here)
         if kind not in _POINTS[block is not None, in_joints]:
-            goal = FoundGoal(Meaning.UNKNOWN, NOTHING, why=SPLINE)
+            goal = not_reached(_Goal(self, move, row, here).end(move.to), SPLINE)
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
         reader = _Goal(self, move, row, here)
@@ -121,7 +123,7 @@ class KrlGoals:
             )
         goal = reader.end(move.to)
         if why:
-            goal = FoundGoal(Meaning.UNKNOWN, NOTHING, name=goal.name, why=ANGLE)
+            goal = not_reached(goal, ANGLE)
         yield KrlVisit(
             here, row, motion, False, goal, modes, why=SPLINE if in_joints else "",
             arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
@@ -331,11 +333,15 @@ class _Goal:
         return FoundGoal(meaning, (0.0,) * WIDTH, name=name, why=why)
 
     def _home(self, operand: said.DataObject) -> FoundGoal:
-        """Read the home position: it holds no target of a process."""
-        goal = self._point(operand) if not operand.name.startswith("$") else None
-        if goal is None or goal.target != Meaning.JOINTS:
-            return FoundGoal(Meaning.HOME, NOTHING, name=operand.name)
-        return FoundGoal(Meaning.HOME, goal.values, name=operand.name)
+        """Read a home position: it holds no target of a process."""
+        name = operand.name
+        stated = name in self.task.written or self.task.place(name, self.here)
+        if name in HOME and not stated:
+            return FoundGoal(Meaning.HOME, NOTHING, name=name)
+        goal = self._point(operand)
+        if goal.target == Meaning.JOINTS:
+            return FoundGoal(Meaning.HOME, goal.values, name=name)
+        return replace(goal, why=goal.why or AT_HOME)
 
     # Products of frames: the point is moved along.
 
@@ -373,7 +379,7 @@ class _Goal:
     def _is_point(self, operand: said.DataObject) -> bool:
         """Tell whether data is a position, and no frame."""
         found = self.task.datum(operand.name, self.here)
-        return found is not None and found[1].type in ("pos", "e6pos")
+        return found is not None and found[1].type in POSITIONS
 
     # Steps.
 

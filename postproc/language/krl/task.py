@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+
+import numpy as np
 
 from postproc.language.flow import HeadedRows
 from postproc.language.krl import syntax as said
@@ -18,6 +20,7 @@ from postproc.language.machine import Scope
 
 CONFIG = "$config"
 ANY = -1  # an entry of a table whose number is not known
+POSITIONS = ("pos", "e6pos")  # types
 DEEPEST = 20  # names that stand for names
 
 
@@ -182,6 +185,25 @@ class KrlTask:
         """Names of data that something may change."""
         return self._uses[0]
 
+    @cached_property
+    def assigned(self) -> frozenset[str]:
+        """Names of data that statements other than loops may change."""
+        programs = (file for file in self.files if file.routines)
+        said_ones = (one for file in programs for one in file.text.said)
+        changed = (data for one in said_ones for data in changed_by(one, self.routines))
+        return frozenset(data.name for data in changed) | self.beside
+
+    @cached_property
+    def counted(self) -> Counter[str]:
+        """Names of the variables of loops, and how many loops count each."""
+        found = Counter[str]()
+        for file in self.files:
+            rows = np.bincount(file.text.shape, minlength=len(file.text.said.shapes))
+            for one, count in zip(file.text.said, rows.tolist(), strict=False):
+                if isinstance(one, said.ForLoop):
+                    found[one.name] += count
+        return found
+
     def is_global(self, name: str, here: Scope) -> bool:
         """Return True if a name means data that all programs share."""
         if name in here.parameters:
@@ -199,9 +221,10 @@ class KrlTask:
         found: dict[str, set[int]] = {table: set() for table in TABLES}
         for number, file in enumerate(self.files):
             here = Scope(number, file.name, "")
-            for row in range(len(file.text)) if file.routines else ():
-                for target in changed_by(file.text.statement(row)):
-                    if target.name in found:
+            for row in range(len(file.text)):
+                for target in changed_by(file.text.statement(row), self.routines):
+                    given = not (file.routines or _is_of_part(target))
+                    if target.name in found and not given:
                         found[target.name].add(self._entry(target, row, here))
         return {table: frozenset(numbers) for table, numbers in found.items()}
 
@@ -231,26 +254,41 @@ class KrlTask:
     @cached_property
     def beside(self) -> frozenset[str]:
         """Names of data that submit programs may change at any time."""
-        found = set[str]()
+        return self._uses_beside[0]
+
+    @cached_property
+    def _uses_beside(self) -> tuple[frozenset[str], frozenset[str]]:
+        """Collect the names that submit programs may change, and those they take."""
+        written, read = set[str](), set[str]()
         for file in (f for f in self.files if f.is_submit):
             own = {datum.name for datum in file.data if not datum.shared}
-            uses = _Uses()
+            uses = _Uses(self.routines, self._points)
             for one in file.text.said:
                 uses.note(one)
-            found |= uses.written - own
-        return frozenset(found)
+            written |= uses.written - own
+            read |= uses.read - own
+        return frozenset(written), frozenset(read)
 
     @cached_property
     def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
-        uses = _Uses()
+        uses = _Uses(self.routines, self._points)
         for file in (f for f in self.files if not f.is_submit):
             lists = file.routines == ()
             for one in file.text.said:
                 if not (lists and isinstance(one, said.Assignment)):
                     uses.note(one)
-                else:
-                    uses.take(one.value)
-        return frozenset(uses.written) | self.beside, frozenset(uses.read) | self.beside
+                    continue
+                uses.take(one.value)
+                if _is_of_part(one.target):
+                    uses.written.add(one.target.name)
+        written, read = self._uses_beside
+        return written | uses.written, read | written | uses.read
+
+    @cached_property
+    def _points(self) -> frozenset[str]:
+        """Names of data that are positions."""
+        data = (datum for file in self.files for datum in file.data)
+        return frozenset(one.name for one in data if one.type in POSITIONS)
 
     @cached_property
     def _taught_lines(self) -> list[frozenset[int]]:
@@ -372,8 +410,15 @@ def _result(operator: str, numbers: Sequence[float]) -> float:
 
 @dataclass
 class _Uses:
-    """Names that statements may change, and those that they take."""
+    """Names that statements may change, and those that they take.
 
+    Attributes:
+        own: Names of the routines of the job.
+        points: Names of positions.
+    """
+
+    own: Collection[str]
+    points: Collection[str]
     written: set[str] = field(default_factory=set)
     read: set[str] = field(default_factory=set)
 
@@ -424,7 +469,8 @@ class _Uses:
 
     def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
         """Note arguments: a routine may change them, unless it is known not to."""
-        self.written |= {one.name for one in _changed_arguments(name, arguments)}
+        changed = _changed_arguments(name, arguments, self.own)
+        self.written |= {one.name for one in changed}
         for argument in arguments:
             self.take(argument.value)
 
@@ -433,36 +479,60 @@ class _Uses:
         match operand:
             case said.DataObject():
                 self._subscripts(operand)
-            case said.Operation(operator=":", operands=operands):
-                for one in operands:
-                    self._destination(one)
+            case said.Operation(operator=":", operands=(first, second)):
+                point, shift = point_and_shift(first, second, self.points)
+                self._destination(point)
+                self.take(shift)
             case _:
                 self.take(operand)
 
 
-def changed_by(one: said.SourceStatement) -> Iterator[said.DataObject]:
-    """Yield data that a statement may change, also what it does later."""
+def point_and_shift(
+    first: said.Operand, second: said.Operand, points: Collection[str]
+) -> tuple[said.Operand, said.Operand]:
+    """Tell which operand of ``first : second`` is the point that is shifted.
+
+    It is the first where that is a position, else the second.
+    """
+    behind = isinstance(first, said.DataObject) and first.name in points
+    return (first, second) if behind else (second, first)
+
+
+def changed_by(
+    one: said.SourceStatement, own: Collection[str] = ()
+) -> Iterator[said.DataObject]:
+    """Yield data that a statement may change, also what it does later.
+
+    Args:
+        one: The statement.
+        own: Names of the routines of the job.
+    """
     match one:
         case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
-            yield from changed_by(action)
+            yield from changed_by(action, own)
         case said.Assignment(target=target):
             yield target
         case said.Instruction(name=name, arguments=arguments):
-            yield from _changed_arguments(name, arguments)
+            yield from _changed_arguments(name, arguments, own)
     for part in parts_of(operands_of(one)):
         if isinstance(part, said.FunctionCall):
-            yield from _changed_arguments(part.name, part.arguments)
+            yield from _changed_arguments(part.name, part.arguments, own)
 
 
 def _changed_arguments(
-    name: str, arguments: Sequence[said.Argument]
+    name: str, arguments: Sequence[said.Argument], own: Collection[str]
 ) -> Iterator[said.DataObject]:
     """Yield the arguments that a routine may change: all, unless it is known."""
-    if name in KEEPING:
+    if name in KEEPING and name not in own:
         return
     for argument in arguments:
         if isinstance(argument.value, said.DataObject):
             yield argument.value
+
+
+def _is_of_part(target: said.DataObject) -> bool:
+    """Return True if a component is meant: a list that sets one is not followed."""
+    return any(isinstance(step, str) for step in target.steps)
 
 
 def is_word(operand: said.Operand | None, word: str) -> bool:

@@ -11,9 +11,11 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.exceptions import ProgramError
 from postproc.files import is_module, read_input
+from postproc.language.archive import Archive
 from postproc.language.rapid.dialect import RAPID_DIALECT
 from postproc.language.rapid.program import read_rapid
 from postproc.language.source import source_from_bytes
+from postproc.robot.pose import record_from_pose
 
 PROGRAMS, SYSTEM = "progmod", "sysmod"  # folders of a task
 SETTINGS = ("syspar", "moc.cfg")
@@ -110,3 +112,24 @@ def _is_readable(path: Path) -> bool:
     except ProgramError:
         return False
     return True
+
+
+def read_backup(folder: Path) -> Archive | None:
+    """Read where ``MOC.cfg`` of a backup places its arm, None without a backup.
+
+    The backup is the folder, or lies in it. Of several arms no place is given.
+    """
+    inside = (
+        sorted(p for p in folder.iterdir() if p.is_dir()) if folder.is_dir() else []
+    )
+    for place in (folder, *inside):
+        settings = _entry(place, SETTINGS[0])
+        file = None if settings is None else _entry(settings, SETTINGS[1])
+        if file is not None and file.is_file():
+            arms = read_arms(file.read_text(encoding="latin-1"))
+            one = [arm for arm in arms if len(arms) == 1]
+            root = [tuple(record_from_pose(arm.pose[None])[0].tolist()) for arm in one]
+            shown = file.relative_to(folder).as_posix()
+            kinds = {"arms": tuple(range(1, len(arms) + 1))}
+            return Archive(shown, kinds, (), (), root[0] if root else (), -1)
+    return None

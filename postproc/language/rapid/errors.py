@@ -9,7 +9,8 @@ from itertools import pairwise
 
 from postproc.language.flow import CLOSING, RoutineFlow
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.task import functions_in, inside
+from postproc.language.rapid.targets import operands_of
+from postproc.language.rapid.task import SHIFTS, functions_in, inside
 from postproc.language.statements import StatementText
 
 Numbers = frozenset[str] | None
@@ -253,5 +254,36 @@ def _raises(called: Sequence[str], number: str, declared: bool) -> bool:
     return starts is None or any(name.startswith(starts) for name in called)
 
 
+def may_be_skipped(one: said.RapidStatement) -> bool:
+    """Return True if an error may keep an instruction from being carried out.
+
+    Plain moves, and instructions that set modes, raise none: but for an index or a
+    function among their operands, and for what waits or couples.
+    """
+    one = inside(one)
+    if not isinstance(one, said.Instruction):
+        return False
+    concurrent = any(argument.name == "conc" for argument in one.arguments)
+    asks = any(name not in SHIFTS for name in functions_in(one))
+    indexed = any(map(_is_indexed, operands_of(one)))
+    return concurrent or asks or indexed or one.name in COUPLING
+
+
+def _is_indexed(operand: said.Operand | None) -> bool:
+    """Return True if an operand is an element whose index is no number."""
+    match operand:
+        case said.DataObject(steps=steps):
+            found = [at for at in steps if isinstance(at, said.ElementStep)]
+            indices = [index for at in found for index in at.subscripts]
+            return not all(isinstance(index, said.Num) for index in indices)
+        case said.FunctionCall(arguments=arguments):
+            return any(_is_indexed(argument.value) for argument in arguments)
+        case said.Composite(items=items) | said.Operation(operands=items):
+            return any(map(_is_indexed, items))
+    return False
+
+
+COUPLING = ("syncmoveoff", "syncmoveundo", "dropwobj", "corrdiscon", "softdeact")
+"""Instructions that end a coupling, and can fail."""
 RAISING = ("errraise", "raisetouser", "procerrrecovery")
 """Instructions that raise any error."""

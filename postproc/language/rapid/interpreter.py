@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, TypeGuard
 
+from postproc.language.collect import FoundGoal
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
 from postproc.language.machine import (
@@ -25,6 +28,7 @@ from postproc.language.rapid.errors import (
     clauses_of,
     common,
     key_of,
+    may_be_skipped,
     may_raise,
     numbers_of,
 )
@@ -47,12 +51,14 @@ from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
 SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
+BY_NAME = "callbyvar"
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (
     said.FileHeader, said.DataDeclaration, said.ConnectTrap, said.Assignment,
     said.TypeAlias,
 )  # fmt: skip
+_Place = tuple[int, str, HeadedRows]  # file, module and rows of a routine
 _PASSED = (*_PLAIN, said.RapidStatement, said.LabelMark)
 
 
@@ -69,11 +75,14 @@ class RapidMachine(TaskMachine):
 
     task: RapidTask = field(kw_only=True)
     goals: Goals = field(kw_only=True)
-    ends: list[Modes] = field(default_factory=list)
-    restarts: list[Modes] = field(default_factory=list)
+    ends: list[Arrived] = field(default_factory=list)
+    restarts: list[Arrived] = field(default_factory=list)
     _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
     _exits: dict[CallContext, tuple[ErrorExit, ...]] = field(default_factory=dict)
     _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _direct: dict[tuple[int, int], tuple[bool, list[_Place]]] = field(
+        default_factory=dict
+    )
 
     @classmethod
     def of(cls, task: RapidTask, start: Start) -> RapidMachine:
@@ -104,18 +113,18 @@ class RapidMachine(TaskMachine):
             self.follow_all()
 
     def _next_cycle(self, here: Arrived) -> Arrived:
-        """Return how main begins again: with the modes that hold where a cycle ends.
+        """Return how main begins again: from where, and with what, a cycle ends.
 
-        What an unknown call leaves unknown there does not count:
+        The controller sets modes to what it starts with only where the program is
+        started from its beginning. What an unknown call leaves unknown does not count:
         it would leave whole programs.
         """
         modes, displaced = here.modes, "pdispon" in self.task.called
-        for end in self.ends:
-            modes = modes.continued(end, ("shift", "blocked", "grip"), displaced)
-        for end in self.restarts:
-            modes = modes.continued(end, modes.names(), displaced)
-        origins = here.origins | (NOWHERE if self.restarts else frozenset())
-        return Arrived(origins, modes)
+        for end in (*self.ends, *self.restarts):
+            modes = modes.continued(end.modes, modes.names(), displaced)
+        found = [here.origins, *(end.origins for end in self.ends)]
+        found += [NOWHERE] if self.restarts else []
+        return Arrived(frozenset().union(*found), modes)
 
     def _procedures(self) -> list[tuple[int, str, HeadedRows]]:
         routines = (one for found in self.task.routines.values() for one in found)
@@ -163,7 +172,7 @@ class RapidMachine(TaskMachine):
     def at_return(self, context: CallContext, here: Arrived) -> Arrived:
         """Note the end of a cycle; forget what a handler may have changed."""
         if context.caller is None:
-            self.ends.append(here.modes)
+            self.ends.append(here)
         return here.lost() if self._handlers_of(context).moves else here
 
     # Errors.
@@ -178,7 +187,10 @@ class RapidMachine(TaskMachine):
                 return key_of(operand, self.task.number(operand, row, scope))
 
             clauses = clauses_of(text, context.flow, read)
-            moves = self._any_moves(scope, context.flow.handlers, (EXIT_CYCLE,))
+            rows = context.flow.handlers
+            moves = self._any_moves(scope, rows, (EXIT_CYCLE,))
+            if moves:
+                self.beside.add((scope.file, rows.start, rows.stop))
             self._handlers[key] = ErrorHandlers(clauses, moves)
         return self._handlers[key]
 
@@ -193,13 +205,17 @@ class RapidMachine(TaskMachine):
     ) -> None:
         """Allow for an error that a statement raises and another routine handles.
 
-        The routine's own handler that goes on behind the statement, or with it again,
-        changes nothing of how the arm comes there.
+        The routine's own handler may skip a statement whose operands are not known
+        before it runs. Otherwise it changes nothing of how the arm comes there.
         """
         for way in self._exits_of(context):
             beside = way.own and way.context is context
-            if not beside and self._may_raise(one, way.numbers):
+            if not self._may_raise(one, way.numbers):
+                continue
+            if not beside:
                 self._handled(context, row, way, replace(here, origins=NOWHERE))
+            elif way.row and may_be_skipped(one):
+                self._handled(context, row, way, here)
 
     def _may_raise(self, one: said.RapidStatement, numbers: Numbers) -> bool:
         return may_raise(one, numbers, self.task.routines, self.task.declared)
@@ -224,9 +240,9 @@ class RapidMachine(TaskMachine):
         elif way.context is not None:
             self.enter(way.context, way.row, here)
         elif way.restarts:
-            self.restarts.append(here.modes)
+            self.restarts.append(here)
         else:
-            self.ends.append(here.modes)
+            self.ends.append(here)
 
     def raise_error(
         self, context: CallContext, row: int, one: said.Leave, here: Arrived
@@ -247,7 +263,62 @@ class RapidMachine(TaskMachine):
             self.enter(context, row + 1, here)
             self._compact(context, row, one.statement, here)
         else:
+            self._bind_late(one)
             super().part_otherwise(context, row, one, here)
+
+    def _bind_late(self, one: said.RapidStatement) -> None:
+        """Note the procedures that ``%name%`` may call."""
+        if not isinstance(one, said.LateCall):
+            return
+        if _is_text(one.procedure):
+            self._run_named_beside(_called(one.procedure))
+        else:
+            self._run_all_beside()
+
+    def _run_named_beside(self, name: str) -> None:
+        """Note all routines of a name."""
+        for file, _, routine in self.task.routines.get(name, []):
+            self.run_beside(file, routine)
+
+    def _run_all_beside(self) -> None:
+        """Note that every procedure may be called."""
+        for file, _, routine in self._procedures():
+            self.run_beside(file, routine)
+
+    def calls_of(
+        self, file: int, one: said.RapidStatement
+    ) -> list[tuple[int, HeadedRows]]:
+        """Return the routines that a statement calls, see `TaskMachine`."""
+        inner = inside(one)
+        names = {*functions_in(one)}
+        if isinstance(inner, said.LateCall) or getattr(inner, "name", "") == BY_NAME:
+            return [(at, routine) for at, _, routine in self._procedures()]
+        if isinstance(inner, said.Instruction):
+            texts = [a.value for a in inner.arguments if _is_text(a.value)]
+            late = inner.name in SYNCHRONOUS
+            names |= {inner.name, *(_called(text) for text in texts if late)}
+        found = [one for name in names for one in self.task.routines.get(name, [])]
+        return [(at, routine) for at, _, routine in found]
+
+    def goals_of(self, file: int, row: int) -> Iterator[FoundGoal]:
+        """Yield where a move goes, see `TaskMachine`."""
+        one = inside(self.texts[file].statement(row))
+        around = (r for r in self._by_file[file] if r[2].first < row < r[2].last)
+        place = next(around, None)
+        signature = MOTIONS.get(getattr(one, "name", ""))
+        if place and signature and isinstance(one, said.Instruction):
+            scope = self.task.scope_of(*place)
+            for visit in self.goals.visits(one, signature, row, scope, AT_START):
+                yield visit.goal
+
+    @cached_property
+    def _by_file(self) -> Mapping[int, list[tuple[int, str, HeadedRows]]]:
+        """Return the routines of every file."""
+        found = defaultdict[int, list[tuple[int, str, HeadedRows]]](list)
+        for routines in self.task.routines.values():
+            for one in routines:
+                found[one[0]].append(one)
+        return found
 
     def _compact(
         self, context: CallContext, row: int, inside: said.RapidStatement, here: Arrived
@@ -260,6 +331,7 @@ class RapidMachine(TaskMachine):
         elif isinstance(inside, said.JumpTo | said.Leave | said.CompactIf):
             self.part(context, row, inside, here)
         elif type(inside) not in _PASSED:
+            self._bind_late(inside)
             self.enter(context, row + 1, self.unknown(context, row, here))
 
     # What instructions do.
@@ -277,10 +349,11 @@ class RapidMachine(TaskMachine):
             self.reached.add((scope.file, row))
             return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
+            self._run_named_beside(name)
             return self.unknown(context, row, here, "names several routines")
         kind = known_instructions().get(name)
         if name == EXIT_CYCLE:
-            self.restarts.append(here.modes)
+            self.restarts.append(here)
             return None
         if name in STOPPED:
             return here.lost()
@@ -289,6 +362,8 @@ class RapidMachine(TaskMachine):
             return replace(here, modes=changed.allowing())
         if kind in ("still", "modal") or self.said_still(name):
             return here
+        if name == BY_NAME:
+            self._run_all_beside()
         if kind == "left" and name not in self.start.routines:
             return self.unknown(context, row, here, _LEFT)
         return self.outside(context, row, name, here)
@@ -327,12 +402,13 @@ class RapidMachine(TaskMachine):
         """Allow for the procedure that a move calls while the program runs ahead."""
         placed = [argument.value for argument in one.arguments if not argument.name]
         called = placed[-1] if placed else None
-        name = called.text.strip('"').lower() if _is_text(called) else ""
+        name = _called(called) if _is_text(called) else ""
         if self.said_still(name) and name not in self.task.routines:
             return here
-        found = self.task.routine(name.split(":")[-1], context.scope)
+        found = self.task.routine(name, context.scope)
         given = None if found is None else self._given(*found)
         if given is None:
+            self._run_named_beside(name)
             what = "calls a procedure on its way that may move the arm"
             what = what if found else f"{what}: it is in no file of the task"
             here = self.unknown(context, row, here, what)
@@ -348,6 +424,8 @@ class RapidMachine(TaskMachine):
         scope, found = self.task.scope_of(file, module, routine), set[tuple[str, Any]]()
         for row in range(routine.first + 1, routine.last):
             one = inside(self.texts[file].statement(row))
+            if self._asks_moving(scope, self.texts[file].statement(row)):
+                return None
             own = isinstance(one, said.Instruction) and one.name in self.task.routines
             if isinstance(one, said.Instruction) and not own:
                 kind = known_instructions().get(one.name)
@@ -376,12 +454,13 @@ class RapidMachine(TaskMachine):
         for name in functions_in(one):
             found = self.task.routine(name, context.scope)
             own = name in self.task.routines
-            if not own and (name in STILL_FUNCTIONS or self.said_still(name)):
+            if not own and self._is_still_function(name):
                 continue
             if found is None:
                 what = f"calls the function {name}, which is not known: it may move"
                 here = self.unknown(context, row, here, what)
             elif self._moves(*found):
+                self.run_beside(found[0], found[2])
                 what = f"calls the function {name}, which moves: it is not followed"
                 here = self.unknown(context, row, here, what)
         return here
@@ -392,10 +471,7 @@ class RapidMachine(TaskMachine):
         """Tell whether a routine moves, or changes how moves are carried out."""
         key = file, routine.first
         if key not in self._moving:
-            self._moving[key] = False  # of one that calls itself
-            scope = self.task.scope_of(file, module, routine)
-            rows = range(routine.first + 1, routine.last)
-            self._moving[key] = self._any_moves(scope, rows)
+            self._moving[key] = self._reach_moves([(file, module, routine)])
         return self._moving[key]
 
     def _any_moves(
@@ -408,19 +484,62 @@ class RapidMachine(TaskMachine):
             rows: Their rows.
             passed: Instructions that do not count.
         """
-        text = self.texts[scope.file]
+        moves, called = self._read_rows(scope, rows, passed)
+        return moves or self._reach_moves(called)
+
+    def _reach_moves(self, waiting: list[_Place]) -> bool:
+        """Return True if routines, or those that they call, may move the arm."""
+        waiting, seen = [*waiting], set[tuple[int, int]]()
+        while waiting:
+            file, module, routine = waiting.pop()
+            key = file, routine.first
+            if key in seen:
+                continue
+            seen.add(key)
+            if key not in self._direct:
+                scope = self.task.scope_of(file, module, routine)
+                rows = range(routine.first + 1, routine.last)
+                self._direct[key] = self._read_rows(scope, rows)
+            moves, called = self._direct[key]
+            if moves:
+                return True
+            waiting += called
+        return False
+
+    def _read_rows(
+        self, scope: Scope, rows: range, passed: tuple[str, ...] = ()
+    ) -> tuple[bool, list[_Place]]:
+        """Say whether statements may move the arm themselves, and what they call."""
+        text, called = self.texts[scope.file], list[_Place]()
         for row in rows:
             one = inside(text.statement(row))
             if isinstance(one, said.LateCall | said.NotUnderstood):
-                return True
+                return True, []
+            names = [*functions_in(text.statement(row))]
+            still = [self._is_still_function(name) for name in names]
             if isinstance(one, said.Instruction) and one.name not in passed:
-                found = self.task.routine(one.name, scope)
-                if found is not None:
-                    if self._moves(*found):
-                        return True
-                elif not self._is_still(one.name):
-                    return True
+                names.append(one.name)
+                still.append(self._is_still(one.name))
+            for name, harmless in zip(names, still, strict=True):
+                found = self.task.routine(name, scope)
+                called += [] if found is None else [found]
+                if found is None and (name in self.task.routines or not harmless):
+                    return True, []
+        return False, called
+
+    def _asks_moving(self, scope: Scope, one: said.RapidStatement) -> bool:
+        """Return True if a function of a statement may move the arm or set modes."""
+        for name in functions_in(one):
+            found = self.task.routine(name, scope)
+            own = name in self.task.routines
+            if found is not None and self._moves(*found):
+                return True
+            if found is None and (own or not self._is_still_function(name)):
+                return True
         return False
+
+    def _is_still_function(self, name: str) -> bool:
+        return name in STILL_FUNCTIONS or self.said_still(name)
 
     def _is_still(self, name: str) -> bool:
         still = known_instructions().get(name) == "still" or name in HARMLESS
@@ -434,6 +553,11 @@ _HANDLER = "the error handler of its routine may move the arm, or change its set
 
 def _is_text(operand: said.Operand | None) -> TypeGuard[said.StringLiteral]:
     return isinstance(operand, said.StringLiteral)
+
+
+def _called(text: said.StringLiteral) -> str:
+    """Return the procedure that a text names, without its module."""
+    return text.text.strip('"').lower().rpartition(":")[2]
 
 
 def _kind(routine: HeadedRows) -> str:

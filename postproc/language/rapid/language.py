@@ -11,6 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.exceptions import ProgramError
 from postproc.files import MODULES, is_system_module
+from postproc.language.archive import Archive
 from postproc.language.grammars import line_parser
 from postproc.language.interface import (
     Cloner,
@@ -20,7 +21,7 @@ from postproc.language.interface import (
     Start,
 )
 from postproc.language.outline import read_once
-from postproc.language.rapid.backup import mounted_arms, system_modules
+from postproc.language.rapid.backup import mounted_arms, read_backup, system_modules
 from postproc.language.rapid.collect import visits_of
 from postproc.language.rapid.dialect import RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
@@ -103,6 +104,10 @@ class Rapid(Language):
     def reads(self, program: Path) -> tuple[Path, ...]:
         """Return the system modules of the task, in a backup."""
         return system_modules(program)
+
+    def read_archive(self, folder: Path) -> Archive | None:
+        """Read ``MOC.cfg`` of a backup."""
+        return read_backup(folder)
 
     def placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
         """Return the arms of a backup, and where ``MOC.cfg`` places them."""

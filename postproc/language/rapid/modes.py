@@ -126,6 +126,8 @@ BLOCKING = {
     "waitwobj": ("dropwobj", "the work object is on a conveyor (WaitWObj)"),
 }
 _ENDING = {name: why for ends, why in BLOCKING.values() for name in ends.split()}
+ONE_OF_MANY = frozenset(["corrcon", "corrdiscon", "waitwobj", "dropwobj"])
+"""Those of them that begin and end one of several: what they name tells which."""
 # They change nothing of where a target is and from which side it is reached.
 HARMLESS = frozenset(
     """
@@ -180,11 +182,30 @@ def changed_modes(
             return replace(modes, override=0.0)
         case "gripload":
             return replace(modes, grip=load(placed[0] if placed else None))
+    which = _which(name, placed)
     if name in BLOCKING:
-        return replace(modes, blocked=modes.blocked | {BLOCKING[name][1]})
+        return replace(modes, blocked=modes.blocked | {BLOCKING[name][1] + which})
     if name in _ENDING:
-        return replace(modes, blocked=modes.blocked - {_ENDING[name]})
+        ended = _ENDING[name] + which
+        kept = {why for why in modes.blocked if not _ends(name, ended, why)}
+        return replace(modes, blocked=frozenset(kept))
     return modes if name in HARMLESS else replace(LOST, blocked=modes.blocked)
+
+
+def _which(name: str, placed: Sequence[said.Operand | None]) -> str:
+    """Say which of several couplings an instruction begins or ends, "" for all."""
+    if name not in ONE_OF_MANY:
+        return ""
+    one = placed[0] if placed else None
+    plain = isinstance(one, said.DataObject) and not one.steps
+    return f": {one.name}" if plain and isinstance(one, said.DataObject) else ": ?"
+
+
+def _ends(name: str, ended: str, why: str) -> bool:
+    """Return True if an instruction ends what leaves targets."""
+    if name in ONE_OF_MANY:
+        return why == ended and not why.endswith("?")
+    return why.startswith(ended)
 
 
 def given_modes(

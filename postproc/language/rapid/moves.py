@@ -17,6 +17,7 @@ from postproc.language.collect import (
     Pose,
     composed,
     flat,
+    not_reached,
 )
 from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
@@ -144,7 +145,7 @@ class Goals:
             )  # fmt: skip
         goal = self.goal(ends[0], signature, row, scope)
         if not signature.reaches:
-            goal = FoundGoal(Meaning.UNKNOWN, NOTHING, why=why, name=goal.name)
+            goal = not_reached(goal, why)
         yield RapidVisit(
             scope, row, motion, False, goal, modes, why=why,
             tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
@@ -213,7 +214,9 @@ class Goals:
             case said.Composite() | said.DataObject():
                 return self._point(operand, signature.joints, row, scope)
             case said.FunctionCall(name=name, arguments=arguments) if (
-                name in SHIFTS and not signature.joints
+                name in SHIFTS
+                and name not in self.task.routines
+                and not signature.joints
             ):
                 return self._shifted(name, arguments, row, scope)
             case _:

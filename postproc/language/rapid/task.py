@@ -165,12 +165,11 @@ class RapidTask:
 
     @cached_property
     def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
-        written: set[str] = set()
-        read: set[str] = set()
+        uses = _NamesUsed(self.routines)
         for file in self.files:
             for statement in file.text.said:
-                _note_uses(statement, written, read)
-        return frozenset(written), frozenset(read)
+                uses.note(statement)
+        return frozenset(uses.written), frozenset(uses.read)
 
     def scope_of(self, number: int, module: str, routine: HeadedRows) -> Scope:
         """Return where the statements of a routine stand."""
@@ -290,109 +289,108 @@ def _computed(operator: str, parts: Sequence[float]) -> float:
 # What statements take and change.
 
 
-def _note_uses(one: said.RapidStatement, written: set[str], read: set[str]) -> None:
-    """Note the names that a statement may change, and those that it takes."""
-    match one:
-        case said.DataDeclaration(value=value, dimensions=dimensions):
-            for operand in (value, *dimensions):
-                _note_operand(operand, written, read)
-        case said.Assignment(target=target, value=value):
-            written.add(target.name)
-            _note_operand(value, written, read)
-        case said.Branch(values=values):
-            for operand in values:
-                _note_operand(operand, written, read)
-        case said.CompactIf(condition=condition, statement=inside):
-            _note_operand(condition, written, read)
-            _note_uses(inside, written, read)
-        case said.ForLoop(name=name, first=first, last=last, step=step):
-            written.add(name)
-            for operand in (first, last, step):
-                _note_operand(operand, written, read)
-        case said.Leave(value=value):
-            _note_operand(value, written, read)
-        case said.ConnectTrap(interrupt=interrupt):
-            written.add(interrupt.name)
-        case said.Instruction(name=name, arguments=arguments):
-            _note_call(name, arguments, written, read)
-        case said.LateCall(arguments=arguments):
-            _note_arguments(arguments, written, read)
-        case said.NotUnderstood():
-            pass  # what it may change is said with it: nothing is known behind it
+@dataclass
+class _NamesUsed:
+    """Names that statements may change, and those that they take.
 
+    Attributes:
+        own: Names of the routines of the task: what else has their names is hidden.
+    """
 
-def _note_call(
-    name: str, arguments: Sequence[said.Argument], written: set[str], read: set[str]
-) -> None:
-    signature = MOTIONS.get(name)
-    if signature is not None:
-        ends = signature.operands(arguments)
-        for argument in arguments:
-            if any(argument.value is end for end in ends):
-                _note_destination(argument.value, written, read)
-            elif signature.reaches:
-                _note_operand(argument.value, written, read)
-            else:
-                _note_arguments([argument], written, read)
-    elif name in READING:
-        for argument in arguments:
-            _note_operand(argument.value, written, read)
-    else:
-        _note_arguments(arguments, written, read)
+    own: Collection[str]
+    written: set[str] = field(default_factory=set)
+    read: set[str] = field(default_factory=set)
 
+    def note(self, one: said.RapidStatement) -> None:
+        """Note the names that a statement may change, and those that it takes."""
+        match one:
+            case said.DataDeclaration(value=value, dimensions=dimensions):
+                for operand in (value, *dimensions):
+                    self._operand(operand)
+            case said.Assignment(target=target, value=value):
+                self.written.add(target.name)
+                self._operand(value)
+            case said.Branch(values=values):
+                for operand in values:
+                    self._operand(operand)
+            case said.CompactIf(condition=condition, statement=inside):
+                self._operand(condition)
+                self.note(inside)
+            case said.ForLoop(name=name, first=first, last=last, step=step):
+                self.written.add(name)
+                for operand in (first, last, step):
+                    self._operand(operand)
+            case said.Leave(value=value):
+                self._operand(value)
+            case said.ConnectTrap(interrupt=interrupt):
+                self.written.add(interrupt.name)
+            case said.Instruction(name=name, arguments=arguments):
+                self._call(name, arguments)
+            case said.LateCall(arguments=arguments):
+                self._arguments(arguments)
+            case said.NotUnderstood():
+                pass  # what it may change is said with it: nothing is known behind it
 
-def _note_destination(
-    operand: said.Operand | None, written: set[str], read: set[str]
-) -> None:
-    """Note what the destination of a move takes besides the point itself."""
-    match operand:
-        case said.DataObject(steps=steps):
-            _note_steps(steps, written, read)
-        case said.FunctionCall(name=name, arguments=arguments) if name in SHIFTS:
-            if arguments and isinstance(arguments[0].value, said.DataObject):
-                _note_steps(arguments[0].value.steps, written, read)
-                arguments = arguments[1:]
+    def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
+        signature = None if name in self.own else MOTIONS.get(name)
+        if signature is not None:
+            ends = signature.operands(arguments)
             for argument in arguments:
-                _note_operand(argument.value, written, read)
-        case _:
-            _note_operand(operand, written, read)
+                if any(argument.value is end for end in ends):
+                    self._destination(argument.value)
+                elif signature.reaches:
+                    self._operand(argument.value)
+                else:
+                    self._arguments([argument])
+        elif name in READING and name not in self.own:
+            for argument in arguments:
+                self._operand(argument.value)
+        else:
+            self._arguments(arguments)
 
-
-def _note_steps(
-    steps: Sequence[str | said.ElementStep], written: set[str], read: set[str]
-) -> None:
-    for step in steps:
-        if isinstance(step, said.ElementStep):
-            for subscript in step.subscripts:
-                _note_operand(subscript, written, read)
-
-
-def _note_arguments(
-    arguments: Sequence[said.Argument], written: set[str], read: set[str]
-) -> None:
-    """Note arguments that a routine may change."""
-    for argument in arguments:
-        if isinstance(argument.value, said.DataObject):
-            written.add(argument.value.name)
-        _note_operand(argument.value, written, read)
-
-
-def _note_operand(
-    operand: said.Operand | None, written: set[str], read: set[str]
-) -> None:
-    match operand:
-        case said.DataObject(name=name, steps=steps):
-            read.add(name)
-            _note_steps(steps, written, read)
-        case said.Composite(items=items) | said.Operation(operands=items):
-            for item in items:
-                _note_operand(item, written, read)
-        case said.FunctionCall(name=name, arguments=arguments):
-            if name in BUILT_IN_FUNCTIONS:
+    def _destination(self, operand: said.Operand | None) -> None:
+        """Note what the destination of a move takes besides the point itself."""
+        match operand:
+            case said.DataObject(steps=steps):
+                self._steps(steps)
+            case said.FunctionCall(name=name, arguments=arguments) if (
+                name in SHIFTS and name not in self.own
+            ):
+                if arguments and isinstance(arguments[0].value, said.DataObject):
+                    self._steps(arguments[0].value.steps)
+                    arguments = arguments[1:]
                 for argument in arguments:
-                    _note_operand(argument.value, written, read)
-            else:
-                _note_arguments(arguments, written, read)
+                    self._operand(argument.value)
+            case _:
+                self._operand(operand)
+
+    def _steps(self, steps: Sequence[str | said.ElementStep]) -> None:
+        for step in steps:
+            if isinstance(step, said.ElementStep):
+                for subscript in step.subscripts:
+                    self._operand(subscript)
+
+    def _arguments(self, arguments: Sequence[said.Argument]) -> None:
+        """Note arguments that a routine may change."""
+        for argument in arguments:
+            if isinstance(argument.value, said.DataObject):
+                self.written.add(argument.value.name)
+            self._operand(argument.value)
+
+    def _operand(self, operand: said.Operand | None) -> None:
+        match operand:
+            case said.DataObject(name=name, steps=steps):
+                self.read.add(name)
+                self._steps(steps)
+            case said.Composite(items=items) | said.Operation(operands=items):
+                for item in items:
+                    self._operand(item)
+            case said.FunctionCall(name=name, arguments=arguments):
+                if name in BUILT_IN_FUNCTIONS and name not in self.own:
+                    for argument in arguments:
+                        self._operand(argument.value)
+                else:
+                    self._arguments(arguments)
 
 
 def inside(one: said.RapidStatement) -> said.RapidStatement:

@@ -25,8 +25,8 @@ def left(found):
 
 @pytest.mark.parametrize("more", [MOVES, SETS, BRAKES, AGAIN])
 def test_an_interrupt_leaves_what_it_may_interrupt(more):
-    lines = ["LIN XP1", SEARCH, "LIN XP1", "INTERRUPT ON 10", "LIN XP1", "LIN XP1",
-             "INTERRUPT OFF 10", *FRAMES, "LIN XP1", "LIN XP1"]  # fmt: skip
+    lines = ["LIN XP1", SEARCH, "LIN XP1", "WAIT SEC 0", "INTERRUPT ON 10", "LIN XP1",
+             "LIN XP1", "INTERRUPT OFF 10", *FRAMES, "LIN XP1", "LIN XP1"]  # fmt: skip
     found = job(*lines, more=more)
     assert left(found) == [False, False, True, True, False, False]
     assert origins(found)[4] == [ELSEWHERE] and reasons(found)[5] == ""
@@ -38,8 +38,8 @@ def test_behind_an_interrupt_that_may_set_frames_they_are_not_known():
 
 
 def test_resume_leaves_everything_from_the_declaration_on():
-    lines = ["LIN XP1", SEARCH, "INTERRUPT ON 10", "LIN XP1", "INTERRUPT OFF 10",
-             *FRAMES, "LIN XP1"]  # fmt: skip
+    lines = ["LIN XP1", "WAIT SEC 0", SEARCH, "INTERRUPT ON 10", "LIN XP1",
+             "INTERRUPT OFF 10", *FRAMES, "LIN XP1"]  # fmt: skip
     assert left(job(*lines, more=RESUMES)) == [False, True, True]
 
 
@@ -49,7 +49,10 @@ def test_an_interrupt_that_does_no_harm_leaves_nothing():
 
 
 def test_an_interrupt_that_nothing_switches_on_may_be_on_from_its_declaration():
-    assert left(job("LIN XP1", SEARCH, "LIN XP1", more=MOVES)) == [False, True]
+    assert left(job("LIN XP1", "WAIT SEC 0", SEARCH, "LIN XP1", more=MOVES)) == [
+        False,
+        True,
+    ]
 
 
 @pytest.mark.parametrize("off", ["INTERRUPT OFF 11", "INTERRUPT OFF N2",
@@ -61,7 +64,8 @@ def test_what_does_not_switch_it_off_for_sure_leaves_on(off):
 
 @pytest.mark.parametrize("on", ["INTERRUPT ON", "INTERRUPT ON N2"])
 def test_all_interrupts_are_switched_on_and_off(on):
-    lines = [SEARCH, "LIN XP1", on, "LIN XP1", "INTERRUPT OFF", *FRAMES, "LIN XP1"]
+    lines = [SEARCH, "LIN XP1", "WAIT SEC 0", on, "LIN XP1", "INTERRUPT OFF", *FRAMES,
+             "LIN XP1"]  # fmt: skip
     assert left(job(*lines, more=MOVES)) == [False, True, False]
 
 

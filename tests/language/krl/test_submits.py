@@ -62,6 +62,21 @@ def test_what_the_program_sets_may_be_changed_at_once():
     assert "$LOAD" in reasons(found)[0]
 
 
+def test_a_point_that_a_submit_program_reads_keeps_its_numbers():
+    pins = job("LIN XP1", submit="N2=XP1.Z").visits.literals.pins
+    assert [*pins] == ["xp1 is used otherwise than as a destination too"]
+
+
+def test_a_submit_program_may_change_the_variable_of_a_loop():
+    found = job("FOR I=1 TO 2", "LIN XS[I]", "ENDFOR", submit="I=2")
+    assert all(reasons(found))
+
+
+def test_a_submit_program_may_change_settings_before_bas_takes_them():
+    lines = ["FDAT_ACT=FP1", "BAS(#FRAMES)", "LIN XP1"]
+    assert reasons(job(*lines, submit="FDAT_ACT.BASE_NO=3"))[0]
+
+
 def test_a_submit_program_alone_is_refused():
     with pytest.raises(ProgramError, match=r"sps\.sub: is a submit program"):
         Krl().read([Source("sps.sub", b"DEF sps( )\nEND\n")], Start())

@@ -8,7 +8,7 @@ import pytest
 
 from postproc.language.rapid.errors import EXIT_CYCLE
 from postproc.language.rapid.signatures import MOTIONS, known_instructions
-from postproc.language.visits import ELSEWHERE, OrientationLaw, Switch
+from postproc.language.visits import ELSEWHERE, START, OrientationLaw, Switch
 from tests.language.rapid.test_visits import L, origins, reasons, task
 
 PAGE = Path(__file__).parents[3] / "docs" / "rapid.md"
@@ -71,6 +71,9 @@ CHECKS = {
                  + f"PROC far()\n{P3}\nwait;\nENDPROC"))[1]),
     "an error, `RETURN` in a handler": lambda: anywhere(
         "bad;", more=RAISED % "sub;\nERROR\nRETURN;"),
+    "an error that the own handler answers with `TRYNEXT`": lambda: (
+        0 in origins(task(P1, L.format("list{n}"), P2, "ERROR", "TRYNEXT;",
+                          more=MORE))[2]),
     "`RAISE`": lambda: left(SHIFT, "bad;", handler=["TRYNEXT;"], more=RAISED
                             % "IF n=1 THEN\nPDispSet d;\nRAISE 5;\nENDIF"),
     "a handler that ends in `Stop`, `EXIT` or at its end": lambda: all(
@@ -79,6 +82,9 @@ CHECKS = {
         "sub;", handler=["IF ERRNO=ERR_WHLSEARCH TRYNEXT;"]),
     "an error of a process move (`ArcL`, `CapL`, ..), own handler": lambda: (
         after(r"ArcL p1,v200,s,x,fine,t\WObj:=w;", handler=["TRYNEXT;"])[0]),
+    "the end of `main`, `RETURN` in it": lambda: (
+        origins(task(P1, P2))[0] == [START, 1]
+        and origins(task(P1, P2, "EXIT;"))[0] == [START]),
     "`ExitCycle`": lambda: ELSEWHERE in origins(
         task(P1, "IF n=1 ExitCycle;", P2, more=MORE))[0],
     "an error handler that moves": lambda: left("handler", handler=[P3, "RETRY;"]),
@@ -89,7 +95,13 @@ CHECKS = {
         SHIFT, r'MoveLSync p1,v200,z10,t\WObj:=w,"away";'),
     '`%"name"%`, `CallByVar`': lambda: (
         anywhere('%"sub"%;') and anywhere('CallByVar "sub",n;')),
-    "a function that moves": lambda: anywhere("n:=moving();"),
+    "a function that moves or changes modes": lambda: (
+        anywhere("n:=moving();")
+        and left("TRAP", more="TRAP x\nn:=moving();\nENDTRAP")),
+    "a routine that calls itself": lambda: (
+        anywhere("again;", more="PROC again()\nagain;\nENDPROC")),
+    "a routine of the task named like an instruction or function": lambda: left(
+        SHIFT, "TPErase;", more="PROC TPErase()\nPDispOn p1,t;\nENDPROC"),
     "a routine in no file": lambda: anywhere("weld 3;"),
     "`IndAMove`, `EGMRunPose`, `FCAct`, `PathRecMoveBwd` and the like": lambda: all(
         anywhere(f"{one} x;") for one in

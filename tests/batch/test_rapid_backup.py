@@ -1,0 +1,70 @@
+"""`batch` over a RobotWare backup: its system modules are read, and copied."""
+
+from __future__ import annotations
+
+import pytest
+
+from postproc.batch.archive import missing_in_cell
+from postproc.language.rapid.backup import read_backup
+from postproc.robot.cell import load_cell
+from tests.language.rapid.test_backup import GIVEN, MOC, backup  # noqa: F401
+from tests.written import cli
+
+SECOND = '      -name "ROB_2"'
+ONE_ARM = MOC.replace(SECOND, f"#\n{SECOND}")
+
+
+@pytest.fixture
+def tree(backup, tmp_path_factory):  # noqa: F811
+    """Move a backup into a folder of its own, beside cell and model."""
+    root = tmp_path_factory.mktemp("plant")
+    (backup / "RAPID" / "TASK1" / "SYSMOD" / "coded.sys").unlink()
+    for name in GIVEN:
+        (backup / name).rename(root / name)
+    backup.rename(root / "backup")
+    return root
+
+
+def run(tree):
+    given = ("--cell", tree / "cell.toml", "--model", tree / "model.json")
+    return cli("batch", tree / "backup", tree / "out", *given, "-j", "1")
+
+
+def test_a_batch_reads_system_modules_and_copies_them(tree):
+    found = run(tree)
+    assert found.exit_code == 0, found.output
+    task = tree / "out" / "RAPID" / "TASK1"
+    before = tree / "backup" / "RAPID" / "TASK1"
+    name = "SYSMOD/user.sys"
+    assert (task / name).read_bytes() == (before / name).read_bytes()
+    job = "PROGMOD/Job.mod"
+    assert (task / job).read_bytes() != (before / job).read_bytes()
+
+
+def test_a_batch_tells_where_the_backup_places_the_arm(tree):
+    (tree / "backup" / "SYSPAR" / "MOC.cfg").write_text(ONE_ARM)
+    told = run(tree).output
+    assert "SYSPAR/MOC.cfg gives arms 1" in told
+    assert "xyz_mm = [1500.0, 0.0, 250.0]" in told
+
+
+def test_a_cell_that_agrees_with_the_backup_lacks_no_base(tree):
+    (tree / "backup" / "SYSPAR" / "MOC.cfg").write_text(ONE_ARM)
+    found = read_backup(tree)
+    assert found.place == "backup/SYSPAR/MOC.cfg"
+    cell = tree / "cell.toml"
+    base = "[base]\nxyz_mm = [{}, 0.0, 250.0]\neuler_zyz_deg = [90.0, 0.0, 0.0]\n"
+    text = cell.read_text()
+    cell.write_text(text + "\n" + base.format(1500.0))
+    assert not any("xyz_mm" in line for line in missing_in_cell(found, load_cell(cell)))
+    cell.write_text(text + "\n" + base.format(1400.0))
+    assert any("xyz_mm" in line for line in missing_in_cell(found, load_cell(cell)))
+
+
+def test_a_backup_of_two_arms_places_none(tree):
+    found = read_backup(tree / "backup")
+    assert found.root == () and found.entries == {"arms": (1, 2)}
+
+
+def test_a_folder_without_settings_is_no_backup(tmp_path):
+    assert read_backup(tmp_path) is None and read_backup(tmp_path / "none") is None
