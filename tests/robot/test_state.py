@@ -91,7 +91,6 @@ def test_another_state_is_another_correction(campaign):
 @pytest.mark.parametrize(
     ("payload", "temperature", "why"),
     [
-        (200, 26, r"payload outside the surveyed 0 to 120 kg"),
         (60, 45, r"temperature outside the surveyed 20.* to 3\d.* deg C"),
         (None, 26, r"payload is not known, and the model needs it"),
         (60, None, r"temperature is not known, and the model needs it"),
@@ -100,4 +99,25 @@ def test_another_state_is_another_correction(campaign):
 def test_a_state_that_was_not_surveyed_is_refused(campaign, payload, temperature, why):
     for row in compensate(campaign, payload, temperature):
         assert row["status"] == "guarded" and re.search(why, row["why"]), row
+        assert row["corrected"] == row["original"]
+
+
+def test_a_load_that_was_not_surveyed_costs_certainty_and_is_bounded_by_the_cell(
+    campaign,
+):
+    known, heavy = (compensate(campaign, p, 26) for p in (120, 200))
+    assert [row["status"] for row in heavy] == ["safe", "safe"]
+    for less, more in zip(known, heavy, strict=True):
+        assert np.linalg.norm(more["std_error_mm"]) > np.linalg.norm(
+            less["std_error_mm"]
+        )
+    cell = declared(200, 26).replace("[limits]", "[limits]\npayload_mm = 1e-6")
+    if "[limits]" not in cell:
+        cell += "[limits]\npayload_mm = 1e-6\n"
+    (campaign / "bounded.toml").write_text(cell)
+    run("compensate", campaign / "job.pdl", "--cell", campaign / "bounded.toml",
+        "--model", campaign / "m.json", "-o", campaign / "b.pdl",
+        "--report", campaign / "b.json")  # fmt: skip
+    for row in json.loads((campaign / "b.json").read_bytes())["targets"]:
+        assert row["status"] == "guarded" and "load" in row["why"], row
         assert row["corrected"] == row["original"]

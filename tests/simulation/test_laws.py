@@ -117,10 +117,10 @@ def test_bending_leaves_what_stands_before_its_joint() -> None:
     assert np.abs(displacement(arm, at_wrist)).max() < 1e-12
     moved = displacement(arm)
     # A rotation about axes across axis 5: nothing moves along what it turns about.
-    law = arm.laws[0](REFERENCE).reshape(-1, 6, 2)
+    law = arm.laws[0](REFERENCE).reshape(-1, 6, 6)
     assert (np.abs(law).max(axis=(0, 2)) > 0).tolist() == [False] * 4 + [True, False]
     frames = NJ220.frames(REFERENCE.q)
-    turn = np.einsum("nca,na->nc", frames[:, 4, :3, :2], law[:, 4])
+    turn = np.einsum("nca,na->nc", frames[:, 4, :3, :2], law[:, 4, 3:5])
     tcp = (frames[:, 6] @ REFERENCE.tool)[:, :3, 3]
     wanted = np.cross(turn, tcp - frames[:, 4, :3, 3])
     np.testing.assert_allclose(moved, wanted, atol=1e-6)
