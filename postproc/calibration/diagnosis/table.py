@@ -57,6 +57,7 @@ LIKELY = 0.25  # part of all families that are looked at closely
 NARROW = 60  # families that a search weighs once it has seen all
 TOLD = 10  # families whose scores are told
 NONE = np.zeros(0, dtype=np.int64)
+MANY = 6000  # rows: of more, products would take gigabytes and minutes
 LEAST_MOMENT = 1.0  # [N m] by which a load varies that may bend anything
 
 
@@ -229,7 +230,7 @@ class Table:
         factors = [f"lambda {j}" for j in JOINTS if f"lambda {j}" in drivers]
         factors += [f"torque {j}" for j in JOINTS if f"torque {j}" in drivers]
         laws = {"": MotionLaws.of(batch, drivers, "")}
-        for factor in factors:
+        for factor in factors if len(batch) <= MANY else ():
             other = [d for d in drivers if _may_multiply(factor, d)]
             laws[factor] = MotionLaws.of(batch, other, factor)
         named: dict[str, set[tuple[str, str]]] = defaultdict(set)
