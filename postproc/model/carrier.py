@@ -112,6 +112,7 @@ def carrier(text: str) -> Carrier:
     raise ValueError(f"there is no carrier {text!r}")
 
 
+@cache
 def every_carrier() -> tuple[Carrier, ...]:
     """List all motions once: a turn about z is a joint's, that of link 1 the base's."""
     joints = [Carrier("joint", k, "turn", 2) for k in range(1, 7)]

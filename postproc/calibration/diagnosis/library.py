@@ -88,10 +88,15 @@ class Projection:
 
     def filter(self, whitened: Floats) -> Floats:
         """Take the model out of whitened columns, (3 n,) or (3 n, k)."""
-        along = (self.taken.T @ whitened).T * (self.root / (self.root + 1.0))
-        left: Floats = whitened - self.taken @ along.T
+        left = self._without_taken(whitened)
         if self.free is not None:
             left -= np.multiply.outer(self.free, self.free @ left)
+        return left
+
+    def _without_taken(self, rows: Floats) -> Floats:
+        """Multiply by F without a free column, (3 n,) or (3 n, k)."""
+        along = (self.taken.T @ rows).T * (self.root / (self.root + 1.0))
+        left: Floats = rows - self.taken @ along.T
         return left
 
     def beside(self, whitened: Floats) -> Projection:
@@ -109,9 +114,7 @@ class Projection:
         """All that is taken out twice: I - F F = S S^T, (3 n, k)."""
         if self.free is None:
             return self.taken
-        along = (self.taken.T @ self.free) * (self.root / (self.root + 1.0))
-        column = self.free - self.taken @ along
-        return np.column_stack([self.taken, column])
+        return np.column_stack([self.taken, self._without_taken(self.free)])
 
     @cached_property
     def twice(self) -> Floats:
@@ -125,9 +128,7 @@ class Projection:
         """
         if self.free is not None:
             filtered = filtered - np.outer(self.free, self.free @ filtered)
-        along = (self.taken.T @ filtered).T * (self.root / (self.root + 1.0))
-        left: Floats = filtered - self.taken @ along.T
-        return left
+        return self._without_taken(filtered)
 
     def view(self, joint: int | None, rows: Floats) -> View:
         """See twice filtered rows (3 n, draws) and the model along columns of a shelf.

@@ -147,6 +147,12 @@ class Revision(Effect):
         raise TypeError("a revision is no part of a model file")
 
 
+def revises(fit: Fit) -> bool:
+    """Tell whether a fit revises a given model."""
+    effects = fit.combination.effects
+    return bool(effects) and isinstance(effects[0], Revision)
+
+
 def joints_of(effect: Effect) -> set[int]:
     """Return the joints that the parameters of an effect act on."""
     return {p.joint for p in effect.parameters() if p.joint is not None}

@@ -14,7 +14,7 @@ from postproc.calibration.diagnosis.held_out import (
     regions,
 )
 from postproc.calibration.diagnosis.library import Projection, reduce_some
-from postproc.calibration.diagnosis.refit import Revision
+from postproc.calibration.diagnosis.refit import revises
 from postproc.calibration.diagnosis.score import Null, Score, rank
 from postproc.calibration.diagnosis.table import Causes, loosened
 from postproc.calibration.regression import Fit, beside, fit_effects
@@ -161,8 +161,7 @@ class Views:
         """See it with a constant motion of a carrier open, where a model is given."""
         if carrier.joint is not None:
             return self.of_joint(carrier.joint)
-        effects = self.projection.fit.combination.effects
-        if not effects or not isinstance(effects[0], Revision):
+        if not revises(self.projection.fit):
             return self.projection
         if str(carrier) not in self.made:
             self.made[str(carrier)] = loosened(self.projection, carrier)

@@ -25,7 +25,7 @@ from postproc.calibration.diagnosis.library import (
     reduce_columns,
     reduce_some,
 )
-from postproc.calibration.diagnosis.refit import Revision
+from postproc.calibration.diagnosis.refit import revises
 from postproc.calibration.diagnosis.score import (
     Null,
     Score,
@@ -175,7 +175,7 @@ class MotionFamily:
         carrier: What moves.
         factor: What multiplies the driver, or "".
         driver: Number of the driver among those of its laws.
-        laws: MotionLaws of the factor.
+        laws: Laws of the factor.
         each: Evidence of these by width, with their shares, (c, 1) each.
     """
 
@@ -205,7 +205,7 @@ class Table:
 
     Attributes:
         revised: Whether rows revise a given model, which may have means otherwise.
-        laws: MotionLaws by the factor that multiplies them, "" without one.
+        laws: Laws by the factor that multiplies them, "" without one.
         named: (driver, law) of cells that named effects are, by carrier.
         only: Numbers of the drivers that are tried, by carrier and factor; None: all.
     """
@@ -237,8 +237,9 @@ class Table:
         for kind in EFFECTS:
             for carrier, *cell in kind.cells():
                 named[carrier].add((cell[0], cell[1]))
-        revised = isinstance((*fit.combination.effects, None)[0], Revision)
-        return cls(revised, laws, {k: frozenset(cells) for k, cells in named.items()})
+        return cls(
+            revises(fit), laws, {k: frozenset(cells) for k, cells in named.items()}
+        )
 
     def at_rows(self, rows: Ints) -> Table:
         """Return the table of some of the rows."""

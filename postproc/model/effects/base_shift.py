@@ -14,6 +14,7 @@ from postproc.model.effects.effect import (
     Parameter,
     Sought,
     alternatives,
+    cells_in_time,
 )
 from postproc.model.effects.step import CampaignStep, moments
 from postproc.model.kinematics import Batch
@@ -50,12 +51,7 @@ class BaseShift(CampaignStep):
     @classmethod
     def cells(cls) -> Cells:
         """Name the cells of the table of causes that it is."""
-        return tuple(
-            (f"base {motion} {a}", clock, "step")
-            for motion in ("shift", "turn")
-            for a in "xyz"
-            for clock in ("order", "time")
-        )
+        return cells_in_time("base", "step")
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:

@@ -19,7 +19,6 @@ from postproc.model.kinematics import Batch
 TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 8, 3, 5
 HELD = ("temperature", "payload", "speed", "torque", "moment", "travel", "way")
 ANGLES = tuple(f"joint {j}" for j in JOINTS)
-FRAMES = tuple(f"{part} shift {axis}" for part in ("base", "tool") for axis in "xyz")
 
 
 @dataclass(frozen=True)

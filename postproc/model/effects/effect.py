@@ -451,6 +451,22 @@ def own_cells(driver: str, *laws: str) -> Cells:
     )
 
 
+def cells_in_time(part: str, *laws: str) -> Cells:
+    """Name all motions of the base or the tool in the course of a campaign.
+
+    Args:
+        part: "base" or "tool".
+        laws: The laws.
+    """
+    return tuple(
+        (f"{part} {motion} {a}", clock, law)
+        for motion in ("shift", "turn")
+        for a in "xyz"
+        for clock in ("order", "time")
+        for law in laws
+    )
+
+
 # What a search may try of an effect.
 
 NAMED, FREE = 0, 1

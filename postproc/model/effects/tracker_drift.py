@@ -19,6 +19,7 @@ from postproc.model.effects.effect import (
     Sought,
     Unasked,
     alternatives,
+    cells_in_time,
 )
 from postproc.model.effects.step import moments
 from postproc.model.kinematics import Batch
@@ -56,13 +57,7 @@ class TrackerDrift(Effect):
     @classmethod
     def cells(cls) -> Cells:
         """Name the cells of the table of causes that it is."""
-        return tuple(
-            (f"base {motion} {a}", clock, law)
-            for motion in ("shift", "turn")
-            for a in "xyz"
-            for clock in ("order", "time")
-            for law in ("linear", "curve")
-        )
+        return cells_in_time("base", "linear", "curve")
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
