@@ -54,7 +54,7 @@ class CellTrial:
         cells: What was planted.
         verdict: What the tool said.
         found: Place and driver of every finding, and of its group.
-        named: Findings with a name, none of which was planted.
+        named: Findings with a name whose group holds nothing that was planted.
         right: Whether link and driver of every cell are told, alone or in a group.
         alone: Whether they are without the group.
         groups: Sizes of the groups.
@@ -176,8 +176,10 @@ def run(job: tuple[int, float, int]) -> str:
     plain, _ = true_errors(c, seed, base, kept)
     named = [
         str(f.family)
-        for f in traced.findings
-        if f.effect != "part_motion" and not BY_NAME[f.effect].free
+        for f, group in zip(traced.findings, groups, strict=True)
+        if f.effect != "part_motion"
+        and not BY_NAME[f.effect].free
+        and not any(told(g) in asked for g in group if g is not None)
     ]
     trial = CellTrial(
         seed, size, texts, traced.verdict,

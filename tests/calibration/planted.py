@@ -13,6 +13,7 @@ from postproc.calibration.diagnosis.refit import revise
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.selection import fit_survey, model_of
+from postproc.exceptions import PostprocError
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
@@ -46,6 +47,7 @@ NAMELESS = ("joint_product", "hysteresis")
 READINGS = ("tracker_drift", "azimuth", "refraction")  # nothing moves, it only seems to
 UNTOLD = ("elastic_flank",)  # measured row by row: no travels, no directions told
 WAVES = ("motor_wave", "drive_wave", "drive_backlash")  # of an arm whose gears are told
+STILL = 0.01  # times the noise: what moves the tool less is not one to be blown up
 SIZES = (0.3, 0.5, 1.0, 2.0)  # rms after projection on the base model over the noise
 
 
@@ -123,6 +125,8 @@ def campaign(
     arrivals = (row_by_row if untold else survey)(clean, seed, rows)
     planted = tuple(Planted(kind) for kind in kinds)
     reached = tuple(_size(clean, seed, p, arrivals, rows) for p in planted)
+    if size > 0 and min(reached) < STILL:
+        raise PostprocError(f"one of {', '.join(kinds)} moves nothing")
     if size > 0:
         planted = tuple(
             replace(p, peak_mm=float(_peak(seed, p, rows) * size / was))

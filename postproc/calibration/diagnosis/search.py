@@ -13,6 +13,7 @@ from postproc.calibration.diagnosis.held_out import (
     held_out_gain,
     regions,
 )
+from postproc.calibration.diagnosis.jumps import jumps
 from postproc.calibration.diagnosis.library import Projection, reduce_some
 from postproc.calibration.diagnosis.refit import revises
 from postproc.calibration.diagnosis.score import Null, Score, rank
@@ -29,6 +30,7 @@ from postproc.model.effects.effect import (
     Family,
 )
 from postproc.model.effects.joint_offset import JointOffset
+from postproc.model.effects.step import CampaignStep
 
 # Finer settings around a candidate that a grid found.
 
@@ -622,6 +624,10 @@ def stand(found: Search, number: int) -> JudgedAddition:
         if s.evidence >= here.evidence - _within(own, s.best) and name not in names:
             rivals.append(s)
             names.add(name)
+    if isinstance(own.effect, CampaignStep):
+        least = here.evidence - NEAR
+        alike = [s for s in jumps(own.effect, projection) if s.evidence >= least]
+        rivals = [*alike, *rivals]
     p_value = found.null.p_of(here)
     return JudgedAddition(here.evidence, p_value, _told(own.family, rivals))
 

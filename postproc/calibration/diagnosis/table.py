@@ -466,7 +466,7 @@ def _laws_of(batch: Batch, driver: str, factor: str) -> list[MotionLaw]:
         if len(np.unique(x)) > FEW_VALUES:
             bends = product(places[::2], WIDTHS)
             kinds.append([cell("saturating", at, w * half) for at, w in bends])
-        kinds.append([Curve("joint 1", (driver,), (low,), (high,), factor)])
+        kinds.append([Curve.over(batch, "joint 1", (driver,), factor, whole=False)])
     if driver.startswith("joint"):
         kinds.append([cell(f"harmonic {n}") for n in range(1, ORDERS + 1)])
     return [

@@ -16,7 +16,10 @@ from postproc.model.effects.effect import FREE, Candidate, Family, Parameter, fa
 from postproc.model.effects.part_motion import CarriedEffect
 from postproc.model.kinematics import Batch
 
-TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 8, 3, 5
+TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 16, 3, 5
+LINEAR = ("temperature", "payload", "speed", "torque", "moment")  # beyond their ranges
+WAYS = ("way",)
+BEYOND = 0.3  # part of a range over which a curve goes on with its last slope
 HELD = ("temperature", "payload", "speed", "torque", "moment", "travel", "way")
 ANGLES = tuple(f"joint {j}" for j in JOINTS)
 
@@ -107,8 +110,8 @@ class Curve(CarriedEffect):
     ) -> Self:
         """Make the curve over the surveyed ranges of its covariates."""
         values = [covariate(batch, name) for name in source]
-        lower = tuple(float(np.nanmin(v)) for v in values)
-        upper = tuple(float(np.nanmax(v)) for v in values)
+        ends = [_ends(n, v) for n, v in zip(source, values, strict=True)]
+        lower, upper = (tuple(e[k] for e in ends) for k in (0, 1))
         return cls(direction, source, lower, upper, factor, whole)
 
     def covariates(self) -> tuple[str, ...]:
@@ -150,8 +153,8 @@ class Curve(CarriedEffect):
             x = covariate(batch, name)
             if not name.startswith(HELD):
                 inside *= np.nan_to_num(fade(x, np.array(low), np.array(high)))
-            u = np.clip((np.nan_to_num(x) - low) / max(high - low, 1e-12), 0, 1)
-            terms = legvander(2.0 * u - 1.0, int(order[:, k].max()))
+            u = _place(name, np.nan_to_num(x), low, high)
+            terms = _terms(u, int(order[:, k].max()), BEYOND * name.startswith(LINEAR))
             value *= terms[:, order[:, k]]
         return np.asarray(value * inside[:, None])
 
@@ -161,3 +164,39 @@ class Curve(CarriedEffect):
         if self.factor:
             shape *= np.nan_to_num(covariate(batch, self.factor))[:, None]
         return shape
+
+
+def _terms(u: Floats, degree: int, beyond: float) -> Floats:
+    """Evaluate Legendre polynomials over [0, 1], (n, degree + 1).
+
+    Args:
+        u: Where, (n,).
+        degree: Of the last one.
+        beyond: How far outside they go on as straight lines; from there on they keep
+            their values.
+    """
+    inside = np.clip(u, 0.0, 1.0)
+    terms = legvander(2.0 * inside - 1.0, degree)
+    out = np.clip(u - inside, -beyond, beyond)
+    k = np.arange(degree + 1)
+    slope = k * (k + 1) * np.where(out[:, None] < 0.0, (-1.0) ** (k + 1), 1.0)
+    values: Floats = terms + slope * out[:, None]
+    return values
+
+
+def _ends(name: str, x: Floats) -> tuple[float, float]:
+    """Return the range of a covariate, of a way 0 and its median."""
+    if name.startswith(WAYS):
+        return 0.0, float(np.nanmedian(x))
+    return float(np.nanmin(x)), float(np.nanmax(x))
+
+
+def _place(name: str, x: Floats, low: float, high: float) -> Floats:
+    """Tell where in its range a covariate is, 0 to 1.
+
+    Most ways since a reversal are short and a few are long: half of them lie below the
+    middle.
+    """
+    if name.startswith(WAYS):
+        return x / (x + max(high, 1e-12))
+    return (x - low) / max(high - low, 1e-12)

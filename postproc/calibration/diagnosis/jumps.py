@@ -1,0 +1,60 @@
+"""Jumps: what a step at one row may be as well, where the arm passed a value there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from postproc.calibration.diagnosis.library import Projection, reduce_some
+from postproc.calibration.diagnosis.score import Score, rank
+from postproc.model.carrier import carrier
+from postproc.model.covariate import covariate, varies, varies_enough
+from postproc.model.effects.effect import FREE, PART_MOTION, Candidate, Family
+from postproc.model.effects.part_motion import OF_STATE, PartMotion
+from postproc.model.effects.step import CampaignStep
+from postproc.model.kinematics import Batch
+
+ALIKE = 0.98  # part of the rows that a value parts as the step does
+
+
+def jumps(step: CampaignStep, projection: Projection) -> list[Score]:
+    """Score the parts that a step moves as if they jumped at a temperature, say.
+
+    Args:
+        step: The step, at one row.
+        projection: The fit without it.
+
+    Returns:
+        The best first; none where nothing passes one value at that row alone.
+    """
+    square = float(projection.rest @ projection.rest)
+    reduced = reduce_some(projection, list(_candidates(step, projection.at)))
+    return rank(reduced, square, projection.rows)
+
+
+def _candidates(step: CampaignStep, batch: Batch) -> Iterator[Candidate]:
+    """List the parts by the values that are passed."""
+    moved = sorted({part for part, *_ in step.cells()})
+    for driver, value in _passed(step, batch):
+        for part in moved:
+            joint = carrier(part).joint
+            along = None if joint is not None else part
+            family = Family(PART_MOTION, joint, driver, FREE, along)
+            half = float(np.ptp(covariate(batch, driver))) / 2
+            jump = PartMotion(part, source=driver, law="step", middle=value, half=half)
+            yield Candidate(family, jump, driver, 0.0)
+
+
+def _passed(step: CampaignStep, batch: Batch) -> Iterator[tuple[str, float]]:
+    """List what is below a value before the step and above it after, or the reverse."""
+    before = step.before(batch)
+    for driver in OF_STATE:
+        x = covariate(batch, driver)
+        if not varies(x) or not varies_enough(batch.states, driver):
+            continue
+        rows = np.argsort(batch.states.order)
+        at = int(before.sum())
+        value = float(x[rows[at - 1 : at + 1]].mean())
+        if abs(np.mean((x < value) == before) - 0.5) >= ALIKE - 0.5:
+            yield driver, value
