@@ -1,0 +1,4 @@
+MODULE CalibData(SYSMODULE)
+    TASK PERS tooldata gun_1:=[TRUE,[[-170,3,630],[0.991445,0,-0.130526,0]],[104,[-40,3,290],[1,0,0,0],0,0,0]];
+    TASK PERS wobjdata fix_110:=[FALSE,TRUE,"",[[1650,-350,1080],[0.999998,0.000002,-0.000873,0.001745]],[[0,0,0],[1,0,0,0]]];
+ENDMODULE
