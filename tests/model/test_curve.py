@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.model.effects.curve import BEYOND, Curve
+from postproc.model.effects.curve import BEYOND, END, Curve
 from postproc.model.kinematics import Batch
 from postproc.robot.state import States, make_states
 from tests.calibration.planted import ARM
@@ -36,12 +36,11 @@ def test_a_curve_of_the_temperature_goes_on_as_a_straight_line() -> None:
     assert pytest.approx(3.0) == BEYOND * 10.0
 
 
-@pytest.mark.parametrize("end", [20.0, 30.0])
-def test_its_slope_is_the_same_on_both_sides_of_an_end(end: float) -> None:
+def test_the_line_has_the_slope_of_the_last_part_of_the_range() -> None:
     curve = Curve("link 3 turn x", ("temperature",), (20.0,), (30.0,))
-    near = np.resize([end - 1e-5, end, end + 1e-5], ROWS)
-    before, here, after = curve.shape(batch(temperature=near))[:3]
-    assert here - before == pytest.approx(after - here, rel=2e-3, abs=1e-12)
+    places = np.resize([20.0 - 10.0 * END, 20.0, 20.0 + 10.0 * END], ROWS)
+    before, here, after = curve.shape(batch(temperature=places))[:3]
+    assert here - before == pytest.approx(after - here)
 
 
 def test_a_curve_of_an_angle_fades_where_nobody_has_been() -> None:

@@ -19,7 +19,8 @@ from postproc.model.kinematics import Batch
 TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 16, 3, 5
 LINEAR = ("temperature", "payload", "speed", "torque", "moment")  # beyond their ranges
 WAYS = ("way",)
-BEYOND = 0.3  # part of a range over which a curve goes on with its last slope
+BEYOND = 0.3  # part of a range over which a curve goes on as a straight line
+END = 0.05  # part of a range whose slope that is
 HELD = ("temperature", "payload", "speed", "torque", "moment", "travel", "way")
 ANGLES = tuple(f"joint {j}" for j in JOINTS)
 
@@ -36,8 +37,9 @@ class Curve(CarriedEffect):
     Attributes:
         direction: The carrier that moves, see `carrier`.
         source: Names of one or two covariates.
-        lower, upper: Their ranges; outside, the curve of an angle fades to zero, and
-            one of a load, a temperature or a speed keeps its last value.
+        lower, upper: Their ranges, of a way 0 and its median. Outside, the curve of an
+            angle fades to zero, and one of a load, a temperature or a speed goes on as
+            a straight line.
         factor: Covariate that it is multiplied with, an arrival direction say, or "".
         whole: Whether functions of each of two covariates alone belong to it.
     """
@@ -177,10 +179,10 @@ def _terms(u: Floats, degree: int, beyond: float) -> Floats:
     """
     inside = np.clip(u, 0.0, 1.0)
     terms = legvander(2.0 * inside - 1.0, degree)
-    out = np.clip(u - inside, -beyond, beyond)
-    k = np.arange(degree + 1)
-    slope = k * (k + 1) * np.where(out[:, None] < 0.0, (-1.0) ** (k + 1), 1.0)
-    values: Floats = terms + slope * out[:, None]
+    out = np.clip(u - inside, -beyond, beyond)[:, None]
+    ends = legvander(np.array([-1.0, 2.0 * END - 1.0, 1.0 - 2.0 * END, 1.0]), degree)
+    slope = np.where(out < 0.0, ends[1] - ends[0], ends[3] - ends[2]) / END
+    values: Floats = terms + slope * out
     return values
 
 
