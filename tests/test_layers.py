@@ -59,6 +59,7 @@ KNOWING = {
     "calibration.weight_direction": {"compliance"},
     # The given model's zero of a joint holds the mean of what the model lacks.
     "calibration.diagnosis.refit": {"joint_offset"},
+    "calibration.diagnosis.jumps": {"part_motion", "step"},
     "calibration.diagnosis.search": {"joint_offset"},
     # What has no name is a motion of a part, by a law or by a free curve.
     "calibration.diagnosis.table": {"curve", "part_motion"},

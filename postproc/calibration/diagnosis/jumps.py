@@ -10,7 +10,7 @@ from postproc.calibration.diagnosis.library import Projection, reduce_some
 from postproc.calibration.diagnosis.score import Score, rank
 from postproc.model.carrier import carrier
 from postproc.model.covariate import covariate, varies, varies_enough
-from postproc.model.effects.effect import FREE, PART_MOTION, Candidate, Family
+from postproc.model.effects.effect import FREE, PART_MOTION, Candidate, Effect, Family
 from postproc.model.effects.part_motion import OF_STATE, PartMotion
 from postproc.model.effects.step import CampaignStep
 from postproc.model.kinematics import Batch
@@ -18,18 +18,20 @@ from postproc.model.kinematics import Batch
 ALIKE = 0.98  # part of the rows that a value parts as the step does
 
 
-def jumps(step: CampaignStep, projection: Projection) -> list[Score]:
+def jumps(effect: Effect, projection: Projection) -> list[Score]:
     """Score the parts that a step moves as if they jumped at a temperature, say.
 
     Args:
-        step: The step, at one row.
+        effect: The step, at one row; of any other effect there are none.
         projection: The fit without it.
 
     Returns:
         The best first; none where nothing passes one value at that row alone.
     """
+    if not isinstance(effect, CampaignStep):
+        return []
     square = float(projection.rest @ projection.rest)
-    reduced = reduce_some(projection, list(_candidates(step, projection.at)))
+    reduced = reduce_some(projection, list(_candidates(effect, projection.at)))
     return rank(reduced, square, projection.rows)
 
 

@@ -30,7 +30,6 @@ from postproc.model.effects.effect import (
     Family,
 )
 from postproc.model.effects.joint_offset import JointOffset
-from postproc.model.effects.step import CampaignStep
 
 # Finer settings around a candidate that a grid found.
 
@@ -624,10 +623,8 @@ def stand(found: Search, number: int) -> JudgedAddition:
         if s.evidence >= here.evidence - _within(own, s.best) and name not in names:
             rivals.append(s)
             names.add(name)
-    if isinstance(own.effect, CampaignStep):
-        least = here.evidence - NEAR
-        alike = [s for s in jumps(own.effect, projection) if s.evidence >= least]
-        rivals = [*alike, *rivals]
+    as_well = jumps(own.effect, projection)
+    rivals = [s for s in as_well if s.evidence >= here.evidence - NEAR] + rivals
     p_value = found.null.p_of(here)
     return JudgedAddition(here.evidence, p_value, _told(own.family, rivals))
 
