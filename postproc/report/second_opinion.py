@@ -29,7 +29,7 @@ def cells(row: OpinionRow) -> tuple[str, ...]:
     """Write one row: how many differ, where nothing is measured."""
     large = row.beyond > 0 or row.largest >= ROUNDING * row.bound > 0
     size = f"{row.largest:.2g}" if large else f"< {ROUNDING * row.bound:.0e}"
-    largest, bound = f"{size} {row.unit}".strip(), f"{row.bound:g}"
+    largest, bound = f"{size} {row.unit}".strip(), f"{row.bound:.3g}"
     if row.bound == 0.0:
         largest, bound = f"{row.beyond} differ", ""
     if row.unit == COUNTED:

@@ -142,6 +142,14 @@ def test_compensate_gives_it_where_the_cell_asks(desk, tmp_path):
     assert "second_opinion" not in json.loads((tmp_path / "out.json").read_text())
 
 
+def test_compensate_says_that_a_library_is_broken(desk, tmp_path, monkeypatch):
+    monkeypatch.setattr(extra, "find_spec", str)
+    monkeypatch.setitem(sys.modules, "pinocchio", None)
+    done = compensate(desk, "asking.toml", tmp_path)
+    assert done.exit_code == 2 and "a library is broken" in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
 def test_compensate_writes_nothing_where_it_cannot(desk, tmp_path, nothing_installed):
     done = compensate(desk, "asking.toml", tmp_path)
     assert done.exit_code == 2 and "pip install pin toppra" in done.stderr
