@@ -18,6 +18,7 @@ from postproc.robot.trajectory import Motion
 # Sampled runs of moves between stops, as a time law wants them.
 
 JOINT_INTERVALS = 8  # gridpoints of a JOINT move inside a fly run
+EVEN = 1e-6  # of an interval: what is longer by less is not cut once more
 SHORTEST = 1e-9  # [s at full joint speed] below this two samples are one
 SIMILAR = 0.1  # neighbouring bounds nearer than this share belong to one speed
 
@@ -111,7 +112,38 @@ def waypoints(
     inside = np.flatnonzero(run_of >= 0)
     np.minimum.at(override, run_of[inside], targets.override[inside])
     at = np.where(run_of >= 0, start[1:] - 1, -1)
-    return _thinned(q, ds, least, override[run_of[visit]], run_of[visit], at)
+    parts = _parts(ds, visit, curved & (targets.move[visit] == Motion.JOINT))
+    run = run_of[visit]
+    return _thinned(*_divided(parts, q, ds, least, override[run], run, at))
+
+
+def _parts(ds: Floats, visit: Ints, rounded: Bools) -> Ints:
+    """Say into how many gridpoints the intervals of rounded JOINT moves are cut, (k,).
+
+    Their corners have samples, what is straight between these has one interval: with
+    one acceleration throughout, a stop behind it would be twice as late, or more.
+    """
+    whole = np.bincount(visit, ds)[visit]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(rounded & (whole > SHORTEST), ds / whole, 0.0)
+    return np.maximum(np.ceil(JOINT_INTERVALS * share - EVEN), 1).astype(np.int64)
+
+
+def _divided(
+    parts: Ints, q: Floats, ds: Floats, least: Floats, override: Floats, run: Ints,
+    at: Ints,
+) -> tuple[Floats, Floats, Floats, Floats, Ints, Ints]:  # fmt: skip
+    """Cut the intervals before waypoints into equal parts."""
+    if (parts == 1).all():
+        return q, ds, least, override, run, at
+    end = np.cumsum(parts)
+    row = np.repeat(np.arange(len(parts)), parts)
+    u = (np.arange(len(row)) - end[row] + parts[row] + 1) / parts[row]
+    before = np.maximum(row - 1, 0)
+    q = q[before] + u[:, None] * (q[row] - q[before])
+    ds, least = (ds / parts)[row], (least / parts)[row]
+    at = np.where(at >= 0, end[np.maximum(at, 0)] - 1, -1)
+    return q, ds, least, override[row], run[row], at
 
 
 def _runs_of(n: int, first: Ints, end: Ints) -> Ints:
