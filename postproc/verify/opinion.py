@@ -50,6 +50,10 @@ class Claim:
         singular: Smallest singular value of the flange's Jacobian, (n,).
         payload: Mass [kg] and centre in the flange frame [m], (n, 4); mass 0: none.
         torque: Gravity torques, (n, 6) [N m]; empty where no link has a mass.
+        time: Since the first move, along the first predecessors, (n,) [s], NaN where
+            not known.
+        within: 1 where all joints stay within their limits on the way, -1 where one is
+            beyond, 0 where that is not known, (n,).
         own: Visits that the source makes too, (k,).
     """
 
@@ -61,6 +65,8 @@ class Claim:
     singular: Floats
     payload: Floats
     torque: Floats
+    time: Floats
+    within: Ints
     own: Ints
 
     def __len__(self) -> int:
@@ -137,10 +143,21 @@ class Opinion:
             found[row.what] = row if old is None else old.with_more(row)
         return cls(name, tuple(found.values()), sum(o.seconds for o in opinions))
 
+    @classmethod
+    def of_report(cls, told: Mapping[str, Any]) -> Self:
+        """Take it out of a written report.
+
+        Raises:
+            KeyError, TypeError: It is none.
+        """
+        rows = tuple(OpinionRow(**row) for row in told["rows"])
+        return cls(str(told["program"]), rows, float(told["seconds"]))
+
     def told(self) -> dict[str, Any]:
         """Return it for JSON."""
         rows = [asdict(row) for row in self.rows]
-        return {"program": self.program, "agrees": self.agrees, "rows": rows}
+        told = {"program": self.program, "agrees": self.agrees}
+        return {**told, "seconds": round(self.seconds, 3), "rows": rows}
 
 
 def compare(
@@ -165,4 +182,20 @@ def compare(
         float(size[worst]) if worst >= 0 else 0.0, bound,
         claim.place(worst) if worst >= 0 else "",
         {reason: n for reason, n in skipped.items() if n},
+    )  # fmt: skip
+
+
+def worst_of(
+    what: str,
+    unit: str,
+    bound: float,
+    claim: Claim,
+    sizes: Sequence[tuple[float, int]],
+    skipped: Mapping[str, int],
+) -> OpinionRow:
+    """Make a row from differences and the visits that they are at."""
+    worst, i = max(sizes, default=(0.0, -1))
+    return OpinionRow(
+        what, unit, len(sizes), sum(size > bound for size, _ in sizes), worst, bound,
+        claim.place(i) if i >= 0 else "", dict(skipped),
     )  # fmt: skip
