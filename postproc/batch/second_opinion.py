@@ -53,7 +53,8 @@ class TreeOpinion:
         """Return it for JSON."""
         skipped = [{"place": place, "why": why} for place, why in self.skipped]
         told = self.opinion.told() | {"programs": self.programs, "skipped": skipped}
-        return {key: told[key] for key in ("programs", "agrees", "rows", "skipped")}
+        keys = "programs", "agrees", "seconds", "rows", "skipped"
+        return {key: told[key] for key in keys}
 
 
 def judge_tree(folder: Path, plan: BatchPlan) -> TreeOpinion:
