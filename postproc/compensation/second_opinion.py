@@ -18,10 +18,9 @@ from postproc.motion.planner import plan
 from postproc.motion.targets import CODE, LIMITS, PATH_LIMITS
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
-from postproc.verify.directions import SECONDS
 from postproc.verify.extra import require
 from postproc.verify.judge import judge
-from postproc.verify.opinion import ArmFacts, Claim, Opinion
+from postproc.verify.opinion import ENOUGH, Allowance, ArmFacts, Claim, Opinion
 
 
 def second_opinion(
@@ -29,7 +28,7 @@ def second_opinion(
     output: Mapping[str, bytes],
     cell: Cell,
     record: Sidecar,
-    seconds: float = SECONDS,
+    allowance: Allowance = ENOUGH,
 ) -> Opinion:
     """Let Pinocchio, toppra and ruckig judge a compensated program.
 
@@ -38,7 +37,7 @@ def second_opinion(
         output: The same files as they were written.
         cell: The cell, with the play that the correction used.
         record: What the targets were corrected for.
-        seconds: Time for directions.
+        allowance: How long it may take.
 
     Raises:
         ProgramError: A file cannot be read as a program.
@@ -48,7 +47,7 @@ def second_opinion(
     before = _claim("source", read_program(source, cell).visits, cell)
     after = _claim("output", read_program(output, cell).visits, cell)
     after = _corrected_for(after, before.visits, record)
-    return judge(next(iter(source)), facts_of(cell), before, after, seconds)
+    return judge(next(iter(source)), facts_of(cell), before, after, allowance)
 
 
 def facts_of(cell: Cell) -> ArmFacts:

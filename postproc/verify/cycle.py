@@ -18,13 +18,13 @@ from postproc.verify.ways import MadeWay
 MOVE_S = 1e-5  # a JOINT move by ruckig, twice
 RUN_PERCENT = 2.0  # two time-optimal laws on grids of their own
 SHORTEST_S = 0.1  # shares are of this at least: fewer gridpoints than a controller has
-FLY_PERCENT = 25.0  # by which a passage may be slower than a stop at every point
+FLY_PERCENT = 20.0  # by which a passage may be slower than a stop at every point
 LIMIT_RAD = 1e-3  # a joint may turn between the samples of a way
 
-PASSING = "passes on: counted with the stop behind"
 NO_LAW = "a way or a time law is not there"
-UNSAID = "the planner says no time"
+UNSAID = "the planner has no time law"
 NOT_TOLD = "not known to the planner"
+NO_WAY = "the way there was not made"
 
 
 @dataclass(frozen=True)
@@ -165,12 +165,21 @@ def compare_limits(
     low, high = np.deg2rad(file.joints.lower_deg), np.deg2rad(file.joints.upper_deg)
     sizes, skipped = [], Counter[str]()
     for i in range(len(claim)):
-        way = ways.get(i)
-        q = confirmed[i][None] if way is None or way.why else way.q
-        if claim.within[i] == 0 or np.isnan(q).any():
-            skipped[NOT_TOLD] += 1
+        q = _on_the_way(claim, ways, i)
+        if not len(q) and claim.within[i] > 0:
+            q = confirmed[i][None]
+        if claim.within[i] == 0 or not len(q) or np.isnan(q).any():
+            skipped[NOT_TOLD if claim.within[i] == 0 else NO_WAY] += 1
             continue
         beyond = float(np.maximum(low - q, q - high).max())
         sizes.append((max(0.0, beyond * float(claim.within[i])), i))
     what = f"{claim.label}: joint limits"
     return worst_of(what, "rad", LIMIT_RAD, claim, sizes, skipped)
+
+
+def _on_the_way(claim: Claim, ways: Mapping[int, MadeWay], i: int) -> Floats:
+    """Return the joint angles behind the begin of a way or of an arc, (k, 6)."""
+    before, none = int(claim.visits.before[i]), np.empty((0, 6))
+    whole = [before, i] if before >= 0 and claim.visits.via[before] else [i]
+    made = [ways[k].q[1:] for k in whole if k in ways and not ways[k].why]
+    return np.concatenate(made) if len(made) == len(whole) else none

@@ -13,7 +13,7 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.robot.arm_file import ArmFile
 from postproc.robot.trajectory import Motion
-from postproc.verify.cycle import compare_limits, compare_times
+from postproc.verify.cycle import NO_WAY, compare_limits, compare_times
 from postproc.verify.opinion import COUNTED, ArmFacts, Claim, OpinionRow, worst_of
 from postproc.verify.play_memory import PlayMemory
 from postproc.verify.ruckig_move import move_in_time
@@ -21,7 +21,6 @@ from postproc.verify.toppra_run import TimedRun, run_in_time
 from postproc.verify.ways import NO_TIME, SEVERAL, MadeWay, WayMaker, not_made
 
 MOVES, BLOCK = 5_000, 250  # at most so many in time, drawn in blocks
-SECONDS = 60.0
 END_RAD = 1e-4  # what a joint may be off at the end of a way
 TO_SPEED, TO_PUSH = 0.4, 0.1  # [s], where the arm file has no acceleration, no jerk
 BENT = 0.05  # [rad] between joint paths before and behind a fly point: passed at rest
@@ -29,7 +28,6 @@ BENT = 0.05  # [rad] between joint paths before and behind a fly point: passed a
 FLY = "fly points: passed on a blend"
 NEAR = "within two plays of a reversal"
 UNKNOWN = "not known to the planner"
-NO_WAY = "the way there was not made"
 NOT_DRAWN = "not drawn, or the time was up"
 
 

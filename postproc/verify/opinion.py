@@ -14,6 +14,8 @@ from postproc.language.visits import Visits
 from postproc.robot.arm_file import ArmFile
 
 COUNTED = "counted"  # unit of a row that compares nothing
+NOT_KNOWN = "not known to the planner, or no pose"
+TIME_UP = "the time was up"
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,27 @@ class ArmFacts:
     calibration: Floats | None
     elbow: float
     wrist_centre: float
+
+
+@dataclass(frozen=True)
+class Allowance:
+    """Time for a second opinion.
+
+    Attributes:
+        positions: For the places of targets, and what goes with them [s].
+        ways: For the ways between them [s].
+    """
+
+    positions: float = 60.0
+    ways: float = 60.0
+
+    def less(self, opinion: Opinion) -> Allowance:
+        """Return what one opinion leaves for the next."""
+        positions = opinion.seconds - opinion.on_ways
+        return Allowance(self.positions - positions, self.ways - opinion.on_ways)
+
+
+ENOUGH = Allowance()
 
 
 @dataclass(frozen=True)
@@ -123,11 +146,13 @@ class Opinion:
         program: Its name.
         rows: What was compared.
         seconds: Time that it took.
+        on_ways: How much of it for ways, times and directions.
     """
 
     program: str
     rows: tuple[OpinionRow, ...]
     seconds: float
+    on_ways: float = 0.0
 
     @property
     def agrees(self) -> bool:
@@ -161,7 +186,13 @@ class Opinion:
 
 
 def compare(
-    what: str, unit: str, bound: float, claim: Claim, size: Floats, why: Bools | None
+    what: str,
+    unit: str,
+    bound: float,
+    claim: Claim,
+    size: Floats,
+    late: Bools,
+    unasked: Bools | None = None,
 ) -> OpinionRow:
     """Make a row from the differences at the visits, NaN where there is none.
 
@@ -171,18 +202,15 @@ def compare(
         bound: What differs by more disagrees.
         claim: Names the places.
         size: Differences, (n,).
-        why: Visits of which nothing is expected, (n,): not counted as skipped.
+        late: Visits for which there was no time, (n,).
+        unasked: Visits of which nothing is expected, (n,): not counted as skipped.
     """
-    known = ~np.isnan(size)
-    lost = ~known if why is None else ~known & ~why
-    skipped = {"not known to the planner, or no pose": int(lost.sum())}
-    worst = int(np.nanargmax(size)) if known.any() else -1
-    return OpinionRow(
-        what, unit, int(known.sum()), int((size[known] > bound).sum()),
-        float(size[worst]) if worst >= 0 else 0.0, bound,
-        claim.place(worst) if worst >= 0 else "",
-        {reason: n for reason, n in skipped.items() if n},
-    )  # fmt: skip
+    lost = np.isnan(size) if unasked is None else np.isnan(size) & ~unasked
+    skipped = Counter({TIME_UP: int((lost & late).sum())})
+    skipped[NOT_KNOWN] = int((lost & ~late).sum())
+    rows = np.flatnonzero(~np.isnan(size))
+    sizes = list(zip(size[rows].tolist(), rows.tolist(), strict=True))
+    return worst_of(what, unit, bound, claim, sizes, +skipped)
 
 
 def worst_of(

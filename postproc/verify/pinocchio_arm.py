@@ -54,23 +54,23 @@ class PinocchioArm:
         self._pin.framesForwardKinematics(self._model, self._data, self._mix @ q)
         return np.array(self._data.oMf[self._flange].homogeneous)
 
-    def joints(self, q: Floats) -> tuple[Floats, Floats]:
-        """Place the joints and the flange.
+    def placed(self, q: Floats) -> tuple[Floats, Floats, Floats]:
+        """Place the arm for joint angles (6,) [rad].
 
         Returns:
-            Origins of the joints' frames and of the flange, (7, 3) [m], and axes of
-            positive rotation, (6, 3).
+            The flange, (4, 4) [m], the origins of the joints, (6, 3) [m], and how the
+            base's origin would move with the flange, (6, 6), linear rows first.
         """
-        end = self.flange(q)[:3, 3]
-        frames = [self._data.oMi[k + 1] for k in range(6)]
-        axes = [
-            self._data.oMi[k + 1].rotation @ self._axis(k) for k in range(6)
-        ]  # fmt: skip
-        return np.array([*(f.translation for f in frames), end]), np.array(axes)
+        pin, data = self._pin, self._data
+        J = pin.computeJointJacobians(self._model, data, self._mix @ q)
+        flange = pin.updateFramePlacement(self._model, data, self._flange).homogeneous
+        origins = [frame.translation for frame in list(data.oMi)[1:]]
+        return np.array(flange), np.array(origins), np.array(J)
 
-    def _axis(self, k: int) -> Floats:
-        """Return the axis of joint k in its own frame, (3,)."""
-        return np.array(self._model.joints[k + 1].extract().axis)
+    @property
+    def mix(self) -> Floats:
+        """Angles of the chain from the controller's, (6, 6)."""
+        return self._mix
 
     def jacobian(self, q: Floats) -> Floats:
         """Differentiate the flange: (6, 6), linear rows first, base frame."""
