@@ -63,7 +63,7 @@ def cells(row: OpinionRow) -> tuple[str, ...]:
     largest, bound = f"{size} {row.unit}".strip(), f"{row.bound:.3g}"
     if row.bound == 0.0:
         largest, bound = f"{row.beyond} differ", ""
-    if row.unit == COUNTED:
+    if row.unit == COUNTED or not row.compared:
         largest = ""
     return row.what, str(row.compared), largest, bound, row.where if large else ""
 

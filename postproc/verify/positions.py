@@ -10,8 +10,8 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.robot.arm_file import ArmFile
-from postproc.verify.goals import WrittenGoals, written_branches
-from postproc.verify.opinion import ArmFacts, Claim, OpinionRow, compare
+from postproc.verify.goals import WrittenGoals, written_branches, written_turns
+from postproc.verify.opinion import ArmFacts, Claim, OpinionRow, compare, worst_of
 from postproc.verify.pinocchio_arm import PinocchioArm
 
 POSITION_MM, TURN_RAD, JOINT_RAD = 1e-3, 1e-5, 1e-6
@@ -19,7 +19,12 @@ SINGULAR = 1e-6  # of a Jacobian in m and rad
 TORQUE = 0.01  # [N m]
 OFTEN = 256  # visits, after which the clock is looked at
 BORDER = 1e-4  # of a bit of the branch: nearer to its border it may be either
+HALF_RAD = 1e-4  # an angle may be half a turn from its turns, and rounded
+TURNING = [3, 5, 2]  # axes whose turns flags name
 MM = 1e-3
+
+NO_LINKS = "the arm file has no [links]"
+NO_FORM = "the arm has no closed form: its branches have no names"
 
 LoadedArms = Mapping[tuple[float, ...], PinocchioArm]
 """The arm with every load: mass [kg] and centre [m]."""
@@ -111,11 +116,13 @@ def judge_positions(
     ]
     off = np.abs(at.singular - claim.singular)
     rows.append(compare(f"{named}: singular value", "", SINGULAR, claim, off, late))
-    if len(claim.torque):
+    what = f"{named}: gravity torque"
+    if not len(claim.torque):
+        lost = {NO_LINKS: len(claim)}
+        rows.append(worst_of(what, "N m", TORQUE, claim, [], lost))
+    else:
         off = torque_misses(claim, arms, late)
-        rows.append(
-            compare(f"{named}: gravity torque", "N m", TORQUE, claim, off, late)
-        )
+        rows.append(compare(what, "N m", TORQUE, claim, off, late))
     return rows
 
 
@@ -129,11 +136,12 @@ def torque_misses(claim: Claim, arms: LoadedArms, late: Bools) -> Floats:
 
 
 def judge_branches(claim: Claim, file: ArmFile, at: Posture) -> list[OpinionRow]:
-    """Compare the branches with what the planner and the text name."""
+    """Compare branches and turns with what the planner and the text name."""
+    rows = [_turns(claim, at)]
     if file.opw is None:
-        return []
+        what, lost = f"{claim.label}: branch, planner", {NO_FORM: len(claim)}
+        return [*rows, worst_of(what, "", 0.0, claim, [], lost)]
     bits, sure = branch_bits(at, file)
-    rows = []
     written = written_branches(claim.visits)
     for what, slot in (("planner", claim.slot), ("flags", written)):
         named = (slot[:, None] >> np.array([2, 1, 0])) & 1
@@ -142,6 +150,17 @@ def judge_branches(claim: Claim, file: ArmFile, at: Posture) -> list[OpinionRow]
         text = f"{claim.label}: branch, {what}"
         rows.append(compare(text, "", 0.0, claim, other, at.late, slot < 0))
     return rows
+
+
+def _turns(claim: Claim, at: Posture) -> OpinionRow:
+    """Say how far angles are from the turns that flags of JOINT moves name."""
+    turns = written_turns(claim.visits)
+    beyond = np.abs(claim.q[:, TURNING] - 2 * np.pi * turns) - np.pi
+    unnamed = np.asarray(np.isnan(turns).all(axis=1))
+    off = np.where(np.isnan(turns), 0.0, np.maximum(beyond, 0.0)).max(axis=1)
+    off[unnamed] = np.nan
+    what = f"{claim.label}: turns, flags"
+    return compare(what, "rad", HALF_RAD, claim, off, at.late, unnamed)
 
 
 def branch_bits(at: Posture, file: ArmFile) -> tuple[Ints, Bools]:
