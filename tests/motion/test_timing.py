@@ -198,3 +198,21 @@ def test_a_rounded_joint_move_is_no_slower_than_stops(
         )  # fmt: skip
         times.append(plan(arm, targets, WRIST).time[-1])
     assert 0.5 * times[0] < times[1] < 1.02 * times[0]
+
+
+@pytest.mark.parametrize("length", [0.004, 0.01, 0.03, 0.2])
+def test_a_short_line_takes_its_length_over_its_speed(
+    arm: Arm, tool: np.ndarray, home: np.ndarray, length: float
+) -> None:
+    """And no more than the joints need to start and brake, by their acceleration."""
+    tcp = np.tile((arm.flange(home[None]) @ tool)[0], (2, 1, 1))
+    tcp[1, 0, 3] += length
+    targets = make_targets(
+        np.zeros(2, int), tcp, move=np.array([0, 1]), slot=np.zeros(2, int),
+        tool=np.tile(tool, (2, 1, 1)), linear_speed=np.full(2, 0.05),
+    )  # fmt: skip
+    found = plan(arm, targets, WRIST)
+    turned = np.abs(found.q[1] - found.q[0]).max()
+    ramp = (turned / length * 0.05 / arm.acceleration).max()
+    even = length / 0.05
+    assert even < found.time[-1] < 1.02 * even + 2 * ramp
