@@ -15,6 +15,7 @@ import numpy as np
 from postproc.arrays import Floats
 
 SHORT = 1e-9  # [rad] a run of no length has no time law, and needs none
+END_POINTS = 12  # parts of an interval next to a stop
 AT_ONCE = 1e6  # [1/s] how fast the programmed speed is reached, if joints allow it
 
 
@@ -64,6 +65,19 @@ def run_in_time(
     return TimedRun(np.asarray(found[:, :6]), float(trajectory.duration))
 
 
+def _fine(s: Floats) -> Floats:
+    """Return gridpoints: waypoints, and more in both intervals at the ends.
+
+    They are the finest where the arm stands: it may be fast within a part of one.
+    """
+    u = np.linspace(0.0, 1.0, END_POINTS + 1)[1:-1] ** 2
+    first, last = s[1] - s[0], s[-1] - s[-2]
+    if len(s) == 2:
+        both = np.append(u, 2.0 - u) / 2
+        return np.unique(np.concatenate([s, s[0] + both * first]))
+    return np.unique(np.concatenate([s, s[0] + u * first, s[-1] - u * last]))
+
+
 def _trajectory(s: Floats, q: Floats, velocity: Floats, acceleration: Floats) -> Any:
     """Let toppra plan; None where it fails, in whatever way."""
     import toppra
@@ -76,7 +90,9 @@ def _trajectory(s: Floats, q: Floats, velocity: Floats, acceleration: Floats) ->
         constraint.JointAccelerationConstraint(acceleration),
     ]
     try:
-        solver = algorithm.TOPPRA(limits, path, gridpoints=s, solver_wrapper="seidel")
+        solver = algorithm.TOPPRA(
+            limits, path, gridpoints=_fine(s), solver_wrapper="seidel"
+        )
         return solver.compute_trajectory(0.0, 0.0)
     except (ValueError, IndexError, ArithmeticError):
         return None
