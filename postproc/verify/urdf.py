@@ -11,6 +11,7 @@ from time import monotonic
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.exceptions import PostprocError
 from postproc.robot.arm_file import ArmFile
 from postproc.verify.opinion import Opinion, OpinionRow
 from postproc.verify.pinocchio_arm import PinocchioUrdf, serial
@@ -40,9 +41,20 @@ class UrdfChainNames:
     joints: tuple[str, ...]
 
     def read(self, whole_turns: bool) -> PinocchioUrdf:
-        """Let Pinocchio read it, rounded quarter turns (1.57) taken as whole or not."""
+        """Let Pinocchio read it, rounded quarter turns (1.57) taken as whole or not.
+
+        Raises:
+            PostprocError: It cannot.
+        """
         text = with_whole_turns(self.text) if whole_turns else self.text
-        return PinocchioUrdf(text, self.joints, self.base, self.tip)
+        try:
+            return PinocchioUrdf(text, self.joints, self.base, self.tip)
+        except (ValueError, RuntimeError, IndexError) as exc:
+            problem = " ".join(str(exc).split()).rstrip(".") or type(exc).__name__
+            cure = "Mend the file, or leave --verify out"
+            raise PostprocError(
+                f"Pinocchio cannot read the URDF ({problem}). {cure}"
+            ) from None
 
 
 @dataclass(frozen=True)
@@ -94,6 +106,9 @@ def judge_urdf(
         chain: The URDF.
         claim: The arm file.
         count: How many joint angles are drawn, within the limits of the arm file.
+
+    Raises:
+        PostprocError: Pinocchio cannot read the URDF.
     """
     begun = monotonic()
     q, stated, whole = drawn(claim.file, count), chain.read(False), chain.read(True)

@@ -150,3 +150,17 @@ def test_an_endless_joint_takes_the_range_that_is_stated(urdf):
     found = cli("arm", "from-urdf", urdf, "--verify", "-o", urdf.with_name("arm.toml"))
     assert found.exit_code == 0 and "is continuous: its range is taken" in found.stderr
     assert "continuous joints: the URDF states no range" in found.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [('<robot name="irb">', "<robot>"), ('<link name="l3"/>', "")]
+)
+def test_what_pinocchio_cannot_read_is_no_traceback(urdf, old, new):
+    text = urdf.read_text()
+    assert old in text
+    urdf.write_text(text.replace(old, new))
+    place = urdf.with_name("arm.toml")
+    found = cli("arm", "from-urdf", urdf, "-o", place, "--verify")
+    assert found.exit_code == 2 and "leave --verify out" in found.stderr
+    assert not place.exists()
+    assert cli("arm", "from-urdf", urdf, "-o", place).exit_code == 0
