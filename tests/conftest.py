@@ -20,6 +20,8 @@ from postproc.simulation import (
     virtual_arm,
     write_measurements,
 )
+from postproc.simulation.kinematics import NJ220, Chain
+from postproc.simulation.reference import WORKING_RANGE
 from tests.any_controller import EVERY, any_controller
 from tests.pipes import made_device, made_pipe
 
@@ -83,6 +85,7 @@ def make_job(
     seed: int = SEED,
     poses: int = POSES,
     quiet: bool = False,
+    chain: Chain = NJ220,
 ) -> Path:
     """Write a cell, a survey of a virtual arm, and the model fitted to it.
 
@@ -92,11 +95,13 @@ def make_job(
         seed: Of the arm and its survey.
         poses: Of the survey.
         quiet: The survey's arm repeats exactly, and its tracker has no noise.
+        chain: The arm of the cell, as the virtual arm has it.
     """
     (folder / "cell.toml").write_text(text)
     cell = load_cell(folder / "cell.toml")
     rows = folder / "rows.csv"
-    targets = sample_survey(virtual_arm(seed), poses, seed=seed)
+    arm = virtual_arm(seed, chain=chain, coupling=cell.arm.coupling)
+    targets = sample_survey(arm, poses, seed=seed, within=working_range(chain))
     with rows.open("w") as out:
         names = [f"q{j}_deg" for j in range(1, 7)]
         sides = [f"lambda{j}" for j in range(1, 7)]
@@ -106,7 +111,6 @@ def make_job(
             out.write(f"{i + 1}," + ",".join(f"{c:.5f}" for c in cells) + "\n")
     from postproc.cli.simulate import setup_of
 
-    arm = virtual_arm(seed)
     if quiet:
         arm = replace(arm, joint_noise=np.zeros(6), tracker_noise=(0.0, 0.0))
     campaign = measure_rows(arm, setup_of(cell), read_rows(rows))
@@ -116,6 +120,15 @@ def make_job(
         folder / "model.json"
     )
     return folder
+
+
+def working_range(chain: Chain) -> np.ndarray:
+    """Return where the NJ 220 works in the angles of another arm, (6, 2) [rad]."""
+    if chain is NJ220:
+        return WORKING_RANGE
+    ends = NJ220.dh_angles(np.array(WORKING_RANGE).T)
+    q = np.sort(chain.controller_angles(ends).T, axis=1)
+    return np.clip(q, chain.lower[:, None], chain.upper[:, None])
 
 
 @pytest.fixture(scope="session")

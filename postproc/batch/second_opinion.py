@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import copyfile
 from tempfile import TemporaryDirectory
-from time import monotonic
 from typing import Any
 
 from postproc.batch.plan import BatchPlan, JobSetup, Unit
@@ -25,9 +24,8 @@ from postproc.compensation.record import (
 from postproc.compensation.second_opinion import second_opinion
 from postproc.exceptions import PostprocError
 from postproc.files import name_read, program_of, read_input, variables_of
-from postproc.verify.directions import SECONDS
 from postproc.verify.extra import require
-from postproc.verify.opinion import Opinion
+from postproc.verify.opinion import ENOUGH, Allowance, Opinion
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,8 @@ class TreeOpinion:
         """Return it for JSON."""
         skipped = [{"place": place, "why": why} for place, why in self.skipped]
         told = self.opinion.told() | {"programs": self.programs, "skipped": skipped}
-        return {key: told[key] for key in ("programs", "agrees", "rows", "skipped")}
+        keys = "programs", "agrees", "seconds", "rows", "skipped"
+        return {key: told[key] for key in keys}
 
 
 def judge_tree(folder: Path, plan: BatchPlan) -> TreeOpinion:
@@ -68,13 +67,14 @@ def judge_tree(folder: Path, plan: BatchPlan) -> TreeOpinion:
     """
     require()
     opinions: list[Opinion] = []
-    skipped, until = [], monotonic() + SECONDS
+    skipped, left = [], ENOUGH
     with TemporaryDirectory(prefix="postproc-") as place:
         _restored(folder, Path(place))
         for unit in sorted(scan(Path(place), plan).units, key=lambda u: u.program):
-            left, setup = until - monotonic(), plan.setups[unit.setup]
+            setup = plan.setups[unit.setup]
             try:
                 opinions.append(_judged(folder, Path(place), unit, setup, left))
+                left = left.less(opinions[-1])
             except PostprocError as exc:
                 skipped.append((unit.program, str(exc)))
     table = Opinion.joined(str(folder), opinions)
@@ -113,7 +113,7 @@ def _records(path: Path) -> Mapping[str, FileRecord]:
 
 
 def _judged(
-    folder: Path, sources: Path, unit: Unit, setup: JobSetup, seconds: float
+    folder: Path, sources: Path, unit: Unit, setup: JobSetup, left: Allowance
 ) -> Opinion:
     """Judge one program with its pages.
 
@@ -127,7 +127,7 @@ def _judged(
     source, output = dict(_files(sources, unit)), dict(_files(folder, unit))
     strict = Options(strict_calls=bool(record.options.get("strict_calls")))
     cell = prepared(setup.cell, setup.model, strict)
-    return second_opinion(source, output, cell, record, seconds)
+    return second_opinion(source, output, cell, record, left)
 
 
 def _record(folder: Path, unit: Unit) -> Sidecar:

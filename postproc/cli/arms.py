@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.common import app, as_path, explained, say, write_text
+from postproc.exceptions import PostprocError
 from postproc.files import check_places
 
 if TYPE_CHECKING:
     from postproc.robot.arm import Arm
+    from postproc.robot.urdf import UrdfChain
 
 arm = typer.Typer(
     no_args_is_help=True,
@@ -66,25 +68,78 @@ def from_urdf(
     repeatability: Annotated[
         float, typer.Option("--repeatability", min=0.001, help="RP of ISO 9283 [mm].")
     ] = 0.1,
+    verify: Annotated[
+        bool,
+        typer.Option(
+            "--verify",
+            help="Compare with Pinocchio's reading of the URDF. If they differ, no "
+            "file is written, exit 1.",
+        ),
+    ] = False,
+    arm: Annotated[
+        str | None,
+        typer.Option(
+            "--arm", help="With --verify: compare this arm, and write no file."
+        ),
+    ] = None,
 ) -> None:
     """Write the arm file of a URDF: six revolute joints in series."""
-    from postproc.robot.ortho_parallel import arm_text, closed_form_obstacle
+    from postproc.robot.ortho_parallel import arm_text
     from postproc.robot.urdf import read_chain
-    from postproc.robot.urdf_links import placeholder
 
     with explained(urdf):
         check_places([as_path(output)], [urdf])
+        if arm is not None and not verify:
+            raise PostprocError("--arm: it is compared alone. Add --verify")
+        if verify:
+            from postproc.verify.extra import require
+
+            require()
         chain = read_chain(urdf, base, tip)
-        text = arm_text(chain, repeatability, name)
-        write_text(output, text)
-        for rounded in chain.rounded:
-            say(f"{urdf}: {rounded}")
-        if obstacle := closed_form_obstacle(chain):
-            say(obstacle)
-        if (problem := placeholder(chain.weights)) is not None:
-            say(f"{urdf}: {problem}. [links] is not written")
-        if output != "-":
-            say(f"written {output}")
+        for assumed in (*chain.rounded, *chain.endless):
+            say(f"{urdf}: {assumed}")
+        text = None if arm is not None else arm_text(chain, repeatability, name)
+        if text is not None:
+            _say_what_lacks(chain)
+        if verify and not _verified(chain, text, arm):
+            raise typer.Exit(1)
+        if text is not None:
+            write_text(output, text)
+            if output != "-":
+                say(f"written {output}")
+
+
+def _say_what_lacks(chain: UrdfChain) -> None:
+    """Say why an arm file has no closed form, or no links."""
+    from postproc.robot.ortho_parallel import closed_form_obstacle
+    from postproc.robot.urdf_links import placeholder
+
+    if obstacle := closed_form_obstacle(chain):
+        say(obstacle)
+    if (problem := placeholder(chain.weights)) is not None:
+        say(f"{chain.path}: {problem}. [links] is not written")
+
+
+def _verified(chain: UrdfChain, text: str | None, arm: str | None) -> bool:
+    """Compare the text of an arm file, or an arm, with Pinocchio's reading of a URDF.
+
+    Raises:
+        PostprocError: There is no such arm, or Pinocchio cannot be loaded.
+    """
+    from postproc.report.second_opinion import print_opinion
+    from postproc.robot.arm import arm_of_text, load_arm
+    from postproc.verify.extra import libraries
+    from postproc.verify.urdf import ArmClaim, UrdfChainNames, judge_urdf
+
+    ours = load_arm(arm or "") if text is None else arm_of_text(chain.path, text)
+    names = tuple(joint.name for joint in chain.moving)
+    stated = chain.path.read_text("utf-8", "replace")
+    theirs = UrdfChainNames(stated, chain.base, chain.tip, names)
+    claim = ArmClaim(ours.file, ours.flange, ours.gravity_torque)
+    with libraries():
+        opinion = judge_urdf(ours.name, theirs, claim)
+    print_opinion(opinion)
+    return opinion.agrees
 
 
 @arm.command("from-machine-dat")

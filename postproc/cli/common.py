@@ -295,6 +295,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "arm from-urdf": (
         "postproc arm from-urdf robot.urdf -o arm.toml",
         "postproc arm from-urdf robot.urdf --base base_link --tip flange",
+        "postproc arm from-urdf robot.urdf -o arm.toml --verify",
     ),
     "arm from-machine-dat": (
         "postproc arm from-machine-dat 'R1/Mada/$machine.dat' -o arm.toml",

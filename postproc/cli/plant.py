@@ -206,7 +206,7 @@ def _second_opinion(
     Raises:
         PostprocError: Somebody asked for it, and it cannot be given.
     """
-    from postproc.verify.extra import INSTALL, missing
+    from postproc.verify.extra import INSTALL, broken, missing
 
     if asked is False:
         return None
@@ -225,10 +225,9 @@ def _second_opinion(
     try:
         return judge_tree(folder, made)
     except ImportError as exc:
-        problem = f"no second opinion: a library is broken ({exc}): {INSTALL}"
         if asked:
-            raise PostprocError(problem) from None
-        say(problem)
+            raise PostprocError(broken(exc)) from None
+        say(broken(exc))
         return None
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, Ints
 from postproc.compensation.outcome import corrected_directions
 from postproc.compensation.payload import payload_of
 from postproc.compensation.program import read_program
@@ -15,12 +15,12 @@ from postproc.compensation.record import Sidecar
 from postproc.compensation.targets import targets_from_visits
 from postproc.language.visits import Visits
 from postproc.motion.planner import plan
+from postproc.motion.targets import CODE, LIMITS, PATH_LIMITS
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
-from postproc.verify.directions import SECONDS
 from postproc.verify.extra import require
 from postproc.verify.judge import judge
-from postproc.verify.opinion import ArmFacts, Claim, Opinion
+from postproc.verify.opinion import ENOUGH, Allowance, ArmFacts, Claim, Opinion
 
 
 def second_opinion(
@@ -28,7 +28,7 @@ def second_opinion(
     output: Mapping[str, bytes],
     cell: Cell,
     record: Sidecar,
-    seconds: float = SECONDS,
+    allowance: Allowance = ENOUGH,
 ) -> Opinion:
     """Let Pinocchio, toppra and ruckig judge a compensated program.
 
@@ -37,7 +37,7 @@ def second_opinion(
         output: The same files as they were written.
         cell: The cell, with the play that the correction used.
         record: What the targets were corrected for.
-        seconds: Time for directions.
+        allowance: How long it may take.
 
     Raises:
         ProgramError: A file cannot be read as a program.
@@ -47,7 +47,7 @@ def second_opinion(
     before = _claim("source", read_program(source, cell).visits, cell)
     after = _claim("output", read_program(output, cell).visits, cell)
     after = _corrected_for(after, before.visits, record)
-    return judge(next(iter(source)), facts_of(cell), before, after, seconds)
+    return judge(next(iter(source)), facts_of(cell), before, after, allowance)
 
 
 def facts_of(cell: Cell) -> ArmFacts:
@@ -62,7 +62,8 @@ def facts_of(cell: Cell) -> ArmFacts:
 def _claim(label: str, visits: Visits, cell: Cell) -> Claim:
     """Plan a program as `compensate` does, and say what comes of it."""
     arm, (targets, _) = cell.arm, targets_from_visits(visits, cell)
-    planned = plan(arm, targets, np.deg2rad(cell.limits.wrist_deg), timed=False)
+    timed = arm.file.joints.velocity_deg_s is not None
+    planned = plan(arm, targets, np.deg2rad(cell.limits.wrist_deg), timed)
     q, load = planned.exact.q, _loads(visits, cell)
     return Claim(
         label=label,
@@ -73,8 +74,16 @@ def _claim(label: str, visits: Visits, cell: Cell) -> Claim:
         singular=_singular(cell, q),
         payload=load,
         torque=_torque(cell, q, load),
+        time=np.where(planned.untimed, np.nan, planned.time),
+        within=_within_limits(planned.exact.reason),
         own=np.arange(len(visits)),
     )
+
+
+def _within_limits(reason: Ints) -> Ints:
+    """Say where joints stay within their limits, -1 where they do not, 0: unknown."""
+    beyond = np.isin(reason, [CODE[text] for text in (*LIMITS, *PATH_LIMITS)])
+    return np.where(beyond, -1, np.where(reason == 0, 1, 0))
 
 
 def _loads(visits: Visits, cell: Cell) -> Floats:

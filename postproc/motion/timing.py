@@ -18,6 +18,8 @@ from postproc.robot.trajectory import Motion
 # Sampled runs of moves between stops, as a time law wants them.
 
 JOINT_INTERVALS = 8  # gridpoints of a JOINT move inside a fly run
+END_INTERVALS = 8  # gridpoints between a stop and the sample next to it
+EVEN = 1e-6  # of an interval: what is longer by less is not cut once more
 SHORTEST = 1e-9  # [s at full joint speed] below this two samples are one
 SIMILAR = 0.1  # neighbouring bounds nearer than this share belong to one speed
 
@@ -111,7 +113,91 @@ def waypoints(
     inside = np.flatnonzero(run_of >= 0)
     np.minimum.at(override, run_of[inside], targets.override[inside])
     at = np.where(run_of >= 0, start[1:] - 1, -1)
-    return _thinned(q, ds, least, override[run_of[visit]], run_of[visit], at)
+    parts = _parts(ds, visit, curved & (targets.move[visit] == Motion.JOINT))
+    run = run_of[visit]
+    kept = _thinned(*_divided(parts, q, ds, least, override[run], run, at))
+    return _fine_ends(arm, kept)
+
+
+def _parts(ds: Floats, visit: Ints, rounded: Bools) -> Ints:
+    """Say into how many gridpoints the intervals of rounded JOINT moves are cut, (k,).
+
+    Their corners have samples, what is straight between these has one interval: with
+    one acceleration throughout, a stop behind it would be twice as late, or more.
+    """
+    whole = np.bincount(visit, ds)[visit]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(rounded & (whole > SHORTEST), ds / whole, 0.0)
+    return np.maximum(np.ceil(JOINT_INTERVALS * share - EVEN), 1).astype(np.int64)
+
+
+def _divided(
+    parts: Ints, q: Floats, ds: Floats, least: Floats, override: Floats, run: Ints,
+    at: Ints,
+) -> tuple[Floats, Floats, Floats, Floats, Ints, Ints]:  # fmt: skip
+    """Cut the intervals before waypoints into equal parts."""
+    if (parts == 1).all():
+        return q, ds, least, override, run, at
+    end = np.cumsum(parts)
+    row = np.repeat(np.arange(len(parts)), parts)
+    u = (np.arange(len(row)) - end[row] + parts[row] + 1) / parts[row]
+    before = np.maximum(row - 1, 0)
+    q = q[before] + u[:, None] * (q[row] - q[before])
+    ds, least = (ds / parts)[row], (least / parts)[row]
+    at = np.where(at >= 0, end[np.maximum(at, 0)] - 1, -1)
+    return q, ds, least, override[row], run[row], at
+
+
+def _fine_ends(arm: Arm, points: Waypoints) -> Waypoints:
+    """Cut the first and the last interval of runs at a programmed speed.
+
+    The arm reaches that speed within some mm, or less. On intervals of 5 mm it would
+    take the whole of one, and double the time for it. Between are points of the
+    parabola through the nearest three.
+    """
+    k, begins = len(points.ds), points.begins
+    if k == 0:
+        return points
+    ends, row = np.append(begins[1:], True), np.arange(k)
+    first = np.append(False, begins[:-1]) & ~begins
+    cut = (first | ends) & ~begins & (points.least > 0)
+    third = np.where(first, row + 1, row - 2)
+    lone = (first & ends) | (third < 0) | (third >= k)
+    third = np.where(lone, row, third)
+    parts = np.where(cut, END_INTERVALS, 1)
+    bend = _bend(points, third) * cut[:, None]
+    own = np.repeat(row, parts)
+    end = np.cumsum(parts)
+    nth = np.arange(len(own)) - end[own] + parts[own]
+    u, since = (_graded(n, parts[own], first[own]) for n in (nth + 1, nth))
+    before = np.maximum(own - 1, 0)
+    q = points.q[before] + u[:, None] * (points.q[own] - points.q[before])
+    q += (u * (u - 1))[:, None] * bend[own]
+    step = np.linalg.norm(np.diff(q, axis=0, prepend=q[:1]) / arm.velocity, axis=1)
+    ds = np.where(cut[own], step, points.ds[own])
+    least = points.least[own] * (u - since)
+    at = np.where(points.at >= 0, end[np.maximum(points.at, 0)] - 1, -1)
+    return Waypoints(q, ds, least, points.override[own], begins[own], at)
+
+
+def _graded(nth: Ints, parts: Ints, first: Bools) -> Floats:
+    """Say where an interval is cut: by squares, the finest where the arm stands."""
+    u = nth / parts
+    return np.where(parts == 1, u, np.where(first, u**2, 1 - (1 - u) ** 2))
+
+
+def _bend(points: Waypoints, third: Ints) -> Floats:
+    """Return what bends the chord before each waypoint into the parabola, (k, 6).
+
+    q(u) = q_before + u (q - q_before) + u (u - 1) bend goes through a third waypoint.
+    """
+    row, s = np.arange(len(third)), np.cumsum(points.ds)
+    before = np.maximum(row - 1, 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u = ((s[third] - s[before]) / (s - s[before]))[:, None]
+        chord = points.q[before] + u * (points.q - points.q[before])
+        bend = (points.q[third] - chord) / (u * (u - 1))
+    return np.where(np.isfinite(bend), bend, 0.0)
 
 
 def _runs_of(n: int, first: Ints, end: Ints) -> Ints:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from postproc import _native
 from postproc.arrays import Floats, Ints, floats
 from postproc.exceptions import ArmError
-from postproc.robot.arm_file import ArmFile, arm_path, read_arm_file
+from postproc.robot.arm_file import ArmFile, arm_path, parse_toml, read_arm_file
 from postproc.robot.inverse import (
     Branches,
     ClosedForm,
@@ -528,6 +528,19 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     if arm.file.opw is not None:
         _check_inverse(arm, path)
     return arm
+
+
+def arm_of_text(path: Path, text: str) -> Arm:
+    """Build the arm of an arm file that is not written yet.
+
+    Args:
+        path: What messages name.
+        text: Of the arm file.
+
+    Raises:
+        ArmError: It is no arm file.
+    """
+    return build_arm(parse_toml(path, text.encode(), ArmFile, ArmError))
 
 
 def _mounted_arm(file: ArmFile, weight: Floats) -> Arm:

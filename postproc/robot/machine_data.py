@@ -13,8 +13,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError
-from postproc.robot.arm import build_arm
-from postproc.robot.arm_file import ArmFile, parse_toml
+from postproc.robot.arm import arm_of_text
 from postproc.robot.pose import MM
 
 MAX_BYTES = 5_000_000  # no machine data are longer
@@ -379,7 +378,7 @@ def _verify(path: Path, shape: KukaShape, text: str) -> None:
     Raises:
         ArmError: It places the flange elsewhere.
     """
-    arm = build_arm(parse_toml(path, text.encode(), ArmFile, ArmError))
+    arm = arm_of_text(path, text)
     q = np.linspace(-2.0, 2.0, 60).reshape(10, 6) * [1.0, -0.7, 0.5, -0.9, 0.6, 0.8]
     wanted = np.array([shape.place(angles) for angles in q])
     gap = float(np.abs(arm.flange(q) - wanted).max())

@@ -10,8 +10,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError
-from postproc.robot.arm import Arm, build_arm
-from postproc.robot.arm_file import ArmFile, parse_toml
+from postproc.robot.arm import Arm, arm_of_text
 from postproc.robot.denavit_hartenberg import PARALLEL, DhParameters, dh_parameters
 from postproc.robot.pose import MM
 from postproc.robot.urdf import MOVING, UrdfChain, turned
@@ -24,7 +23,10 @@ from postproc.robot.urdf_links import links_text
 
 EXACT = 1e-10  # [rad], [m] that axes may be off
 BY_NUMBERS = "Its inverse kinematics is numeric"
-ON_AXIS_6 = "Name the flange with --tip: it stands on axis 6, its z points out of it"
+ON_AXIS_6 = (
+    "Name the flange with --tip: it stands on axis 6, its z points out of it. Where no "
+    "link does, add one by a fixed joint"
+)
 
 
 class NoClosedFormError(ArmError):
@@ -264,7 +266,7 @@ def arm_text(chain: UrdfChain, repeatability_mm: float, name: str | None = None)
     except NoClosedFormError as exc:
         obstacle, parts = exc, _numeric_parts(dh_of(chain))
     text = _written(chain, parts, repeatability_mm, name or chain.name)
-    arm = build_arm(parse_toml(chain.path, text.encode(), ArmFile, ArmError))
+    arm = arm_of_text(chain.path, text)
     if obstacle is not None:
         _check_mobility(arm, obstacle)
     _verify(chain, arm)

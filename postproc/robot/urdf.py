@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.parsers import expat
@@ -165,6 +165,16 @@ class UrdfChain:
         return tuple(joint for joint in self.joints if joint.kind in MOVING)
 
     @property
+    def endless(self) -> tuple[str, ...]:
+        """Which joints turn without end, and what range is taken, in words."""
+        return tuple(
+            f"joint {joint.name} is continuous: its range is taken as the stated "
+            f"{math.degrees(joint.lower):g} to {math.degrees(joint.upper):g} deg"
+            for joint in self.moving
+            if joint.kind == "continuous"
+        )
+
+    @property
     def rounded(self) -> tuple[str, ...]:
         """Which angles were taken as quarter turns, in words."""
         return tuple(text for joint in self.joints for text in joint.rounded)
@@ -208,6 +218,8 @@ def read_chain(
         raise ArmError(path, problem, "Give a URDF", line=robot.line)
     joints = _joints(path, robot)
     links = [c.attributes.get("name", "") for c in robot.children if c.tag == "link"]
+    if not links:
+        raise ArmError(path, "has no links", "Give a URDF of an arm", line=robot.line)
     base = _end(path, links, base, ("base", "base_link"), _roots(links, joints))
     tip = _end(path, links, tip, ("tool0", "flange"), _last(links, joints))
     up, down = _way(path, joints, base), _way(path, joints, tip)
@@ -349,6 +361,7 @@ def _numbers(
     sound = all(abs(number) <= LARGEST for number in found)  # nan is not
     if len(found) != len(default) or not sound:
         wanted = f"{len(default)} numbers" if len(default) > 1 else "a number"
+        wanted += f" below {LARGEST:g}" if len(found) == len(default) else ""
         problem = f"<{element.tag} {key}> is not {wanted}: {text}"
         cure = EXPAND if "$" in text else "Correct it"
         raise ArmError(path, problem, cure, line=element.line)
@@ -442,10 +455,7 @@ def _check_joints(chain: UrdfChain) -> None:
     Raises:
         ArmError: Naming the joint.
     """
-    for joint in chain.joints:
-        for problem, cure in _complaints(joint):
-            problem = f"joint {joint.name} {problem}"
-            raise ArmError(chain.path, problem, cure, line=joint.line)
+    _refuse_joints(chain, _other_kind)
     if len(chain.moving) != 6:
         names = ", ".join(joint.name for joint in chain.moving) or "none"
         problem = (
@@ -453,19 +463,38 @@ def _check_joints(chain: UrdfChain) -> None:
             f"{chain.tip}, not 6 ({names})"
         )
         raise ArmError(chain.path, problem, "Name the ends with --base and --tip")
+    _refuse_joints(chain, _complaints)
+
+
+def _refuse_joints(
+    chain: UrdfChain, complaints: Callable[[UrdfJoint], Iterator[tuple[str, str]]]
+) -> None:
+    """Refuse a chain for the first complaint about one of its joints.
+
+    Raises:
+        ArmError: Naming the joint.
+    """
+    for joint in chain.joints:
+        for problem, cure in complaints(joint):
+            problem = f"joint {joint.name} {problem}"
+            raise ArmError(chain.path, problem, cure, line=joint.line)
+
+
+def _other_kind(joint: UrdfJoint) -> Iterator[tuple[str, str]]:
+    """Say that a joint neither turns nor stands still, with the cure."""
+    if joint.kind not in (*MOVING, "fixed"):
+        yield f"is {joint.kind or 'of no type'}", "Give an arm of revolute joints"
 
 
 def _complaints(joint: UrdfJoint) -> Iterator[tuple[str, str]]:
     """Say what keeps a joint from being one of an arm file, with the cure."""
-    if joint.kind not in (*MOVING, "fixed"):
-        yield f"is {joint.kind or 'of no type'}", "Give an arm of revolute joints"
     if joint.kind not in MOVING:
         return
     if joint.mimics:
         cure = "Write the chain as six joints of their own"
         yield f"follows {joint.mimics}", cure
-    if joint.kind == "continuous" or not joint.lower < joint.upper:
-        cure = "Make it revolute, with a <limit lower upper velocity>"
+    if not joint.lower < joint.upper:
+        cure = "Give it one: <limit lower upper velocity>"
         yield "has no range", cure
     if not joint.velocity > 0.0:
         yield "has no velocity", "Give it one: <limit velocity>"

@@ -13,14 +13,14 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.robot.arm_file import ArmFile
 from postproc.robot.trajectory import Motion
-from postproc.verify.opinion import COUNTED, ArmFacts, Claim, OpinionRow
+from postproc.verify.cycle import NO_WAY, compare_limits, compare_times
+from postproc.verify.opinion import COUNTED, ArmFacts, Claim, OpinionRow, worst_of
 from postproc.verify.play_memory import PlayMemory
 from postproc.verify.ruckig_move import move_in_time
-from postproc.verify.toppra_run import run_in_time
+from postproc.verify.toppra_run import TimedRun, run_in_time
 from postproc.verify.ways import NO_TIME, SEVERAL, MadeWay, WayMaker, not_made
 
 MOVES, BLOCK = 5_000, 250  # at most so many in time, drawn in blocks
-SECONDS = 60.0
 END_RAD = 1e-4  # what a joint may be off at the end of a way
 TO_SPEED, TO_PUSH = 0.4, 0.1  # [s], where the arm file has no acceleration, no jerk
 BENT = 0.05  # [rad] between joint paths before and behind a fly point: passed at rest
@@ -28,7 +28,6 @@ BENT = 0.05  # [rad] between joint paths before and behind a fly point: passed a
 FLY = "fly points: passed on a blend"
 NEAR = "within two plays of a reversal"
 UNKNOWN = "not known to the planner"
-NO_WAY = "the way there was not made"
 NOT_DRAWN = "not drawn, or the time was up"
 
 
@@ -53,13 +52,14 @@ class DriveTrain:
         coupling = np.array(facts.file.joints.drive_coupling or np.eye(6))
         return cls(_limits(facts.file), facts.play, coupling)
 
-    def timed(self, way: Floats, joint: bool) -> Floats | None:
-        """Sample a run in time, (m, 6); without limits as it is."""
+    def timed(self, ways: Sequence[MadeWay], joint: bool) -> TimedRun | None:
+        """Find the time law of a run; without limits it has none, but goes its way."""
+        q = np.concatenate([ways[0].q[:1], *(way.q[1:] for way in ways)])
         if not len(self.limits):
-            return way
+            return TimedRun(q, np.nan)
         if joint:
-            return move_in_time(way[0], way[-1], self.limits)
-        return run_in_time(way, self.limits[0], self.limits[1])
+            return move_in_time(q[0], q[-1], self.limits)
+        return run_in_time(q, self.limits[0], self.limits[1], _least(ways))
 
 
 def _limits(file: ArmFile) -> Floats:
@@ -70,6 +70,12 @@ def _limits(file: ArmFile) -> Floats:
     velocity = np.array(joints.velocity_deg_s)
     push = np.array(joints.acceleration_deg_s2 or velocity / TO_SPEED)
     return np.deg2rad([velocity, push, np.array(joints.jerk_deg_s3 or push / TO_PUSH)])
+
+
+def _least(ways: Sequence[MadeWay]) -> Floats:
+    """Return the time to every waypoint at the programmed speeds, (k,) [s]."""
+    steps = [np.full(len(w.q) - 1, w.least / (len(w.q) - 1)) for w in ways]
+    return np.append(0.0, np.cumsum(np.concatenate(steps)))
 
 
 def judge_directions(
@@ -86,10 +92,13 @@ def judge_directions(
     train = DriveTrain.of(facts)
     ways = make_ways(maker, draw(claim), until)
     runs = list(runs_of(claim, ways))
-    arrived = arrivals(claim, train, ways, runs, until)
+    timed = runs_in_time(claim, train, ways, runs, until)
+    arrived = arrivals(claim, train, ways, runs, timed)
     return [
         _compare_ends(claim, maker, ways),
-        _compare_times(claim, runs, arrived),
+        compare_limits(claim, facts.file, ways, maker.confirmed),
+        _count_times(claim, runs, arrived),
+        *compare_times(claim, facts.file, ways, runs, timed),
         _compare_directions(claim, train, arrived),
     ]
 
@@ -151,29 +160,42 @@ def _bend(before: Floats, behind: Floats) -> float:
     return float(np.arccos(np.clip(a @ b / size, -1, 1))) if size else 0.0
 
 
-def arrivals(
+def runs_in_time(
     claim: Claim,
     train: DriveTrain,
     ways: Mapping[int, MadeWay],
     runs: Sequence[list[int]],
     until: float,
+) -> dict[int, TimedRun]:
+    """Find the time laws of runs, by the visits that they begin with."""
+    found: dict[int, TimedRun] = {}
+    for run in runs:
+        joint = bool(claim.visits.motion[run[0]] == Motion.JOINT)
+        late = monotonic() > until
+        timed = None if late else train.timed([ways[i] for i in run], joint)
+        if timed is not None:
+            found[run[0]] = timed
+    return found
+
+
+def arrivals(
+    claim: Claim,
+    train: DriveTrain,
+    ways: Mapping[int, MadeWay],
+    runs: Sequence[list[int]],
+    timed: Mapping[int, TimedRun],
 ) -> dict[int, PlayMemory]:
     """Run the drives along trajectories in time: what they remember behind each run.
 
     A run without a time law is not there, and what follows knows nothing of before.
     """
     found: dict[int, PlayMemory] = {}
-    for run in runs:
+    for run in (run for run in runs if run[0] in timed):
         first, last = run[0], run[-1]
-        way = np.concatenate([ways[run[0]].q[:1], *(ways[i].q[1:] for i in run)])
-        joint = bool(claim.visits.motion[first] == Motion.JOINT)
-        sampled = None if monotonic() > until else train.timed(way, joint)
-        if sampled is None:
-            continue
-        drive = np.vstack([sampled, way[-1:]]) @ train.coupling.T
-        start = PlayMemory.at(way[0] @ train.coupling.T)
+        q = np.vstack([timed[first].q, ways[last].q[-1:]])
+        start = PlayMemory.at(ways[first].q[0] @ train.coupling.T)
         before = found.get(int(claim.visits.before[first]), start)
-        found[last] = before.passed(drive, train.play)
+        found[last] = before.passed(q @ train.coupling.T, train.play)
     return found
 
 
@@ -186,17 +208,13 @@ def _compare_ends(
         for i, way in ways.items()
         if not way.why
     ]
-    worst, i = max(ends, default=(0.0, -1))
     skipped = Counter(way.why for way in ways.values() if way.why)
     skipped[NOT_DRAWN] = len(claim) - len(ways)
-    return OpinionRow(
-        f"{claim.label}: end of the way", "rad", len(ends),
-        sum(off > END_RAD for off, _ in ends), worst, END_RAD,
-        claim.place(i) if i >= 0 else "", dict(+skipped),
-    )  # fmt: skip
+    what = f"{claim.label}: end of the way"
+    return worst_of(what, "rad", END_RAD, claim, ends, +skipped)
 
 
-def _compare_times(
+def _count_times(
     claim: Claim, runs: Sequence[list[int]], arrived: Mapping[int, PlayMemory]
 ) -> OpinionRow:
     """Say how many runs have a time law of toppra or ruckig."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 
 from postproc.exceptions import PostprocError
@@ -26,3 +28,22 @@ def require() -> None:
         raise PostprocError(
             f"the second opinion needs {names}, not installed here: {INSTALL}"
         )
+
+
+@contextmanager
+def libraries() -> Iterator[None]:
+    """Check that all are installed, and say so where one of them cannot be loaded.
+
+    Raises:
+        PostprocError: Naming the command that installs them.
+    """
+    require()
+    try:
+        yield
+    except ImportError as exc:
+        raise PostprocError(broken(exc)) from None
+
+
+def broken(exc: ImportError) -> str:
+    """Say that a library cannot be loaded."""
+    return f"no second opinion: a library is broken ({exc}): {INSTALL}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import Meaning, Switch, Visits
 from postproc.robot.trajectory import Motion
 from postproc.verify.opinion import ArmFacts, Claim
@@ -96,6 +96,21 @@ def written_branches(v: Visits) -> Ints:
     On a line the flags may be overruled, and so may those that nothing checks.
     """
     slot, _ = v.dialect.flags(v.config, v.configs, v.values)
+    return np.where(_checked(v), slot, -1)
+
+
+def written_turns(v: Visits) -> Floats:
+    """Return the turns of axes 4, 6 and 3 that such flags name, (n, 3), or NaN.
+
+    An angle is within half a turn of them.
+    """
+    _, turns = v.dialect.flags(v.config, v.configs, v.values)
+    named = _checked(v) & ~v.nearest_turn
+    return np.where(named[:, None], turns, np.nan)
+
+
+def _checked(v: Visits) -> Bools:
+    """Tell where flags hold, (n,)."""
     checked = ~np.isin(v.care, (Switch.OFF, Switch.UNKNOWN)).any(axis=1)
     asked = v.config_given & np.isin(v.target, POSES) & (v.motion == Motion.JOINT)
-    return np.where(asked & checked, slot, -1)
+    return np.asarray(asked & checked)

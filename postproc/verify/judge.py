@@ -6,9 +6,16 @@ from time import monotonic
 
 import numpy as np
 
-from postproc.verify.directions import SECONDS, judge_directions
+from postproc.verify.directions import judge_directions
 from postproc.verify.goals import goals_of
-from postproc.verify.opinion import ArmFacts, Claim, Opinion
+from postproc.verify.opinion import (
+    ENOUGH,
+    Allowance,
+    ArmFacts,
+    Claim,
+    Opinion,
+    OpinionRow,
+)
 from postproc.verify.pinocchio_arm import PinocchioArm
 from postproc.verify.positions import (
     LoadedArms,
@@ -26,7 +33,7 @@ def judge(
     facts: ArmFacts,
     source: Claim,
     output: Claim,
-    seconds: float = SECONDS,
+    allowance: Allowance = ENOUGH,
 ) -> Opinion:
     """Judge what a planner says of a program and of its output.
 
@@ -35,21 +42,26 @@ def judge(
         facts: The arm.
         source: What is said of the program as it was.
         output: Of what was written.
-        seconds: Time for directions.
+        allowance: How long it may take.
     """
     begun = monotonic()
     arm = PinocchioArm.build(facts)
-    rows, postures = [], []
-    for claim in (source, output):
-        goals, at = goals_of(claim, facts), posture_of(arm, claim.q)
-        rows += judge_positions(claim, goals, at, _loaded(facts, claim))
-        rows += judge_branches(claim, facts.file, at)
+    rows: list[OpinionRow] = []
+    postures = []
+    for claim in (output, source):  # what was written counts, where time is short
+        goals = goals_of(claim, facts)
+        at = posture_of(arm, claim.q, begun + allowance.positions)
+        found = judge_positions(claim, goals, at, _loaded(facts, claim))
+        rows[:0] = [*found, *judge_branches(claim, facts.file, at)]
         postures.append(at)
     if len(output.own) == len(source):
-        rows += judge_motion(source, output, facts, *postures)
-    maker = WayMaker(arm, output.visits, goals, confirmed(output, goals, at))
-    rows += judge_directions(output, maker, facts, begun + seconds)
-    return Opinion(program, tuple(rows), monotonic() - begun)
+        rows += judge_motion(source, output, facts, *reversed(postures))
+    goals = goals_of(output, facts)
+    maker = WayMaker(arm, output.visits, goals, confirmed(output, goals, postures[0]))
+    placed = monotonic()
+    rows += judge_directions(output, maker, facts, placed + allowance.ways)
+    ended = monotonic()
+    return Opinion(program, tuple(rows), ended - begun, ended - placed)
 
 
 def _loaded(facts: ArmFacts, claim: Claim) -> LoadedArms:

@@ -14,6 +14,8 @@ from postproc.language.visits import Visits
 from postproc.robot.arm_file import ArmFile
 
 COUNTED = "counted"  # unit of a row that compares nothing
+NOT_KNOWN = "not known to the planner, or no pose"
+TIME_UP = "the time was up"
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,27 @@ class ArmFacts:
 
 
 @dataclass(frozen=True)
+class Allowance:
+    """Time for a second opinion.
+
+    Attributes:
+        positions: For the places of targets, and what goes with them [s].
+        ways: For the ways between them [s].
+    """
+
+    positions: float = 60.0
+    ways: float = 60.0
+
+    def less(self, opinion: Opinion) -> Allowance:
+        """Return what one opinion leaves for the next."""
+        positions = opinion.seconds - opinion.on_ways
+        return Allowance(self.positions - positions, self.ways - opinion.on_ways)
+
+
+ENOUGH = Allowance()
+
+
+@dataclass(frozen=True)
 class Claim:
     """What the planner says of the n visits of a program.
 
@@ -50,6 +73,10 @@ class Claim:
         singular: Smallest singular value of the flange's Jacobian, (n,).
         payload: Mass [kg] and centre in the flange frame [m], (n, 4); mass 0: none.
         torque: Gravity torques, (n, 6) [N m]; empty where no link has a mass.
+        time: Since the first move, along the first predecessors, (n,) [s], NaN where
+            not known.
+        within: 1 where all joints stay within their limits on the way, -1 where one is
+            beyond, 0 where that is not known, (n,).
         own: Visits that the source makes too, (k,).
     """
 
@@ -61,6 +88,8 @@ class Claim:
     singular: Floats
     payload: Floats
     torque: Floats
+    time: Floats
+    within: Ints
     own: Ints
 
     def __len__(self) -> int:
@@ -117,11 +146,13 @@ class Opinion:
         program: Its name.
         rows: What was compared.
         seconds: Time that it took.
+        on_ways: How much of it for ways, times and directions.
     """
 
     program: str
     rows: tuple[OpinionRow, ...]
     seconds: float
+    on_ways: float = 0.0
 
     @property
     def agrees(self) -> bool:
@@ -137,14 +168,31 @@ class Opinion:
             found[row.what] = row if old is None else old.with_more(row)
         return cls(name, tuple(found.values()), sum(o.seconds for o in opinions))
 
+    @classmethod
+    def of_report(cls, told: Mapping[str, Any]) -> Self:
+        """Take it out of a written report.
+
+        Raises:
+            KeyError, TypeError: It is none.
+        """
+        rows = tuple(OpinionRow(**row) for row in told["rows"])
+        return cls(str(told["program"]), rows, float(told["seconds"]))
+
     def told(self) -> dict[str, Any]:
         """Return it for JSON."""
         rows = [asdict(row) for row in self.rows]
-        return {"program": self.program, "agrees": self.agrees, "rows": rows}
+        told = {"program": self.program, "agrees": self.agrees}
+        return {**told, "seconds": round(self.seconds, 3), "rows": rows}
 
 
 def compare(
-    what: str, unit: str, bound: float, claim: Claim, size: Floats, why: Bools | None
+    what: str,
+    unit: str,
+    bound: float,
+    claim: Claim,
+    size: Floats,
+    late: Bools,
+    unasked: Bools | None = None,
 ) -> OpinionRow:
     """Make a row from the differences at the visits, NaN where there is none.
 
@@ -154,15 +202,28 @@ def compare(
         bound: What differs by more disagrees.
         claim: Names the places.
         size: Differences, (n,).
-        why: Visits of which nothing is expected, (n,): not counted as skipped.
+        late: Visits for which there was no time, (n,).
+        unasked: Visits of which nothing is expected, (n,): not counted as skipped.
     """
-    known = ~np.isnan(size)
-    lost = ~known if why is None else ~known & ~why
-    skipped = {"not known to the planner, or no pose": int(lost.sum())}
-    worst = int(np.nanargmax(size)) if known.any() else -1
+    lost = np.isnan(size) if unasked is None else np.isnan(size) & ~unasked
+    skipped = Counter({TIME_UP: int((lost & late).sum())})
+    skipped[NOT_KNOWN] = int((lost & ~late).sum())
+    rows = np.flatnonzero(~np.isnan(size))
+    sizes = list(zip(size[rows].tolist(), rows.tolist(), strict=True))
+    return worst_of(what, unit, bound, claim, sizes, +skipped)
+
+
+def worst_of(
+    what: str,
+    unit: str,
+    bound: float,
+    claim: Claim,
+    sizes: Sequence[tuple[float, int]],
+    skipped: Mapping[str, int],
+) -> OpinionRow:
+    """Make a row from differences and the visits that they are at."""
+    worst, i = max(sizes, default=(0.0, -1))
     return OpinionRow(
-        what, unit, int(known.sum()), int((size[known] > bound).sum()),
-        float(size[worst]) if worst >= 0 else 0.0, bound,
-        claim.place(worst) if worst >= 0 else "",
-        {reason: n for reason, n in skipped.items() if n},
+        what, unit, len(sizes), sum(size > bound for size, _ in sizes), worst, bound,
+        claim.place(i) if i >= 0 else "", dict(skipped),
     )  # fmt: skip

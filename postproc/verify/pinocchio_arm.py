@@ -1,7 +1,8 @@
-"""The arm as Pinocchio sees it. The only importer of pinocchio."""
+"""Arms as Pinocchio sees them. The only importer of pinocchio."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -53,23 +54,23 @@ class PinocchioArm:
         self._pin.framesForwardKinematics(self._model, self._data, self._mix @ q)
         return np.array(self._data.oMf[self._flange].homogeneous)
 
-    def joints(self, q: Floats) -> tuple[Floats, Floats]:
-        """Place the joints and the flange.
+    def placed(self, q: Floats) -> tuple[Floats, Floats, Floats]:
+        """Place the arm for joint angles (6,) [rad].
 
         Returns:
-            Origins of the joints' frames and of the flange, (7, 3) [m], and axes of
-            positive rotation, (6, 3).
+            The flange, (4, 4) [m], the origins of the joints, (6, 3) [m], and how the
+            base's origin would move with the flange, (6, 6), linear rows first.
         """
-        end = self.flange(q)[:3, 3]
-        frames = [self._data.oMi[k + 1] for k in range(6)]
-        axes = [
-            self._data.oMi[k + 1].rotation @ self._axis(k) for k in range(6)
-        ]  # fmt: skip
-        return np.array([*(f.translation for f in frames), end]), np.array(axes)
+        pin, data = self._pin, self._data
+        J = pin.computeJointJacobians(self._model, data, self._mix @ q)
+        flange = pin.updateFramePlacement(self._model, data, self._flange).homogeneous
+        origins = [frame.translation for frame in list(data.oMi)[1:]]
+        return np.array(flange), np.array(origins), np.array(J)
 
-    def _axis(self, k: int) -> Floats:
-        """Return the axis of joint k in its own frame, (3,)."""
-        return np.array(self._model.joints[k + 1].extract().axis)
+    @property
+    def mix(self) -> Floats:
+        """Angles of the chain from the controller's, (6, 6)."""
+        return self._mix
 
     def jacobian(self, q: Floats) -> Floats:
         """Differentiate the flange: (6, 6), linear rows first, base frame."""
@@ -132,6 +133,11 @@ def _add_joint(
     return joint, link
 
 
+def serial(file: ArmFile) -> Floats:
+    """Return the controller's angles from those of joints in series, (6, 6)."""
+    return np.asarray(np.linalg.inv(_mix(file)))
+
+
 def _mix(file: ArmFile) -> Floats:
     """Return the angles of the chain from the controller's, (6, 6).
 
@@ -143,3 +149,86 @@ def _mix(file: ArmFile) -> Floats:
         same = dh.sense[1] * dh.sense[2] * np.cos(np.deg2rad(dh.alpha_deg[1]))
         mix[2, 1] = -np.sign(same)
     return mix
+
+
+class PinocchioUrdf:
+    """Six joints of a URDF between two of its links, as Pinocchio reads the file.
+
+    All other joints stand at 0, as an arm file takes them.
+    """
+
+    def __init__(self, text: str, joints: Sequence[str], base: str, tip: str) -> None:
+        """Read a URDF.
+
+        Args:
+            text: Of the file.
+            joints: Names of the six joints, base to tip.
+            base: The link at the begin.
+            tip: The link at the end.
+        """
+        import pinocchio as pin
+
+        whole = pin.buildModelFromXML(text)
+        zero = pin.neutral(whole)
+        others = [k for k in range(1, whole.njoints) if whole.names[k] not in joints]
+        self._pin = pin
+        self._model = pin.buildReducedModel(whole, others, zero)
+        self._data, self._zero = self._model.createData(), pin.neutral(self._model)
+        body = pin.FrameType.BODY
+        self._ends = tuple(self._model.getFrameId(name, body) for name in (base, tip))
+        self._weigh()
+
+    def _weigh(self) -> None:
+        """Let weight pull along -z of the base, as in an arm file."""
+        self._pin.framesForwardKinematics(self._model, self._data, self._zero)
+        down = self._data.oMf[self._ends[0]].rotation[:, 2]
+        self._model.gravity.linear = -GRAVITY * down
+
+    def flange(self, q: Floats) -> Floats:
+        """Place the tip in the base link for joint angles (6,) [rad], (4, 4) [m]."""
+        pin, angles = self._pin, self._angles(q)
+        pin.framesForwardKinematics(self._model, self._data, angles)
+        base, tip = (self._data.oMf[k] for k in self._ends)
+        return np.array((base.inverse() * tip).homogeneous)
+
+    def torque(self, q: Floats) -> Floats:
+        """Return the torque that gravity exerts about every joint, (6,) [N m]."""
+        angles = self._angles(q)
+        held = self._pin.computeGeneralizedGravity(self._model, self._data, angles)
+        return np.asarray(-held)
+
+    def _angles(self, q: Floats) -> Any:
+        """Return what Pinocchio calls the angles: of endless joints sine and cosine."""
+        return self._pin.integrate(self._model, self._zero, q)
+
+    @property
+    def limits(self) -> Floats:
+        """Lower and upper limits and velocities, (3, 6); NaN for endless joints."""
+        low, high = np.full(6, np.nan), np.full(6, np.nan)
+        for k, joint in enumerate(list(self._model.joints)[1:]):
+            if joint.nq == 1:
+                low[k] = self._model.lowerPositionLimit[joint.idx_q]
+                high[k] = self._model.upperPositionLimit[joint.idx_q]
+        return np.array([low, high, self._model.velocityLimit])
+
+    @property
+    def mass(self) -> Floats:
+        """What hangs on every joint, (6,) [kg]."""
+        return np.array([inertia.mass for inertia in list(self._model.inertias)[1:]])
+
+    @property
+    def reach(self) -> float:
+        """Length of all links, stretched [m]."""
+        return float(sum(np.linalg.norm(place.translation) for place in self._places()))
+
+    def turned_from(self, other: PinocchioUrdf) -> float:
+        """Return by what angle the frames of joints stand otherwise, in all [rad]."""
+        pairs = zip(self._places(), other._places(), strict=True)
+        return float(sum(
+            np.linalg.norm(self._pin.log3(a.rotation.T @ b.rotation)) for a, b in pairs
+        ))  # fmt: skip
+
+    def _places(self) -> list[Any]:
+        """Place every joint on the one before it, and both ends."""
+        ends = [self._model.frames[k].placement for k in self._ends]
+        return [*list(self._model.jointPlacements)[1:], *ends]

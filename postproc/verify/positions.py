@@ -4,20 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from time import monotonic
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.robot.arm_file import ArmFile
-from postproc.verify.goals import WrittenGoals, written_branches
-from postproc.verify.opinion import ArmFacts, Claim, OpinionRow, compare
+from postproc.verify.goals import WrittenGoals, written_branches, written_turns
+from postproc.verify.opinion import ArmFacts, Claim, OpinionRow, compare, worst_of
 from postproc.verify.pinocchio_arm import PinocchioArm
 
 POSITION_MM, TURN_RAD, JOINT_RAD = 1e-3, 1e-5, 1e-6
 SINGULAR = 1e-6  # of a Jacobian in m and rad
 TORQUE = 0.01  # [N m]
+OFTEN = 256  # visits, after which the clock is looked at
 BORDER = 1e-4  # of a bit of the branch: nearer to its border it may be either
+HALF_RAD = 1e-4  # an angle may be half a turn from its turns, and rounded
+TURNING = [3, 5, 2]  # axes whose turns flags name
 MM = 1e-3
+
+NO_LINKS = "the arm file has no [links]"
+NO_FORM = "the arm has no closed form: its branches have no names"
 
 LoadedArms = Mapping[tuple[float, ...], PinocchioArm]
 """The arm with every load: mass [kg] and centre [m]."""
@@ -32,24 +39,40 @@ class Posture:
         points: Origins of the joints and of the flange, (n, 7, 3) [m].
         axes: Axes of the joints, (n, 6, 3).
         singular: Smallest singular value of the Jacobian, (n,).
+        late: Visits for which there was no time, (n,).
     """
 
     flange: Floats
     points: Floats
     axes: Floats
     singular: Floats
+    late: Bools
 
 
-def posture_of(arm: PinocchioArm, q: Floats) -> Posture:
-    """Place the arm for joint angles (n, 6) [rad]."""
+def posture_of(arm: PinocchioArm, q: Floats, until: float = np.inf) -> Posture:
+    """Place the arm for joint angles (n, 6) [rad], until a time of the clock."""
     n = len(q)
     flange, points = np.full((n, 4, 4), np.nan), np.full((n, 7, 3), np.nan)
-    axes, singular = np.full((n, 6, 3), np.nan), np.full(n, np.nan)
-    for i in np.flatnonzero(~np.isnan(q).any(axis=1)).tolist():
-        flange[i] = arm.flange(q[i])
-        points[i], axes[i] = arm.joints(q[i])
-        singular[i] = np.linalg.svd(arm.jacobian(q[i]), compute_uv=False)[-1]
-    return Posture(flange, points, axes, singular)
+    J, late = np.full((n, 6, 6), np.nan), np.zeros(n, dtype=bool)
+    rows = np.flatnonzero(~np.isnan(q).any(axis=1))
+    for k, i in enumerate(rows.tolist()):
+        if k % OFTEN == 0 and monotonic() > until:
+            late[rows[k:]] = True
+            break
+        flange[i], points[i, :6], J[i] = arm.placed(q[i])
+    points[:, 6] = flange[:, :3, 3]
+    singular = np.full(n, np.nan)
+    done = rows[~late[rows]]
+    moved = at_the_flange(J[done], points[done, 6]) @ arm.mix
+    singular[done] = np.linalg.svd(moved, compute_uv=False)[:, -1]
+    return Posture(flange, points, J[:, 3:].swapaxes(1, 2), singular, late)
+
+
+def at_the_flange(J: Floats, flange: Floats) -> Floats:
+    """Move Jacobians (n, 6, 6) from the base's origin to points (n, 3) [m]."""
+    out = np.array(J)
+    out[:, :3] += np.cross(J[:, 3:], flange[:, :, None], axis=1)
+    return out
 
 
 def misses(
@@ -83,45 +106,61 @@ def judge_positions(
     """Compare targets, branches, singular values and torques of one program."""
     place, turn, joints = misses(claim, goals, at)
     poses = np.asarray(np.isnan(goals.joints).any(axis=1))
-    named = claim.label
+    named, late = claim.label, at.late
     rows = [
-        compare(f"{named}: place", "mm", POSITION_MM, claim, place / MM, ~poses),
-        compare(f"{named}: orientation", "rad", TURN_RAD, claim, turn, ~poses),
-        compare(f"{named}: joint targets", "rad", JOINT_RAD, claim, joints, poses),
+        compare(f"{named}: place", "mm", POSITION_MM, claim, place / MM, late, ~poses),
+        compare(f"{named}: orientation", "rad", TURN_RAD, claim, turn, late, ~poses),
+        compare(
+            f"{named}: joint targets", "rad", JOINT_RAD, claim, joints, late, poses
+        ),
     ]
     off = np.abs(at.singular - claim.singular)
-    rows.append(compare(f"{named}: singular value", "", SINGULAR, claim, off, None))
-    if len(claim.torque):
-        off = torque_misses(claim, arms)
-        rows.append(
-            compare(f"{named}: gravity torque", "N m", TORQUE, claim, off, None)
-        )
+    rows.append(compare(f"{named}: singular value", "", SINGULAR, claim, off, late))
+    what = f"{named}: gravity torque"
+    if not len(claim.torque):
+        lost = {NO_LINKS: len(claim)}
+        rows.append(worst_of(what, "N m", TORQUE, claim, [], lost))
+    else:
+        off = torque_misses(claim, arms, late)
+        rows.append(compare(what, "N m", TORQUE, claim, off, late))
     return rows
 
 
-def torque_misses(claim: Claim, arms: LoadedArms) -> Floats:
+def torque_misses(claim: Claim, arms: LoadedArms, late: Bools) -> Floats:
     """Return how far claimed gravity torques are from Pinocchio's, (n,) [N m]."""
     out = np.full(len(claim), np.nan)
-    for i in np.flatnonzero(~np.isnan(claim.q).any(axis=1)).tolist():
+    for i in np.flatnonzero(~np.isnan(claim.q).any(axis=1) & ~late).tolist():
         arm = arms[tuple(claim.payload[i].tolist())]
         out[i] = np.abs(arm.torque(claim.q[i]) - claim.torque[i]).max()
     return out
 
 
 def judge_branches(claim: Claim, file: ArmFile, at: Posture) -> list[OpinionRow]:
-    """Compare the branches with what the planner and the text name."""
+    """Compare branches and turns with what the planner and the text name."""
+    rows = [_turns(claim, at)]
     if file.opw is None:
-        return []
+        what, lost = f"{claim.label}: branch, planner", {NO_FORM: len(claim)}
+        return [*rows, worst_of(what, "", 0.0, claim, [], lost)]
     bits, sure = branch_bits(at, file)
-    rows = []
     written = written_branches(claim.visits)
     for what, slot in (("planner", claim.slot), ("flags", written)):
         named = (slot[:, None] >> np.array([2, 1, 0])) & 1
         other = ((bits != named) & sure).any(axis=1).astype(float)
         other[(slot < 0) | np.isnan(at.singular)] = np.nan
         text = f"{claim.label}: branch, {what}"
-        rows.append(compare(text, "", 0.0, claim, other, slot < 0))
+        rows.append(compare(text, "", 0.0, claim, other, at.late, slot < 0))
     return rows
+
+
+def _turns(claim: Claim, at: Posture) -> OpinionRow:
+    """Say how far angles are from the turns that flags of JOINT moves name."""
+    turns = written_turns(claim.visits)
+    beyond = np.abs(claim.q[:, TURNING] - 2 * np.pi * turns) - np.pi
+    unnamed = np.asarray(np.isnan(turns).all(axis=1))
+    off = np.where(np.isnan(turns), 0.0, np.maximum(beyond, 0.0)).max(axis=1)
+    off[unnamed] = np.nan
+    what = f"{claim.label}: turns, flags"
+    return compare(what, "rad", HALF_RAD, claim, off, at.late, unnamed)
 
 
 def branch_bits(at: Posture, file: ArmFile) -> tuple[Ints, Bools]:
@@ -169,15 +208,16 @@ def judge_motion(
     """Judge how far a correction swings elbow and wrist centre, and joint limits."""
     own = output.own
     moved = np.linalg.norm(after.points[own] - before.points, axis=2) / MM
+    late = before.late | after.late[own]
     limits = ((2, "elbow", facts.elbow), (4, "wrist centre", facts.wrist_centre))
     rows = [
-        compare(f"swing of the {name}", "mm", most / MM, source, moved[:, k], None)
+        compare(f"swing of the {name}", "mm", most / MM, source, moved[:, k], late)
         for k, name, most in limits
     ]
     beyond = _beyond(output.q[own], facts.file) - _beyond(source.q, facts.file)
     text = "beyond a joint limit by correction"
     over = np.maximum(beyond, 0.0)
-    return [*rows, compare(text, "rad", JOINT_RAD, source, over, None)]
+    return [*rows, compare(text, "rad", JOINT_RAD, source, over, late)]
 
 
 def _beyond(q: Floats, file: ArmFile) -> Floats:

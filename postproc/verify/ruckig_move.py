@@ -8,12 +8,13 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.verify.toppra_run import TimedRun
 
 SAMPLES = 24  # of a move
 
 
-def move_in_time(begin: Floats, end: Floats, limits: Floats) -> Floats | None:
-    """Sample the trajectory of a JOINT move, all axes in phase.
+def move_in_time(begin: Floats, end: Floats, limits: Floats) -> TimedRun | None:
+    """Find the trajectory of a JOINT move, all axes in phase.
 
     Args:
         begin: Joint angles, (6,) [rad].
@@ -21,7 +22,7 @@ def move_in_time(begin: Floats, end: Floats, limits: Floats) -> Floats | None:
         limits: Velocity, acceleration and jerk of the joints, (3, 6).
 
     Returns:
-        Joint angles at even times, (m, 6), or None where ruckig finds no time law.
+        The move, or None where ruckig finds no time law.
     """
     import ruckig
 
@@ -37,4 +38,5 @@ def move_in_time(begin: Floats, end: Floats, limits: Floats) -> Floats | None:
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         return None
     times = np.linspace(0.0, found.duration, SAMPLES).tolist()
-    return np.array([found.at_time(t)[0] for t in times])
+    q = np.array([found.at_time(t)[0] for t in times])
+    return TimedRun(q, float(found.duration))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,10 +32,12 @@ class MadeWay:
     Attributes:
         q: Joint angles from its begin to its end, (k, 6) [rad]; empty if not made.
         why: Why it was not made, or "".
+        least: What it takes at the programmed speed at least [s].
     """
 
     q: Floats
     why: str = ""
+    least: float = 0.0
 
 
 def not_made(why: str) -> MadeWay:
@@ -91,7 +93,10 @@ class WayMaker:
         if points is None or np.isnan(points).any():
             return not_made(NO_END)
         turn = np.linalg.norm(self.arm.turn(start, end))
-        return self._followed(begin, _ToolCourse(points, start, end, tool, float(turn)))
+        course = _ToolCourse(points, start, end, tool, float(turn))
+        v = self.visits
+        least = course.least(float(v.lin_spd[i]), float(v.rot_spd[i]))
+        return replace(self._followed(begin, course), least=least)
 
     def _end(self, i: int) -> Floats:
         """Return the TCP at the end of a way, (4, 4)."""
@@ -149,10 +154,19 @@ class _ToolCourse:
     tool: Floats
     turn: float
 
+    @property
+    def length(self) -> float:
+        """Length of the way [m]."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+    def least(self, speed: float, turning: float) -> float:
+        """Return how long it takes [s] at speeds [m/s], [rad/s], NaN if not known."""
+        return float(np.nanmax([0.0, self.length / speed, self.turn / turning]))
+
     def steps(self) -> int:
         """Choose how many steps to go."""
-        length = np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum()
-        return int(np.clip(np.ceil(max(length / STEP, self.turn / TURN)), LEAST, MOST))
+        share = max(self.length / STEP, self.turn / TURN)
+        return int(np.clip(np.ceil(share), LEAST, MOST))
 
     def at(self, u: float, arm: PinocchioArm) -> Floats:
         """Place the TCP at a share of the way, (4, 4)."""

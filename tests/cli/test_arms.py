@@ -102,3 +102,65 @@ def test_inputs_are_never_overwritten(urdf):
     assert cli("arm", "from-urdf", urdf.with_name("no.urdf")).exit_code == 2
     found = cli("arm", "from-urdf", urdf, "--repeatability", "nan")
     assert found.exit_code == 2 and "--repeatability" in found.stderr
+
+
+def test_an_arm_file_is_verified_before_it_is_written(urdf):
+    place = urdf.with_name("arm.toml")
+    found = cli("arm", "from-urdf", urdf, "-o", place, "--verify")
+    assert found.exit_code == 0 and place.exists()
+    assert "flange: place" in found.stderr and "second opinion: agrees" in found.stderr
+
+
+def test_another_arm_disagrees_and_nothing_is_written(urdf):
+    place = urdf.with_name("arm.toml")
+    given = "arm", "from-urdf", urdf, "-o", place, "--verify", "--arm"
+    assert cli(*given, "irb6640-185-2.8").exit_code == 1
+    same = cli(*given, "irb4600-60-2.05")
+    assert same.exit_code == 1 and "joint limits" in same.stderr
+    assert re.search(r"flange: place +1000 +< 1e-06 mm", same.stderr)
+    assert not place.exists()
+    alone = cli("arm", "from-urdf", urdf, "--arm", "ur10")
+    assert alone.exit_code == 2 and "Add --verify" in alone.stderr
+
+
+def test_what_differs_is_not_written(urdf, monkeypatch):
+    from postproc.robot import ortho_parallel as made
+
+    place, right = urdf.with_name("arm.toml"), made.arm_text
+    monkeypatch.setattr(
+        made,
+        "arm_text",
+        lambda *a: right(*a).replace("lower_deg = [-", "lower_deg = [-1"),
+    )
+    found = cli("arm", "from-urdf", urdf, "-o", place, "--verify")
+    assert found.exit_code == 1 and not place.exists()
+
+
+def test_without_pinocchio_it_says_what_installs_it(urdf, monkeypatch):
+    from postproc.verify import extra
+
+    monkeypatch.setattr(extra, "find_spec", lambda name: None)
+    found = cli("arm", "from-urdf", urdf, "--verify")
+    assert found.exit_code == 2 and "pip install pin toppra" in found.stderr
+    assert cli("arm", "from-urdf", urdf).exit_code == 0
+
+
+def test_an_endless_joint_takes_the_range_that_is_stated(urdf):
+    urdf.write_text(urdf.read_text().replace('"revolute"', '"continuous"', 1))
+    found = cli("arm", "from-urdf", urdf, "--verify", "-o", urdf.with_name("arm.toml"))
+    assert found.exit_code == 0 and "is continuous: its range is taken" in found.stderr
+    assert "continuous joints: the URDF states no range" in found.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [('<robot name="irb">', "<robot>"), ('<link name="l3"/>', "")]
+)
+def test_what_pinocchio_cannot_read_is_no_traceback(urdf, old, new):
+    text = urdf.read_text()
+    assert old in text
+    urdf.write_text(text.replace(old, new))
+    place = urdf.with_name("arm.toml")
+    found = cli("arm", "from-urdf", urdf, "-o", place, "--verify")
+    assert found.exit_code == 2 and "leave --verify out" in found.stderr
+    assert not place.exists()
+    assert cli("arm", "from-urdf", urdf, "-o", place).exit_code == 0

@@ -128,7 +128,7 @@ def compensate(desk: Path, cell: str, folder: Path):
     return run(
         "compensate", PROGRAMS / "spot.pdl", "--cell", desk / cell,
         "--model", desk / "model.json", "-o", folder / "out.pdl",
-        "--report", folder / "out.json",
+        "--report", folder / "out.json", "--html", folder / "out.html",
     )  # fmt: skip
 
 
@@ -137,9 +137,20 @@ def test_compensate_gives_it_where_the_cell_asks(desk, tmp_path):
     assert "second opinion: agrees" in done.stderr
     told = json.loads((tmp_path / "out.json").read_text())["second_opinion"]
     assert told["agrees"] and len(told["rows"]) > 15
+    page = (tmp_path / "out.html").read_text()
+    assert "<h2>Second opinion</h2>" in page
+    assert all(row["what"] in page for row in told["rows"])
     plain = compensate(desk, "cell.toml", tmp_path)
     assert plain.exit_code == 0 and "opinion" not in plain.stderr
     assert "second_opinion" not in json.loads((tmp_path / "out.json").read_text())
+
+
+def test_compensate_says_that_a_library_is_broken(desk, tmp_path, monkeypatch):
+    monkeypatch.setattr(extra, "find_spec", str)
+    monkeypatch.setitem(sys.modules, "pinocchio", None)
+    done = compensate(desk, "asking.toml", tmp_path)
+    assert done.exit_code == 2 and "a library is broken" in done.stderr
+    assert not list(tmp_path.iterdir())
 
 
 def test_compensate_writes_nothing_where_it_cannot(desk, tmp_path, nothing_installed):

@@ -5,7 +5,7 @@ import pytest
 
 from postproc.motion.planner import Plan, plan
 from postproc.motion.ruckig import JointMoves
-from postproc.motion.targets import TargetKind, make_targets
+from postproc.motion.targets import Fly, TargetKind, make_targets
 from postproc.robot.arm import Arm
 
 WRIST = np.deg2rad(3.0)
@@ -180,3 +180,39 @@ def test_windows_change_no_direction(
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-9)
     np.testing.assert_allclose(pieces.speed, whole.speed, rtol=3e-4)
     np.testing.assert_allclose(pieces.time, whole.time, rtol=3e-4)
+
+
+@pytest.mark.parametrize("turn", [0.05, 0.3, 1.5])
+def test_a_rounded_joint_move_is_no_slower_than_stops(
+    arm: Arm, home: np.ndarray, turn: float
+) -> None:
+    """From a corner to a stop it brakes at the end, not throughout."""
+    q = home + np.array([[0.0] * 6, [0.1, *[0.0] * 5], [turn] * 6, [0.0] * 6])
+    kind = np.full(len(q), int(TargetKind.JOINTS))
+    times = []
+    for flying in (False, True):
+        fly = np.array([False, flying, flying, False])
+        targets = make_targets(
+            kind, joints=q, fly=fly, rounding=np.full(len(q), int(Fly.OVERLAP)),
+            overlap=np.full(len(q), 0.7),
+        )  # fmt: skip
+        times.append(plan(arm, targets, WRIST).time[-1])
+    assert 0.5 * times[0] < times[1] < 1.02 * times[0]
+
+
+@pytest.mark.parametrize("length", [0.004, 0.01, 0.03, 0.2])
+def test_a_short_line_takes_its_length_over_its_speed(
+    arm: Arm, tool: np.ndarray, home: np.ndarray, length: float
+) -> None:
+    """And no more than the joints need to start and brake, by their acceleration."""
+    tcp = np.tile((arm.flange(home[None]) @ tool)[0], (2, 1, 1))
+    tcp[1, 0, 3] += length
+    targets = make_targets(
+        np.zeros(2, int), tcp, move=np.array([0, 1]), slot=np.zeros(2, int),
+        tool=np.tile(tool, (2, 1, 1)), linear_speed=np.full(2, 0.05),
+    )  # fmt: skip
+    found = plan(arm, targets, WRIST)
+    turned = np.abs(found.q[1] - found.q[0]).max()
+    ramp = (turned / length * 0.05 / arm.acceleration).max()
+    even = length / 0.05
+    assert even < found.time[-1] < 1.02 * even + 2 * ramp

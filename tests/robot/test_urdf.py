@@ -168,9 +168,14 @@ def test_an_arm_of_another_structure_has_no_closed_form(tmp_path, rows, said):
     [
         ("<robot", "<xacro:robot", ":2: <xacro:robot> is not expanded.*xacro FILE"),
         ('xyz="0.175', 'xyz="${a1}', r":.*<origin xyz> is not 3 numbers.*xacro FILE"),
-        ('lower="-3.0"', 'lower="nan"', "<limit lower> is not a number: nan"),
-        ('axis xyz="0.0', 'axis xyz="1e300', "<axis xyz> is not 3 numbers: 1e300"),
-        ('type="revolute"', 'type="continuous"', "joint j1 has no range.*<limit"),
+        (
+            'lower="-3.0"',
+            'lower="nan"',
+            "<limit lower> is not a number below 1e.09: nan",
+        ),
+        ('lower="-3.0"', 'lower="low"', "<limit lower> is not a number: low"),
+        ('axis xyz="0.0', 'axis xyz="1e300', "is not 3 numbers below 1e.09: 1e300"),
+        ('lower="-3.0" upper="3.0"', "", "joint j1 has no range.*<limit"),
         ('type="revolute"', 'type="prismatic"', "joint j1 is prismatic"),
         ('velocity="2.0"', 'velocity="0"', "joint j1 has no velocity"),
         ('axis xyz="0.0 0.0 1.0"', 'axis xyz="0 0 0"', "has an axis of no direction"),

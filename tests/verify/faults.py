@@ -205,12 +205,16 @@ def plant(seed: int, cell: Cell, model: Model) -> Planted:
     opinion = one.judged(wrong)
     rows = [row.what for row in opinion.rows if row.beyond]
     came = FOUND if rows else otherwise
-    if came == MISSED and not _compares(one, wrong) and fault is not wrong_branch:
+    if (
+        came == MISSED
+        and not compares_directions(one, wrong)
+        and fault is not wrong_branch
+    ):
         came = NEAR
     return Planted(fault.__name__, seed, what, came, next(iter(rows), ""))
 
 
-def _compares(one: Case, wrong: Claims) -> bool:
+def compares_directions(one: Case, wrong: Claims) -> bool:
     """Tell whether a direction that is wrong is among those that are compared.
 
     As many fewer are, where the planner says that it does not know these.

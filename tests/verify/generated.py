@@ -2,8 +2,7 @@
 
     python -m tests.verify.generated [--count 300] [--first 0] [--shipped]
 
-With --shipped it judges those of `programs/`, welding and facing with the model of the
-other arm, whose size is no matter here.
+With --shipped it judges those of `programs/`, each with a model of its own arm.
 
 Three in four are a job of lines, arcs, zones and JOINT moves in PDL2, RAPID or KRL, one
 in four a PDL2 program with conditions, loops, calls and pages.
@@ -14,10 +13,10 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from postproc.model.model import Model, load_model
+from postproc.model.model import load_model
 from postproc.report.second_opinion import print_opinion
 from postproc.robot.cell import Cell, load_cell
 from postproc.verify.opinion import Opinion
@@ -25,7 +24,14 @@ from tests.any_controller import any_controller
 from tests.conftest import make_job
 from tests.generated.landing import program
 from tests.language.neutral_job import LANGUAGES, drawn
-from tests.verify.judged import PROGRAMS, SHIPPED, compensated, shipped
+from tests.verify.judged import (
+    PROGRAMS,
+    SHIPPED,
+    Compensated,
+    compensated,
+    own_models,
+    shipped,
+)
 
 
 def files_of(seed: int, cell: Cell) -> dict[str, bytes]:
@@ -38,13 +44,22 @@ def files_of(seed: int, cell: Cell) -> dict[str, bytes]:
     return {name: files[name], **files}
 
 
-def judged(seed: int | str, cell: Cell, model: Model) -> tuple[int, Opinion]:
-    """Compensate a program, drawn or shipped; return its visits and the opinion."""
-    if isinstance(seed, str):
-        job = shipped(seed, model)
-    else:
-        job = compensated(files_of(seed, cell), cell, model)
+def judged(job: Compensated) -> tuple[int, Opinion]:
+    """Return the visits of a program and the opinion on it."""
     return len(job.outcome.visits), job.opinion()
+
+
+def jobs_of(folder: Path, seeds: Sequence[int]) -> Iterator[tuple[str, Compensated]]:
+    """Compensate the programs of seeds, or without any those of `programs/`."""
+    if not seeds:
+        models = own_models(folder)
+        yield from ((name, shipped(name, models)) for name in SHIPPED)
+        return
+    place = make_job(folder, (PROGRAMS / "cell.toml").read_text())
+    cell = any_controller(load_cell(place / "cell.toml"))
+    model = load_model(place / "model.json")
+    for seed in seeds:
+        yield str(seed), compensated(files_of(seed, cell), cell, model)
 
 
 def main() -> int:
@@ -54,22 +69,20 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--shipped", action="store_true")
     given = parser.parse_args()
+    seeds = range(given.first, given.first + given.count)
     with tempfile.TemporaryDirectory() as name:
-        folder = make_job(Path(name), (PROGRAMS / "cell.toml").read_text())
-        cell = any_controller(load_cell(folder / "cell.toml"))
-        model = load_model(folder / "model.json")
-        seeds: Sequence[int | str] = range(given.first, given.first + given.count)
-        if given.shipped:
-            seeds = list(SHIPPED)
-        found = [judged(seed, cell, model) for seed in seeds]
-    whole = Opinion.joined("generated", [opinion for _, opinion in found])
+        jobs = jobs_of(Path(name), () if given.shipped else seeds)
+        found = {which: judged(job) for which, job in jobs}
+    whole = Opinion.joined("generated", [opinion for _, opinion in found.values()])
     print_opinion(whole)
-    visits, wrong = sum(n for n, _ in found), sum(not o.agrees for _, o in found)
+    visits, wrong = (
+        sum(n for n, _ in found.values()),
+        sum(not opinion.agrees for _, opinion in found.values()),
+    )
     print(f"{len(found)} programs, {visits} visits, {wrong} disagree")
-    for seed, (_, opinion) in zip(seeds, found, strict=True):
-        for row in opinion.rows if not opinion.agrees else ():
-            if row.beyond:
-                print(seed, row, file=sys.stderr)
+    for which, (_, opinion) in found.items():
+        for row in (row for row in opinion.rows if row.beyond):
+            print(which, row, file=sys.stderr)
     return 1 if wrong else 0
 
 

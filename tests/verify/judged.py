@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from postproc.cli.jobs import read_files
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import AS_USUAL, Options
@@ -13,9 +15,13 @@ from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import prepared
 from postproc.compensation.second_opinion import second_opinion
 from postproc.files import variables_of
-from postproc.model.model import Model
+from postproc.model.model import Model, load_model
+from postproc.robot.arm_file import ArmFile
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.pose import MM
+from postproc.simulation.kinematics import Chain
 from postproc.verify.opinion import Opinion, OpinionRow
+from tests.conftest import make_job
 
 PROGRAMS = Path(__file__).parents[2] / "programs"
 SHIPPED = {
@@ -26,6 +32,13 @@ SHIPPED = {
     "welding/Welding.mod": "welding/cell.toml",
     "facing/Milling.src": "facing/cell.toml",
 }
+PROBES = """
+[tracker]
+xyz_mm = [3150.0, -2480.0, 1120.0]
+
+[survey]
+points_mm = [[-212.5, 96.0, 331.0], [148.0, -121.5, 268.0], [-58.0, 42.5, 514.0]]
+"""
 
 
 @dataclass(frozen=True)
@@ -67,11 +80,46 @@ def compensated(
     return Compensated(own, files, {**files, **outcome.outputs}, outcome)
 
 
-def shipped(name: str, model: Model, options: Options = AS_USUAL) -> Compensated:
-    """Compensate one of `programs/`."""
+def shipped(
+    name: str, models: Mapping[str, Model], options: Options = AS_USUAL
+) -> Compensated:
+    """Compensate one of `programs/` with the model of its own arm."""
     cell = load_cell(PROGRAMS / SHIPPED[name])
     files = read_files(PROGRAMS / name)
-    return compensated(files, cell, model_of(cell, model), options)
+    return compensated(files, cell, models[SHIPPED[name]], options)
+
+
+def own_models(folder: Path) -> dict[str, Model]:
+    """Survey the arm of every cell of `programs/` and fit its model, by cell file."""
+    return {
+        name: load_model(surveyed(folder / str(k), PROGRAMS / name) / "model.json")
+        for k, name in enumerate(dict.fromkeys(SHIPPED.values()))
+    }
+
+
+def surveyed(folder: Path, cell: Path) -> Path:
+    """Survey a virtual arm of the kind that a cell names, and fit its model."""
+    folder.mkdir()
+    text = cell.read_text()
+    text += "" if "[survey]" in text else PROBES
+    return make_job(folder, text, chain=chain_of(load_cell(cell).arm.file))
+
+
+def chain_of(file: ArmFile) -> Chain:
+    """Return the arm of an arm file as the virtual arm has it."""
+    dh, joints, links = file.dh, file.joints, file.links
+    angles = dh.alpha_deg, dh.offset_deg, dh.shift_deg
+    alpha, offset, shift = map(np.deg2rad, angles)
+    return Chain(
+        a=np.array(dh.a_mm) * MM, d=np.array(dh.d_mm) * MM,
+        alpha=alpha, offset=offset, sense=np.array(dh.sense), shift=shift,
+        beta=np.zeros(6),
+        mass=np.zeros(6) if links is None else np.array(links.mass_kg),
+        centre=np.zeros((6, 3)) if links is None else np.array(links.com_mm) * MM,
+        speed=np.deg2rad(joints.velocity_deg_s or [100.0] * 6),
+        lower=np.deg2rad(joints.lower_deg), upper=np.deg2rad(joints.upper_deg),
+        parallelogram=dh.axis3_adds_axis2,
+    )  # fmt: skip
 
 
 def row(opinion: Opinion, what: str) -> OpinionRow:

@@ -14,38 +14,55 @@ from tests.verify.judged import SHIPPED, row, shipped
 LIMITS = np.array([[2.0] * 6, [5.0] * 6, [50.0] * 6])
 
 
+FREE = np.zeros(40)  # [s] what the programmed speed asks for: nothing
+
+
 def test_a_run_is_timed_and_goes_its_way() -> None:
     u = np.linspace(0.0, 1.0, 40)[:, None]
     way = np.sin(u * np.arange(1, 7))
-    found = run_in_time(way, LIMITS[0], LIMITS[1])
+    found = run_in_time(way, LIMITS[0], LIMITS[1], FREE)
     assert found is not None
-    np.testing.assert_allclose(found[[0, -1]], way[[0, -1]], atol=1e-6)
-    apart = np.abs(found[:, None] - way).max(axis=2).min(axis=1)
+    np.testing.assert_allclose(found.q[[0, -1]], way[[0, -1]], atol=1e-6)
+    apart = np.abs(found.q[:, None] - way).max(axis=2).min(axis=1)
     assert apart.max() < np.abs(np.diff(way, axis=0)).max()
+    longest = np.abs(np.diff(way, axis=0)).sum(axis=0).max()
+    assert longest / 2.0 < found.seconds < longest / 2.0 + 5.0
+
+
+def test_a_run_takes_what_the_programmed_speed_asks_for() -> None:
+    """A straight way of 10 s at the programmed speed; the joints could do it in 1 s."""
+    way = np.linspace(0.0, 1.0, 40)[:, None] * np.ones(6)
+    found = run_in_time(way, LIMITS[0], LIMITS[1], np.linspace(0.0, 10.0, 40))
+    assert found is not None
+    ramps = 0.1 / 5.0  # [s] speed over acceleration
+    assert found.seconds == pytest.approx(10.0 + ramps, rel=0.02)
 
 
 def test_a_run_of_no_length_needs_no_time() -> None:
-    still = run_in_time(np.zeros((5, 6)), LIMITS[0], LIMITS[1])
-    assert still is not None and np.abs(still).max() == 0.0
+    still = run_in_time(np.zeros((5, 6)), LIMITS[0], LIMITS[1], FREE[:5])
+    assert still is not None and still.seconds == 0.0
+    assert np.abs(still.q).max() == 0.0
 
 
 def test_toppra_may_fail() -> None:
     way = np.linspace(0.0, 1.0, 9)[:, None] * np.ones(6)
     way[4] = np.nan
-    assert run_in_time(way, LIMITS[0], LIMITS[1]) is None
+    assert run_in_time(way, LIMITS[0], LIMITS[1], FREE[:9]) is None
 
 
 def test_a_joint_move_is_timed() -> None:
     end = np.arange(1.0, 7.0)
     found = move_in_time(np.zeros(6), end, LIMITS)
     assert found is not None
-    np.testing.assert_allclose(found[[0, -1]], [np.zeros(6), end], atol=1e-9)
+    np.testing.assert_allclose(found.q[[0, -1]], [np.zeros(6), end], atol=1e-9)
+    v, a, j = 2.0, 5.0, 50.0  # of the axis that goes farthest: 6 rad
+    assert found.seconds == pytest.approx(6.0 / v + v / a + a / j)
     assert move_in_time(np.zeros(6), end, 0 * LIMITS) is None
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_the_shipped_programs_agree(name: str, bench_model) -> None:
-    job = shipped(name, bench_model)
+def test_the_shipped_programs_agree(name: str, models) -> None:
+    job = shipped(name, models)
     opinion = job.opinion()
     assert opinion.agrees, opinion.told()
     ends = row(opinion, "output: end of the way")
@@ -58,15 +75,15 @@ def test_the_shipped_programs_agree(name: str, bench_model) -> None:
     assert found.compared > 0.7 * stops
 
 
-def test_long_programs_are_drawn_from_in_blocks(bench_model) -> None:
-    opinion = shipped("milling.pdl", bench_model).opinion()
+def test_long_programs_are_drawn_from_in_blocks(models) -> None:
+    opinion = shipped("milling.pdl", models).opinion()
     ends = row(opinion, "output: end of the way")
     assert ends.compared + sum(ends.skipped.values()) == 5171
     assert MOVES - 250 < ends.compared <= MOVES
     assert opinion.seconds < 60
 
 
-def test_the_same_program_is_drawn_from_alike(bench_model) -> None:
+def test_the_same_program_is_drawn_from_alike(models) -> None:
     class Long:
         def __init__(self, seed: int) -> None:
             self.visits = self
@@ -80,15 +97,15 @@ def test_the_same_program_is_drawn_from_alike(bench_model) -> None:
     assert np.array_equal(rows[0], rows[1]) and not np.array_equal(rows[0], rows[2])
 
 
-def test_clones_are_judged_by_what_they_are_corrected_for(bench_model) -> None:
-    opinion = shipped("handling.pdl", bench_model, Options(clone=True)).opinion()
+def test_clones_are_judged_by_what_they_are_corrected_for(models) -> None:
+    opinion = shipped("handling.pdl", models, Options(clone=True)).opinion()
     assert opinion.agrees, opinion.told()
     assert row(opinion, "output: approach directions").compared > 400
 
 
-def test_points_on_ways_are_visits_of_the_output_alone(bench_model) -> None:
+def test_points_on_ways_are_visits_of_the_output_alone(models) -> None:
     options = Options(path_mm=0.05, max_inserted=50)
-    job = shipped("drilling.pdl", bench_model, options)
+    job = shipped("drilling.pdl", models, options)
     opinion = job.opinion()
     assert opinion.agrees, opinion.told()
     before, after = (row(opinion, f"{k}: place").compared for k in ("source", "output"))

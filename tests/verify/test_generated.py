@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from tests.verify.generated import judged
-from tests.verify.judged import row
+from tests.verify.generated import files_of, judged
+from tests.verify.judged import compensated, row
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_generated_programs_agree(seed: int, bench_cell, bench_model) -> None:
-    visits, opinion = judged(seed, bench_cell, bench_model)
+    visits, opinion = judged(
+        compensated(files_of(seed, bench_cell), bench_cell, bench_model)
+    )
     assert opinion.agrees, opinion.told()
     poses, joints = (
         row(opinion, f"output: {what}").compared for what in ("place", "joint targets")

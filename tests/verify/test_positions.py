@@ -62,8 +62,8 @@ def test_gravity_pulls_as_it_does_for_the_effects() -> None:
 
 
 @pytest.mark.parametrize("name", [n for n in SHIPPED if n != "milling.pdl"])
-def test_the_shipped_programs_agree(name: str, bench_model) -> None:
-    opinion = shipped(name, bench_model).opinion()
+def test_the_shipped_programs_agree(name: str, models) -> None:
+    opinion = shipped(name, models).opinion()
     assert opinion.agrees, opinion.told()
     for label in ("source", "output"):
         found = row(opinion, f"{label}: place")

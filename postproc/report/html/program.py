@@ -16,8 +16,10 @@ from postproc.language.source import Source
 from postproc.language.visits import Meaning
 from postproc.report.html.page import render, short, visible
 from postproc.report.json import JOINTS, in_time_of
+from postproc.report.second_opinion import opinion_table
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
+from postproc.verify.opinion import Opinion
 
 # What the program page knows of every visit, as columns.
 
@@ -119,6 +121,7 @@ class ProgramPage:
         shares: What the effects do; none where the report does not say.
         motion: Largest changes of joints, elbow and wrist centre; empty likewise.
         in_time: The keys of the report that tell of time and paths; empty likewise.
+        opinion: The second opinion; None likewise.
     """
 
     name: str
@@ -131,6 +134,7 @@ class ProgramPage:
     shares: PageShares
     motion: Mapping[str, float]
     in_time: Mapping[str, Any]
+    opinion: Opinion | None
 
 
 def columns_of(outcome: Outcome) -> PageColumns:
@@ -555,6 +559,7 @@ def finite(value: Any) -> Any:
 # The page of a compensated program: what moved, by how much, and what did not.
 
 IN_TIME = ("timing", "path_accuracy", "path")  # keys of the report
+OPINION = "second_opinion"  # another one
 
 
 def largest_use(in_time: Mapping[str, Any]) -> str:
@@ -599,6 +604,7 @@ def program_report(outcome: Outcome, sources: Mapping[str, bytes] | None = None)
         shares=shares_of(outcome),
         motion=outcome.motion,
         in_time=in_time_of(outcome),
+        opinion=outcome.opinion,
     )
     return _page(program)
 
@@ -626,6 +632,7 @@ def program_report_from_json(
         shares=shares_from(data["targets"]),
         motion=data.get("motion", {}),
         in_time={key: data[key] for key in IN_TIME if key in data},
+        opinion=Opinion.of_report(told) if (told := data.get(OPINION)) else None,
     )
     return _page(program)
 
@@ -656,5 +663,6 @@ def _page(program: ProgramPage) -> str:
         shown=len(carried),
         paths=worst_paths(program.in_time),
         use=largest_use(program.in_time),
+        second=opinion_table(program.opinion),
         placed=bool(np.isfinite(columns.position_mm).all(axis=1).any()),
     )

@@ -4,6 +4,7 @@ import base64
 import gzip
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from typing import Any
 
@@ -23,6 +24,7 @@ from postproc.report.html.program import (
     stretches,
 )
 from postproc.report.json import report_text
+from postproc.verify.opinion import Opinion, OpinionRow
 from tests.language.neutral_job import drawn, rapid
 from tests.report.html.builders import FIRST_LINE, outcome_of
 from tests.written import FIRST, POSE
@@ -278,3 +280,40 @@ def test_all_numbers_of_a_rapid_target_have_a_head(bench_cell, bench_model) -> N
         joints = outcome.visits.target == Meaning.JOINTS
         assert joints.any() and not joints.all()
         assert np.isnan(rows[joints, 6:]).all() and np.isfinite(rows[~joints]).all()
+
+
+ROWS = (
+    OpinionRow("output: place", "mm", 40, 0, 1e-9, 1e-3, "", {"no pose": 2}),
+    OpinionRow(
+        "output: approach directions", "lambda", 9, 1, 2.0, 0.0, f"output {NASTY}:7", {}
+    ),
+)
+
+
+def cells_of(page: Elements) -> list[str]:
+    return [told.strip() for told in page.texts if told.strip()]
+
+
+def test_a_second_opinion_is_a_table_on_the_page() -> None:
+    outcome = replace(outcome_of(40), opinion=Opinion("panel.pdl", ROWS, 1.25))
+    text = program_report(outcome)
+    told = cells_of(Elements(text))
+    assert {"Second opinion", "output: place", "< 1e-06 mm", "1 differ"} <= set(told)
+    assert "second opinion: disagrees (1.2 s)" in text and "Do not upload" in text
+    assert "not compared, output: place: 2 (no pose)" in told
+    assert any(
+        "axis" not in cell and ":7" in cell and "alert(" in cell for cell in told
+    )
+    assert "<script>alert(" not in text and "\x1b" not in text
+    again = program_report_from_json(json.loads(report_text(outcome)), outcome.sources)
+    at = slice(text.index('id="second-opinion"'), text.index("Words on this page"))
+    assert text[at] in again
+
+
+def test_without_a_second_opinion_there_is_none() -> None:
+    outcome = outcome_of(40)
+    assert "Second opinion" not in program_report(outcome)
+    data = json.loads(report_text(outcome))
+    assert "Second opinion" not in program_report_from_json(data, outcome.sources)
+    agrees = replace(outcome, opinion=Opinion("panel.pdl", ROWS[:1], 1.0))
+    assert "Do not upload" not in program_report(agrees)
