@@ -94,8 +94,9 @@ def smooth_shape(seed: int, joint: int) -> Law:
     rng = stream(seed, f"shape {joint}")
     at = rng.uniform(LOW[joint - 1], HIGH[joint - 1], 8)
     high = rng.normal(size=8)
-    orders, phase = rng.choice([1.0, 2.0, 17.0, 40.0], 2, replace=False), rng.uniform(
-        0, 2 * np.pi, 2
+    orders, phase = (
+        rng.choice([1.0, 2.0, 17.0, 40.0], 2, replace=False),
+        rng.uniform(0, 2 * np.pi, 2),
     )
 
     def shape(arrivals: VirtualArrivals) -> Floats:
@@ -170,12 +171,14 @@ def run(seed: int, size: float, given: str, nothing: bool = False) -> WeightTria
     truth = arm.error(unseen)
     before = truth - less.error(ARM, there.states)
     after = truth - moved(traced.search.fit, there, ("arm", "state"))
-    informed = truth - _informed(arm, clean, yields, shapes, fresh, unseen, new.position)
-    groups = [
-        [str(f.family), *map(str, f.rivals)] for f in traced.findings
-    ]
+    informed = truth - _informed(
+        arm, clean, yields, shapes, fresh, unseen, new.position
+    )
+    groups = [[str(f.family), *map(str, f.rivals)] for f in traced.findings]
     yielding = {
-        f.joint for t in traced.findings for f in (t.family, *t.rivals)
+        f.joint
+        for t in traced.findings
+        for f in (t.family, *t.rivals)
         if f is not None and f.effect == "compliance" and f.joint
     }
     return WeightTrial(

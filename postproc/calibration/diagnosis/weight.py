@@ -64,7 +64,7 @@ def weigh_laws(found: Search, progress: Progress) -> Search:
 
 
 def pass_on(found: Search, progress: Progress) -> Search:
-    """Take a law of the weight at further joints, where one joint was found to follow it.
+    """Take a law of the weight at further joints, where one joint follows it.
 
     Args:
         found: The search.
