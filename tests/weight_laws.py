@@ -21,12 +21,14 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.refit import revise
 from postproc.calibration.diagnosis.trace import trace
-from postproc.calibration.regression import fit_effects
+from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.state import States, make_states
 from postproc.simulation import (
@@ -110,7 +112,7 @@ def smooth_shape(seed: int, joint: int) -> Law:
     return Law("", Where.JOINTS, (joint,), 0, {}, shape, 1e-6)
 
 
-def states_of(arm: VirtualArm, a: VirtualArrivals) -> States:
+def states_of(a: VirtualArrivals) -> States:
     """Say what a file of joint angles, in order, tells the model."""
     way = arrivals_of_rows(ARM, a.q)
     return make_states(a.q, way.direction, a.tool[:, :3, 3], travel=way.travel,
@@ -119,9 +121,7 @@ def states_of(arm: VirtualArm, a: VirtualArrivals) -> States:
 
 def size_of(clean: VirtualArm, laws: Sequence[Law], a: VirtualArrivals) -> float:
     """rms of laws after projection on the base model, over the noise."""
-    from postproc.calibration.diagnosis.library import Projection
-
-    states = states_of(clean, a)
+    states = states_of(a)
     position = clean.measure(a, TRACKER, stream(clean.seed, "sizes"))
     effects = propose(BASE_EFFECTS, ARM, states)
     fit = fit_effects(Batch(ARM, states), position, effects, tuple(TRACKER))
@@ -148,32 +148,60 @@ def drawn(seed: int, size: float) -> tuple[VirtualArm, list[Law], list[Law]]:
     return clean, scaled(clean, yields, a, size), scaled(clean, shapes, a, BESIDE)
 
 
-def run(seed: int, size: float, given: str, nothing: bool = False) -> WeightTrial:
-    """Draw, fit, diagnose, score."""
+@dataclass(frozen=True, eq=False)
+class Yielding:
+    """An arm that yields, a model that does not know it, and fresh rows.
+
+    Attributes:
+        clean, arm: Without and with laws.
+        laws: The laws.
+        fresh, unseen: What is diagnosed, and what nothing sees.
+        model: Fitted to another series.
+        base: The model, revised by the fresh rows.
+        position: Of the fresh rows, (n, 3) [m].
+    """
+
+    clean: VirtualArm
+    arm: VirtualArm
+    laws: tuple[Law, ...]
+    fresh: VirtualArrivals
+    unseen: VirtualArrivals
+    model: Model
+    base: Fit
+    position: Floats
+
+
+def measured(seed: int, size: float, given: str, nothing: bool = False) -> Yielding:
+    """Draw and measure an arm, and fit a model without compliance."""
     clean, yields, shapes = drawn(seed, size)
-    yields = [] if nothing else yields
-    arm = replace(clean, laws=(*clean.laws, *yields, *shapes))
+    laws = (*([] if nothing else yields), *shapes)
+    arm = replace(clean, laws=(*clean.laws, *laws))
     first, fresh, unseen = (
         follow_rows(arm, lines(seed + k * 500_000, n), tool=TOOL)
         for k, n in enumerate((ROWS, ROWS, UNSEEN))
     )
     old, new = (
-        measurements(states_of(arm, a), arm.measure(a, TRACKER, stream(seed, n)), n)
+        measurements(states_of(a), arm.measure(a, TRACKER, stream(seed, n)), n)
         for a, n in ((first, "first"), (fresh, "fresh"))
     )
-    less = model_of(fit_survey(old, ARM, GIVEN[given], TRACKER), old)
-    batch = Batch(ARM, new.states)
-    base = revise(new, less, batch, tuple(TRACKER))[0]
+    model = model_of(fit_survey(old, ARM, GIVEN[given], TRACKER), old)
+    base = revise(new, model, Batch(ARM, new.states), tuple(TRACKER))[0]
+    return Yielding(clean, arm, laws, fresh, unseen, model, base, new.position)
+
+
+def run(seed: int, size: float, given: str, nothing: bool = False) -> WeightTrial:
+    """Draw, fit, diagnose, score."""
+    y = measured(seed, size, given, nothing)
     start = time.process_time()
-    traced = trace(base, seed=0)
+    traced = trace(y.base, seed=0)
     seconds = time.process_time() - start
-    there = Batch(ARM, states_of(arm, unseen))
-    truth = arm.error(unseen)
-    before = truth - less.error(ARM, there.states)
-    after = truth - moved(traced.search.fit, there, ("arm", "state"))
-    informed = truth - _informed(
-        arm, clean, yields, shapes, fresh, unseen, new.position
+    there = Batch(ARM, states_of(y.unseen))
+    told = (
+        y.model.error(ARM, there.states),
+        moved(traced.search.fit, there, ("arm", "state")),
+        _informed(y),
     )
+    left = [np.linalg.norm(y.arm.error(y.unseen) - e, axis=1).mean() for e in told]
     groups = [[str(f.family), *map(str, f.rivals)] for f in traced.findings]
     yielding = {
         f.joint
@@ -181,10 +209,10 @@ def run(seed: int, size: float, given: str, nothing: bool = False) -> WeightTria
         for f in (t.family, *t.rivals)
         if f is not None and f.effect == "compliance" and f.joint
     }
+    before, after, informed = (float(1e3 * e) for e in left)
     return WeightTrial(
-        seed, size, given, groups, sorted(yielding), _false(groups),
-        tuple(float(np.linalg.norm(e, axis=1).mean() * 1e3)
-              for e in (before, after, informed)), seconds,
+        seed, 0.0 if nothing else size, given, groups, sorted(yielding),
+        _false(groups), (before, after, informed), seconds,
     )  # fmt: skip
 
 
@@ -196,19 +224,17 @@ def _false(groups: Sequence[Sequence[str]]) -> list[str]:
     return [g[0] for g in groups if not any(any(k in x for k in FREE) for x in g)]
 
 
-def _informed(arm: VirtualArm, clean: VirtualArm, yields: Sequence[Law],
-              shapes: Sequence[Law], fresh: VirtualArrivals, unseen: VirtualArrivals,
-              position: Floats) -> Floats:  # fmt: skip
+def _informed(y: Yielding) -> Floats:
     """Predict unseen poses by a fit that knows each planted law but for its size."""
     known = []
-    for law in (*yields, *shapes):
-        one = replace(clean, laws=(*clean.laws, law))
-        table = [one.tcp(a) - clean.tcp(a) for a in (fresh, unseen)]
+    for law in y.laws:
+        one = replace(y.clean, laws=(*y.clean.laws, law))
+        table = [one.tcp(a) - y.clean.tcp(a) for a in (y.fresh, y.unseen)]
         known.append(Known(np.concatenate(table)))
-    states = states_of(arm, fresh)
+    states = states_of(y.fresh)
     effects = (*propose(BASE_EFFECTS, ARM, states), *known)
-    fit = fit_effects(Batch(ARM, states), position, effects, tuple(TRACKER))
-    later = states_of(arm, unseen)
+    fit = fit_effects(Batch(ARM, states), y.position, effects, tuple(TRACKER))
+    later = states_of(y.unseen)
     later = replace(later, order=later.order + len(states))
     return moved(fit, Batch(ARM, later), ("arm", "state", "setup"))
 
