@@ -88,7 +88,8 @@ def lines(seed: int, rows: int) -> Floats:
     count = -(-rows // LINE)
     ends = rng.uniform(LOW, HIGH, (2, count, 6))
     share = np.linspace(0.0, 1.0, LINE)[:, None, None]
-    return (ends[0] + share * (ends[1] - ends[0])).swapaxes(0, 1).reshape(-1, 6)[:rows]
+    every: Floats = (ends[0] + share * (ends[1] - ends[0])).swapaxes(0, 1)
+    return every.reshape(-1, 6)[:rows]
 
 
 def smooth_shape(seed: int, joint: int) -> Law:
