@@ -13,7 +13,6 @@ from postproc.calibration.regression import Fit
 from postproc.calibration.report import SHOWN_UNITS, impossible
 from postproc.model.covariate import varies_enough
 from postproc.model.effects.effect import PART_MOTION, Effect
-from postproc.model.effects.part_motion import PartMotion
 from postproc.robot.pose import MM
 from postproc.robot.state import States
 
@@ -78,7 +77,7 @@ def story(fit: Fit, effect: Effect, part: slice) -> str:
         part: Its parameters.
     """
     sentence = effect.sentence(fit.values[part], fit.covariance[part, part])
-    if not isinstance(effect, PartMotion) or effect.covariates():
+    if effect.name != PART_MOTION or effect.settings()["law"] != "constant":
         return sentence
     doubt = unseen_drivers(fit.batch.states)
     return f"{sentence} ({doubt})" if doubt else sentence
