@@ -56,6 +56,7 @@ KNOWING = {
     # A fit must leave less than registration alone.
     "calibration.validation": {"placement"},
     # Weight shows by what yields to it.
+    "calibration.diagnosis.weight": {"compliance"},
     "calibration.weight_direction": {"compliance"},
     # The given model's zero of a joint holds the mean of what the model lacks.
     "calibration.diagnosis.refit": {"joint_offset"},

@@ -12,7 +12,7 @@ and after are those of its rows.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -83,12 +83,14 @@ def trial(
     )  # fmt: skip
 
 
-def lines(data: DataSet, seeds: int, only: list[str] | None) -> Iterator[str]:
+def lines(
+    data: DataSet, seeds: int, only: list[str] | None, kinds: Sequence[str]
+) -> Iterator[str]:
     """Write a line for every series, kind and seed."""
     for series in only or data.series:
         if series not in data.series:
             continue
-        for kind in KINDS:
+        for kind in kinds:
             for seed in range(seeds):
                 before, after, whole, story = trial(data, series, kind, seed)
                 yield (
@@ -102,13 +104,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
     parser.add_argument("--series", nargs="+", help="names of series; all without it")
     asked = parser.parse_args()
     print("| rows | taken away | before mm | after mm | whole fit mm | story |")
     print("|---|---|---|---|---|---|")
     for path, base in descriptions(asked.data):
         data = read_set(path, base)
-        for line in () if data is None else lines(data, asked.seeds, asked.series):
+        if data is None:
+            continue
+        for line in lines(data, asked.seeds, asked.series, asked.kinds):
             print(line, flush=True)
 
 

@@ -11,8 +11,10 @@ from postproc.calibration.diagnosis.result import Finding
 from postproc.calibration.diagnosis.search import Addition, JudgedAddition, Search
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import SHOWN_UNITS, impossible
+from postproc.model.covariate import varies_enough
 from postproc.model.effects.effect import PART_MOTION, Effect
 from postproc.robot.pose import MM
+from postproc.robot.state import States
 
 
 def describe(found: Search, standings: Sequence[JudgedAddition]) -> tuple[Finding, ...]:
@@ -61,8 +63,43 @@ def _describe(
         held_out_gain=(addition.gain.mean, addition.gain.std_error),
         impossible=impossible(fit, _own(fit, part)),
         family=family,
-        told=effect.sentence(fit.values[part], fit.covariance[part, part]),
+        told=story(fit, effect, part),
         rivals=rivals,
+    )
+
+
+def story(fit: Fit, effect: Effect, part: slice) -> str:
+    """Say place, driver, law and size of what has no name, and what may be its driver.
+
+    Args:
+        fit: The fit.
+        effect: One of its effects.
+        part: Its parameters.
+    """
+    sentence = effect.sentence(fit.values[part], fit.covariance[part, part])
+    if effect.name != PART_MOTION or effect.settings()["law"] != "constant":
+        return sentence
+    doubt = unseen_drivers(fit.batch.states)
+    return f"{sentence} ({doubt})" if doubt else sentence
+
+
+STATES = ("temperature", "payload")  # that hold a whole survey at another value
+
+
+def unseen_drivers(states: States) -> str:
+    """Say what may move a part that stands elsewhere at all rows, "" without a doubt.
+
+    What hardly varies over the rows moves a part by the same at each of them.
+
+    Args:
+        states: Of the rows.
+    """
+    names = [name for name in STATES if not varies_enough(states, name)]
+    if not names:
+        return ""
+    return (
+        f"perhaps by the {' or the '.join(names)}, which the rows hardly vary in or "
+        "do not record"
     )
 
 

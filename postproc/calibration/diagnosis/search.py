@@ -376,11 +376,13 @@ class Addition:
         score: Evidence when it was chosen, settings refined.
         p_value: Probability that noise alone reaches the evidence anywhere.
         gain: What it brings on held-out rows.
+        together: Whether it was weighed with others as one cause, not by itself.
     """
 
     score: Score
     p_value: float
     gain: Gain
+    together: bool = False
 
     @property
     def candidate(self) -> Candidate:
@@ -436,7 +438,16 @@ def search(base: Fit, causes: Causes, null: Null, progress: Progress) -> Search:
         null: Distribution of the largest evidence under the fit.
         progress: Told what is being done.
     """
-    found = Search(base, base, causes, causes, (), null, None)
+    return grow_on(Search(base, base, causes, causes, (), null, None), progress)
+
+
+def grow_on(found: Search, progress: Progress) -> Search:
+    """Go on with a search until nothing more is called for, and look at all again.
+
+    Args:
+        found: The search so far.
+        progress: Told what is being done.
+    """
     for number in range(MOST):
         progress(f"looking for effect {number + 1}", 0.1 + 0.4 * number / MOST)
         grown = _grow(found)
@@ -487,6 +498,9 @@ def settle(found: Search, first: int, elsewhere: bool = False) -> Search:
     """
     number = max(first, 0)
     while number < len(found.additions) - found.waves:
+        if found.additions[number].together:
+            number += 1
+            continue
         again = _again(found, number, elsewhere)
         number += len(again.additions) == len(found.additions)
         found = again
@@ -625,8 +639,23 @@ def stand(found: Search, number: int) -> JudgedAddition:
             names.add(name)
     as_well = jumps(own.effect, projection)
     rivals = [s for s in as_well if s.evidence >= here.evidence - NEAR] + rivals
-    p_value = found.null.p_of(here)
-    return JudgedAddition(here.evidence, p_value, _told(own.family, rivals))
+    evidence = here.evidence
+    if found.additions[number].together:
+        evidence = max(evidence, _of_cause(found, own.family.effect))
+    p_value = found.null.p_of(replace(here, evidence=evidence))
+    return JudgedAddition(evidence, p_value, _told(own.family, rivals))
+
+
+def _of_cause(found: Search, effect: str) -> float:
+    """Return what speaks for all additions of one effect, at whatever joints [nats]."""
+    own = {
+        found.place(k)
+        for k, a in enumerate(found.additions)
+        if a.candidate.family.effect == effect
+    }
+    every = enumerate(found.fit.combination.effects)
+    less = with_effects(found.fit, [e for place, e in every if place not in own])
+    return found.fit.log_evidence - less.log_evidence
 
 
 def _told(own: Family, rivals: Sequence[Score]) -> tuple[Score, ...]:

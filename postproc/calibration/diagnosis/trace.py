@@ -24,6 +24,7 @@ from postproc.calibration.diagnosis.search import (
 )
 from postproc.calibration.diagnosis.table import Causes
 from postproc.calibration.diagnosis.waves import name_waves
+from postproc.calibration.diagnosis.weight import pass_on, weigh_laws
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import FREE, JointEffect
 
@@ -35,7 +36,8 @@ STANDS_IN = 0.9  # share of the name's evidence that a free form must have
 
 def investigate(base: Fit, causes: Causes, null: Null, progress: Progress) -> Search:
     """Search for what a fit lacks, take back names that do not hold, name waves."""
-    return name_waves(withdraw(search(base, causes, null, progress)))
+    found = withdraw(search(base, causes, null, progress))
+    return name_waves(pass_on(weigh_laws(found, progress), progress))
 
 
 def withdraw(found: Search) -> Search:
