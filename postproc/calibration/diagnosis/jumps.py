@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.calibration.diagnosis.library import Projection, reduce_some
 from postproc.calibration.diagnosis.score import Score, rank
-from postproc.model.carrier import carrier
+from postproc.model.carrier import every_carrier
 from postproc.model.covariate import covariate, varies, varies_enough
 from postproc.model.effects.effect import FREE, PART_MOTION, Candidate, Effect, Family
 from postproc.model.effects.part_motion import OF_STATE, PartMotion
@@ -19,7 +19,7 @@ ALIKE = 0.98  # part of the rows that a value parts as the step does
 
 
 def jumps(effect: Effect, projection: Projection) -> list[Score]:
-    """Score the parts that a step moves as if they jumped at a temperature, say.
+    """Score all parts as if they jumped at a temperature, say, instead of at a row.
 
     Args:
         effect: The step, at one row; of any other effect there are none.
@@ -37,13 +37,12 @@ def jumps(effect: Effect, projection: Projection) -> list[Score]:
 
 def _candidates(step: CampaignStep, batch: Batch) -> Iterator[Candidate]:
     """List the parts by the values that are passed."""
-    moved = sorted({part for part, *_ in step.cells()})
     for driver, value in _passed(step, batch):
-        for part in moved:
-            joint = carrier(part).joint
-            along = None if joint is not None else part
-            family = Family(PART_MOTION, joint, driver, FREE, along)
-            half = float(np.ptp(covariate(batch, driver))) / 2
+        half = float(np.ptp(covariate(batch, driver))) / 2
+        for moved in every_carrier():
+            part = str(moved)
+            along = None if moved.joint is not None else part
+            family = Family(PART_MOTION, moved.joint, driver, FREE, along)
             jump = PartMotion(part, source=driver, law="step", middle=value, half=half)
             yield Candidate(family, jump, driver, 0.0)
 

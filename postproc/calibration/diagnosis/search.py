@@ -135,6 +135,7 @@ def ranking(projection: Projection, causes: Causes) -> list[Score]:
         view = views.of(score.family, score.best.effect)
         refined.append(readable(view, refine(view, score), causes))
     rest = [s for s in scores if s not in leading]
+    rest += jumps(refined[0].best.effect, projection)
     return sorted([*refined, *rest], key=lambda s: -s.evidence)
 
 
@@ -637,8 +638,6 @@ def stand(found: Search, number: int) -> JudgedAddition:
         if s.evidence >= here.evidence - _within(own, s.best) and name not in names:
             rivals.append(s)
             names.add(name)
-    as_well = jumps(own.effect, projection)
-    rivals = [s for s in as_well if s.evidence >= here.evidence - NEAR] + rivals
     evidence = here.evidence
     if found.additions[number].together:
         evidence = max(evidence, _of_cause(found, own.family.effect))
