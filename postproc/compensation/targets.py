@@ -37,6 +37,7 @@ def rounding_of(visits: Visits) -> tuple[Ints, Floats, Floats]:
     within = visits.zone_rule == ZoneRule.WITHIN
     rounding = np.where(cartesian, np.where(within, Fly.WITHIN, Fly.FROM), Fly.OVERLAP)
     rounding[passing | (visits.zone_mm < 0)] = Fly.EXACT
+    rounding[visits.zone_rule == ZoneRule.UNKNOWN] = Fly.UNKNOWN
     distance = np.nan_to_num(visits.zone_mm, nan=USUAL_DISTANCE) * MM
     overlap = np.nan_to_num(visits.overlap_percent, nan=USUAL_OVERLAP) / 100.0
     return rounding, np.maximum(distance, 0.0), np.clip(overlap, 0.0, 1.0)
@@ -63,6 +64,24 @@ def rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
         )
         found.append(_note(visits, worst, "fly-corner", text))
     return found
+
+
+def unknown_blends(visits: Visits, corrected: Bools) -> list[Diagnostic]:
+    """Report once which corrected points may be stops, or be passed in any zone.
+
+    Args:
+        visits: Every arrival.
+        corrected: Those that are corrected, (n,).
+    """
+    found = np.flatnonzero(corrected & (visits.zone_rule == ZoneRule.UNKNOWN))
+    if len(found) == 0:
+        return []
+    text = (
+        f"the program does not show whether the arm stops at {len(found)} points, or "
+        "how early it leaves them. They are corrected for both cases; joints that turn "
+        "back there are corrected for the middle of their play"
+    )
+    return [_note(visits, int(found[0]), "fly-unknown", text)]
 
 
 def _assumed(visits: Visits, rows: Ints) -> str:

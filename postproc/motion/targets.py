@@ -18,6 +18,7 @@ class Fly(IntEnum):
     FROM = 1  # the zone begins at a distance (FLY_CART with FLY_FROM or nothing said)
     WITHIN = 2  # the path passes within a distance (FLY_TOL)
     EXACT = 3  # the path passes through the point (FLY_PASS, negative $FLY_DIST)
+    UNKNOWN = 4  # the arm stops there, or passes it in a way that is not known
 
 
 class TargetKind(IntEnum):

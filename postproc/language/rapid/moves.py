@@ -135,8 +135,6 @@ class Goals:
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
         total, untold = self._total(one, row, scope)
         why = why or untold
-        if zone == UNKNOWN_ZONE:
-            why = why or "its zone is not known: no zonedata of the files at hand"
         if signature.via >= 0:
             goal = self.goal(ends[1], signature, row, scope)
             yield RapidVisit(
