@@ -200,16 +200,20 @@ def compensated(folder: Path, cell: Path) -> Iterator[tuple[Unit, Outcome | Exce
 
 
 def reasons_of(unit: Unit, outcome: Outcome) -> dict[Place, str]:
-    """Return why each motion line of a program is not corrected, "" where it is."""
+    """Return why each motion line of a program is not corrected, "" where it is.
+
+    A target that is shifted from a corrected point (`Offs`) is corrected with it.
+    """
     places = {file.rpartition("/")[2]: file for file in unit.files}
     v, d = outcome.visits, outcome.decisions
     found: dict[Place, str] = {}
+    written = set(v.literal[(d.status == Status.SAFE) & (v.literal >= 0)].tolist())
     for finding in outcome.diagnostics:
         if finding.code in NOT_FOLLOWED and finding.file in places:
             found[places[finding.file], finding.line] = finding.message
     for k in range(len(v)):
         place = places.get(v.files[v.file[k]], ""), int(v.line[k])
-        safe = d.status[k] == Status.SAFE
+        safe = d.status[k] == Status.SAFE or v.follows[k] in written
         reason = "" if safe else d.reasons[d.why[k]] or Status(d.status[k]).name
         found[place] = found.get(place) or reason
     return found
