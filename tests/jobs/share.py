@@ -26,7 +26,7 @@ from postproc.batch.tree import scan
 from postproc.batch.workers import outcomes_of
 from postproc.calibration.fit import fit
 from postproc.cli.simulate import setup_of
-from postproc.compensation.options import Options
+from postproc.compensation.options import AS_USUAL, Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.exceptions import PostprocError
 from postproc.language.visits import NOT_FOLLOWED
@@ -162,18 +162,21 @@ def counted(folder: Path) -> list[Place]:
     return [(r["file"], int(r["line"])) for r in rows if r["kind"] == "counted"]
 
 
-def count(folder: Path, cell: Path | None = None) -> JobCount:
+def count(
+    folder: Path, cell: Path | None = None, options: Options = AS_USUAL
+) -> JobCount:
     """Compensate a job, and say of every counted line why it is not corrected.
 
     Args:
         folder: The job.
         cell: Its cell; default: the one in the folder.
+        options: Of the compensation.
     """
     start = perf_counter()
     places = counted(folder)
     found: dict[Place, str] = {}
     codes, messages = [], []
-    for unit, outcome in compensated(folder, cell or folder / "cell.toml"):
+    for unit, outcome in compensated(folder, cell or folder / "cell.toml", options):
         if isinstance(outcome, Exception):
             if not isinstance(outcome, PostprocError):
                 raise outcome
@@ -190,10 +193,12 @@ def count(folder: Path, cell: Path | None = None) -> JobCount:
     return JobCount(name, reasons, tuple(codes), tuple(messages), seconds)
 
 
-def compensated(folder: Path, cell: Path) -> Iterator[tuple[Unit, Outcome | Exception]]:
+def compensated(
+    folder: Path, cell: Path, options: Options = AS_USUAL
+) -> Iterator[tuple[Unit, Outcome | Exception]]:
     """Yield the programs of a job, grouped as `batch` does, and what came of each."""
     arm = load_cell(cell).arm.name
-    plan = make_plan(None, cell, model_of(arm, cell), Options(timing=False))
+    plan = make_plan(None, cell, model_of(arm, cell), options)
     for unit in scan(folder, plan).units:
         task = Task(unit, tuple((folder / f).read_bytes() for f in unit.files))
         yield unit, outcomes_of([task], plan.setups[unit.setup])[0]
@@ -225,10 +230,11 @@ def reasons_of(unit: Unit, outcome: Outcome) -> dict[Place, str]:
 def main() -> None:
     """Print the share of every language, and the reasons for the rest."""
     given = _arguments()
+    options = Options(clone=given.clone)
     for language in given.language or LANGUAGES:
         folders = sorted((HERE / language).glob("job*"))
         folders = [f for f in folders if not given.jobs or f.name[3:] in given.jobs]
-        found = [count(folder) for folder in folders]
+        found = [count(folder, options=options) for folder in folders]
         if given.lines:
             _print_lines(found)
         _print_share(language, found)
@@ -238,6 +244,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--language", nargs="+", choices=LANGUAGES)
     parser.add_argument("--jobs", nargs="+", help="Numbers, as 01.")
+    parser.add_argument("--clone", action="store_true", help="Clone shared points.")
     parser.add_argument("--lines", action="store_true", help="List every other line.")
     return parser.parse_args()
 
