@@ -9,7 +9,14 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.arc_angles import ArcAngles, place_ends
 from postproc.compensation.eligibility import Reasons
-from postproc.language.visits import Blend, Diagnostic, Meaning, Visits, ZoneRule
+from postproc.language.visits import (
+    Blend,
+    Diagnostic,
+    Meaning,
+    OrientationLaw,
+    Visits,
+    ZoneRule,
+)
 from postproc.motion.path import arc_per_start
 from postproc.motion.targets import Fly, TargetKind, Targets
 from postproc.robot.cell import Cell
@@ -215,6 +222,8 @@ def _targets(
         wrist_joint=visits.wrist_joint,
         block=visits.block,
         curved=visits.curved,
+        along=(visits.motion == Motion.CIRCULAR)
+        & (visits.orientation_law == OrientationLaw.ALONG_PATH),
         pred_start=pred_start,
         pred=pred,
     )

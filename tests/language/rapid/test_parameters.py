@@ -127,8 +127,9 @@ TRAPS = {
     "two routines of one name": ("go p1;", GO + GO),
     "a loop that has its name": (
         "at 5;",
-        routine("at", "FOR x FROM 1 TO n DO", "MoveL Offs(p1,x,0,0),v9,fine,t\\WObj:=w;",
-                "ENDFOR", L.format("p1"), given="(num x)"),
+        routine("at", "FOR x FROM 1 TO n DO",
+                "MoveL Offs(p1,x,0,0),v9,fine,t\\WObj:=w;", "ENDFOR", L.format("p1"),
+                given="(num x)"),
     ),
 }  # fmt: skip
 
