@@ -371,11 +371,16 @@ def _step(target: int, value: Floats, user: Floats) -> tuple[TargetKind, Floats]
 
 
 def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
-    """Tell which visits depend on axes that may move the arm or the part, (n,)."""
+    """Tell which visits depend on axes that may move the arm or the part, (n,).
+
+    With its track at 0 the arm stands at the base of the cell.
+    """
     outside = np.zeros(len(visits), dtype=bool)
     for column in range(visits.aux.shape[1] if visits.aux.ndim == 2 else 0):
         axis = column + 1
         given, use = ~np.isnan(visits.aux[:, column]), cell.aux.get(axis)
+        if use == "track":
+            given &= visits.aux[:, column] != 0.0
         if use == "gun" or not given.any():
             continue
         outside |= given

@@ -1,6 +1,6 @@
 """Count the motion lines of the frozen jobs that are corrected.
 
-python -m tests.jobs.share [--language rapid|krl] [--jobs 01 02 ..] [--pasted] [--lines]
+python -m tests.jobs.share [--language rapid|krl] [--jobs 01 02 ..] [--clone] [--pasted]
 
 Every job is compensated as a folder, as `batch` does, with a model of its arm: a
 virtual arm of the same dimensions is surveyed once, over its whole range and all loads
@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import argparse
 import csv
+import re
+import tempfile
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -21,6 +23,7 @@ from time import perf_counter
 
 import numpy as np
 
+from postproc.batch.archive import missing_in_cell
 from postproc.batch.plan import Task, Unit, make_plan
 from postproc.batch.tree import scan
 from postproc.batch.workers import outcomes_of
@@ -29,6 +32,7 @@ from postproc.cli.simulate import setup_of
 from postproc.compensation.options import AS_USUAL, Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.exceptions import PostprocError
+from postproc.language.languages import languages
 from postproc.language.visits import NOT_FOLLOWED
 from postproc.model.effects import BASE_EFFECTS
 from postproc.robot.arm_file import arm_path
@@ -204,6 +208,30 @@ def compensated(
         yield unit, outcomes_of([task], plan.setups[unit.setup])[0]
 
 
+ASKED = re.compile(r"auxiliary axis (\d) is not declared")
+
+
+def pasted(folder: Path, place: Path) -> Path:
+    """Write the cell of a job with the lines that the messages about the job ask for.
+
+    Args:
+        folder: The job.
+        place: The new cell file.
+    """
+    cell = folder / "cell.toml"
+    asked = {axis for reason in count(folder).reasons.values()
+             for axis in ASKED.findall(reason)}  # fmt: skip
+    archives = (language.read_archive(folder) for language in languages())
+    lines = [line for archive in archives if archive is not None
+             for line in missing_in_cell(archive, load_cell(cell))[2:]]  # fmt: skip
+    if asked and not any("[aux]" in line for line in lines):
+        lines += ["[aux]", *(f'{axis} = "track"' for axis in sorted(asked))]
+    text = cell.read_text(encoding="utf-8")
+    text += "".join(f"\n{line.strip()}" for line in lines) + "\n"
+    place.write_text(text, encoding="utf-8")
+    return place
+
+
 def reasons_of(unit: Unit, outcome: Outcome) -> dict[Place, str]:
     """Return why each motion line of a program is not corrected, "" where it is.
 
@@ -234,7 +262,12 @@ def main() -> None:
     for language in given.language or LANGUAGES:
         folders = sorted((HERE / language).glob("job*"))
         folders = [f for f in folders if not given.jobs or f.name[3:] in given.jobs]
-        found = [count(folder, options=options) for folder in folders]
+        with tempfile.TemporaryDirectory() as name:
+            place = Path(name) / "cell.toml"
+            found = [
+                count(f, pasted(f, place) if given.pasted else None, options)
+                for f in folders
+            ]
         if given.lines:
             _print_lines(found)
         _print_share(language, found)
@@ -245,6 +278,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--language", nargs="+", choices=LANGUAGES)
     parser.add_argument("--jobs", nargs="+", help="Numbers, as 01.")
     parser.add_argument("--clone", action="store_true", help="Clone shared points.")
+    parser.add_argument(
+        "--pasted", action="store_true", help="Add what messages ask for to the cells."
+    )
     parser.add_argument("--lines", action="store_true", help="List every other line.")
     return parser.parse_args()
 
