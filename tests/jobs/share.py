@@ -17,12 +17,13 @@ import tempfile
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
+from postproc.arrays import Floats
 from postproc.batch.archive import missing_in_cell
 from postproc.batch.plan import Task, Unit, make_plan
 from postproc.batch.tree import scan
@@ -31,17 +32,19 @@ from postproc.calibration.fit import fit
 from postproc.cli.simulate import setup_of
 from postproc.compensation.options import AS_USUAL, Options
 from postproc.compensation.outcome import Outcome, Status
+from postproc.compensation.program import read_program
 from postproc.exceptions import PostprocError
 from postproc.language.languages import languages
 from postproc.language.visits import NOT_FOLLOWED
 from postproc.model.effects import BASE_EFFECTS
 from postproc.robot.arm_file import arm_path
-from postproc.robot.cell import load_cell
+from postproc.robot.cell import Cell, load_cell
 from postproc.simulation import (
     NJ220,
     Campaign,
     VirtualArm,
     follow_rows,
+    land,
     stream,
     virtual_arm,
     write_measurements,
@@ -252,6 +255,57 @@ def reasons_of(unit: Unit, outcome: Outcome) -> dict[Place, str]:
     return found
 
 
+# Where the independent arm lands.
+
+
+@dataclass(frozen=True)
+class Misses:
+    """How far an arm lands from where a job asks it to be, at corrected stops.
+
+    Attributes:
+        sure: Where the sides of all joints are known, (n,) [mm].
+        other: At the other stops, (m,) [mm].
+        before: At all of them without a correction, (n + m,) [mm].
+    """
+
+    sure: Floats
+    other: Floats
+    before: Floats
+
+
+def landed(folder: Path, options: Options = AS_USUAL) -> Misses:
+    """Let the virtual arm that was surveyed run what is written for a job."""
+    found = Misses(*(np.empty(0),) * 3)
+    cell_file = folder / "cell.toml"
+    for _, outcome in compensated(folder, cell_file, options):
+        if isinstance(outcome, Outcome):
+            one = _landed(outcome, load_cell(cell_file))
+            found = Misses(
+                np.concatenate([found.sure, one.sure]),
+                np.concatenate([found.other, one.other]),
+                np.concatenate([found.before, one.before]),
+            )
+    return found
+
+
+def _landed(outcome: Outcome, cell: Cell) -> Misses:
+    arm, setup = arm_of(cell.arm.name), setup_of(cell)
+    setup = replace(setup, chain=arm.nominal)
+    given, made = (
+        read_program(files, cell).visits
+        for files in (outcome.sources, {**outcome.sources, **outcome.outputs})
+    )
+    before, after = land(arm, setup, given), land(arm, setup, given, made)
+    v, d, rows = outcome.visits, outcome.decisions, after.visit
+    stops = (d.status == Status.SAFE) & ~v.fly & ~v.via
+    stops[:1] = False  # how the gears lie at first is not known
+    sure = stops & (d.direction != 0).all(axis=1)
+    was, miss = (1e3 * np.linalg.norm(x.error, axis=1) for x in (before, after))
+    return Misses(
+        miss[sure[rows]], miss[(stops & ~sure)[rows]], was[stops[before.visit]]
+    )
+
+
 # The table.
 
 
@@ -271,6 +325,8 @@ def main() -> None:
         if given.lines:
             _print_lines(found)
         _print_share(language, found)
+        if given.land:
+            _print_misses([landed(folder, options) for folder in folders])
 
 
 def _arguments() -> argparse.Namespace:
@@ -281,6 +337,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--pasted", action="store_true", help="Add what messages ask for to the cells."
     )
+    parser.add_argument(
+        "--land", action="store_true", help="Let the arm run what is written."
+    )
     parser.add_argument("--lines", action="store_true", help="List every other line.")
     return parser.parse_args()
 
@@ -290,6 +349,16 @@ def _print_lines(found: Iterable[JobCount]) -> None:
         for (file, line), reason in job.reasons.items():
             if reason:
                 print(f"{job.job}/{file}:{line}: {reason}")
+
+
+def _print_misses(found: Iterable[Misses]) -> None:
+    for name in ("before", "sure", "other"):
+        some = np.concatenate([getattr(one, name) for one in found])
+        if len(some):
+            print(
+                f"  {name}: {len(some)} corrected stops, the arm misses by "
+                f"{some.mean():.4f} mm on average, {some.max():.4f} at most"
+            )
 
 
 def _print_share(language: str, found: list[JobCount]) -> None:
