@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -98,6 +99,50 @@ def test_which_joints_may_arrive_on_another_side(angles, side, unknown):
     found = turns_at_unknown_blends(arm, targets, q, sides)
     assert found[1].tolist() == [unknown, *(False,) * 5]
     assert not found[2].any()  # the arm stops there
+
+
+WAYS = {  # predecessors of four moves, and whether axis 1 is sure at the second
+    "one way": ([[-1], [0], [1], [2]], True),
+    "one way in of two turns back": ([[-1], [0, 3], [1], [1]], False),
+    "one way out of two turns back": ([[-1], [0], [1], [1]], False),
+    "from anywhere, too": ([[-1], [0, -1], [1], [2]], True),
+    "from nowhere": ([[-1], [-1], [1], [2]], True),
+}
+
+
+@pytest.mark.parametrize("ways", WAYS)
+def test_several_ways(ways):
+    preds, sure = WAYS[ways]
+    arm = load_arm("nj220-2.7")
+    targets, q = moves(0.0, 0.1, 0.2, 0.05)
+    targets = replace(
+        targets, pred=np.array([p for own in preds for p in own]),
+        pred_start=np.cumsum([0, *map(len, preds)]), fly=np.array([False, True] * 2),
+    )  # fmt: skip
+    found = turns_at_unknown_blends(arm, targets, q, np.ones((4, 6)))
+    assert found[1, 0] != sure
+
+
+def test_a_joint_on_a_coupled_drive():
+    """Axis 4 goes on, but its turn turns the drive of axis 5 back behind the point."""
+    arm = load_arm("kr210-r2700-extra")
+    assert arm.coupling[4, 3] > 0.0
+    targets, q = moves(0.0, 0.0, 0.0)
+    q[:, 3] = [0.0, 0.2, -2.0]
+    q[:, 4] = [0.5, 0.51, 0.515]
+    sides = np.ones((3, 6))
+    found = turns_at_unknown_blends(arm, targets, q, sides)
+    assert found[1, 3] and found[1, 4]
+
+
+@pytest.mark.parametrize("number", [np.nan, 0.0])
+def test_what_is_not_known_or_singular_is_not_sure(number):
+    arm = load_arm("nj220-2.7")
+    targets, q = moves(0.0, 0.1, 0.2)
+    targets = replace(targets, move=np.ones(3, dtype=np.int64))
+    q[1, 4] = number
+    found = turns_at_unknown_blends(arm, targets, q, np.ones((3, 6)))
+    assert found[1].any()
 
 
 def test_a_line_that_begins_backwards():
