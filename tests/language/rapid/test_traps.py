@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.language.visits import ELSEWHERE, START, OrientationLaw, Switch
+from postproc.language.visits import (
+    ELSEWHERE,
+    START,
+    Meaning,
+    OrientationLaw,
+    Switch,
+)
 from tests.language.rapid.test_visits import END, L, names, once, origins, reasons, task
 
 MORE = (
@@ -68,16 +74,15 @@ def test_what_a_search_writes_is_not_known(search):
 @pytest.mark.parametrize("search", ["line", "arc", "by a flag"])
 def test_a_search_leaves_its_tool_and_its_other_points(search):
     found = once(SEARCHES[search].format("found"), P2, more=MORE + FOUND)
-    assert reasons(found)[-1] == "" and origins(found)[-1] == [ELSEWHERE]
+    (before,) = origins(found)[-1]
+    assert reasons(found)[-1] == ""
+    assert found.visits.target[before] == Meaning.UNKNOWN  # it ends anywhere
 
 
 def test_a_routine_that_is_named_like_a_search_may_write_all():
     own = routine("SearchL", "x:=t2;", given="(INOUT tooldata x)")
-    more = (
-        MORE
-        + own
-        + "PERS tooldata t2:=[TRUE,[[0,0,9],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n"
-    )
+    load = "[1,[0,0,1],[1,0,0,0],0,0,0]"
+    more = f"{MORE}{own}PERS tooldata t2:=[TRUE,[[0,0,9],[1,0,0,0]],{load}];\n"
     assert "may be changed" in reasons(once("SearchL t;", P1, more=more))[0]
 
 
