@@ -435,9 +435,14 @@ class _NamesUsed:
     def _fitting(
         self, name: str, arguments: Sequence[said.Argument]
     ) -> list[tuple[said.Parameter, said.Argument]] | None:
-        """Pair the arguments of a call of the only routine of a name, else None."""
+        """Pair the arguments of a call of the only routine of a name, else None.
+
+        A local one need not be what is called.
+        """
         found = self.own.get(name, ())
         if len(found) != 1 or any(one.passed_on for one in arguments):
+            return None
+        if getattr(found[0][2].head, "local", False):
             return None
         return matched(parameters_of(found[0][2]), arguments)
 
