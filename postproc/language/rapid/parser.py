@@ -115,10 +115,10 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "end": lambda c: said.BlockWord(_low(c[0])),
     "scope": lambda c: ScopePart(c[0]),
     "parameters": lambda c: tuple(c),
-    "parameter": lambda c: said.Parameter(
+    "parameter": lambda c: said.RoutineParameter(
         _last_name(c), any(x is BY_REFERENCE for x in c)
     ),
-    "optional": lambda c: said.Parameter(_last_name(c).lstrip("\\"), True, True),
+    "optional": lambda c: said.RoutineParameter(_last_name(c).lstrip("\\"), True, True),
     "mode": lambda c: BY_REFERENCE,
     "open_dimensions": lambda c: None,
     "data": _data,

@@ -65,7 +65,7 @@ class ModuleHead(RapidStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class RoutineParameter:
     r"""A parameter of a routine.
 
     Attributes:
@@ -94,7 +94,7 @@ class RoutineHead(RapidStatement):
 
     kind: str
     name: str
-    parameters: tuple[Parameter, ...] = ()
+    parameters: tuple[RoutineParameter, ...] = ()
     local: bool = False
     returns: str = ""
 

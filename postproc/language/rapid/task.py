@@ -313,15 +313,15 @@ class RapidTask:
 DEEPEST = 20  # names that stand for names
 
 
-def parameters_of(routine: HeadedRows) -> tuple[said.Parameter, ...]:
+def parameters_of(routine: HeadedRows) -> tuple[said.RoutineParameter, ...]:
     """Return the parameters of a routine."""
     head = routine.head
     return head.parameters if isinstance(head, said.RoutineHead) else ()
 
 
 def matched(
-    parameters: Sequence[said.Parameter], arguments: Sequence[said.Argument]
-) -> list[tuple[said.Parameter, said.Argument]] | None:
+    parameters: Sequence[said.RoutineParameter], arguments: Sequence[said.Argument]
+) -> list[tuple[said.RoutineParameter, said.Argument]] | None:
     """Pair parameters with arguments; None where the call does not fit."""
     placed = [one for one in arguments if not one.name]
     required = [one for one in parameters if not one.optional]
@@ -434,7 +434,7 @@ class _NamesUsed:
 
     def _fitting(
         self, name: str, arguments: Sequence[said.Argument]
-    ) -> list[tuple[said.Parameter, said.Argument]] | None:
+    ) -> list[tuple[said.RoutineParameter, said.Argument]] | None:
         """Pair the arguments of a call of the only routine of a name, else None.
 
         A local one need not be what is called.
@@ -446,7 +446,9 @@ class _NamesUsed:
             return None
         return matched(parameters_of(found[0][2]), arguments)
 
-    def _give(self, parameter: said.Parameter, operand: said.Operand | None) -> None:
+    def _give(
+        self, parameter: said.RoutineParameter, operand: said.Operand | None
+    ) -> None:
         """Note what a routine of the task is called with."""
         if isinstance(operand, said.DataObject):
             by_reference = parameter.by_reference

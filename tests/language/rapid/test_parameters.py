@@ -155,7 +155,9 @@ def test_a_tool_that_a_routine_changes(change, why):
 
 def test_a_local_routine_of_another_module_is_not_what_is_called():
     """The routine of this name that the controller finds may change what it gets."""
-    other = "MODULE o\nLOCAL " + GO.replace("robtarget", "VAR robtarget") + "ENDMODULE\n"
+    other = (
+        "MODULE o\nLOCAL " + GO.replace("robtarget", "VAR robtarget") + "ENDMODULE\n"
+    )
     found = once("go q;", L.format("q"), L.format("p2"), more=MORE, others=[other])
     assert not free(found, "q") and "may be changed" in "".join(reasons(found))
 
