@@ -233,13 +233,13 @@ def run_tasks(tasks: Sequence[Task], setup: JobSetup, version: str) -> list[Resu
         text = f"the worker has postproc {__version__}, the run {version}: make equal"
         return [failed(task.unit, text) for task in tasks]
     start = perf_counter()
-    found = _compensated(tasks, setup)
+    found = outcomes_of(tasks, setup)
     results = [_result(*pair) for pair in zip(tasks, found, strict=True)]
     seconds = (perf_counter() - start) / max(len(tasks), 1)
     return [replace(result, seconds=seconds) for result in results]
 
 
-def _compensated(tasks: Sequence[Task], setup: JobSetup) -> list[Outcome | Exception]:
+def outcomes_of(tasks: Sequence[Task], setup: JobSetup) -> list[Outcome | Exception]:
     """Compensate the programs of tasks; what fails for all of them is told of each."""
     given = [_given(task) for task in tasks]
     try:

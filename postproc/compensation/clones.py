@@ -199,6 +199,7 @@ def _origin(
 
 # Cloning what moves disagree on, group by group, and the proof that it fits.
 
+FOLLOWED = "computed targets move along with the point, and keep it"
 NOTHING = np.zeros(0, dtype=np.int64)  # no literal gets new numbers
 
 
@@ -300,7 +301,13 @@ class _CloneWork:
         named: dict[MoveSlot, NamedPoint] = {}
         members = list(self._members(literals, named, agree_mm))
         stays = not literals.isdisjoint(self.proposal.fixed.tolist())
-        for group in group_arrivals(members, stays, agree_mm)[1:]:
+        original, *others = group_arrivals(members, stays, agree_mm)
+        followed = not literals.isdisjoint(self.reading.visits.follows.tolist())
+        if followed and not original.stops:
+            place = members[0].stop
+            self._note(place.file, place.line, "not-cloned", FOLLOWED)
+            return
+        for group in others:
             self._clone([named[stop] for stop in group.stops], group)
 
     def _members(

@@ -52,7 +52,7 @@ from postproc.compensation.rewrite import (
     check_output,
     write_edits,
 )
-from postproc.compensation.targets import rounded_points
+from postproc.compensation.targets import rounded_points, unknown_blends
 from postproc.exceptions import CellError, ProgramError
 from postproc.files import variables_of
 from postproc.language.interface import Language
@@ -301,6 +301,7 @@ def _findings(
         *overruled_strings(visits, kept.overruled),
         *untimed_runs(visits, kept.untimed),
         *rounded_points(visits, kept.away),
+        *unknown_blends(visits, rows),
         *unsure_sides(visits, rows, d.side, d.std_error, advice),
         *unsure_frames(visits, rows, d.std_error, cell),
         *flank_steps(visits, rows, kept.position, d.side, setting.gap, cell.arm),

@@ -297,6 +297,8 @@ def _followers(visits: Visits, doubtful: Bools, sure: Bools) -> tuple[Bools, Boo
 # three angles run in proportion instead (likely), RS_TRAJ takes the tool along an arc.
 # The ends are the same, the way between is not: where it may be off by more than a
 # joint's play, a joint may arrive from another side, and the target is left alone.
+# On arcs on which the tool turns little the targets are corrected, and joints that may
+# arrive from another side are not known (`motion.curves`).
 #
 # Euler angles in proportion turn the tool at w = a' z + e' y(a) + r' z(a, e), and |w'|
 # <= turn^2 / sin(e), so that it is off by at most turn^2 / (8 sin(e)), and by no more
@@ -304,6 +306,7 @@ def _followers(visits: Visits, doubtful: Bools, sure: Bools) -> tuple[Bools, Boo
 # RS_WORLD does.
 
 PLAY = np.deg2rad(0.01)  # [rad] what a joint may be off without another side
+SMALL_TURN = np.deg2rad(0.5)  # of an arc: joints that this may turn back are not sure
 LEAST = 3e-4  # sine below which e is 0 or 180 deg
 
 
@@ -360,7 +363,8 @@ def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bo
     both = np.maximum(_sine(world @ begin, kind), _sine(world @ end, kind))
     same = (both < LEAST) & (kind == OrientationLaw.EULER_ANGLES)
     off = np.where(kind == OrientationLaw.ALONG_PATH, turn, np.where(same, 0.0, off))
-    found[edge[off > PLAY]] = True
+    along = kind == OrientationLaw.ALONG_PATH
+    found[edge[off > np.where(along, SMALL_TURN, PLAY)]] = True
     return found
 
 

@@ -9,7 +9,14 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.arc_angles import ArcAngles, place_ends
 from postproc.compensation.eligibility import Reasons
-from postproc.language.visits import Blend, Diagnostic, Meaning, Visits, ZoneRule
+from postproc.language.visits import (
+    Blend,
+    Diagnostic,
+    Meaning,
+    OrientationLaw,
+    Visits,
+    ZoneRule,
+)
 from postproc.motion.path import arc_per_start
 from postproc.motion.targets import Fly, TargetKind, Targets
 from postproc.robot.cell import Cell
@@ -37,6 +44,7 @@ def rounding_of(visits: Visits) -> tuple[Ints, Floats, Floats]:
     within = visits.zone_rule == ZoneRule.WITHIN
     rounding = np.where(cartesian, np.where(within, Fly.WITHIN, Fly.FROM), Fly.OVERLAP)
     rounding[passing | (visits.zone_mm < 0)] = Fly.EXACT
+    rounding[visits.zone_rule == ZoneRule.UNKNOWN] = Fly.UNKNOWN
     distance = np.nan_to_num(visits.zone_mm, nan=USUAL_DISTANCE) * MM
     overlap = np.nan_to_num(visits.overlap_percent, nan=USUAL_OVERLAP) / 100.0
     return rounding, np.maximum(distance, 0.0), np.clip(overlap, 0.0, 1.0)
@@ -63,6 +71,24 @@ def rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
         )
         found.append(_note(visits, worst, "fly-corner", text))
     return found
+
+
+def unknown_blends(visits: Visits, corrected: Bools) -> list[Diagnostic]:
+    """Report once which corrected points may be stops, or be passed in any zone.
+
+    Args:
+        visits: Every arrival.
+        corrected: Those that are corrected, (n,).
+    """
+    found = np.flatnonzero(corrected & (visits.zone_rule == ZoneRule.UNKNOWN))
+    if len(found) == 0:
+        return []
+    text = (
+        f"the program does not show whether the arm stops at {len(found)} points, or "
+        "how early it leaves them. They are corrected for both cases; joints that turn "
+        "back there are corrected for the middle of their play"
+    )
+    return [_note(visits, int(found[0]), "fly-unknown", text)]
 
 
 def _assumed(visits: Visits, rows: Ints) -> str:
@@ -196,6 +222,8 @@ def _targets(
         wrist_joint=visits.wrist_joint,
         block=visits.block,
         curved=visits.curved,
+        along=(visits.motion == Motion.CIRCULAR)
+        & (visits.orientation_law == OrientationLaw.ALONG_PATH),
         pred_start=pred_start,
         pred=pred,
     )
@@ -343,11 +371,16 @@ def _step(target: int, value: Floats, user: Floats) -> tuple[TargetKind, Floats]
 
 
 def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
-    """Tell which visits depend on axes that may move the arm or the part, (n,)."""
+    """Tell which visits depend on axes that may move the arm or the part, (n,).
+
+    With its track at 0 the arm stands at the base of the cell.
+    """
     outside = np.zeros(len(visits), dtype=bool)
     for column in range(visits.aux.shape[1] if visits.aux.ndim == 2 else 0):
         axis = column + 1
         given, use = ~np.isnan(visits.aux[:, column]), cell.aux.get(axis)
+        if use == "track":
+            given &= visits.aux[:, column] != 0.0
         if use == "gun" or not given.any():
             continue
         outside |= given

@@ -144,6 +144,7 @@ class Conditions:
         override: Share of the programmed speed, 0 or NaN where not known.
         overlap: Of moves that begin before the last has ended [%], NaN for a zone.
         exact: It is passed exactly, without stopping.
+        unsized: It may be a stop, or be passed in a zone of any size.
         load: What the program states that the arm carries: mass [kg] and its centre in
             the flange frame [m], empty where it states nothing.
     """
@@ -163,6 +164,7 @@ class Conditions:
     override: float = 1.0
     overlap: float = math.nan
     exact: bool = False
+    unsized: bool = False
     load: tuple[float, ...] = ()
 
 
@@ -274,9 +276,11 @@ def _moves(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> dict[str,
     overlap = np.array([c.overlap for c in held], float)
     overlaps = overlap >= 0.0
     exact = np.array([c.exact for c in held], bool)
-    fly = (zone >= 0.0) | via | overlaps | exact  # via: nothing stops on an arc
+    unsized = np.array([c.unsized for c in held], bool)
+    fly = (zone >= 0.0) | via | overlaps | exact | unsized
     rounded = np.where(overlaps, Blend.OVERLAP, Blend.ZONE)
     rule = np.where(exact, ZoneRule.PASS, ZoneRule.FROM)
+    rule = np.where(unsized & ~via, ZoneRule.UNKNOWN, rule)
     return {
         "motion": slim(np.array([v.motion for v in found], np.int64)),
         "target": slim(np.array([v.goal.target for v in found], np.int64)),

@@ -31,6 +31,8 @@ class Scope:
         module, routine: Names, "" outside of all.
         parameters: Of the routine.
         loops: Values of loop variables that are known.
+        given: What the routine is called with, by parameter: the operand, its row and
+            where that stands. Parameters without an entry are not known.
     """
 
     file: int
@@ -38,6 +40,7 @@ class Scope:
     routine: str
     parameters: frozenset[str] = frozenset()
     loops: tuple[tuple[str, float], ...] = ()
+    given: tuple[tuple[str, said.Operand, int, Scope], ...] = ()
 
 
 class ModesLike(Protocol):
@@ -205,6 +208,19 @@ class TaskMachine(ABC):
     @abstractmethod
     def goals_of(self, file: int, row: int) -> Iterable[Any]:
         """Yield where a move goes that is not followed."""
+
+    def called_with(
+        self, scope: Scope, routine: HeadedRows, caller: CallContext, row: int
+    ) -> Scope:
+        """Add what a routine is called with, as far as that is known.
+
+        Args:
+            scope: Where its statements stand.
+            routine: The routine.
+            caller: Where the call stands.
+            row: .. and its row.
+        """
+        return scope
 
     def part_otherwise(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
@@ -487,6 +503,8 @@ class TaskMachine(ABC):
             if place not in self._flows:
                 self._flows[place] = flow_of(self.texts[file], routine, self.handles)
             scope = self.scope_of(file, module, routine)
+            if caller is not None:
+                scope = self.called_with(scope, routine, caller, back - 1)
             depth = 0 if caller is None else caller.depth + 1
             flow = self._flows[place]
             self._contexts[key] = CallContext(scope, routine, flow, depth, caller, back)

@@ -81,6 +81,7 @@ class ZoneRule(IntEnum):
     PASS = 2  # the point is passed exactly
     WITHIN = 3  # the path passes the point at this distance
     FROM = 4  # the path is left at this distance from the point
+    UNKNOWN = 5  # the arm may stop there, or pass it in a zone of any size
 
 
 def texts_of(n: int, told: Mapping[int, str]) -> tuple[str, ...]:

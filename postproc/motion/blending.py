@@ -94,7 +94,7 @@ def _corners(targets: Targets, traced: Trace) -> tuple[Ints, Ints, Ints]:
     out[targets.pred[told]] = told
     known = (source >= 0) & ~np.isnan(traced.q[to, 0])
     known &= ~np.isnan(traced.q[np.maximum(source, 0), 0])
-    round_ = targets.fly & ~targets.via & (targets.rounding != Fly.EXACT)
+    round_ = targets.fly & ~targets.via & (targets.rounding < Fly.EXACT)
     single = (np.diff(targets.pred_start) == 1) & (ways_out == 1)
     visit = np.flatnonzero(round_ & single)
     into = targets.pred_start[visit]

@@ -1,4 +1,4 @@
-"""Curves through many points: which joints may have turned before they arrive."""
+"""Curves, and points that may be rounded: which joints may have turned before."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.motion.targets import Targets
+from postproc.motion.targets import Fly, Targets
 from postproc.robot.arm import Arm
 from postproc.robot.direction import Arrivals, Sides
-from postproc.robot.pose import lengths
+from postproc.robot.pose import lengths, rotation_vector
+from postproc.robot.trajectory import Motion
 
 # How a controller leads a curve from point to point is its own. It is planned by its
 # chords; and a joint that goes on beyond a point much as it came to it has not turned
@@ -64,11 +65,174 @@ def _rates(
     return (angles[end] - angles[begin]).T / way, way
 
 
+# Of some points it is not known whether the arm stops there, or how large their zones
+# are. A joint whose drive goes on behind such a point as it came there arrives on the
+# same side in any case: within the zone its motion is made of that before and behind.
+
+LITTLE = 0.05  # of the play: a shorter way leaves a joint where it lies in its play
+SINGULAR = 1e-9  # determinant of the Jacobian [m^3], below which rates say nothing
+
+
+def turns_at_unknown_blends(
+    arm: Arm, targets: Targets, q: Floats, side: Floats
+) -> Bools:
+    """Return which joints may arrive on another side where rounding is not known.
+
+    Args:
+        arm: The arm; its coupling is used.
+        targets: n moves.
+        q: Joint angles there, (n, 6) [rad].
+        side: Where the joints lie in their play if the arm stops there, (n, 6).
+
+    Returns:
+        (n, 6).
+    """
+    unknown = targets.fly & (targets.rounding == Fly.UNKNOWN)
+    out = np.zeros((len(q), 6), dtype=bool)
+    if not unknown.any():
+        return out
+    to = np.repeat(np.arange(len(q)), np.diff(targets.pred_start))
+    known = targets.pred >= 0
+    source, to = targets.pred[known], to[known]
+    into, behind = unknown[to], unknown[source]
+    for at, way in (
+        (to[into], _ways(arm, q, source[into], to[into])),
+        (source[behind], _ways(arm, q, source[behind], to[behind])),
+        (source[behind], _begins(arm, targets, q, source[behind], to[behind])),
+    ):
+        np.logical_or.at(out, at, ~(way * side[at] >= 0.0))
+    out[unknown] |= side[unknown] == 0.0
+    return out
+
+
+def _ways(arm: Arm, q: Floats, begin: Ints, end: Ints) -> Floats:
+    """Return how the drives turn between places, (k, 6) [rad], 0 where they rest."""
+    return _counted(arm, q[end] - q[begin])
+
+
+def _counted(arm: Arm, way: Floats) -> Floats:
+    """Return ways of joints as ways of their drives, 0 where they cross no play."""
+    way = way @ arm.coupling.T
+    return np.where(np.abs(way) < LITTLE * arm.play, 0.0, way)
+
+
+def _begins(arm: Arm, targets: Targets, q: Floats, begin: Ints, end: Ints) -> Floats:
+    """Return how the drives begin moves between places, as `_ways`.
+
+    On joint moves, and on the chords of arcs, they go on as the whole way tells.
+    """
+    rate = q[end] - q[begin]
+    line = np.flatnonzero(targets.move[end] == Motion.LINEAR)
+    one, other = begin[line], end[line]
+    start, target = (arm.flange(q[rows]) @ targets.tool[rows] for rows in (one, other))
+    twist = np.hstack([(target - start)[:, :3, 3], _turn(start, target)])
+    jacobian = arm.jacobian(q[one], targets.tool[one][:, :3, 3])
+    rate[line] = _solved(jacobian, twist)
+    return _counted(arm, rate)
+
+
+def _turn(start: Floats, target: Floats) -> Floats:
+    """Return how tools turn from poses to others, base frame, (k, 3) [rad]."""
+    return rotation_vector(target[:, :3, :3] @ np.swapaxes(start[:, :3, :3], 1, 2))
+
+
+def _solved(jacobian: Floats, twist: Floats) -> Floats:
+    """Return the joint rates of twists, (k, 6), NaN where the arm is singular."""
+    good: Bools = np.asarray(~np.isnan(jacobian).any(axis=(1, 2)))
+    good[good] = np.abs(np.linalg.det(jacobian[good])) > SINGULAR
+    out = np.full(twist.shape, np.nan)
+    out[good] = np.linalg.solve(jacobian[good], twist[good][:, :, None])[:, :, 0]
+    return out
+
+
+# On some arcs it is not known how the tool turns. It is off by no more than a few times
+# what it turns by in all. A joint that goes much farther than it must turn to make up
+# for that arrives on the side that is planned.
+
+NO_TURN = np.deg2rad(0.01)  # of the tool: it moves no joint to another side
+OFF = 3.0  # times the turn of the tool by which its orientation may be off
+LAST = 0.25  # of an arc, on which a joint goes farther than it turns for that
+FARTHER = 3.0  # times what a joint turns for that: it goes farther, and is sure
+
+
+def turns_on_arcs(arm: Arm, targets: Targets, q: Floats, side: Floats) -> Bools:
+    """Return which joints may arrive on another side than planned on arcs.
+
+    Args:
+        arm: The arm; its coupling is used.
+        targets: n moves.
+        q: Joint angles there, (n, 6) [rad].
+        side: Where the joints lie in their play as planned, (n, 6).
+
+    Returns:
+        (n, 6).
+    """
+    out = np.zeros((len(q), 6), dtype=bool)
+    if not targets.along.any():
+        return out
+    out[targets.along] = True
+    via = np.flatnonzero(targets.along & targets.via)
+    start = targets.pred[np.minimum(targets.pred_start[via], len(targets.pred) - 1)]
+    good = (np.diff(targets.pred_start)[via] == 1) & (start >= 0)
+    start, via = start[good], via[good]
+    tools = targets.tool[via]
+    poses = [arm.flange(q[at]) @ tools for at in (start, via, via + 1)]
+    rates = _tangents(*(pose[:, :3, 3] for pose in poses))
+    for k, (begin, at) in enumerate(((start, via), (via, via + 1))):
+        turn = OFF * lengths(_turn(poses[0], poses[k + 1]))
+        jacobian = arm.jacobian(q[at], tools[:, :3, 3])
+        made_up = _made_up(arm, jacobian, turn)
+        sign = np.sign(side[at])
+        way = (q[at] - q[begin]) @ arm.coupling.T * sign
+        last = _solved(jacobian, rates[k]) @ arm.coupling.T * sign * LAST
+        steady = (way > FARTHER * made_up) & (last > made_up + arm.play)
+        out[at] = ~(steady | (turn <= OFF * NO_TURN)[:, None])
+    return out
+
+
+def _made_up(arm: Arm, jacobian: Floats, turn: Floats) -> Floats:
+    """Return how far drives turn for turns of the tool about any axis, (k, 6) [rad]."""
+    axes = np.eye(6)[3:]
+    by_axis = [_solved(jacobian, np.tile(axis, (len(turn), 1))) for axis in axes]
+    found = np.linalg.norm(np.stack(by_axis) @ arm.coupling.T, axis=0)
+    return np.asarray(found * turn[:, None])
+
+
+def _tangents(start: Floats, via: Floats, end: Floats) -> list[Floats]:
+    """Return twists along arcs where they pass and end, as if all went on so, (k, 6).
+
+    Args:
+        start: Where arcs begin, (k, 3) [m].
+        via: The points on their way.
+        end: Where they end.
+    """
+    a, b = via - start, end - start
+    normal = np.cross(a, b)
+    square = np.maximum(np.einsum("kc,kc->k", normal, normal), 1e-30)[:, None]
+    to_centre = (
+        np.cross(normal, a) * np.einsum("kc,kc->k", b, b)[:, None]
+        - np.cross(normal, b) * np.einsum("kc,kc->k", a, a)[:, None]
+    ) / (2.0 * square)
+    centre = start + to_centre
+    unit = normal / np.sqrt(square)
+    found = []
+    for at in (via, end):
+        first, last = start - centre, end - centre
+        sine = np.einsum("kc,kc->k", np.cross(first, last), unit)
+        angle = np.arctan2(sine, np.einsum("kc,kc->k", first, last))
+        angle = np.where(angle <= 0.0, angle + 2.0 * np.pi, angle)
+        along = np.cross(unit, at - centre) * angle[:, None]
+        found.append(np.hstack([along, np.zeros_like(along)]))
+    return found
+
+
 def arrivals_on_curves(
     arm: Arm, targets: Targets, q: Floats, found: Arrivals
 ) -> Arrivals:
     """Take back the sides of joints that may have turned before they arrived."""
     unsure = turns_unsure(arm, targets, q)
+    unsure |= turns_at_unknown_blends(arm, targets, q, found.side)
+    unsure |= turns_on_arcs(arm, targets, q, found.side)
     if not unsure.any():
         return found
     side, direction = np.array(found.side), np.array(found.direction)
@@ -79,6 +243,8 @@ def arrivals_on_curves(
 def sides_on_curves(arm: Arm, targets: Targets, q: Floats, found: Sides) -> Sides:
     """Do as `arrivals_on_curves` with sides alone."""
     unsure = turns_unsure(arm, targets, q)
+    unsure |= turns_at_unknown_blends(arm, targets, q, found.side)
+    unsure |= turns_on_arcs(arm, targets, q, found.side)
     if not unsure.any():
         return found
     return replace(found, side=np.where(unsure, 0.0, found.side))

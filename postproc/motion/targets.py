@@ -18,6 +18,7 @@ class Fly(IntEnum):
     FROM = 1  # the zone begins at a distance (FLY_CART with FLY_FROM or nothing said)
     WITHIN = 2  # the path passes within a distance (FLY_TOL)
     EXACT = 3  # the path passes through the point (FLY_PASS, negative $FLY_DIST)
+    UNKNOWN = 4  # the arm stops there, or passes it in a way that is not known
 
 
 class TargetKind(IntEnum):
@@ -66,6 +67,8 @@ class Targets:
         wrist_joint: The wrist axes are interpolated instead of the orientation, (n,).
         block: Equal for the points of one curve, (n,), -1 beside curves.
         curved: The way to it is bent so that a curve goes on smoothly, (n,).
+        along: The tool turns on the way in a way that is not known, as along an arc,
+            (n,).
         pred_start: Predecessors of move v are pred[pred_start[v] : pred_start[v + 1]].
         pred: Predecessors; negative for a place that is not known.
     """
@@ -90,6 +93,7 @@ class Targets:
     wrist_joint: Bools
     block: Ints
     curved: Bools
+    along: Bools
     pred_start: Ints
     pred: Ints
 
@@ -186,6 +190,7 @@ def make_targets(
         "wrist_joint": np.zeros(n, dtype=bool),
         "block": np.full(n, -1),
         "curved": np.zeros(n, dtype=bool),
+        "along": np.zeros(n, dtype=bool),
         "pred_start": np.arange(n + 1),
         "pred": np.arange(n) - 1,
     }

@@ -125,6 +125,19 @@ def test_auxiliary_axes(cell: Cell) -> None:
     assert reasons[0] == reasons[3] == ""
 
 
+@pytest.mark.parametrize(
+    ("column", "value", "why"),
+    [(1, 0.0, ""), (1, -0.0, ""), (1, 1e-3, "track"), (2, 0.0, "[aux]")],
+)
+def test_an_arm_on_a_track_that_is_at_0(cell: Cell, column, value, why) -> None:
+    aux = np.full((1, 3), np.nan)
+    aux[0, column] = value
+    given = visits([Meaning.POSE], [POSE], aux=aux)
+    targets, reasons = targets_from_visits(given, cell)
+    assert (why in reasons[0]) if why else (reasons[0] == "")
+    assert (targets.kind[0] == TargetKind.POSE) == (why == "")
+
+
 def test_a_remote_tool_is_not_guessed(cell: Cell) -> None:
     given = visits([Meaning.POSE], [POSE], tool_remote=np.array([True]))
     targets, reasons = targets_from_visits(given, cell)

@@ -29,13 +29,7 @@ from postproc.language.krl.syntax import SplineBlock
 from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
 from postproc.robot.trajectory import Motion
 
-UNKNOWN_ZONE = -1.0
 STOP, PASS, MAYBE = "stop", "pass", "maybe"
-_MAYBE = (
-    "whether it is passed or the arm stops there is not known: what comes behind may "
-    "stop what is planned ahead"
-)
-_UNSIZED = "how early it is blended ($APO) is not known here"
 _IPO = "$IPO_MODE is not known here"
 _STATUS = "bit 2 of S and bit 4 of T disagree, otherwise than at the other points"
 _STILL_TOOL = "$ORI_TYPE = #CONSTANT: the tool keeps the orientation it comes with"
@@ -89,12 +83,15 @@ def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, str]:
 
 @dataclass(frozen=True)
 class _Blending:
-    """How a point is passed: size of the zone [mm], overlap [%], what is not known."""
+    """How a point is passed: see `Conditions`."""
 
     zone_mm: float = math.nan
     overlap: float = math.nan
-    why: str = ""
     exact: bool = False
+    unsized: bool = False
+
+
+_UNSIZED = _Blending(unsized=True)
 
 
 def _conditions(
@@ -115,7 +112,7 @@ def _conditions(
     if v.goal.target != Meaning.JOINTS:
         given += (modes.base.why, "" if modes.interpolation else _IPO)
         given += (_swapped(modes),)
-    given += (_STATUS if odd else "", blending.why)
+    given += (_STATUS if odd else "",)
     given += (NO_LOAD if modes.load == LOST_LOAD else "",)
     return Conditions(
         tool=modes.tool.pose,
@@ -133,6 +130,7 @@ def _conditions(
         override=modes.share if joint else 1.0,
         overlap=blending.overlap,
         exact=blending.exact,
+        unsized=blending.unsized,
         load=_load(modes),
     )
 
@@ -164,16 +162,16 @@ def _blending(v: KrlVisit, modes: KrlModes, end: str) -> _Blending:
     if v.via or not v.blends or end == STOP or modes.ahead is False:
         return _Blending()
     if end == MAYBE or modes.ahead is None:
-        return _Blending(zone_mm=UNKNOWN_ZONE, why=_MAYBE)
+        return _UNSIZED
     words = v.move.words
     by_share = "c_ptp" in words and "c_dis" not in words
     if by_share:
         if modes.overlap == UNKNOWN:
-            return _Blending(zone_mm=UNKNOWN_ZONE, why=_UNSIZED)
+            return _UNSIZED
         return _Blending(overlap=modes.overlap)
     by_distance = "c_dis" in words or "c_spl" in words
     if not by_distance or modes.distance == UNKNOWN:
-        return _Blending(zone_mm=UNKNOWN_ZONE, why=_UNSIZED)
+        return _UNSIZED
     return _Blending(zone_mm=modes.distance)
 
 

@@ -10,6 +10,7 @@ from postproc.language.rapid.dialect import COMMENTS, RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.modes import NO_SHIFT, UNKNOWN_SHIFT
 from postproc.language.rapid.moves import (
+    UNKNOWN_ZONE,
     FrameOfMove,
     RapidVisit,
     pose_of_numbers,
@@ -56,6 +57,7 @@ def _conditions(v: RapidVisit, base: Pose, uframe: Pose) -> Conditions:
         flagged=v.goal.target == Meaning.POSE,
         law=v.modes.arc_law if v.motion == Motion.CIRCULAR else v.modes.law,
         zone_mm=v.zone_mm,
+        unsized=v.zone_mm == UNKNOWN_ZONE,
         speed=v.speed,
         wrist=bool(v.modes.wrist) and not joint,
         override=v.modes.override,

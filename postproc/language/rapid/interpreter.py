@@ -46,7 +46,12 @@ from postproc.language.rapid.signatures import (
     STILL_FUNCTIONS,
     known_instructions,
 )
-from postproc.language.rapid.task import RapidTask, functions_in, inside
+from postproc.language.rapid.task import (
+    RapidTask,
+    functions_in,
+    inside,
+    parameters_of,
+)
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
@@ -79,6 +84,7 @@ class RapidMachine(TaskMachine):
     restarts: list[Arrived] = field(default_factory=list)
     _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
     _exits: dict[CallContext, tuple[ErrorExit, ...]] = field(default_factory=dict)
+    _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
     _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
     _direct: dict[tuple[int, int], tuple[bool, list[_Place]]] = field(
         default_factory=dict
@@ -154,6 +160,43 @@ class RapidMachine(TaskMachine):
         """Return where the statements of a routine stand."""
         return self.task.scope_of(file, module, routine)
 
+    def called_with(
+        self, scope: Scope, routine: HeadedRows, caller: CallContext, row: int
+    ) -> Scope:
+        """Add what a routine is called with, see `TaskMachine.called_with`.
+
+        One that calls itself has other values the next time.
+        """
+        call = inside(self.texts[caller.scope.file].statement(row))
+        known = isinstance(call, said.Instruction) and call.name == routine.head.name
+        if not known or self._is_recursive(scope.file, routine):
+            return scope
+        assert isinstance(call, said.Instruction)
+        return self.task.bound(scope, routine, call, row, caller.scope)
+
+    def _is_recursive(self, file: int, routine: HeadedRows) -> bool:
+        """Return True if a routine has parameters and may come to call itself."""
+        key = file, routine.first
+        if key not in self._recursive:
+            found = bool(parameters_of(routine)) and key in self._reached_from(key)
+            self._recursive[key] = found
+        return self._recursive[key]
+
+    def _reached_from(self, routine: tuple[int, int]) -> set[tuple[int, int]]:
+        """Return the routines that one may call, and those that they may call."""
+        last = {
+            (at, r.first): r.last for at, rs in self._by_file.items() for _, _, r in rs
+        }
+        waiting, seen = [routine], set[tuple[int, int]]()
+        while waiting:
+            file, first = waiting.pop()
+            for row in range(first + 1, last[file, first]):
+                for at, one in self.calls_of(file, self.texts[file].statement(row)):
+                    if (at, one.first) not in seen:
+                        seen.add((at, one.first))
+                        waiting.append((at, one.first))
+        return seen
+
     def handles(self, one: said.RapidStatement) -> bool:
         """Tell whether a handler begins, see `TaskMachine.handles`."""
         return isinstance(one, said.ErrorHandler) or (
@@ -181,7 +224,8 @@ class RapidMachine(TaskMachine):
         """Read the error handlers of a routine once."""
         key = context.scope.file, context.routine.first
         if key not in self._handlers:
-            scope, text = context.scope, self.texts[context.scope.file]
+            scope = replace(context.scope, given=(), loops=())
+            text = self.texts[scope.file]
 
             def read(operand: said.Operand | None, row: int) -> str:
                 return key_of(operand, self.task.number(operand, row, scope))
@@ -307,9 +351,38 @@ class RapidMachine(TaskMachine):
         place = next(around, None)
         signature = MOTIONS.get(getattr(one, "name", ""))
         if place and signature and isinstance(one, said.Instruction):
-            scope = self.task.scope_of(*place)
-            for visit in self.goals.visits(one, signature, row, scope, AT_START):
-                yield visit.goal
+            for scope in self._scopes_of(place):
+                for visit in self.goals.visits(one, signature, row, scope, AT_START):
+                    yield visit.goal
+
+    def _scopes_of(
+        self, place: _Place, seen: frozenset[tuple[int, int]] = frozenset()
+    ) -> Iterator[Scope]:
+        """Yield where the statements of a routine stand, by all calls of it."""
+        file, module, routine = place
+        scope = self.task.scope_of(file, module, routine)
+        yield scope
+        if not parameters_of(routine) or (file, routine.first) in seen:
+            return
+        seen = seen | {(file, routine.first)}
+        for caller, row, call in self._calls_by_name[routine.head.name]:
+            for there in self._scopes_of(caller, seen):
+                yield self.task.bound(scope, routine, call, row, there)
+
+    @cached_property
+    def _calls_by_name(
+        self,
+    ) -> Mapping[str, list[tuple[_Place, int, said.Instruction]]]:
+        """Return all calls of routines of the task, and where they stand."""
+        found = defaultdict[str, list[tuple[_Place, int, said.Instruction]]](list)
+        for places in self._by_file.values():
+            for place in places:
+                file, _, routine = place
+                for row in range(routine.first + 1, routine.last):
+                    one = inside(self.texts[file].statement(row))
+                    if isinstance(one, said.Instruction):
+                        found[one.name].append((place, row, one))
+        return found
 
     @cached_property
     def _by_file(self) -> Mapping[int, list[tuple[int, str, HeadedRows]]]:
@@ -347,6 +420,8 @@ class RapidMachine(TaskMachine):
             return self._move(context, row, one, here)
         if found is not None:
             self.reached.add((scope.file, row))
+            if self._is_recursive(found[0], found[2]):
+                self.run_beside(found[0], found[2])
             return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
             self._run_named_beside(name)

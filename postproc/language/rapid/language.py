@@ -17,11 +17,11 @@ from postproc.language.interface import (
     Cloner,
     JobReading,
     Language,
-    NoClones,
     Start,
 )
 from postproc.language.outline import read_once
 from postproc.language.rapid.backup import mounted_arms, read_backup, system_modules
+from postproc.language.rapid.clones import RapidCloner
 from postproc.language.rapid.collect import visits_of
 from postproc.language.rapid.dialect import RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
@@ -35,7 +35,6 @@ from postproc.language.visits import never_reached
 # What the interpreter says of a statement where it is reached, knowing all modules.
 _SAID_AGAIN = ("unknown-instruction", "late-binding")
 _BEGIN = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|![^\r\n]*[\r\n])*(?:%%%|MODULE\s)", re.I)
-_NOT_CLONED = "points of RAPID are not cloned: give the move a point of its own"
 
 
 class Rapid(Language):
@@ -81,8 +80,8 @@ class Rapid(Language):
         return JobReading(texts, visits, tuple(sorted(found)), kept, missed)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
-        """Say that nothing is cloned."""
-        return NoClones(_NOT_CLONED)
+        """Parse the modules of a task to clone points in them."""
+        return RapidCloner.of(RapidTask([read_rapid(source) for source in sources]))
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]

@@ -27,7 +27,7 @@ from postproc.language.rapid.dialect import (
     rotation_from_quaternion,
 )
 from postproc.language.rapid.modes import EMPTY_HAND, Modes
-from postproc.language.rapid.signatures import Signature
+from postproc.language.rapid.signatures import POINT, Signature
 from postproc.language.rapid.targets import COUNTS
 from postproc.language.rapid.task import (
     SHIFTS,
@@ -135,8 +135,6 @@ class Goals:
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
         total, untold = self._total(one, row, scope)
         why = why or untold
-        if zone == UNKNOWN_ZONE:
-            why = why or "its zone is not known: no zonedata of the files at hand"
         if signature.via >= 0:
             goal = self.goal(ends[1], signature, row, scope)
             yield RapidVisit(
@@ -158,6 +156,7 @@ class Goals:
 
         ``load0`` and other loads up to a hundredth of a kilogram are no load.
         """
+        operand, row, scope = self.task.behind(operand, row, scope)
         if isinstance(operand, said.DataObject) and operand.name == "load0":
             if not operand.steps and "load0" not in self.task.declared:
                 return EMPTY_HAND
@@ -210,6 +209,7 @@ class Goals:
         scope: Scope,
     ) -> FoundGoal:
         """Read a destination."""
+        operand, row, scope = self.task.behind(operand, row, scope)
         match operand:
             case said.Composite() | said.DataObject():
                 return self._point(operand, signature.joints, row, scope)
@@ -350,11 +350,9 @@ class Goals:
         """Read Offs and RelTool: the point is moved along, the shift stays."""
         placed = [one.value for one in arguments if not one.name]
         turns = {one.name: one.value for one in arguments if one.name}
-        if len(placed) != 4 or not isinstance(
-            placed[0], said.DataObject | said.Composite
-        ):
+        if len(placed) != 4:
             return FoundGoal(Meaning.UNKNOWN, NOTHING, why=RUN_TIME)
-        base = self._point(placed[0], False, row, scope)
+        base = self.goal(placed[0], POINT, row, scope)
         shift = [self.task.number(one, row, scope) for one in placed[1:]]
         angles = [
             self.task.number(turns[axis], row, scope) if axis in turns else 0.0
@@ -363,14 +361,14 @@ class Goals:
         if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
             pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
             return FoundGoal(
-                Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
+                Meaning.UNKNOWN, NOTHING, base.file, follows=_from(base),
                 name=base.name, why=base.why or RUN_TIME, pins=pins,
             )  # fmt: skip
         values = _moved(np.array(base.values), name, shift, angles)
         turned = any(angles)
         pins = base.pins or (f"{name} turns it" if turned else "")
         return FoundGoal(
-            Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name, base.aux,
+            Meaning.POSE, values, base.file, NO_SLOTS, _from(base), base.name, base.aux,
             base.why, pins,
         )  # fmt: skip
 
@@ -392,7 +390,9 @@ class Goals:
         self, kind: str, operand: said.Operand, arguments: _Arguments
     ) -> FrameOfMove:
         """Read a tool or a work object, by name once for each place it may mean."""
-        scope = arguments.scope
+        found, row, scope = self.task.behind(operand, arguments.row, arguments.scope)
+        operand = operand if found is None else found
+        arguments = replace(arguments, row=row, scope=scope)
         if isinstance(operand, said.DataObject) and not operand.steps:
             if operand.name == f"{kind}0" and arguments.is_built_in(operand.name):
                 return FLANGE if kind == "tool" else WORLD
@@ -412,6 +412,11 @@ class Goals:
             why = f"{name} {self._untold(name, arguments.scope)}"
             return FrameOfMove((), kind == "tool", why)
         return replace(read, taught=self.task.is_taught(name, found))
+
+
+def _from(base: FoundGoal) -> tuple[int, ...]:
+    """Return where the numbers stand that a shifted point moves along with."""
+    return base.follows if base.slots[0] < 0 <= base.follows[0] else base.slots
 
 
 WORLD = FrameOfMove(IDENTITY, False)
@@ -448,9 +453,10 @@ class _Arguments:
         return found[0] if len(found) == 1 else None
 
     def _type(self, operand: said.Operand | None) -> str:
+        operand, _, scope = self.task.behind(operand, self.row, self.scope)
         if not isinstance(operand, said.DataObject):
             return ""
-        found = self.task.datum(operand.name, self.scope)
+        found = self.task.datum(operand.name, scope)
         if found is not None:
             return found[1].declared.type
         if operand.name == "tool0":
@@ -459,14 +465,20 @@ class _Arguments:
             return "zonedata"
         return "speeddata" if _SPEED.match(operand.name) else ""
 
+    def _named(self, type_: str) -> tuple[said.DataObject | None, _Arguments]:
+        """Return the only argument of a type, and the arguments where it stands."""
+        found = self.task.behind(self.of_type(type_), self.row, self.scope)
+        named = found[0] if isinstance(found[0], said.DataObject) else None
+        return named, replace(self, row=found[1], scope=found[2])
+
     def is_built_in(self, name: str) -> bool:
         """Tell whether a name is the controller's: no data, no parameter has it."""
         hidden = name in self.task.declared or name in self.scope.parameters
         return not hidden
 
     def _stops(self) -> bool:
-        operand = self.of_type("zonedata")
-        return isinstance(operand, said.DataObject) and operand.name == "fine"
+        operand, _ = self._named("zonedata")
+        return operand is not None and operand.name == "fine"
 
     def zone(self) -> float:
         """Return the size of the zone [mm], NaN for a stop, -1 where not known."""
@@ -478,15 +490,15 @@ class _Arguments:
                 return UNKNOWN_ZONE
             own = self.task.number(size, self.row, self.scope)
             return own if own >= 0.0 else UNKNOWN_ZONE
-        operand = self.of_type("zonedata")
-        if not isinstance(operand, said.DataObject):
+        operand, there = self._named("zonedata")
+        if operand is None:
             return UNKNOWN_ZONE
         if operand.name == "fine":
             return np.nan
         usual = _ZONE.match(operand.name)
-        if usual and self.is_built_in(operand.name):
+        if usual and there.is_built_in(operand.name):
             return float(usual[1]) or Z0
-        found = self.task.record(operand, self.row, self.scope)
+        found = self.task.record(operand, there.row, there.scope)
         if isinstance(found, tuple) and len(found) >= 2:
             stops, tcp = found[:2]
             if isinstance(stops, WrittenNumber) and isinstance(tcp, WrittenNumber):
@@ -498,13 +510,13 @@ class _Arguments:
         own = self.option("v")
         if own is not None:
             return self.task.number(own, self.row, self.scope) / 1000.0
-        operand = self.of_type("speeddata")
-        if not isinstance(operand, said.DataObject):
+        operand, there = self._named("speeddata")
+        if operand is None:
             return np.nan
         usual = _SPEED.match(operand.name)
-        if usual and self.is_built_in(operand.name):
+        if usual and there.is_built_in(operand.name):
             return float(usual[1]) / 1000.0
-        found = self.task.record(operand, self.row, self.scope)
+        found = self.task.record(operand, there.row, there.scope)
         if isinstance(found, tuple) and found and isinstance(found[0], WrittenNumber):
             return found[0].value / 1000.0
         return np.nan

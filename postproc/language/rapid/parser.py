@@ -25,6 +25,13 @@ class DimensionsPart(tuple[Any, ...]):
     """The dimensions of an array."""
 
 
+BY_REFERENCE = object()  # stands for VAR, PERS or INOUT before a parameter
+
+
+def _last_name(c: Children) -> str:
+    return [_low(x) for x in c if isinstance(x, Word)][-1]
+
+
 def _low(text: str) -> str:
     return str(text).lower()
 
@@ -108,9 +115,11 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "end": lambda c: said.BlockWord(_low(c[0])),
     "scope": lambda c: ScopePart(c[0]),
     "parameters": lambda c: tuple(c),
-    "parameter": lambda c: [_low(x) for x in c if isinstance(x, Word)][-1],
-    "optional": lambda c: [_low(x) for x in c if isinstance(x, Word)][-1],
-    "mode": lambda c: None,
+    "parameter": lambda c: said.RoutineParameter(
+        _last_name(c), any(x is BY_REFERENCE for x in c)
+    ),
+    "optional": lambda c: said.RoutineParameter(_last_name(c).lstrip("\\"), True, True),
+    "mode": lambda c: BY_REFERENCE,
     "open_dimensions": lambda c: None,
     "data": _data,
     "kind": lambda c: c[0],

@@ -21,12 +21,19 @@ class Signature:
         via: The point that an arc leads through, -1 where there is none.
         joints: The destination is a jointtarget.
         reaches: The move ends at its destination, not where a signal comes.
+        given: Data that the instruction writes where a search ends, -1 for none.
     """
 
     to: int = 0
     via: int = -1
     joints: bool = False
     reaches: bool = True
+    given: int = -1
+
+    def written(self, arguments: Sequence[Argument]) -> Operand | None:
+        """Return the data that the instruction writes, None where there are none."""
+        placed = [one.value for one in arguments if not one.name]
+        return placed[self.given] if 0 <= self.given < len(placed) else None
 
     def operands(self, arguments: Sequence[Argument]) -> tuple[Operand | None, ...]:
         """Return destination and via point, None where one is missing."""
@@ -38,8 +45,8 @@ class Signature:
 
 POINT, ARC = Signature(), Signature(to=1, via=0)
 JOINTS = Signature(joints=True)
-SEARCH = Signature(to=2, reaches=False)  # signal, where it came, destination
-ARC_SEARCH = Signature(to=3, via=2, reaches=False)
+SEARCH = Signature(to=2, reaches=False, given=1)  # signal, where it came, destination
+ARC_SEARCH = Signature(to=3, via=2, reaches=False, given=1)
 
 _KINDS: Mapping[Signature, str] = {
     POINT: """
@@ -59,7 +66,7 @@ _KINDS: Mapping[Signature, str] = {
     Signature(joints=True, reaches=False): "MoveExtJ ArcMoveExtJ",  # the arm stays
     SEARCH: "SearchL",
     ARC_SEARCH: "SearchC",
-    Signature(to=2, joints=True, reaches=False): "SearchExtJ",
+    Signature(to=2, joints=True, reaches=False, given=1): "SearchExtJ",
 }
 MOTIONS: Mapping[str, Signature] = {
     name.lower(): signature

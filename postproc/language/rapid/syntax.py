@@ -65,20 +65,36 @@ class ModuleHead(RapidStatement):
 
 
 @dataclass(frozen=True, slots=True)
+class RoutineParameter:
+    r"""A parameter of a routine.
+
+    Attributes:
+        name: Its name.
+        by_reference: ``VAR``, ``PERS`` or ``INOUT``: the routine may change what it is
+            called with; others are copies.
+        optional: ``\name``.
+    """
+
+    name: str
+    by_reference: bool = False
+    optional: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class RoutineHead(RapidStatement):
     """``PROC name(..)``, ``FUNC type name(..)``, ``TRAP name``.
 
     Attributes:
         kind: proc, func or trap.
         name: Its name.
-        parameters: Names of its parameters.
+        parameters: Its parameters.
         local: Only its module knows it.
         returns: The type of a function's value.
     """
 
     kind: str
     name: str
-    parameters: tuple[str, ...] = ()
+    parameters: tuple[RoutineParameter, ...] = ()
     local: bool = False
     returns: str = ""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from postproc.language.flow import HeadedRows
@@ -169,13 +169,54 @@ class RapidTask:
         for file in self.files:
             for statement in file.text.said:
                 uses.note(statement)
+        uses.pass_on()
         return frozenset(uses.written), frozenset(uses.read)
 
     def scope_of(self, number: int, module: str, routine: HeadedRows) -> Scope:
         """Return where the statements of a routine stand."""
-        head = routine.head
-        given = frozenset(getattr(head, "parameters", ()))
-        return Scope(number, module, head.name, given)
+        given = frozenset(one.name for one in parameters_of(routine))
+        return Scope(number, module, routine.head.name, given)
+
+    # What routines are called with.
+
+    def bound(
+        self, scope: Scope, routine: HeadedRows, call: said.Instruction,
+        row: int, there: Scope,
+    ) -> Scope:  # fmt: skip
+        """Add what a routine is called with to where its statements stand.
+
+        A parameter that something may change has no value that is known.
+
+        Args:
+            scope: Where the statements of the routine stand.
+            routine: The routine.
+            call: The call.
+            row: Its row.
+            there: Where it stands.
+        """
+        if BY_STRING & self.called:
+            return scope
+        pairs = matched(parameters_of(routine), call.arguments) or ()
+        given = tuple(
+            (parameter.name, argument.value, row, there)
+            for parameter, argument in pairs
+            if argument.value is not None and parameter.name not in self.written
+        )
+        return replace(scope, given=given)
+
+    def behind(
+        self, operand: said.Operand | None, row: int, here: Scope
+    ) -> tuple[said.Operand | None, int, Scope]:
+        """Return what stands behind a parameter, where that is known, and its place."""
+        while isinstance(operand, said.DataObject) and not operand.steps:
+            if operand.name in dict(here.loops):
+                break
+            found = (one for one in here.given if one[0] == operand.name)
+            given = next(found, None)
+            if given is None:
+                break
+            _, operand, row, here = given
+        return operand, row, here
 
     # Values.
 
@@ -192,6 +233,9 @@ class RapidTask:
                 loops = dict(here.loops)
                 if name in loops:
                     return loops[name]
+                other, at, there = self.behind(operand, row, here)
+                if other is not operand:
+                    return self.number(other, at, there)
                 found = self.constant(name, here)
                 if found is None:
                     return CONSTANTS.get(name, float("nan"))
@@ -212,6 +256,7 @@ class RapidTask:
         self, operand: said.Operand | None, row: int, here: Scope, depth: int = 0
     ) -> Nested | None:
         """Evaluate a record or array, None where it is not known."""
+        operand, row, here = self.behind(operand, row, here)
         match operand:
             case said.Composite(items=items):
                 parts = [self.record(one, row, here, depth) for one in items]
@@ -268,6 +313,26 @@ class RapidTask:
 DEEPEST = 20  # names that stand for names
 
 
+def parameters_of(routine: HeadedRows) -> tuple[said.RoutineParameter, ...]:
+    """Return the parameters of a routine."""
+    head = routine.head
+    return head.parameters if isinstance(head, said.RoutineHead) else ()
+
+
+def matched(
+    parameters: Sequence[said.RoutineParameter], arguments: Sequence[said.Argument]
+) -> list[tuple[said.RoutineParameter, said.Argument]] | None:
+    """Pair parameters with arguments; None where the call does not fit."""
+    placed = [one for one in arguments if not one.name]
+    required = [one for one in parameters if not one.optional]
+    optional = {one.name: one for one in parameters if one.optional}
+    named = [one for one in arguments if one.name]
+    if len(placed) != len(required) or any(a.name not in optional for a in named):
+        return None
+    pairs = [(optional[a.name], a) for a in named if not a.passed_on]
+    return [*zip(required, placed, strict=True), *pairs]
+
+
 def _computed(operator: str, parts: Sequence[float]) -> float:
     """Compute what an operator gives, NaN where that is no number."""
     match operator, parts:
@@ -294,12 +359,26 @@ class _NamesUsed:
     """Names that statements may change, and those that they take.
 
     Attributes:
-        own: Names of the routines of the task: what else has their names is hidden.
+        own: Routines of the task by name: what else has their names is hidden.
+        passed: Data and the parameter that they are given to, and whether the routine
+            may change them through it.
     """
 
-    own: Collection[str]
+    own: Mapping[str, Sequence[tuple[int, str, HeadedRows]]]
     written: set[str] = field(default_factory=set)
     read: set[str] = field(default_factory=set)
+    passed: set[tuple[str, str, bool]] = field(default_factory=set)
+
+    def pass_on(self) -> None:
+        """Note of data what is noted of the parameters that they are given to."""
+        before = -1
+        while before != len(self.written) + len(self.read):
+            before = len(self.written) + len(self.read)
+            for name, parameter, by_reference in self.passed:
+                if parameter in self.read | self.written:
+                    self.read.add(name)
+                if parameter in self.written and by_reference:
+                    self.written.add(name)
 
     def note(self, one: said.RapidStatement) -> None:
         """Note the names that a statement may change, and those that it takes."""
@@ -332,21 +411,51 @@ class _NamesUsed:
                 pass  # what it may change is said with it: nothing is known behind it
 
     def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
+        pairs = self._fitting(name, arguments)
+        if pairs is not None:
+            for parameter, argument in pairs:
+                self._give(parameter, argument.value)
+            return
         signature = None if name in self.own else MOTIONS.get(name)
         if signature is not None:
-            ends = signature.operands(arguments)
+            ends, given = signature.operands(arguments), signature.written(arguments)
             for argument in arguments:
                 if any(argument.value is end for end in ends):
                     self._destination(argument.value)
-                elif signature.reaches:
-                    self._operand(argument.value)
-                else:
+                elif argument.value is given:
                     self._arguments([argument])
+                else:
+                    self._operand(argument.value)
         elif name in READING and name not in self.own:
             for argument in arguments:
                 self._operand(argument.value)
         else:
             self._arguments(arguments)
+
+    def _fitting(
+        self, name: str, arguments: Sequence[said.Argument]
+    ) -> list[tuple[said.RoutineParameter, said.Argument]] | None:
+        """Pair the arguments of a call of the only routine of a name, else None.
+
+        A local one need not be what is called.
+        """
+        found = self.own.get(name, ())
+        if len(found) != 1 or any(one.passed_on for one in arguments):
+            return None
+        if getattr(found[0][2].head, "local", False):
+            return None
+        return matched(parameters_of(found[0][2]), arguments)
+
+    def _give(
+        self, parameter: said.RoutineParameter, operand: said.Operand | None
+    ) -> None:
+        """Note what a routine of the task is called with."""
+        if isinstance(operand, said.DataObject):
+            by_reference = parameter.by_reference
+            self.passed.add((operand.name, parameter.name, by_reference))
+            self._steps(operand.steps)
+        else:
+            self._operand(operand)
 
     def _destination(self, operand: said.Operand | None) -> None:
         """Note what the destination of a move takes besides the point itself."""
@@ -356,10 +465,9 @@ class _NamesUsed:
             case said.FunctionCall(name=name, arguments=arguments) if (
                 name in SHIFTS and name not in self.own
             ):
-                if arguments and isinstance(arguments[0].value, said.DataObject):
-                    self._steps(arguments[0].value.steps)
-                    arguments = arguments[1:]
-                for argument in arguments:
+                if arguments:  # the point that is shifted
+                    self._destination(arguments[0].value)
+                for argument in arguments[1:]:
                     self._operand(argument.value)
             case _:
                 self._operand(operand)

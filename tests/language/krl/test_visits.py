@@ -194,7 +194,6 @@ def test_the_cell_says_what_holds_at_first():
         (["SPLINE", "SPTP XP1", "ENDSPLINE"], "spline of joint"),
         (["SPL XP1"], "spline of joint"),
         (["$ORI_TYPE=#CONSTANT", "LIN XP1"], "#CONSTANT"),
-        (["LIN XP1 C_DIS", "LIN XP2"], "$APO"),
         (["LIN XCONF"], ""),
     ],
 )  # fmt: skip
@@ -250,7 +249,7 @@ def test_blending_of_inline_settings():
     assert found.visits.zone_mm[:2].tolist() == [12.5, 50.0]
     assert reasons(found) == [""] * 3
     lost = job(f"SPTP XP2 WITH {joint} C_SPL", "SLIN XP1", "PPDAT1.APO_DIST=3")
-    assert "$APO" in reasons(lost)[0]
+    assert reasons(lost) == ["", ""] and lost.visits.zone_rule[0] == ZoneRule.UNKNOWN
 
 
 @pytest.mark.parametrize(
@@ -271,9 +270,17 @@ def test_blending_of_inline_settings():
 def test_what_stops_the_advance_run_ends_blending(between, fly):
     found = job("$APO.CDIS=5", "LIN XP1 C_DIS", between, "LIN XP2")
     if fly is None:
-        assert "ahead" in reasons(found)[0]
+        assert reasons(found) == ["", ""]
+        assert found.visits.zone_rule.tolist() == [ZoneRule.UNKNOWN, ZoneRule.UNSET]
     else:
         assert reasons(found) == ["", ""] and found.visits.fly.tolist() == [fly, False]
+
+
+@pytest.mark.parametrize("word", ["LIN XP1 C_DIS", "PTP XP1 C_PTP", "SLIN XP1 C_SPL"])
+def test_a_distance_of_blending_that_is_not_known(word):
+    found = job(word, "SLIN XP2" if "S" in word[0] else "LIN XP2")
+    assert reasons(found) == ["", ""] and found.visits.fly.tolist() == [True, False]
+    assert found.visits.zone_rule[0] == ZoneRule.UNKNOWN
 
 
 def test_planners_do_not_blend_into_each_other():

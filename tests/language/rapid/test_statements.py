@@ -73,6 +73,7 @@ def one(text):
     return found.statement(0)
 
 
+given = said.RoutineParameter
 X, P10 = said.DataObject("x"), said.DataObject("p10")
 
 
@@ -82,11 +83,15 @@ X, P10 = said.DataObject("x"), said.DataObject("p10")
         ("MODULE Main(SYSMODULE, NOSTEPIN)",
          said.ModuleHead("main", ("sysmodule", "nostepin"))),
         ("LOCAL PROC weld1(num a, \\switch b | INOUT robtarget p{*}, \\VAR num c)",
-         said.RoutineHead("proc", "weld1", ("a", "b", "p", "c"), True)),
+         said.RoutineHead("proc", "weld1", (
+             given("a"), given("b", True, True),
+             given("p", True), given("c", True, True)), True)),
         ("PROC weld(num a\\switch b|switch c,\\num d{*,*})",
-         said.RoutineHead("proc", "weld", ("a", "b", "c", "d"))),
+         said.RoutineHead("proc", "weld", (
+             given("a"), given("b", True, True),
+             given("c"), given("d", True, True)))),
         ("FUNC robtarget near2(robtarget p)",
-         said.RoutineHead("func", "near2", ("p",), False, "robtarget")),
+         said.RoutineHead("func", "near2", (given("p"),), False, "robtarget")),
         ("TRAP t_stop", said.RoutineHead("trap", "t_stop")),
         ("LOCAL RECORD seam", said.RecordHead("seam")),
         ("EndProc", said.BlockWord("endproc")),

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.language.visits import ELSEWHERE, START, OrientationLaw, Switch
+from postproc.language.visits import (
+    ELSEWHERE,
+    START,
+    Meaning,
+    OrientationLaw,
+    Switch,
+)
 from tests.language.rapid.test_visits import END, L, names, once, origins, reasons, task
 
 MORE = (
@@ -42,6 +48,42 @@ def test_a_routine_that_calls_itself_begins_with_what_holds_there(again):
 
 def test_main_may_call_itself():
     assert reached(once(P1, P2, "main;"), "p1") == [[START, 1]]
+
+
+# Searches write where they end, and nothing else.
+
+FOUND = "VAR robtarget found:=[[7,8,9],[1,0,0,0]," + END + "; VAR bool hit;\n"
+SEARCHES = {
+    "line": r"SearchL\Stop,di1,{0},p1,v9,t\WObj:=w;",
+    "arc": r"SearchC\Stop,di1,{0},p2,p1,v9,t\WObj:=w;",
+    "by a flag": r"SearchL\PStop,hit,{0},p1,v9,t\WObj:=w;",
+    "behind a condition": r"IF hit SearchL di1,{0},p1,v9,t\WObj:=w;",
+    "an element": r"SearchL di1,list{{2}},p1,v9,t\WObj:=w;",
+    "external axes": r"SearchExtJ di1,{0},j,v9;",
+}
+
+
+@pytest.mark.parametrize("search", SEARCHES)
+def test_what_a_search_writes_is_not_known(search):
+    written = "list{2}" if search == "an element" else "found"
+    line = SEARCHES[search].format("found")
+    why = reasons(once(P2, line, L.format(written), more=MORE + FOUND))
+    assert why[0] == "" and "may be changed" in why[-1]
+
+
+@pytest.mark.parametrize("search", ["line", "arc", "by a flag"])
+def test_a_search_leaves_its_tool_and_its_other_points(search):
+    found = once(SEARCHES[search].format("found"), P2, more=MORE + FOUND)
+    (before,) = origins(found)[-1]
+    assert reasons(found)[-1] == ""
+    assert found.visits.target[before] == Meaning.UNKNOWN  # it ends anywhere
+
+
+def test_a_routine_that_is_named_like_a_search_may_write_all():
+    own = routine("SearchL", "x:=t2;", given="(INOUT tooldata x)")
+    load = "[1,[0,0,1],[1,0,0,0],0,0,0]"
+    more = f"{MORE}{own}PERS tooldata t2:=[TRUE,[[0,0,9],[1,0,0,0]],{load}];\n"
+    assert "may be changed" in reasons(once("SearchL t;", P1, more=more))[0]
 
 
 # Names of instructions and functions that the task takes for its own.

@@ -15,7 +15,13 @@ from postproc.language.rapid.dialect import (
 )
 from postproc.language.rapid.language import Rapid
 from postproc.language.source import Source
-from postproc.language.visits import ELSEWHERE, START, Meaning, OrientationLaw
+from postproc.language.visits import (
+    ELSEWHERE,
+    START,
+    Meaning,
+    OrientationLaw,
+    ZoneRule,
+)
 
 END = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
 DATA = f"""
@@ -90,14 +96,12 @@ def test_frames_zone_and_speed_of_a_move():
         (["other;", L.format("p1")], "displacement"),
         (["MoveL p1,v200,fine,unknown\\WObj:=w;"], "tool"),
         (["MoveL p1,v200,fine,t\\WObj:=nowhere;"], "nowhere"),
-        (["MoveL p1,v200,odd,t\\WObj:=w;"], "zone"),
         (["MoveL p1\\ID:=10,v200,fine,t\\WObj:=w;"], "another arm"),
         (["SearchL di1,p2,p1,v20,t\\WObj:=w;"], "search"),
         (["MoveExtJ j,v5,fine;"], "external axes"),
         (["MoveL p1,v200,fine,t\\WObj:=w\\Corr;"], "sensor"),
         (["MoveL p1,v200,fine,t\\WObj:=w\\TLoad:=part;"], "TLoad"),
         (["ArcL p1,v200,sm,wd,fine,t\\WObj:=w\\Track:=tr;"], "sensor"),
-        (["MoveL p1,v200,fine\\Z:=5,t\\WObj:=w;"], "zone"),
         ([L.format("nobody")], "nobody"),
         (["p3.trans.x:=5;", L.format("p3")], "may be changed"),
         ([L.format("list{n}")], "run"),
@@ -116,12 +120,23 @@ def test_what_is_not_known_is_left(lines, why):
     assert why in reasons(found)[-1]
 
 
+@pytest.mark.parametrize("zone", ["odd", "fine\\Z:=5", "z10\\Z:=n"])
+def test_a_zone_that_is_not_known(zone):
+    found = once(f"MoveL p1,v200,{zone},t\\WObj:=w;", L.format("p2"))
+    assert reasons(found) == ["", ""] and found.visits.fly.tolist() == [True, False]
+    assert found.visits.zone_rule[0] == ZoneRule.UNKNOWN
+
+
 @pytest.mark.parametrize("name", ["z10", "tool0"])
 def test_a_parameter_hides_what_the_controller_knows(name):
     type_ = "zonedata" if name == "z10" else "PERS tooldata"
     zone, tool = (name, "t") if name == "z10" else ("fine", name)
     more = f"PROC go({type_} {name}) MoveL p1,v200,{zone},{tool}; ENDPROC"
-    assert reasons(task("go fine;", more=more)) != [""]
+    found = task("go fine;", more=more)
+    if name == "z10":
+        assert found.visits.zone_mm.tolist() != [10.0]
+    else:
+        assert reasons(found) != [""]
 
 
 @pytest.mark.parametrize(
