@@ -10,6 +10,7 @@ from postproc.calibration.diagnosis.jumps import jumps
 from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.trace import trace
 from postproc.calibration.regression import Fit
+from postproc.model.carrier import every_carrier
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
 from tests.calibration.planted import campaign
@@ -37,8 +38,18 @@ def test_a_step_back_and_forth_is_no_jump_of_the_temperature(base: Fit) -> None:
     assert not jumps(ToolShift(100.0), Projection.of(mixed))
 
 
-def test_only_parts_that_the_step_moves_jump(base: Fit) -> None:
+def test_any_part_may_jump_at_what_varies_smoothly(base: Fit) -> None:
     found = jumps(ToolShift(100.0), Projection.of(base))
-    assert found
-    assert {str(s.family.along).split()[0] for s in found} == {"tool"}
+    moved = {s.family.along or f"joint {s.family.joint}" for s in found}
+    assert moved == set(map(str, every_carrier()))
     assert {s.best.source for s in found} == {"temperature"}
+
+
+def test_one_jump_comes_before_steps_of_two_joints() -> None:
+    bends = campaign(50178, ("rotation:link4:y by temperature sign",), 2.0, rows=240)
+    (finding,) = trace(bends.base_fit(), seed=0).findings
+    assert str(finding.family) == "link 4 turn y by temperature"
+
+
+def test_what_is_no_step_does_not_jump(base: Fit) -> None:
+    assert not jumps(base.combination.effects[0], Projection.of(base))
