@@ -22,7 +22,6 @@ from postproc.cli.common import (
     write_text,
 )
 from postproc.compensation.options import AS_USUAL
-from postproc.exceptions import PostprocError
 from postproc.files import check_places
 
 if TYPE_CHECKING:
@@ -206,7 +205,7 @@ def _second_opinion(
     Raises:
         PostprocError: Somebody asked for it, and it cannot be given.
     """
-    from postproc.verify.extra import INSTALL, broken, missing
+    from postproc.verify.extra import INSTALL, broken, load, missing
 
     if asked is False:
         return None
@@ -217,18 +216,16 @@ def _second_opinion(
     if not asked and plan is None and None in (cell, model):
         say("no second opinion: it takes --cell and --model, or --plan")
         return None
+    if asked:
+        load()
+    elif problem := broken():
+        say(problem)
+        return None
     from postproc.batch.plan import make_plan
     from postproc.batch.second_opinion import judge_tree
 
     own = (None, None) if cell is None and plan is not None else (cell, model)
-    made = make_plan(plan, *own, AS_USUAL)
-    try:
-        return judge_tree(folder, made)
-    except ImportError as exc:
-        if asked:
-            raise PostprocError(broken(exc)) from None
-        say(broken(exc))
-        return None
+    return judge_tree(folder, make_plan(plan, *own, AS_USUAL))
 
 
 def _print_opinion(judged: TreeOpinion) -> None:

@@ -89,7 +89,7 @@ def compensate(
     from postproc.compensation import parallel
     from postproc.compensation.options import Options
     from postproc.report.json import report_text
-    from postproc.verify.extra import libraries, require
+    from postproc.verify.extra import load
 
     given = None if is_stream(program) else Path(program)
     with explained(given, lsv):
@@ -113,13 +113,12 @@ def compensate(
         if lsv_out is not None:
             _check_values(lsv_out, job)
         if job.wants_opinion:
-            require()
+            load()
         crowd = processes or min(parallel.available(), CROWD)
         with stages() as progress:
             outcome = job.run(options, progress, crowd)
             if job.wants_opinion:
-                with libraries():
-                    outcome = job.judged(outcome, options)
+                outcome = job.judged(outcome, options)
         if strict and outcome.exit_code:
             _print_outcome(outcome)
             raise PostprocError(
