@@ -117,7 +117,7 @@ def judge_positions(
     off = np.abs(at.singular - claim.singular)
     rows.append(compare(f"{named}: singular value", "", SINGULAR, claim, off, late))
     what = f"{named}: gravity torque"
-    if not len(claim.torque):
+    if len(claim.torque) < len(claim):
         lost = {NO_LINKS: len(claim)}
         rows.append(worst_of(what, "N m", TORQUE, claim, [], lost))
     else:
