@@ -25,6 +25,7 @@ NO_LAW = "a way or a time law is not there"
 UNSAID = "the planner has no time law"
 NOT_TOLD = "not known to the planner"
 NO_WAY = "the way there was not made"
+NOT_DRAWN = "not drawn, or the time was up"
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def compare_times(
     moves = [(abs(p.ours - p.theirs), p.last) for p in kinds["moves"]]
     shares = [(p.apart, p.last) for p in kinds["runs"]]
     outside = [(p.outside, p.last) for p in kinds["fly"]]
-    lost = _lost(claim, found)
+    lost = _lost(claim, ways, found)
     named = claim.label
     return [
         worst_of(f"{named}: time of JOINT moves", "s", MOVE_S, claim, moves, {}),
@@ -145,13 +146,16 @@ def _passage(
     return Passage(tuple(chain), float(ours), theirs, least)
 
 
-def _lost(claim: Claim, found: Sequence[Passage]) -> dict[str, int]:
+def _lost(
+    claim: Claim, ways: Mapping[int, MadeWay], found: Sequence[Passage]
+) -> dict[str, int]:
     """Count stops whose passage is not compared, and why."""
     v = claim.visits
     stops = set(np.flatnonzero(~(v.fly | v.via)).tolist()) - {p.last for p in found}
-    unsaid = sum(bool(np.isnan(claim.time[i])) for i in stops)
-    counted = Counter({UNSAID: unsaid, NO_LAW: len(stops) - unsaid})
-    return dict(+counted)
+    return dict(Counter(
+        UNSAID if np.isnan(claim.time[i]) else NO_LAW if i in ways else NOT_DRAWN
+        for i in sorted(stops)
+    ))  # fmt: skip
 
 
 def compare_limits(
