@@ -149,7 +149,8 @@ def _goes_on(claim: Claim, ways: Mapping[int, MadeWay], last: int, i: int) -> bo
     v = claim.visits
     passing = bool(v.fly[last] or v.via[last]) and v.before[i] == last
     in_space = v.motion[last] != Motion.JOINT and v.motion[i] != Motion.JOINT
-    return passing and bool(in_space) and _bend(ways[last].q, ways[i].q) < BENT
+    smooth = bool(v.via[last]) or _bend(ways[last].q, ways[i].q) < BENT
+    return passing and bool(in_space) and smooth
 
 
 def _bend(before: Floats, behind: Floats) -> float:
