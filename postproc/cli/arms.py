@@ -92,9 +92,9 @@ def from_urdf(
         if arm is not None and not verify:
             raise PostprocError("--arm: it is compared alone. Add --verify")
         if verify:
-            from postproc.verify.extra import require
+            from postproc.verify.extra import load
 
-            require()
+            load()
         chain = read_chain(urdf, base, tip)
         for assumed in (*chain.rounded, *chain.endless):
             say(f"{urdf}: {assumed}")
@@ -128,7 +128,6 @@ def _verified(chain: UrdfChain, text: str | None, arm: str | None) -> bool:
     """
     from postproc.report.second_opinion import print_opinion
     from postproc.robot.arm import arm_of_text, load_arm
-    from postproc.verify.extra import libraries
     from postproc.verify.urdf import ArmClaim, UrdfChainNames, judge_urdf
 
     ours = load_arm(arm or "") if text is None else arm_of_text(chain.path, text)
@@ -136,8 +135,7 @@ def _verified(chain: UrdfChain, text: str | None, arm: str | None) -> bool:
     stated = chain.path.read_text("utf-8", "replace")
     theirs = UrdfChainNames(stated, chain.base, chain.tip, names)
     claim = ArmClaim(ours.file, ours.flange, ours.gravity_torque)
-    with libraries():
-        opinion = judge_urdf(ours.name, theirs, claim)
+    opinion = judge_urdf(ours.name, theirs, claim)
     print_opinion(opinion)
     return opinion.agrees
 

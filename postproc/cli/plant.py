@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,8 +24,7 @@ from postproc.cli.common import (
     write_text,
 )
 from postproc.compensation.options import AS_USUAL
-from postproc.exceptions import PostprocError
-from postproc.files import check_places
+from postproc.files import check_places, is_program
 
 if TYPE_CHECKING:
     from postproc.batch.check import Current
@@ -192,7 +193,10 @@ def check(
         if judged is not None:
             _print_opinion(judged)
         say(f"{folder}: {found.programs} programs, {len(found.findings)} findings")
-    raise typer.Exit(max(found.exit_code, 0 if judged is None else judged.exit_code))
+    code = max(found.exit_code, 0 if judged is None else judged.exit_code)
+    if second_opinion and judged is not None and judged.skipped:
+        code = code or 2  # what was asked for could not be given
+    raise typer.Exit(code)
 
 
 Places = tuple[Path | None, Path | None, Path | None]  # of cell, model, plan
@@ -206,7 +210,7 @@ def _second_opinion(
     Raises:
         PostprocError: Somebody asked for it, and it cannot be given.
     """
-    from postproc.verify.extra import INSTALL, broken, missing
+    from postproc.verify.extra import INSTALL, broken, load, missing
 
     if asked is False:
         return None
@@ -217,18 +221,27 @@ def _second_opinion(
     if not asked and plan is None and None in (cell, model):
         say("no second opinion: it takes --cell and --model, or --plan")
         return None
+    if asked:
+        load()
+    elif problem := broken():
+        say(problem)
+        return None
     from postproc.batch.plan import make_plan
     from postproc.batch.second_opinion import judge_tree
 
     own = (None, None) if cell is None and plan is not None else (cell, model)
     made = make_plan(plan, *own, AS_USUAL)
-    try:
-        return judge_tree(folder, made)
-    except ImportError as exc:
-        if asked:
-            raise PostprocError(broken(exc)) from None
-        say(broken(exc))
-        return None
+    judged = judge_tree(folder, made)
+    return replace(judged, skipped=(*judged.skipped, *_without_rule(folder, made)))
+
+
+def _without_rule(folder: Path, plan: BatchPlan) -> Iterator[tuple[str, str]]:
+    """Yield programs of a tree that the plan leaves out, and why."""
+    from postproc.batch.tree import scan
+
+    for place, why in sorted(scan(folder, plan).refused.items()):
+        if is_program(place):
+            yield place, why
 
 
 def _print_opinion(judged: TreeOpinion) -> None:

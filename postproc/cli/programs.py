@@ -89,7 +89,7 @@ def compensate(
     from postproc.compensation import parallel
     from postproc.compensation.options import Options
     from postproc.report.json import report_text
-    from postproc.verify.extra import libraries, require
+    from postproc.verify.extra import load
 
     given = None if is_stream(program) else Path(program)
     with explained(given, lsv):
@@ -113,19 +113,15 @@ def compensate(
         if lsv_out is not None:
             _check_values(lsv_out, job)
         if job.wants_opinion:
-            require()
+            load()
         crowd = processes or min(parallel.available(), CROWD)
         with stages() as progress:
             outcome = job.run(options, progress, crowd)
             if job.wants_opinion:
-                with libraries():
-                    outcome = job.judged(outcome, options)
+                outcome = job.judged(outcome, options)
         if strict and outcome.exit_code:
             _print_outcome(outcome)
-            raise PostprocError(
-                "--strict: targets were left uncompensated (listed above), nothing is "
-                "written. Mend them, or run without --strict"
-            )
+            raise PostprocError(f"--strict: {_why_nothing(outcome)}")
         written = job.write(outcome, output, report, html, lsv_out)
         _print_outcome(outcome)
         if report == Path(STREAM):
@@ -133,6 +129,19 @@ def compensate(
         for path in written:
             say(f"written {path}")
     raise typer.Exit(outcome.exit_code)
+
+
+def _why_nothing(outcome: Outcome) -> str:
+    """Return why a strict run writes nothing, and what to do."""
+    if outcome.opinion is not None and not outcome.opinion.agrees:
+        return (
+            "the second opinion disagrees (listed above), nothing is written. "
+            "Please report it with the program"
+        )
+    return (
+        "targets were left uncompensated (listed above), nothing is written. "
+        "Mend them, or run without --strict"
+    )
 
 
 def _check_values(place: Path, job: Job) -> None:

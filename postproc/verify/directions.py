@@ -13,7 +13,7 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.robot.arm_file import ArmFile
 from postproc.robot.trajectory import Motion
-from postproc.verify.cycle import NO_WAY, compare_limits, compare_times
+from postproc.verify.cycle import NO_WAY, NOT_DRAWN, compare_limits, compare_times
 from postproc.verify.opinion import COUNTED, ArmFacts, Claim, OpinionRow, worst_of
 from postproc.verify.play_memory import PlayMemory
 from postproc.verify.ruckig_move import move_in_time
@@ -28,7 +28,6 @@ BENT = 0.05  # [rad] between joint paths before and behind a fly point: passed a
 FLY = "fly points: passed on a blend"
 NEAR = "within two plays of a reversal"
 UNKNOWN = "not known to the planner"
-NOT_DRAWN = "not drawn, or the time was up"
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ def judge_directions(
         compare_limits(claim, facts.file, ways, maker.confirmed),
         _count_times(claim, runs, arrived),
         *compare_times(claim, facts.file, ways, runs, timed),
-        _compare_directions(claim, train, arrived),
+        _compare_directions(claim, train, ways, arrived),
     ]
 
 
@@ -150,7 +149,8 @@ def _goes_on(claim: Claim, ways: Mapping[int, MadeWay], last: int, i: int) -> bo
     v = claim.visits
     passing = bool(v.fly[last] or v.via[last]) and v.before[i] == last
     in_space = v.motion[last] != Motion.JOINT and v.motion[i] != Motion.JOINT
-    return passing and bool(in_space) and _bend(ways[last].q, ways[i].q) < BENT
+    smooth = bool(v.via[last]) or _bend(ways[last].q, ways[i].q) < BENT
+    return passing and bool(in_space) and smooth
 
 
 def _bend(before: Floats, behind: Floats) -> float:
@@ -224,7 +224,10 @@ def _count_times(
 
 
 def _compare_directions(
-    claim: Claim, train: DriveTrain, arrived: Mapping[int, PlayMemory]
+    claim: Claim,
+    train: DriveTrain,
+    ways: Mapping[int, MadeWay],
+    arrived: Mapping[int, PlayMemory],
 ) -> OpinionRow:
     """Say how many directions differ, and where the first of them is."""
     differ: list[str] = []
@@ -233,7 +236,7 @@ def _compare_directions(
     skipped[FLY] = 6 * int(passed.sum())
     for i in np.flatnonzero(~passed).tolist():
         if i not in arrived:
-            skipped[NO_WAY] += 6
+            skipped[NO_WAY if i in ways else NOT_DRAWN] += 6
             continue
         sure, told = arrived[i].sure(train.play), claim.direction[i] != 0
         skipped[NEAR] += int((~sure).sum())

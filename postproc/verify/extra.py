@@ -1,14 +1,14 @@
-"""Whether the libraries of the second opinion are installed, without loading them."""
+"""Whether the libraries of the second opinion are installed, and can be loaded."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from importlib import import_module
 from importlib.util import find_spec
 
 from postproc.exceptions import PostprocError
 
 PACKAGES = {"pinocchio": "pin", "toppra": "toppra"}  # what is imported: its package
+NEEDED = {"pinocchio": "SE3", "toppra": "SplineInterpolator"}  # what each must have
 INSTALL = "pip install pin toppra"
 
 
@@ -30,20 +30,28 @@ def require() -> None:
         )
 
 
-@contextmanager
-def libraries() -> Iterator[None]:
-    """Check that all are installed, and say so where one of them cannot be loaded.
+def load() -> None:
+    """Load all of them.
 
     Raises:
-        PostprocError: Naming the command that installs them.
+        PostprocError: One is not installed or cannot be loaded; it names the command.
     """
     require()
-    try:
-        yield
-    except ImportError as exc:
-        raise PostprocError(broken(exc)) from None
+    if problem := broken():
+        raise PostprocError(problem)
 
 
-def broken(exc: ImportError) -> str:
-    """Say that a library cannot be loaded."""
-    return f"no second opinion: a library is broken ({exc}): {INSTALL}"
+def broken() -> str:
+    """Return why one of them cannot be loaded, or "".
+
+    A library of another build fails by an error of any kind, and another package of
+    the same name loads but has no arms.
+    """
+    for module, needed in NEEDED.items():
+        try:
+            getattr(import_module(module), needed)
+        except Exception as exc:
+            cause = " ".join(str(exc).split()) or type(exc).__name__
+            which = f"a library is broken ({module}: {cause})"
+            return f"no second opinion: {which}: {INSTALL}"
+    return ""

@@ -23,6 +23,7 @@ from postproc.verify.positions import (
     judge_branches,
     judge_motion,
     judge_positions,
+    motion_not_judged,
     posture_of,
 )
 from postproc.verify.ways import WayMaker
@@ -56,6 +57,8 @@ def judge(
         postures.append(at)
     if len(output.own) == len(source):
         rows += judge_motion(source, output, facts, *reversed(postures))
+    else:
+        rows += motion_not_judged(source, facts)
     goals = goals_of(output, facts)
     maker = WayMaker(arm, output.visits, goals, confirmed(output, goals, postures[0]))
     placed = monotonic()

@@ -26,6 +26,9 @@ MM = 1e-3
 NO_LINKS = "the arm file has no [links]"
 NO_FORM = "the arm has no closed form: its branches have no names"
 
+OTHER_VISITS = "points were put on the ways: source and output have other visits"
+LIMIT_TEXT = "beyond a joint limit by correction"
+
 LoadedArms = Mapping[tuple[float, ...], PinocchioArm]
 """The arm with every load: mass [kg] and centre [m]."""
 
@@ -117,7 +120,7 @@ def judge_positions(
     off = np.abs(at.singular - claim.singular)
     rows.append(compare(f"{named}: singular value", "", SINGULAR, claim, off, late))
     what = f"{named}: gravity torque"
-    if not len(claim.torque):
+    if len(claim.torque) < len(claim):
         lost = {NO_LINKS: len(claim)}
         rows.append(worst_of(what, "N m", TORQUE, claim, [], lost))
     else:
@@ -215,9 +218,19 @@ def judge_motion(
         for k, name, most in limits
     ]
     beyond = _beyond(output.q[own], facts.file) - _beyond(source.q, facts.file)
-    text = "beyond a joint limit by correction"
     over = np.maximum(beyond, 0.0)
-    return [*rows, compare(text, "rad", JOINT_RAD, source, over, late)]
+    return [*rows, compare(LIMIT_TEXT, "rad", JOINT_RAD, source, over, late)]
+
+
+def motion_not_judged(source: Claim, facts: ArmFacts) -> list[OpinionRow]:
+    """Count the targets of a program of which source and output have other visits."""
+    lost = {OTHER_VISITS: len(source)}
+    bounds = (("swing of the elbow", "mm", facts.elbow / MM),
+              ("swing of the wrist centre", "mm", facts.wrist_centre / MM),
+              (LIMIT_TEXT, "rad", JOINT_RAD))  # fmt: skip
+    return [
+        worst_of(what, unit, bound, source, [], lost) for what, unit, bound in bounds
+    ]
 
 
 def _beyond(q: Floats, file: ArmFile) -> Floats:

@@ -25,7 +25,7 @@ from postproc.robot.arm import build_arm
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.direction import directions_of_rows
 from postproc.robot.trajectory import Motion
-from postproc.verify.cycle import MOVE_S, RUN_PERCENT, SHORTEST_S
+from postproc.verify.cycle import LINE_PERCENT, MOVE_S, SHORTEST_S
 from postproc.verify.opinion import Claim
 from tests.any_controller import any_controller
 from tests.conftest import make_job
@@ -495,7 +495,7 @@ def _times_differ(right: Claim, told: Claim) -> bool:
     ours, theirs = (c.time - c.time[v.before] for c in (right, told))
     joint = v.motion == Motion.JOINT
     bound = np.where(
-        joint, 2 * MOVE_S, 0.02 * RUN_PERCENT * np.maximum(ours, SHORTEST_S)
+        joint, 2 * MOVE_S, 0.02 * LINE_PERCENT * np.maximum(ours, SHORTEST_S)
     )
     return bool((rows & (np.abs(theirs - ours) > bound)).any())
 

@@ -12,9 +12,9 @@ from postproc.verify.opinion import Claim, Opinion, OpinionRow
 from tests.verify.faults import Case
 from tests.verify.judged import SHIPPED, row, shipped
 
-MOVES, RUNS, FLY = (
+MOVES, RUNS, ARCS, FLY = (
     f"output: time {what}"
-    for what in ("of JOINT moves", "of lines and arcs", "over fly points")
+    for what in ("of JOINT moves", "of lines", "of arcs", "over fly points")
 )
 LIMITS = "output: joint limits"
 
@@ -39,16 +39,16 @@ def slower(claim: Claim, rows: np.ndarray, by: float) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "counts"),
     [
-        ("drilling.pdl", (7, 678, 0)),
-        ("spot.pdl", (58, 0, 22)),
-        ("facing/Milling.src", (3, 9, 5)),
+        ("drilling.pdl", (7, 678, 0, 0)),
+        ("spot.pdl", (58, 0, 0, 22)),
+        ("facing/Milling.src", (3, 9, 1, 4)),
     ],
 )
 def test_every_stop_is_compared_once(cases, name, counts) -> None:
     opinion = cases[name].judged(cases[name].right)
-    rows = [row(opinion, what) for what in (MOVES, RUNS, FLY)]
+    rows = [row(opinion, what) for what in (MOVES, RUNS, ARCS, FLY)]
     v = cases[name].output.visits
-    lost = sum(rows[2].skipped.values())
+    lost = sum(rows[3].skipped.values())
     assert sum(r.compared for r in rows) + lost == int((~(v.fly | v.via)).sum())
     for found, expected in zip(rows, counts, strict=True):
         assert abs(found.compared - expected) <= 2
@@ -63,6 +63,8 @@ def test_every_stop_is_compared_once(cases, name, counts) -> None:
         ("drilling.pdl", Motion.LINEAR, RUNS, 0.97),
         ("spot.pdl", Motion.JOINT, FLY, 2.5),
         ("facing/Milling.src", Motion.LINEAR, FLY, 0.01),
+        ("facing/Milling.src", Motion.CIRCULAR, ARCS, 1.3),
+        ("facing/Milling.src", Motion.CIRCULAR, ARCS, 0.7),
     ],
 )
 def test_another_time_disagrees(cases, name, motion, what, by) -> None:
@@ -75,7 +77,7 @@ def test_a_time_that_nobody_says_is_counted(cases) -> None:
     one = cases["handling.pdl"]
     found = told(one, time=np.full(len(one.output), np.nan))
     assert found.agrees
-    assert sum(row(found, what).compared for what in (MOVES, RUNS, FLY)) == 0
+    assert sum(row(found, what).compared for what in (MOVES, RUNS, ARCS, FLY)) == 0
     assert row(found, FLY).skipped["the planner has no time law"] == 93
 
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from postproc.compensation.options import Options
+from postproc.verify import directions
+from postproc.verify.cycle import NOT_DRAWN
 from postproc.verify.directions import MOVES, draw
 from postproc.verify.ruckig_move import move_in_time
 from postproc.verify.toppra_run import run_in_time
@@ -83,6 +85,18 @@ def test_long_programs_are_drawn_from_in_blocks(models) -> None:
     assert opinion.seconds < 60
 
 
+def test_stops_that_are_not_drawn_are_counted_as_such(models, monkeypatch) -> None:
+    monkeypatch.setattr(directions, "MOVES", 100)
+    monkeypatch.setattr(directions, "BLOCK", 10)
+    opinion = shipped("drilling.pdl", models).opinion()
+    ends = row(opinion, "output: end of the way")
+    away = ends.skipped[NOT_DRAWN]
+    assert away > 500
+    for what, times in (("approach directions", 6), ("time over fly points", 1)):
+        found = row(opinion, f"output: {what}")
+        assert found.skipped[NOT_DRAWN] == times * away
+
+
 def test_the_same_program_is_drawn_from_alike(models) -> None:
     class Long:
         def __init__(self, seed: int) -> None:
@@ -110,4 +124,6 @@ def test_points_on_ways_are_visits_of_the_output_alone(models) -> None:
     assert opinion.agrees, opinion.told()
     before, after = (row(opinion, f"{k}: place").compared for k in ("source", "output"))
     assert before < after <= before + 50
-    assert not [r.what for r in opinion.rows if "swing" in r.what]
+    swung = [r for r in opinion.rows if "swing" in r.what or "by correction" in r.what]
+    counts = [(r.compared, sum(r.skipped.values())) for r in swung]
+    assert counts == [(0, before + 3)] * 3  # three are joint targets

@@ -60,3 +60,9 @@ def test_an_arm_whose_branches_nobody_names(bench_cell, bench_model) -> None:
     assert [(r.compared, sum(r.skipped.values())) for r in branches] == [(0, 4)] * 2
     assert row(opinion, "output: joint targets").compared == 3
     assert row(opinion, "output: approach directions").compared > 5
+
+
+def test_an_empty_program_lacks_nothing(bench_cell, bench_model) -> None:
+    """An arm has its links, though no target of the program asks for them."""
+    opinion = compensated({"e.pdl": EMPTY}, bench_cell, bench_model).opinion()
+    assert not [r.what for r in opinion.rows if r.compared or r.skipped]
