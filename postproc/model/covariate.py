@@ -68,6 +68,21 @@ def covariate(batch: Batch, name: str) -> Floats:
     raise ValueError(f"there is no covariate {name!r}")
 
 
+def by_weight(batch: Batch, name: str) -> Floats | None:
+    """Return a load per unit of the links' first moments, None of what is no load.
+
+    Returns:
+        (n, 6, 3) [N m/(kg m)], of every link in its own frame.
+    """
+    kind, _, which = name.partition(" ")
+    if kind == "moment":
+        across = "xy".index(which[1])
+        return np.asarray(batch.loads.bending_basis[:, int(which[0]) - 1, across])
+    if kind == "torque":
+        return batch.loads.basis.reshape(len(batch), 6, 6, 4)[:, int(which) - 1, :, 1:]
+    return None
+
+
 def unit(name: str) -> str:
     """Name the unit of a covariate in SI."""
     kind = name.partition(" ")[0]

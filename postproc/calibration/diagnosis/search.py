@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -20,7 +21,7 @@ from postproc.calibration.diagnosis.score import Null, Score, rank
 from postproc.calibration.diagnosis.table import Causes, loosened
 from postproc.calibration.regression import Fit, beside, fit_effects
 from postproc.model.carrier import Carrier, carrier
-from postproc.model.covariate import JOINTS
+from postproc.model.covariate import JOINTS, covariate
 from postproc.model.effects.effect import (
     FREE,
     NAMED,
@@ -30,12 +31,15 @@ from postproc.model.effects.effect import (
     Family,
 )
 from postproc.model.effects.joint_offset import JointOffset
+from postproc.model.kinematics import Batch
 
 # Finer settings around a candidate that a grid found.
 
 HARDLY = 2.0  # nats
 OFFSETS = np.linspace(-1.0, 1.0, 9)
 LEVELS = tuple(0.5**k for k in range(9))  # widths tried, in steps of the grid
+TURNS = 4  # times that a width is tried while settings of several kinds get better
+IDLE = 5  # widths in a row at which nothing is gained
 SETTLED = 0.3  # nats: finer settings no longer matter
 
 
@@ -46,25 +50,34 @@ def refine(projection: Projection, score: Score) -> Score:
     of the grid that they stand for: a sharp peak between two points of the grid counts,
     but only as much of the prior as it covers.
     """
-    square = float(projection.rest @ projection.rest)
-    share = score.best.log_prior
+    idle = 0
     for width in LEVELS:
-        here = score.best.effect
-        effects = [here, *here.refined(width * OFFSETS, projection.at)]
-        if len(effects) == 1:
-            return score
-        tries = [replace(score.best, effect=e, log_prior=0.0) for e in effects]
-        blocks = reduce_some(projection, tries)
-        found = rank(blocks, square, projection.rows)[0]
-        gained = found.best_evidence - score.best_evidence
-        if gained > 0.0:
-            covered = share + float(np.log(2.0 * width / len(tries)))
-            best = replace(found.best, log_prior=share)
-            evidence = max(score.evidence, found.evidence + covered)
-            score = replace(found, best=best, evidence=evidence)
-        if gained < SETTLED and width < 1.0:
+        turns, gained = 0, np.inf
+        while turns < TURNS and gained > SETTLED:
+            score, gained = _finer(projection, score, width)
+            turns += 1
+        idle = idle + 1 if turns == 1 else 0
+        if idle > IDLE:
             break
     return _plainer(projection, score)
+
+
+def _finer(projection: Projection, score: Score, width: float) -> tuple[Score, float]:
+    """Take the best settings around those of a score, and what is gained [nats]."""
+    here, share = score.best.effect, score.best.log_prior
+    effects = [here, *here.refined(width * OFFSETS, projection.at)]
+    if len(effects) == 1:
+        return score, 0.0
+    square = float(projection.rest @ projection.rest)
+    tries = [replace(score.best, effect=e, log_prior=0.0) for e in effects]
+    found = rank(reduce_some(projection, tries), square, projection.rows)[0]
+    gained = found.best_evidence - score.best_evidence
+    if gained <= 0.0:
+        return score, gained
+    covered = share + float(np.log(2.0 * width / len(tries)))
+    best = replace(found.best, log_prior=share)
+    evidence = max(score.evidence, found.evidence + covered)
+    return replace(found, best=best, evidence=evidence), gained
 
 
 def _plainer(projection: Projection, score: Score) -> Score:
@@ -364,6 +377,9 @@ NEAR = 3.0  # nats within which two causes are told together: odds of 20 to 1
 CERTAIN = 3.0  # standard errors by which one must predict other regions better
 MOST_OTHERS = 2  # that are told, and asked
 MOST_CELLS = 5  # the same of a cell without a name
+LOAD = re.compile(r"torque \d|moment \d[xy]")
+ALIKE = 0.98  # correlation of two loads that are one but for the weights of links
+SAME_LOAD = 0.5  # part of the evidence that one may be behind the other
 RECENT = 2  # additions looked at again after each further one
 
 Progress = Callable[[str, float], None]  # what is done, and how far everything is
@@ -635,7 +651,10 @@ def stand(found: Search, number: int) -> JudgedAddition:
     names = {_name(own.family)}
     for s in scores:
         name = _name(s.family)
-        if s.evidence >= here.evidence - _within(own, s.best) and name not in names:
+        within = _within(own, s.best)
+        if _same_load(own, s.best, projection.at):
+            within = max(within, SAME_LOAD * here.evidence)
+        if s.evidence >= here.evidence - within and name not in names:
             rivals.append(s)
             names.add(name)
     evidence = here.evidence
@@ -663,6 +682,19 @@ def _told(own: Family, rivals: Sequence[Score]) -> tuple[Score, ...]:
     others = [s for s in rivals if s.family.effect != PART_MOTION][:MOST_OTHERS]
     most = MOST_CELLS - len(others) if own.effect == PART_MOTION else MOST_OTHERS
     return (*others, *cells[:most])
+
+
+def _same_load(own: Candidate, other: Candidate, at: Batch) -> bool:
+    """Tell whether two loads are one but for weights that nobody knows so well.
+
+    About the axis of joint 4, say, that is the torque of joint 4 and the moment across
+    joint 5 of an arm whose link 4 hangs on this axis.
+    """
+    both = own.source, other.source
+    if not all(LOAD.fullmatch(source) for source in both):
+        return False
+    along = np.corrcoef([covariate(at, source) for source in both])[0, 1]
+    return bool(abs(along) > ALIKE)
 
 
 def _name(family: Family) -> tuple[str | int | None, ...]:

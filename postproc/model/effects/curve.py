@@ -12,7 +12,14 @@ from numpy.polynomial.legendre import legvander
 from postproc.arrays import Floats
 from postproc.model.carrier import carrier
 from postproc.model.covariate import JOINTS, covariate
-from postproc.model.effects.effect import FREE, Candidate, Family, Parameter, fade
+from postproc.model.effects.effect import (
+    FREE,
+    Candidate,
+    Effect,
+    Family,
+    Parameter,
+    fade,
+)
 from postproc.model.effects.part_motion import CarriedEffect
 from postproc.model.kinematics import Batch
 
@@ -120,6 +127,10 @@ class Curve(CarriedEffect):
         """Name the sources and the factor."""
         return (*self.source, self.factor) if self.factor else self.source
 
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Make links heavier or lighter where a load drives it."""
+        return [*self.weighed(offsets, batch)]
+
     def sentence(self, p: Floats, covariance: Floats) -> str:
         """Say place and drivers."""
         return f"{self.carrier.sentence()} by {self.driver()}, a curve"
@@ -152,7 +163,7 @@ class Curve(CarriedEffect):
         order = np.array(self._orders())
         for k, name in enumerate(self.source):
             low, high = self.lower[k], self.upper[k]
-            x = covariate(batch, name)
+            x = self.driven(batch, name)
             if not name.startswith(HELD):
                 inside *= np.nan_to_num(fade(x, np.array(low), np.array(high)))
             u = _place(name, np.nan_to_num(x), low, high)
@@ -164,7 +175,7 @@ class Curve(CarriedEffect):
         """Evaluate the terms, with the factor if there is one, (n, p)."""
         shape = self.shape(batch)
         if self.factor:
-            shape *= np.nan_to_num(covariate(batch, self.factor))[:, None]
+            shape *= np.nan_to_num(self.driven(batch, self.factor))[:, None]
         return shape
 
 

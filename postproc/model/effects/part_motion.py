@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
 from postproc.arrays import Floats
 from postproc.model.carrier import Carrier, carrier
-from postproc.model.covariate import covariate, unit
+from postproc.model.covariate import by_weight, covariate, unit
+from postproc.model.effects.compliance import moments
 from postproc.model.effects.effect import PART_MOTION, Effect, Origin, Parameter
 from postproc.model.kinematics import Batch
 
@@ -18,6 +19,8 @@ TURN, SHIFT = 1e-4, 1e-4  # [rad], [m] prior size of a motion
 ANEW = 3e-4  # [rad], [m] by which a part may sit otherwise than a model has it
 PASSING = ("time", "order")
 OF_STATE = ("temperature", "payload", "speed")
+LOADS = ("torque", "moment")
+UNSURE = 2.0  # times what is unsure of a link's moment that is tried at most
 ARMS_OWN = ("torque", "moment", "lambda", "way", "payload", "speed")
 
 
@@ -29,10 +32,13 @@ class CarriedEffect(Effect):
         direction: The carrier, see `carrier`.
         loose: Whether its mean is fitted too: beside a given model, whose geometry
             holds what the mean was when that was made.
+        heavier: Links whose first moments are others than in the arm file, where a
+            load drives it: (link, by how much in its own frame [kg m]).
     """
 
     direction: str = "joint 1"
     loose: bool = field(default=False, kw_only=True)
+    heavier: tuple[tuple[int, tuple[float, ...]], ...] = field(default=(), kw_only=True)
 
     @property
     def carrier(self) -> Carrier:
@@ -50,6 +56,39 @@ class CarriedEffect(Effect):
     @abstractmethod
     def law_values(self, batch: Batch) -> Floats:
         """Evaluate by how much each of them moves the carrier, (n, p)."""
+
+    def driven(self, batch: Batch, name: str) -> Floats:
+        """Look up what drives it, (n,): a load as the weights of the links make it."""
+        value = covariate(batch, name)
+        for link, more in self.heavier:
+            per_moment = by_weight(batch, name)
+            if per_moment is not None:
+                value = value + per_moment[:, link - 1] @ np.array(more)
+        return value
+
+    def weighed(self, offsets: Floats, batch: Batch) -> list[Self]:
+        """Make links heavier or lighter, in parts of what is unsure of their moments.
+
+        Masses and centres of an arm file are known to a tenth or so, and a jump at a
+        load shows where they are wrong.
+        """
+        load = next((n for n in self.covariates() if n.startswith(LOADS)), None)
+        if load is None:
+            return []
+        return [
+            self._heavier(link, axis, float(offset) * UNSURE * spread)
+            for link, spread in moments(batch.arm, int(load.split()[1][0]))
+            for axis in range(3)
+            for offset in offsets[::2]
+            if offset
+        ]
+
+    def _heavier(self, link: int, axis: int, more: float) -> Self:
+        """Add to one first moment of a link [kg m]."""
+        every = {own: list(old) for own, old in self.heavier}
+        every.setdefault(link, [0.0, 0.0, 0.0])[axis] += more
+        heavier = tuple((own, tuple(m)) for own, m in sorted(every.items()))
+        return replace(self, heavier=heavier)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the unknowns of its law, and its mean where that is fitted too."""
@@ -184,9 +223,9 @@ class PartMotion(CarriedEffect):
 
     def law_values(self, batch: Batch) -> Floats:
         """Evaluate the law, (n, 1), of a harmonic (n, 2)."""
-        value = self._law(np.nan_to_num(covariate(batch, self.source)))
+        value = self._law(np.nan_to_num(self.driven(batch, self.source)))
         if self.factor:
-            value = value * np.nan_to_num(covariate(batch, self.factor))[:, None]
+            value = value * np.nan_to_num(self.driven(batch, self.factor))[:, None]
             value /= self.size
         return value
 
@@ -205,7 +244,14 @@ class PartMotion(CarriedEffect):
         return laws[self.law][:, None]
 
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
-        """Move the place of a step or a bend, in parts of the range, and its width."""
+        """Move the place of a step or a bend, in parts of the range, and its width.
+
+        Where a load drives it the weights of links are others, too.
+        """
+        return [*self._placed(offsets, batch), *self.weighed(offsets, batch)]
+
+    def _placed(self, offsets: Floats, batch: Batch) -> list[PartMotion]:
+        """Move the place of a step or a bend, and its width."""
         if self.law not in PLACED:
             return []
         x = covariate(batch, self.source)
