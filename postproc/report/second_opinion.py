@@ -36,11 +36,20 @@ def opinion_table(opinion: Opinion | None) -> OpinionTable | None:
     """Write a second opinion as text, None where there is none."""
     if opinion is None:
         return None
-    word = "agrees" if opinion.agrees else "disagrees"
     rows = tuple((cells(row), row.beyond > 0) for row in opinion.rows)
-    verdict = f"second opinion: {word} ({opinion.seconds:.1f} s)"
     lost = tuple(not_compared(opinion))
-    return OpinionTable(verdict, opinion.agrees, TITLES, rows, lost)
+    return OpinionTable(verdict_of(opinion), opinion.agrees, TITLES, rows, lost)
+
+
+def verdict_of(opinion: Opinion) -> str:
+    """Say whether it agrees, and of how many approach directions it says so."""
+    word = "agrees" if opinion.agrees else "disagrees"
+    compared, every = opinion.directions
+    if opinion.empty:
+        word = "nothing was compared"
+    elif every:
+        word += f", {compared:,} of {every:,} approach directions compared"
+    return f"second opinion: {word} ({opinion.seconds:.1f} s)"
 
 
 def print_opinion(opinion: Opinion) -> None:

@@ -14,7 +14,14 @@ from postproc.arrays import Floats, Ints
 from postproc.robot.arm_file import ArmFile
 from postproc.robot.trajectory import Motion
 from postproc.verify.cycle import NO_WAY, NOT_DRAWN, compare_limits, compare_times
-from postproc.verify.opinion import COUNTED, ArmFacts, Claim, OpinionRow, worst_of
+from postproc.verify.opinion import (
+    COUNTED,
+    DIRECTIONS,
+    ArmFacts,
+    Claim,
+    OpinionRow,
+    worst_of,
+)
 from postproc.verify.play_memory import PlayMemory
 from postproc.verify.ruckig_move import move_in_time
 from postproc.verify.toppra_run import TimedRun, run_in_time
@@ -245,6 +252,6 @@ def _compare_directions(
         other = sure & told & (arrived[i].side != claim.direction[i])
         differ += [f"{claim.place(i)} axis {j + 1}" for j in np.flatnonzero(other)]
     return OpinionRow(
-        f"{claim.label}: approach directions", "lambda", compared, len(differ),
+        f"{claim.label}: {DIRECTIONS}", "lambda", compared, len(differ),
         2.0 * bool(differ), 0.0, next(iter(differ), ""), dict(+skipped),
     )  # fmt: skip

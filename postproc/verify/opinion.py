@@ -57,6 +57,7 @@ class Allowance:
         return Allowance(self.positions - positions, self.ways - opinion.on_ways)
 
 
+DIRECTIONS = "approach directions"  # the row that lambda is judged in
 ENOUGH = Allowance()
 
 
@@ -158,6 +159,18 @@ class Opinion:
     def agrees(self) -> bool:
         """Return True where no difference is beyond its bound."""
         return not any(row.beyond for row in self.rows)
+
+    @property
+    def empty(self) -> bool:
+        """Return True where nothing was compared."""
+        return not any(row.compared for row in self.rows)
+
+    @property
+    def directions(self) -> tuple[int, int]:
+        """Count the approach directions that were compared, and all."""
+        own = [row for row in self.rows if row.what.endswith(DIRECTIONS)]
+        compared = sum(row.compared for row in own)
+        return compared, compared + sum(sum(row.skipped.values()) for row in own)
 
     @classmethod
     def joined(cls, name: str, opinions: Sequence[Opinion]) -> Self:
