@@ -176,6 +176,21 @@ def test_a_point_of_a_system_module(bench_cell, bench_model):
     assert restore(found.outputs["job.mod"], record, "job.mod") == source
 
 
+@pytest.mark.parametrize(
+    "first", ["  RECORD r\n  num a;\n  ENDRECORD\n", "  ALIAS num a;\n"]
+)
+def test_data_stand_behind_types(bench_cell, bench_model, first):
+    source = moves(bench_cell, *twice(), declared=P)
+    old = next(x for x in source.decode().splitlines() if "robtarget pShared:" in x)
+    system = name_read(PurePosixPath("RAPID/TASK1/SYSMOD/user.sys"))
+    pages = {system: f"MODULE user(SYSMODULE)\n{old}\nENDMODULE\n".encode()}
+    source = source.replace(old.encode() + b"\n", b"")
+    source = source.replace(b"MODULE job\n", b"MODULE job\n" + first.encode())
+    found = run(source, bench_cell, bench_model, pages=pages)
+    assert "defines types" in notes(found, "not-cloned")[0]
+    assert b"pShared__" not in found.outputs["job.mod"]
+
+
 def test_the_nearest_of_two_names_is_meant(bench_cell, bench_model):
     own = "    VAR robtarget pShared:=#;\n"
     source = moves(bench_cell, *twice(), declared=P.replace("#", "[[1,2,3],[1,0,0,0],"
