@@ -380,15 +380,14 @@ def with_tracks(visits: Visits, cell: Cell) -> Visits:
     """Say of all visits of a program where they leave the arm on its tracks.
 
     A target that says nothing of a track leaves it where it is, which is not known
-    where other targets move it away from 0. Axes that the cell does not declare may be
-    tracks.
+    where other targets move it away from 0.
     """
     aux = np.array(visits.aux)
     poses = ~np.isin(visits.target, JOINTS)
     for column in range(aux.shape[1] if aux.ndim == 2 else 0):
         place = aux[:, column]
         away = (place != 0.0) & ~np.isnan(place)
-        if cell.aux.get(column + 1, "track") == "track" and away.any():
+        if cell.aux.get(column + 1) == "track" and away.any():
             place[np.isnan(place) & poses] = STAYS
     return replace(visits, aux=aux)
 

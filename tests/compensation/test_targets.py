@@ -143,7 +143,7 @@ def test_an_arm_on_a_track_that_is_at_0(cell: Cell, column, value, why) -> None:
     [
         (1, [0.0, np.nan, 0.0], ["", "", ""]),
         (1, [np.nan, 500.0, 0.0], ["says nothing", "is a track", ""]),
-        (2, [np.nan, 500.0, np.nan], ["not declared"] * 3),
+        (2, [np.nan, 500.0, np.nan], ["", "not declared", ""]),
     ],
 )
 def test_a_track_stays_where_it_was_left(cell: Cell, column, places, why) -> None:
