@@ -153,6 +153,15 @@ def test_what_another_reads_keeps_its_numbers(bench_cell, bench_model):
     assert old in text and "MoveJ pShared," not in text
 
 
+def test_clones_that_would_keep_their_numbers_are_not_made(bench_cell, bench_model):
+    lines = [*twice(), "GetDataVal sName,pOther;"]
+    more = '  VAR string sName:="pShared"; VAR robtarget pOther;\n'
+    source = moves(bench_cell, *lines, declared=P, extra=more)
+    found = run(source, bench_cell, bench_model)
+    assert "keep their numbers" in notes(found, "not-cloned")[0]
+    assert b"pShared__" not in found.outputs["job.mod"]
+
+
 def test_several_moves_on_a_line_keep_their_point(bench_cell, bench_model):
     more = " MoveJ pShared,vWork,fine,tWork\\WObj:=wPart;"
     source = moves(bench_cell, *twice(more=more), declared=P)
