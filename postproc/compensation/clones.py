@@ -200,6 +200,7 @@ def _origin(
 # Cloning what moves disagree on, group by group, and the proof that it fits.
 
 FOLLOWED = "computed targets move along with the point, and keep it"
+STAYING = "clones would have to keep their numbers, too: nothing is cloned"
 NOTHING = np.zeros(0, dtype=np.int64)  # no literal gets new numbers
 
 
@@ -229,13 +230,19 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
     v = reading.visits
     problem = equivalent(v, again.visits, NOTHING, v.values, work.names)
     visits = None if problem else with_lines_of(reading, again, cloned)
-    if visits is None:
+    if visits is None or _stay(visits, list(work.names)):
         text = "clones would change what the program does: nothing is cloned"
+        text = text if visits is None else STAYING
         found = Diagnostic(reading.sources[0].name, 1, "not-cloned", text)
         return replace(reading, diagnostics=(*reading.diagnostics, found))
     return Reading(
         again.texts, visits, notes, cloned, reading.sources, missed=reading.missed
     )
+
+
+def _stay(visits: Visits, rows: Sequence[int]) -> bool:
+    """Return True if points of visits must keep their numbers."""
+    return any(visits.literals.pinned[k] for k in visits.literal[rows].tolist())
 
 
 def _stops(visits: Visits) -> dict[MoveSlot, Ints]:

@@ -18,7 +18,7 @@ from postproc.compensation.eligibility import (
 )
 from postproc.compensation.options import Options
 from postproc.compensation.payload import payload_of
-from postproc.compensation.targets import targets_from_visits
+from postproc.compensation.targets import targets_from_visits, with_tracks
 from postproc.language.interface import Start
 from postproc.language.languages import language_of
 from postproc.language.rewrite import Skeleton
@@ -173,7 +173,7 @@ def read_program(
     found = language.read(sources, start_of(cell), known)
     return Reading(
         found.texts,
-        found.visits,
+        with_tracks(found.visits, cell),
         found.diagnostics,
         programs=found.programs,
         missed=found.missed,

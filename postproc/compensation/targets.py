@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -370,6 +370,28 @@ def _step(target: int, value: Floats, user: Floats) -> tuple[TargetKind, Floats]
     return (TargetKind.TOOL_STEP if frame == "tool" else TargetKind.BASE_STEP), step
 
 
+_STAYS = (
+    "it says nothing of auxiliary axis {}, a track that other targets move away from 0"
+)
+STAYS = np.inf  # of a track: where earlier moves have left it
+
+
+def with_tracks(visits: Visits, cell: Cell) -> Visits:
+    """Say of all visits of a program where they leave the arm on its tracks.
+
+    A target that says nothing of a track leaves it where it is, which is not known
+    where other targets move it away from 0.
+    """
+    aux = np.array(visits.aux)
+    poses = ~np.isin(visits.target, JOINTS)
+    for column in range(aux.shape[1] if aux.ndim == 2 else 0):
+        place = aux[:, column]
+        away = (place != 0.0) & ~np.isnan(place)
+        if cell.aux.get(column + 1) == "track" and away.any():
+            place[np.isnan(place) & poses] = STAYS
+    return replace(visits, aux=aux)
+
+
 def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
     """Tell which visits depend on axes that may move the arm or the part, (n,).
 
@@ -391,6 +413,7 @@ def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
                 f'{axis} = "gun", "track" or "positioner"',
             )
         else:
+            reasons.mark(given & (visits.aux[:, column] == STAYS), _STAYS.format(axis))
             reasons.mark(given, f"auxiliary axis {axis} is a {use}: not modelled")
     return outside
 

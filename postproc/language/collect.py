@@ -93,7 +93,7 @@ def not_reached(goal: FoundGoal, why: str) -> FoundGoal:
     numbers = (max(goal.slots[0], goal.follows[0]),)
     return FoundGoal(
         Meaning.UNKNOWN, tuple(math.nan for _ in goal.values), goal.file,
-        follows=numbers, name=goal.name, why=why, pins=goal.pins or why,
+        follows=numbers, name=goal.name, aux=goal.aux, why=why, pins=goal.pins or why,
     )  # fmt: skip
 
 

@@ -119,7 +119,7 @@ def _counted(arm: Arm, way: Floats) -> Floats:
 def _begins(arm: Arm, targets: Targets, q: Floats, begin: Ints, end: Ints) -> Floats:
     """Return how the drives begin moves between places, as `_ways`.
 
-    On joint moves, and on the chords of arcs, they go on as the whole way tells.
+    On joint moves they go on as the whole way tells.
     """
     rate = q[end] - q[begin]
     line = np.flatnonzero(targets.move[end] == Motion.LINEAR)
@@ -128,7 +128,30 @@ def _begins(arm: Arm, targets: Targets, q: Floats, begin: Ints, end: Ints) -> Fl
     twist = np.hstack([(target - start)[:, :3, 3], _turn(start, target)])
     jacobian = arm.jacobian(q[one], targets.tool[one][:, :3, 3])
     rate[line] = _solved(jacobian, twist)
+    arc = np.flatnonzero((targets.move[end] == Motion.CIRCULAR) & targets.via[end])
+    rate[arc] = _arcs_begin(arm, targets, q, begin[arc], end[arc])
     return _counted(arm, rate)
+
+
+def _arcs_begin(
+    arm: Arm, targets: Targets, q: Floats, begin: Ints, via: Ints
+) -> Floats:
+    """Return how joints begin arcs, as if the way to their VIA went on so, (k, 6)."""
+    tool = targets.tool[via]
+    last = np.minimum(via + 1, len(q) - 1)
+    poses = [arm.flange(q[rows]) @ tool for rows in (begin, via, last)]
+    a, b, c = (pose[:, :3, 3] for pose in poses)
+    part = _seen(c, a, b) / (_seen(c, a, b) + _seen(a, b, c))
+    twist = -_tangents(c, b, a)[1] * part[:, None]
+    twist[:, 3:] = _turn(poses[0], poses[1])
+    return _solved(arm.jacobian(q[begin], tool[:, :3, 3]), twist)
+
+
+def _seen(place: Floats, one: Floats, other: Floats) -> Floats:
+    """Return the angle at which places see two others apart, (k,) [rad]."""
+    a, b = one - place, other - place
+    across = np.linalg.norm(np.cross(a, b), axis=1)
+    return np.asarray(np.maximum(np.arctan2(across, (a * b).sum(axis=1)), 1e-12))
 
 
 def _turn(start: Floats, target: Floats) -> Floats:

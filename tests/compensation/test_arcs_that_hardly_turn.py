@@ -12,8 +12,8 @@ from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
-from postproc.motion.curves import turns_on_arcs
-from postproc.motion.targets import make_targets
+from postproc.motion.curves import turns_at_unknown_blends, turns_on_arcs
+from postproc.motion.targets import Fly, make_targets
 from postproc.robot.arm import load_arm
 from postproc.robot.trajectory import Motion
 from postproc.simulation import land, virtual_arm
@@ -92,6 +92,37 @@ def test_sides_that_are_sure_are_so_however_the_tool_turns():
             gone = side_of(solved(other, q))
             wrong += (known & (gone * sides[2] < 0.9 * np.abs(sides[2]))).sum()
     assert sure > 40 and wrong == 0
+
+
+def test_arcs_that_begin_where_rounding_is_not_known():
+    """A joint that begins an arc against its arrival is not sure."""
+    rng, against = np.random.default_rng(7), 0
+    at = np.linspace(0.0, 1.0, STEPS)
+    for _ in range(40):
+        q = np.deg2rad([20, -25, -110, 30, 50, 20]) + np.deg2rad(rng.uniform(-9, 9, 6))
+        total = Rotation.random(random_state=rng).apply([0.05, 0, 0])
+        places = circle(ARM.flange(q[None])[0], 0.1, rng.uniform(1, 4) * at, rng)
+        poses = [turned(p, s * total) for p, s in zip(places, at, strict=True)]
+        way = solved(poses, q)
+        if np.isnan(way).any():
+            continue
+        half = int(rng.uniform(0.2, 0.8) * STEPS)
+        targets = make_targets(
+            np.zeros(3), np.array(poses)[[0, half, -1]], via=[False, True, False],
+            move=[Motion.LINEAR, Motion.CIRCULAR, Motion.CIRCULAR],
+            fly=[True, True, False], rounding=[Fly.UNKNOWN, Fly.EXACT, Fly.EXACT],
+        )  # fmt: skip
+        drive = way @ ARM.coupling.T
+        first, chord = drive[2] - drive[0], drive[half] - drive[0]
+        sides = np.stack([-np.sign(first), np.zeros(6), np.zeros(6)])
+        unsure = turns_at_unknown_blends(ARM, targets, way[[0, half, -1]], sides)
+        goes = np.abs(first) > ARM.play
+        against += (goes & (chord * first < 0.0)).sum()
+        assert unsure[0, goes].all()
+        same = turns_at_unknown_blends(ARM, targets, way[[0, half, -1]], -sides)
+        both = goes & (chord * first > 0.0) & (np.abs(chord) > ARM.play)
+        assert not same[0, both].any()
+    assert against > 5
 
 
 def arcs(cell, seed):

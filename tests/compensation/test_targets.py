@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.compensation.targets import targets_from_visits
+from postproc.compensation.targets import targets_from_visits, with_tracks
 from postproc.language.pdl2.dialect import configurations
 from postproc.language.visits import Meaning
 from postproc.motion.targets import TargetKind
@@ -136,6 +136,31 @@ def test_an_arm_on_a_track_that_is_at_0(cell: Cell, column, value, why) -> None:
     targets, reasons = targets_from_visits(given, cell)
     assert (why in reasons[0]) if why else (reasons[0] == "")
     assert (targets.kind[0] == TargetKind.POSE) == (why == "")
+
+
+@pytest.mark.parametrize(
+    ("column", "places", "why"),
+    [
+        (1, [0.0, np.nan, 0.0], ["", "", ""]),
+        (1, [np.nan, 500.0, 0.0], ["says nothing", "is a track", ""]),
+        (2, [np.nan, 500.0, np.nan], ["", "not declared", ""]),
+    ],
+)
+def test_a_track_stays_where_it_was_left(cell: Cell, column, places, why) -> None:
+    aux = np.full((3, 3), np.nan)
+    aux[:, column] = places
+    given = with_tracks(visits([Meaning.POSE] * 3, [POSE] * 3, aux=aux), cell)
+    targets, reasons = targets_from_visits(given, cell)
+    found = [reasons[row] for row in range(3)]
+    assert all(w in f if w else not f for w, f in zip(why, found, strict=True))
+    assert (targets.kind == TargetKind.POSE).tolist() == [not w for w in why]
+
+
+def test_joint_angles_are_the_same_anywhere_on_a_track(cell: Cell) -> None:
+    aux = np.full((2, 3), np.nan)
+    aux[0, 1] = 500.0
+    given = visits([Meaning.POSE, Meaning.JOINTS], [POSE, POSE], aux=aux)
+    assert np.isnan(with_tracks(given, cell).aux[1]).all()
 
 
 def test_a_remote_tool_is_not_guessed(cell: Cell) -> None:

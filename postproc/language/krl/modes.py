@@ -138,6 +138,7 @@ NO_LOAD = "which $LOAD holds here is not known: set it again on every way here"
 SOFT = "an axis is soft ($SOFT_PLCL)"
 GENERATOR = "a function generator ($TECH) moves the tool off its path"
 AXIS_LOAD = "the program sets a load on an axis ($LOAD_A1 to $LOAD_A3)"
+IGNORED = "the track need not go where targets say ($EX_AX_IGNORE)"
 MOVED_BASE = "$ROBROOT or $WORLD is set by the program"
 # System variables that change nothing of where targets are and from which side they are
 # reached; those in the first list do not stop what is planned ahead either.
@@ -207,6 +208,10 @@ class ModeReader:
                 return replace(modes, blocked=modes.blocked | {GENERATOR})
             case "$load_a1" | "$load_a2" | "$load_a3":
                 return replace(modes, blocked=modes.blocked | {AXIS_LOAD})
+            case "$ex_ax_ignore":
+                off = self._number(value) == 0.0
+                rest = modes.blocked - {IGNORED}
+                return replace(modes, blocked=rest if off else rest | {IGNORED})
             case "$robroot" | "$world":
                 return replace(modes, blocked=modes.blocked | {MOVED_BASE})
             case "fdat_act" | "pdat_act" | "ldat_act":

@@ -183,6 +183,9 @@ class RapidCloner(Cloner):
         text, modules = self.task.files[file].text, self.task.files[file].modules
         if len(modules) != 1 or is_system_module(text.source.name):
             raise CloneError("its moves stand in no module that is rewritten")
+        rows = (text.statement(row) for row in range(modules[0].first, modules[0].last))
+        if any(isinstance(one, said.RecordHead | said.TypeAlias) for one in rows):
+            raise CloneError("the module of its moves defines types, which stand first")
         begin, end = text.span(modules[0].first)
         if not _ends_line(text.source, end):
             raise CloneError("other code stands on the line of its module")

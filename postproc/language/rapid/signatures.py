@@ -104,22 +104,27 @@ READING = frozenset(
     corrcon corrdiscon write open close isleep iwatch idelete
     """.split()
 )
-"""Instructions that change none of the data that they are given."""
+"""Instructions that change none of the data that they are given, but by `ANSWERS`."""
+
+ANSWERS = frozenset(
+    ["timeflag", "valueattimeout", "taskno", "mectaskno", "errornumber"]
+)
+"""Options that instructions and functions answer in."""
 
 BUILT_IN_FUNCTIONS = frozenset(
     """
     abs acos asin atan atan2 cos sin tan exp pow round sqrt trunc dim
     offs reltool distance dotprod normalize posemult poseinv posevect orientzyx eulerzyx
-    defframe defaccframe defdframe mirpos crobt cjointt cpos ctool cwobj calcrobt
+    defframe defdframe mirpos crobt cjointt cpos ctool cwobj calcrobt
     calcjointt numtostr strlen strpart valtostr ctime cdate clkread gettime
     doutput dinput goutput testdi valid present ispers isvar opmode runmode execlevel
     isstopmoveact isstopstateevent ismechunitactive bitand bitor bitxor bitneg bitcheck
     stringmatch strfind strmap strmatch strorder gettaskname robos
     """.split()
 )
-"""Functions that neither move nor change the data that they are given."""
+"""Functions that neither move nor change what they are given, but by `ANSWERS`."""
 
-STILL_FUNCTIONS = BUILT_IN_FUNCTIONS | {"strtoval"}
+STILL_FUNCTIONS = BUILT_IN_FUNCTIONS | {"strtoval", "defaccframe"}
 """Functions that do not move."""
 
 BY_STRING = frozenset(["setdataval", "setalldataval"])

@@ -13,6 +13,7 @@ from postproc.language.rapid import syntax as said
 from postproc.language.rapid.dialect import COMMENTS
 from postproc.language.rapid.program import Datum, RapidFile
 from postproc.language.rapid.signatures import (
+    ANSWERS,
     BUILT_IN_FUNCTIONS,
     BY_STRING,
     MOTIONS,
@@ -362,15 +363,21 @@ class _NamesUsed:
         own: Routines of the task by name: what else has their names is hidden.
         passed: Data and the parameter that they are given to, and whether the routine
             may change them through it.
+        parts: Names of which moves go to elements or components.
     """
 
     own: Mapping[str, Sequence[tuple[int, str, HeadedRows]]]
     written: set[str] = field(default_factory=set)
     read: set[str] = field(default_factory=set)
     passed: set[tuple[str, str, bool]] = field(default_factory=set)
+    parts: set[str] = field(default_factory=set)
 
     def pass_on(self) -> None:
-        """Note of data what is noted of the parameters that they are given to."""
+        """Note of data what is noted of the parameters that they are given to.
+
+        Which of the points in them a move takes is not followed.
+        """
+        self.read |= self.parts & {parameter for _, parameter, _ in self.passed}
         before = -1
         while before != len(self.written) + len(self.read):
             before = len(self.written) + len(self.read)
@@ -428,9 +435,16 @@ class _NamesUsed:
                     self._operand(argument.value)
         elif name in READING and name not in self.own:
             for argument in arguments:
-                self._operand(argument.value)
+                self._read(argument)
         else:
             self._arguments(arguments)
+
+    def _read(self, argument: said.Argument) -> None:
+        """Note an argument that is only read, unless it is an option that answers."""
+        if argument.name in ANSWERS:
+            self._arguments([argument])
+        else:
+            self._operand(argument.value)
 
     def _fitting(
         self, name: str, arguments: Sequence[said.Argument]
@@ -460,7 +474,8 @@ class _NamesUsed:
     def _destination(self, operand: said.Operand | None) -> None:
         """Note what the destination of a move takes besides the point itself."""
         match operand:
-            case said.DataObject(steps=steps):
+            case said.DataObject(name=name, steps=steps):
+                self.parts |= {name} if steps else set()
                 self._steps(steps)
             case said.FunctionCall(name=name, arguments=arguments) if (
                 name in SHIFTS and name not in self.own
@@ -496,7 +511,7 @@ class _NamesUsed:
             case said.FunctionCall(name=name, arguments=arguments):
                 if name in BUILT_IN_FUNCTIONS and name not in self.own:
                     for argument in arguments:
-                        self._operand(argument.value)
+                        self._read(argument)
                 else:
                     self._arguments(arguments)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.language.interface import Start
 from postproc.language.visits import ELSEWHERE, START
 from tests.language.krl.test_visits import (
     CONFIG,
@@ -301,3 +302,20 @@ def test_what_waits_for_the_arm_keeps_an_interrupt_out_of_the_moves_before(line)
 def test_an_interrupt_of_a_routine_comes_in_moves_before_the_call():
     more = f"DEF sub( )\n{DECLARED}\nINTERRUPT ON 10\nEND\n{MOVES}"
     assert left(job("LIN XP1", "sub( )", more=more)) == [True]
+
+
+# External axes that do not go where targets say.
+
+
+@pytest.mark.parametrize(
+    ("use", "lines", "left"),
+    [
+        ("track", ["$EX_AX_IGNORE='B1'"], True),
+        ("track", ["$EX_AX_IGNORE=1", "$EX_AX_IGNORE=0"], False),
+        ("track", ["IF $IN[1] THEN", "$EX_AX_IGNORE=1", "ENDIF"], True),
+        ("gun", ["$EX_AX_IGNORE=1"], False),
+    ],
+)
+def test_a_track_that_need_not_go_where_targets_say(use, lines, left):
+    found = job(*FRAMES, *lines, "LIN XP1", start=Start(aux={1: use}))
+    assert ("$EX_AX_IGNORE" in reasons(found)[0]) == left

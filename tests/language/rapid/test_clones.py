@@ -153,6 +153,15 @@ def test_what_another_reads_keeps_its_numbers(bench_cell, bench_model):
     assert old in text and "MoveJ pShared," not in text
 
 
+def test_clones_that_would_keep_their_numbers_are_not_made(bench_cell, bench_model):
+    lines = [*twice(), "GetDataVal sName,pOther;"]
+    more = '  VAR string sName:="pShared"; VAR robtarget pOther;\n'
+    source = moves(bench_cell, *lines, declared=P, extra=more)
+    found = run(source, bench_cell, bench_model)
+    assert "keep their numbers" in notes(found, "not-cloned")[0]
+    assert b"pShared__" not in found.outputs["job.mod"]
+
+
 def test_several_moves_on_a_line_keep_their_point(bench_cell, bench_model):
     more = " MoveJ pShared,vWork,fine,tWork\\WObj:=wPart;"
     source = moves(bench_cell, *twice(more=more), declared=P)
@@ -174,6 +183,21 @@ def test_a_point_of_a_system_module(bench_cell, bench_model):
     assert corrected(found) == corrected(plain) + 2
     record = records_of(found.sidecar)["job.mod"]
     assert restore(found.outputs["job.mod"], record, "job.mod") == source
+
+
+@pytest.mark.parametrize(
+    "first", ["  RECORD r\n  num a;\n  ENDRECORD\n", "  ALIAS num a;\n"]
+)
+def test_data_stand_behind_types(bench_cell, bench_model, first):
+    source = moves(bench_cell, *twice(), declared=P)
+    old = next(x for x in source.decode().splitlines() if "robtarget pShared:" in x)
+    system = name_read(PurePosixPath("RAPID/TASK1/SYSMOD/user.sys"))
+    pages = {system: f"MODULE user(SYSMODULE)\n{old}\nENDMODULE\n".encode()}
+    source = source.replace(old.encode() + b"\n", b"")
+    source = source.replace(b"MODULE job\n", b"MODULE job\n" + first.encode())
+    found = run(source, bench_cell, bench_model, pages=pages)
+    assert "defines types" in notes(found, "not-cloned")[0]
+    assert b"pShared__" not in found.outputs["job.mod"]
 
 
 def test_the_nearest_of_two_names_is_meant(bench_cell, bench_model):

@@ -173,3 +173,44 @@ def test_a_modal_instruction_takes_a_number_of_the_call():
     more = routine("slow", "VelSet x,500;", given="(num x)")
     found = once("slow 50;", L.format("p1"), more=more)
     assert found.visits.override.tolist() == [0.5]
+
+
+# What is handed over whole.
+
+WHOLE = {
+    "an element": ("VAR robtarget p{*}", "p{1}"),
+    "an element that is not known": ("robtarget p{*}", "p{n}"),
+    "a shifted element": ("robtarget p{*}", "Offs(p{2},0,0,9)"),
+}
+
+
+@pytest.mark.parametrize("kind", WHOLE)
+def test_points_of_an_array_that_a_routine_gets_keep_their_numbers(kind):
+    given, goal = WHOLE[kind]
+    line = L.format(goal).replace(",t\\", ",tool0\\")
+    lines = [L.format("list{1}"), "outer list;"]
+    more = MORE + routine("go", line, given=f"({given})")
+    more += routine("outer", "go x;", given=f"({given.replace('p{', 'x{')})")
+    found = once(*lines, more=more)
+    assert not free(found, "list{1}")
+    alone = once(lines[0], more=more.replace(line, "n:=1;"))
+    assert free(alone, "list{1}")
+
+
+# Options and arguments that answer.
+
+ANSWERS = {
+    "an option": r"WaitAI ai1\GT,5\MaxTime:=3\ValueAtTimeout:=n;",
+    "an option of a function": r"name:=GetTaskName(\TaskNo:=n);",
+    "an error number": r"jj:=CalcJointT(p2,t\ErrorNumber:=n);",
+    "an argument": "x:=DefAccFrame(list,list,3,k,n);",
+}
+
+
+@pytest.mark.parametrize("kind", ANSWERS)
+def test_numbers_that_instructions_and_functions_answer_in(kind):
+    more = "VAR num n:=5; VAR num k; VAR pose x; VAR string name; VAR jointtarget jj;\n"
+    lines = ["PDispSet [[0,0,n],[1,0,0,0]];", L.format("p1")]
+    assert reasons(once(*lines, more=more)) == [""]
+    found = once(ANSWERS[kind], *lines, more=more)
+    assert "displacement" in reasons(found)[0]

@@ -475,3 +475,10 @@ def test_what_holds_at_the_end_of_main_may_hold_when_it_begins_again(last, left)
     assert (reasons(found)[0] != "") is left
     behind = ELSEWHERE if last == ["NotKnown;"] else 1
     assert origins(found) == [sorted([START, behind]), [0]]
+
+
+def test_a_move_of_external_axes_says_where_they_go():
+    unused = "9E9,9E9,9E9,9E9,9E9"
+    more = f"CONST jointtarget far:=[[9E9,{unused}],[500,{unused}]];\n"
+    found = once("MoveExtJ far,vrot10,fine;", L.format("p1"), more=more)
+    assert found.visits.aux[:, 0].tolist()[0] == 500.0
