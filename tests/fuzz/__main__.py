@@ -20,11 +20,11 @@ from pathlib import Path
 
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell
+from tests.any_controller import told
 from tests.conftest import CELL, make_job
 from tests.fuzz.case import HangError, compensated, rewrite
 from tests.fuzz.originals import damaged_of
 
-TOLD = "absolute_accuracy = false\n[tool]"  # without it RAPID and KRL are refused
 WHOLE = 9  # every so many are compensated, not only rewritten
 _SETUP: list[tuple[Cell, Model]] = []
 
@@ -79,7 +79,7 @@ def main() -> int:
     counted: Counter[str] = Counter()
     slowest = 0.0
     with tempfile.TemporaryDirectory() as name:
-        folder = str(make_job(Path(name), CELL.replace("[tool]", TOLD)))
+        folder = str(make_job(Path(name), told(CELL)))
         with ProcessPoolExecutor(given.jobs, None, begin, (folder,)) as pool:
             numbers = range(given.first, given.first + given.count)
             seeds = [given.seed] * len(numbers)

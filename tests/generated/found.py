@@ -18,6 +18,7 @@ ALONG = "targets that move along with one (NEAR, FOR, POS_SHIFT)"
 PAIRS = (KNOWN, CLONED, UNSURE, FIRST, ROUNDED, LOADED, ALONG)
 ALL = "all compensated arrivals"
 DONE = "compensated"
+MOST = 12  # reasons that are listed
 
 
 @dataclass
@@ -76,6 +77,13 @@ def lines(found: Found) -> Iterable[str]:
             )
     if found.z:
         yield f"  not sure: within 2 stated standard errors {within(found.z):.1%}"
+    if found.visits:
+        share = found.corrected / found.visits
+        yield f"visits: {found.visits}, corrected {share:.1%}; not corrected as:"
+        yield from (f"  {n:6d} {text}" for text, n in found.reasons.most_common(MOST))
+    yield from (f"  refused {n}: {text}" for text, n in found.refused.most_common())
+    if not found.once:
+        return
     yield f"targets seen at one value from one side: {found.once.total()}"
     for text, count in found.once.most_common():
         yield f"  {count:6d} {text}"

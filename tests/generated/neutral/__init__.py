@@ -1,1 +1,1 @@
-"""Random programs in no language: printed in RAPID and KRL, and run by a small tree walk."""
+"""Random programs in no language: written in RAPID and KRL, run by a walk of them."""

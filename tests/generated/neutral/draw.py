@@ -60,9 +60,9 @@ OPENING = (np.deg2rad(26.0), np.deg2rad(13.0))  # all joints turn one way to the
 DEPTH = 2
 # Of each program half of these are drawn, so that one does not hide what another does.
 FEATURES = (
-    "arc", "call", "displace", "element", "fail", "frames", "given", "handler", "inline",
-    "interrupt", "lift", "load", "loop", "made", "modal", "modules", "offset", "poll",
-    "shared", "shift", "step", "tool", "trigger", "variable", "zone",
+    "arc", "call", "displace", "element", "fail", "frames", "given", "handler",
+    "inline", "interrupt", "lift", "load", "loop", "made", "modal", "modules", "offset",
+    "poll", "shared", "shift", "step", "tool", "trigger", "variable", "zone",
 )  # fmt: skip
 TOOLS, BASES, LOADS = 2, 3, 2
 ENTRY = "job"
@@ -210,12 +210,12 @@ class Draw:
         if self.has("element") and rng.random() < 0.25:
             return Element("row", rng.randint(1, 3))
         names = [n for n, (_, file) in made.points.items() if file <= self.file]
-        return Named(rng.choice([n for n in names if n != "j1"]))
+        return Named(rng.choice([n for n in names if n[0] in "pr"]))
 
     def _point(self) -> Point:
         rng = self.rng
         more = ("element", "offset", "tool", "variable", "given", "made")
-        kinds = ["named"] * 6 + ["inline"] * 4 * self.has("inline")
+        kinds = ["named"] * 3 + ["fresh"] * 6 + ["inline"] * 4 * self.has("inline")
         kind = rng.choice([*kinds, *(name for name in more if self.has(name))])
         match kind:
             case "inline":
@@ -225,6 +225,10 @@ class Draw:
             case "offset" | "tool":
                 by = self._offset()
                 return Shifted(self._fixed(), by, kind == "tool")
+            case "fresh":
+                name = f"q{len(self.made.points)}"
+                self.made.points[name] = (self._literal(), self.file)
+                return Named(name)
             case "variable":
                 return Named(rng.choice(self.made.variables))
             case "given" if self.given:
@@ -258,7 +262,10 @@ class Draw:
     def _statement(self, depth: int) -> Statement:
         kinds: dict[str, int] = {"motion": 12, "assign": 2, "frames": 2, "other": 2}
         if depth < DEPTH:
-            kinds |= {"block": 5, "call": 3 * (bool(self.callable) and self.has("call"))}
+            kinds |= {
+                "block": 5,
+                "call": 3 * (bool(self.callable) and self.has("call")),
+            }
         kind = self.rng.choices(list(kinds), list(kinds.values()))[0]
         if kind == "block":
             return self._block(depth)
@@ -290,9 +297,7 @@ class Draw:
         rng = self.rng
         return rng.randint(-10, 10), rng.randint(-10, 10), rng.randint(-10, 10)
 
-    def _move(
-        self, kind: str, to: Point, zone: int, via: Point | None = None
-    ) -> Move:
+    def _move(self, kind: str, to: Point, zone: int, via: Point | None = None) -> Move:
         self.marks += 1
         rng = self.rng
         named = self.rapid and (not self.has("modal") or rng.random() < 0.7)
@@ -300,9 +305,7 @@ class Draw:
         base = rng.choice([1, 1, 1, 2, 3]) if named else 0
         trigger = kind == "line" and self.has("trigger") and rng.random() < 0.2
         speed, early = rng.choice([0, 100, 200]), kind == "joint" and rng.random() < 0.5
-        return Move(
-            self.marks, kind, to, via, zone, tool, base, speed, trigger, early
-        )
+        return Move(self.marks, kind, to, via, zone, tool, base, speed, trigger, early)
 
     def _assignment(self) -> Statement:
         rng = self.rng
@@ -399,7 +402,9 @@ class Draw:
         body = self._inner(depth)
         name = f"i{self.loops}"
         self.loops -= 1
-        first, last, step = self.rng.choice([(1, 3, 1), (1, 2, 1), (3, 1, -1), (1, 3, 2)])
+        first, last, step = self.rng.choice(
+            [(1, 3, 1), (1, 2, 1), (3, 1, -1), (1, 3, 2)]
+        )
         return For(name, first, last, step, body)
 
     def _inner(self, depth: int) -> Body:

@@ -41,7 +41,9 @@ def follow(
         if not now:
             why = {misfit(visits, v, step, rapid) or "its predecessors" for v in here}
             text = " / ".join(sorted(why)) or "no visit"
-            raise AssertionError(f"{place[0]}, line {place[1]} is run otherwise: {text}")
+            raise AssertionError(
+                f"{place[0]}, line {place[1]} is run otherwise: {text}"
+            )
         found.append(now)
         before = now
     return found
@@ -59,7 +61,8 @@ def misfit(visits: Visits, visit: int, step: Step, rapid: bool) -> str:
     if not step.in_joints and uframe >= 0:
         if not same(visits.frames[uframe], step.base):
             return "the base"
-    if visits.reason[visit] == 0 and not same_load(visits, visit, step):
+    known = visits.reason[visit] == 0 and tool >= 0
+    if known and not same_load(visits, visit, step):
         return "the load"
     return "" if same_goal(visits, visit, step, rapid) else "the target"
 

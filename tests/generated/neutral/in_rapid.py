@@ -198,7 +198,11 @@ class Writer:
 
     def _routine(self, routine: Routine) -> None:
         main = routine is self.made.routines[0]
-        words = {"value": "num", "reference": "INOUT num" if len(routine.own) < 2 else "VAR num", "point": "robtarget"}
+        words = {
+            "value": "num",
+            "reference": "INOUT num" if len(routine.own) < 2 else "VAR num",
+            "point": "robtarget",
+        }
         given = ",".join(f"{words[kind]} {name}" for name, kind in routine.parameters)
         self._emit(f"PROC {'main' if main else routine.name}({given})")
         self.depth += 1

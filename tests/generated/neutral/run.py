@@ -229,7 +229,9 @@ class Run:
         match one:
             case Move():
                 self._move(one)
-            case SetTool() | SetBase() | Displace() | SetLoad() | SetSpeed() | SetZone():
+            case (
+                SetTool() | SetBase() | Displace() | SetLoad() | SetSpeed() | SetZone()
+            ):
                 self._set(one)
             case Assign(name, value):
                 self._box(name).value = self._number(value)
@@ -432,7 +434,9 @@ class Run:
             if not self.rapid and one.zone:
                 modes.zone = zone
             pose = made.tools[tool - 1]
-            step = Step(one, via, target, pose, base, load, fly, zone, speed, made.plain)
+            step = Step(
+                one, via, target, pose, base, load, fly, zone, speed, made.plain
+            )
             self.steps.append(step)
 
     def _load(self, tool: int) -> Load:

@@ -319,8 +319,9 @@ class Return:
 
 
 Statement = (
-    Move | SetTool | SetBase | Displace | SetLoad | SetSpeed | SetZone | Assign | SetPoint | Lift
-    | Wait | Output | MayFail | If | Switch | For | Count | Poll | Loop | Skip | Call | Return
+    Move | SetTool | SetBase | Displace | SetLoad | SetSpeed | SetZone | Assign
+    | SetPoint | Lift | Wait | Output | MayFail | If | Switch | For | Count | Poll
+    | Loop | Skip | Call | Return
 )  # fmt: skip
 Body = tuple[Statement, ...]
 
