@@ -31,6 +31,7 @@ from tests.generated.neutral.tree import (
     Move,
     Named,
     Not,
+    Note,
     Output,
     Place,
     Point,
@@ -61,8 +62,9 @@ DEPTH = 2
 # Of each program half of these are drawn, so that one does not hide what another does.
 FEATURES = (
     "arc", "call", "displace", "element", "fail", "frames", "given", "handler",
-    "inline", "interrupt", "lift", "load", "loop", "made", "modal", "modules", "offset",
-    "poll", "shared", "shift", "step", "tool", "trigger", "variable", "zone",
+    "forms", "inline", "interrupt", "late", "lift", "load", "loop", "made", "meddle",
+    "modal", "modules", "note", "offset", "poll", "repair", "shared", "shift", "step",
+    "tool", "trigger", "variable", "zone",
 )  # fmt: skip
 TOOLS, BASES, LOADS = 2, 3, 2
 ENTRY = "job"
@@ -98,10 +100,12 @@ class Draw:
         self.own, self.given, self.file = (), (), 0
         handler = self._handler()
         body = (*self._opening(), *self._body(rng.randint(6, 14), 0))
-        main = Routine(ENTRY, (), body, ("m1",), handler)
+        main = Routine(ENTRY, (), body, ("m1",), handler, self._repair(handler))
         made.routines = [main, *reversed(self.callable)]
         made.ends = not self.rapid or rng.random() < 0.6
         made.interrupts = self.has("interrupt")
+        if self.inputs and made.interrupts and self.has("meddle"):
+            made.interrupt = (self._change(),)
         made.shared = self.has("shared") or any(r.file for r in self.callable)
         return made
 
@@ -168,13 +172,38 @@ class Draw:
         first = tuple(Assign(n, rng.randint(0, 3)) for n in (*local, *hides))
         body = (*first, *self._body(rng.randint(2, 5), 1))
         name = f"sub{number}"
-        return Routine(name, parameters, body, (*local, *hides), handler, self.file)
+        return Routine(
+            name, parameters, body, (*local, *hides), handler, self._repair(handler),
+            self.file,
+        )  # fmt: skip
 
     def _handler(self) -> tuple[str, int]:
         if not self.rapid or not self.has("handler") or self.rng.random() < 0.4:
             return "", 0
         words = ["RETRY", "TRYNEXT", "TRYNEXT", "RETURN", "RAISE"]
         return self.rng.choice(words), self.rng.randint(0, 2)
+
+    def _repair(self, handler: tuple[str, int]) -> Body:
+        simple = handler[1] < 2 and handler[0]  # the third way is one line
+        if not simple or not self.has("repair") or self.rng.random() < 0.5:
+            return ()
+        return (self._change(),)
+
+    def _change(self) -> Statement:
+        """Change something that other statements build on."""
+        rng = self.rng
+        kinds = ["number", "number", "point", "load", "base"]
+        match rng.choice([*kinds, *["displace"] * self.rapid]):
+            case "point":
+                value = Named(f"p{rng.randint(1, 3)}")
+                return SetPoint(rng.choice(self.made.variables), value)
+            case "load":
+                return SetLoad(rng.randint(0, LOADS))
+            case "base":
+                return SetBase(rng.randint(1, BASES))
+            case "displace":
+                return Displace(self._still_offset())
+        return Assign(rng.choice(["n1", "n2", "n3"]), rng.randint(0, 3))
 
     # Numbers and conditions.
 
@@ -300,11 +329,18 @@ class Draw:
     def _move(self, kind: str, to: Point, zone: int, via: Point | None = None) -> Move:
         self.marks += 1
         rng = self.rng
-        named = self.rapid and (not self.has("modal") or rng.random() < 0.7)
+        named = not self.has("modal") or rng.random() < 0.7
+        if not self.rapid:
+            form = self.has("forms") and kind in ("line", "joint") and zone >= 0
+            named = form and rng.random() < 0.6
         tool = rng.choice([1, 1, 1, 2]) if named else 0
         base = rng.choice([1, 1, 1, 2, 3]) if named else 0
-        trigger = kind == "line" and self.has("trigger") and rng.random() < 0.2
-        speed, early = rng.choice([0, 100, 200]), kind == "joint" and rng.random() < 0.5
+        formed = named and not self.rapid
+        trigger = (
+            kind == "line" and not formed and self.has("trigger") and rng.random() < 0.2
+        )
+        speed = rng.choice([100, 200] if formed else [0, 100, 200])
+        early = kind == "joint" and (formed or rng.random() < 0.5)
         return Move(self.marks, kind, to, via, zone, tool, base, speed, trigger, early)
 
     def _assignment(self) -> Statement:
@@ -340,11 +376,13 @@ class Draw:
 
     def _other(self) -> Statement:
         rng = self.rng
-        kinds = ["wait", "output", "output"]
+        kinds = ["wait", "output", "output", *["note"] * 3 * self.has("note")]
         kinds += ["fail"] * 3 * (self.rapid and self.has("fail"))
         match rng.choice(kinds):
             case "wait":
                 return Wait(rng.randint(0, 1))
+            case "note":
+                return Note(rng.randint(0, 4))
             case "fail":
                 return MayFail(rng.random() < 0.3)
         return Output(rng.randint(1, 3), rng.random() < 0.5)
@@ -361,7 +399,8 @@ class Draw:
                 arguments.append(Var(rng.choice(self._names())))
             else:
                 arguments.append(self._expr())
-        return Call(called.name, tuple(arguments))
+        late = self.rapid and self.has("late") and not arguments and rng.random() < 0.5
+        return Call(called.name, tuple(arguments), late)
 
     def _block(self, depth: int) -> Statement:
         rng = self.rng

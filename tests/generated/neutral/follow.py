@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,6 +16,8 @@ from tests.generated.neutral.tree import Place, Program, Shifted
 
 CLOSE = 1e-6  # of poses [m], whose numbers are both read from the text
 HEAVY = 1e-6  # [kg], [m]
+# Reasons of visits that may go anywhere at any time.
+ANYTHING = re.compile(r"(interrupt|TRAP|handler) .*may (move|be called)|at any time")
 
 
 def follow(
@@ -31,6 +34,10 @@ def follow(
         by_line.setdefault((visits.files[file], line), []).append(visit)
     before, found = {START}, []
     for step in steps:
+        if step.beside:
+            found.append(set())
+            before = set()
+            continue
         place = where.moves[step.move.mark]
         here = by_line.get(place, [])
         alike = [v for v in here if not misfit(visits, v, step, rapid)]
@@ -53,6 +60,8 @@ def misfit(visits: Visits, visit: int, step: Step, rapid: bool) -> str:
     """Say in what a visit differs from a step of a run, "" in nothing."""
     if bool(visits.via[visit]) != step.via:
         return "another point of an arc"
+    if ANYTHING.search(visits.reasons[visits.reason[visit]]):
+        return ""
     tool, uframe = int(visits.tool[visit]), int(visits.uframe[visit])
     if tool >= 0 and not same(visits.frames[tool], step.tool):
         return "the tool"

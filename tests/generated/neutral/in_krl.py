@@ -31,6 +31,7 @@ from tests.generated.neutral.tree import (
     Move,
     Named,
     Not,
+    Note,
     Output,
     Place,
     Point,
@@ -57,6 +58,21 @@ from tests.generated.neutral.tree import (
 from tests.language.neutral_job import NeutralJob, status
 
 END = "E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0"
+NOTES = (
+    "; at work", "$ACC.CP=2", "$VEL_AXIS[1]=50", "$TIMER[1]=0", "$ADVANCE=3",
+)  # fmt: skip
+NEW_LINE = (
+    " WITH $VEL=SVEL_CP({speed}, , LC{zone}), $TOOL=STOOL2({frames}), "
+    "$BASE=SBASE({frames}.BASE_NO), $IPO_MODE=SIPO_MODE({frames}.IPO_FRAME), "
+    "$LOAD=SLOAD({frames}.TOOL_NO), $ACC=SACC_CP(LC{zone}), "
+    "$ORI_TYPE=SORI_TYP(LC{zone}), $APO=SAPO(LC{zone}), $JERK=SJERK(LC{zone})"
+)
+NEW_JOINT = (
+    " WITH $VEL_AXIS[1]=SVEL_JOINT(50.0), $TOOL=STOOL2({frames}), "
+    "$BASE=SBASE({frames}.BASE_NO), $IPO_MODE=SIPO_MODE({frames}.IPO_FRAME), "
+    "$LOAD=SLOAD({frames}.TOOL_NO), $ACC_AXIS[1]=SACC_JOINT(PP{zone}), "
+    "$APO=SAPO_PTP(PP{zone}), $GEAR_JERK[1]=SGEAR_JERK(PP{zone})"
+)
 DEFAULT_LOAD = "{M -1.0,CM {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z 0.0}}"
 
 
@@ -158,6 +174,7 @@ class Writer:
         if not file:
             for point in made.variables:
                 page.emit(f"{scope} E6POS {point}")
+            self._forms(page, scope)
             for number_name, value in made.numbers.items():
                 page.emit(f"{scope} INT {number_name}={value}")
             for row, numbers in made.arrays.items():
@@ -166,6 +183,20 @@ class Writer:
                     page.emit(f"{row}[{k + 1}]={self._literal(number)}")
         page.emit("ENDDAT")
         return page
+
+    def _forms(self, page: Page, scope: str) -> None:
+        """Write the data of inline forms."""
+        for tool in range(1, len(self.made.tools) + 1):
+            for base in range(1, len(self.made.bases) + 1):
+                numbers = f"TOOL_NO {tool},BASE_NO {base}"
+                text = f'{{{numbers},IPO_FRAME #BASE,POINT2[] " ",TQ_STATE FALSE}}'
+                page.emit(f"{scope} FDAT F{tool}{base}={text}")
+        for zone in (0, 5, 10):
+            size = f"ACC 100.0,APO_DIST {zone or 100}.0"
+            path = f"{{VEL 2.0,{size},APO_FAC 50.0,ORI_TYP #VAR,CIRC_TYP #BASE}}"
+            page.emit(f"{scope} LDAT LC{zone}={path}")
+            joint = f"{{VEL 100.0,{size},APO_MODE #CDIS,GEAR_JERK 50.0}}"
+            page.emit(f"{scope} PDAT PP{zone}={joint}")
 
     def _literal(self, number: int) -> str:
         where: Place = self.made.places[number]
@@ -239,8 +270,10 @@ class Writer:
                 self._emit(f"  {line}")
             self._emit("ENDFCT")
         if self.made.interrupts:
-            for line in ("GLOBAL DEF BEEP ( )", "CONTINUE", "$OUT[3]=TRUE", "END"):
+            for line in ("GLOBAL DEF BEEP ( )", "CONTINUE", "$OUT[3]=TRUE"):
                 self._emit(line)
+            self._inner(self.made.interrupt)
+            self._emit("END")
 
     # Statements.
 
@@ -287,6 +320,8 @@ class Writer:
                 if ahead:
                     emit("CONTINUE")
                 emit(f"$OUT[{number}]=TRUE")
+            case Note(way):
+                emit(NOTES[way])
             case Call(name, arguments):
                 emit(f"{name}({','.join(self._argument(a) for a in arguments)})")
             case Return(test):
@@ -392,6 +427,9 @@ class Writer:
             self._emit(f"{word} {{X {x},Y {y},Z {z}}}", one.mark)
             return
         places = [self._point(p) for p in (one.via, one.to) if p is not None]
+        if one.tool:
+            self._form(one, word, *places)
+            return
         if one.trigger and plain:
             self._emit("TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[2]=TRUE")
         blend = "C_DIS" if plain else "C_SPL"
@@ -401,6 +439,23 @@ class Writer:
         if one.zone:
             text += " C_PTP" if plain and one.early else f" {blend}"
         self._emit(text, one.mark)
+
+    def _form(self, one: Move, word: str, to: str) -> None:
+        """Write a move as an inline form does."""
+        line, frames = one.kind == "line", f"F{one.tool}{one.base}"
+        speed = f"{one.speed / 1000:g}"
+        if self.made.plain:
+            self._emit(f"FDAT_ACT={frames}")
+            kind, data = ("CP", f"LDAT_ACT=LC{one.zone}") if line else (
+                "PTP", f"PDAT_ACT=PP{one.zone}")  # fmt: skip
+            self._emit(data)
+            self._emit(f"BAS(#{kind}_PARAMS,{speed if line else 50})")
+            end = " C_DIS" if one.zone else ""
+        else:
+            form = NEW_LINE if line else NEW_JOINT
+            end = form.format(speed=speed, frames=frames, zone=one.zone)
+            end += " C_SPL" if one.zone else ""
+        self._emit(f"{word} {to}{end}", one.mark)
 
     def _point(self, point: Point) -> str:
         match point:

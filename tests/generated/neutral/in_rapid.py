@@ -31,6 +31,7 @@ from tests.generated.neutral.tree import (
     Move,
     Named,
     Not,
+    Note,
     Output,
     Place,
     Point,
@@ -63,6 +64,10 @@ from tests.language.neutral_job import (
 )
 
 FRAME = "[[0,0,0],[1,0,0,0]]"
+NOTES = (
+    'TPWrite "at work";', "ConfL\\On;", "AccSet 80,80;", "ClkStart clock1;",
+    "SingArea\\Off;",
+)  # fmt: skip
 HANDLERS = (
     ("ERROR", "{};"),
     ("ERROR (ERR_WAIT_MAXTIME)", "{};"),
@@ -151,11 +156,13 @@ class Writer:
             scope = "CONST" if made.fixed else "PERS"
             emit(f"{scope} robtarget {name}{{{len(row)}}}:=[{text}];")
         emit("VAR triggdata trig1;")
+        emit("VAR clock clock1;")
         emit("VAR errnum MY_ERR:=-1;")
         if made.interrupts:
             emit("VAR intnum ir1;")
             emit("TRAP beep")
             emit("  PulseDO do3;")
+            self._inner(made.interrupt)
             emit("ENDTRAP")
 
     def _tool(self, k: int) -> str:
@@ -217,6 +224,7 @@ class Writer:
         if word:
             head, line = HANDLERS[way]
             self._emit(head)
+            self._inner(routine.repair)
             self._emit("  " + line.format(word))
         self.depth -= 1
         self._emit("ENDPROC")
@@ -278,6 +286,10 @@ class Writer:
                 emit(f"SetDO do{number},1;")
             case MayFail(own):
                 emit("look;" if own else "WaitDI di7,1\\MaxTime:=2;")
+            case Note(way):
+                emit(NOTES[way])
+            case Call(name, _, True):
+                emit(f'%"{name}"%;')
             case Call(name, arguments):
                 given = ",".join(self._argument(a) for a in arguments)
                 emit(f"{name} {given};" if given else f"{name};")

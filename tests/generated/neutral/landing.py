@@ -112,7 +112,7 @@ def given_back(files: Mapping[str, bytes], done: Outcome) -> dict[str, bytes]:
     check_bytes(files, {**files, **done.outputs}, records, done.visits)
     for name, record in records.items():
         assert restore(done.outputs[name], record, name) == files[name], name
-    new = {n: without_stamp(n, data) for n, data in done.outputs.items()}
+    new = {n: without_stamp(n, done.outputs[n]) for n in records}
     return {**files, **new}
 
 
@@ -135,6 +135,9 @@ def count(
             continue
         line = one.text.moves[old.move.mark][1]
         mine = sorted(rows[k])
+        if not mine:
+            found.wrong.append((seed, line, "is corrected, but not followed"))
+            continue
         if k not in now:
             if k in before:
                 found.wrong.append((seed, line, "the arm cannot reach it any more"))

@@ -30,6 +30,7 @@ from tests.generated.neutral.tree import (
     Move,
     Named,
     Not,
+    Note,
     Output,
     Point,
     Poll,
@@ -58,6 +59,7 @@ MOST = 80  # moves
 ROUNDS = 2  # of a program that begins again
 STEPS = 3_000  # statements
 FAILS = 0.25  # of instructions that may fail
+COMES = 0.04  # interrupts between two statements
 HEAVY = 0.01  # [kg] a lighter tool states nothing
 Load = tuple[float, tuple[float, float, float]]
 NOTHING: Load = (float("nan"), (0.0, 0.0, 0.0))
@@ -88,6 +90,7 @@ class Step:
         fly: It is passed without a stop, in a zone of `zone` [mm].
         speed: Along paths [mm/s].
         plain: It is no spline.
+        beside: A call by a name in a text led to it, which nobody follows.
     """
 
     move: Move
@@ -100,6 +103,7 @@ class Step:
     zone: float
     speed: float
     plain: bool
+    beside: bool
 
     @property
     def by_joints(self) -> bool:
@@ -166,7 +170,9 @@ class Run:
         self.rng = random.Random(f"inputs:{seed}")
         self.steps: list[Step] = []
         self.left = STEPS
-        self.handlers: list[tuple[str, int]] = []
+        self.handlers: list[Routine] = []
+        self.inside = False  # an interrupt
+        self.beside = 0  # calls by name
         self.modes = Modes()
         self.all = {name: Box(value) for name, value in made.numbers.items()}
         self.scopes: list[dict[str, Box]] = []
@@ -185,7 +191,7 @@ class Run:
     def _routine(self, routine: Routine, given: dict[str, Box]) -> bool:
         """Run a routine; tell whether it was left before its end."""
         self.scopes.append(given | {name: Box(0) for name in routine.own})
-        self.handlers.append(routine.handler)
+        self.handlers.append(routine)
         try:
             self._body(routine.body)
         except LeaveError:
@@ -208,10 +214,13 @@ class Run:
             try:
                 self._do(one)
             except FailError as fail:
-                word, way = self.handlers[-1]
+                word, way = self.handlers[-1].handler
                 if fail.args[0] and way == 2 and word:
                     raise EndError from None  # its handler ends without an answer
-                match "" if fail.args[0] and way == 1 else word:
+                word = "" if fail.args[0] and way == 1 else word
+                if word:
+                    self._body(self.handlers[-1].repair)
+                match word:
                     case "RETRY":
                         continue
                     case "TRYNEXT":
@@ -226,7 +235,10 @@ class Run:
         self.left -= 1
         if self.left < 0 or len(self.steps) >= MOST:
             raise EndError
+        self._interrupt()
         match one:
+            case Note():
+                pass
             case Move():
                 self._move(one)
             case (
@@ -249,13 +261,28 @@ class Run:
             case MayFail(own):
                 if self.rng.random() < FAILS:
                     raise FailError(own)
-            case Call(name, arguments):
-                self._call(name, arguments)
+            case Call(name, arguments, late):
+                self.beside += late
+                try:
+                    self._call(name, arguments)
+                finally:
+                    self.beside -= late
             case Return(test):
                 if self._holds(test):
                     raise LeaveError
             case _:
                 self._block(one)
+
+    def _interrupt(self) -> None:
+        """Let an interrupt come, now and then: it knows the program's data alone."""
+        if not self.made.interrupt or self.inside or self.rng.random() > COMES:
+            return
+        self.inside = True
+        self.scopes.append({})
+        for one in self.made.interrupt:
+            self._do(one)
+        self.scopes.pop()
+        self.inside = False
 
     def _block(self, one: Statement) -> None:
         match one:
@@ -398,8 +425,7 @@ class Run:
             case SetTool(number, way):
                 modes.tool = number
                 if way == 1:
-                    mass = made.tool_loads[number - 1]
-                    modes.load = (mass, (0.0, 0.0, 100.0)) if mass > HEAVY else NOTHING
+                    modes.load = self._of_tool(number)
             case SetBase(number, shift, _):
                 modes.base = moved(made.bases[number - 1], shift)
             case Displace(by):
@@ -414,14 +440,16 @@ class Run:
 
     def _move(self, one: Move) -> None:
         modes, made = self.modes, self.made
-        tool = (one.tool if self.rapid else 0) or modes.tool
-        base = modes.base
-        if self.rapid and one.base:
-            base = made.bases[one.base - 1]
+        if one.tool and not self.rapid and made.plain:
+            self._form(one)
+        tool = one.tool or modes.tool
+        base = made.bases[one.base - 1] if one.base else modes.base
         if self.rapid and modes.shown is not None:
             base = base @ modes.shown
-        speed = (one.speed if self.rapid else 0) or modes.speed
+        speed = (one.speed if self.rapid or one.tool else 0) or modes.speed
         load = self._load(tool)
+        if one.tool and not self.rapid:
+            load = self._of_tool(one.tool)
         places = [] if one.via is None else [(True, self._place(one.via))]
         if one.kind == "step":
             assert isinstance(one.to, Shifted)
@@ -431,13 +459,27 @@ class Run:
         for via, target in places:
             fly = bool(one.zone) and not via
             zone = modes.zone if one.zone < 0 else one.zone
-            if not self.rapid and one.zone:
+            if not self.rapid and one.zone and not one.tool:
                 modes.zone = zone
             pose = made.tools[tool - 1]
+            beside, plain = self.beside > 0, made.plain
             step = Step(
-                one, via, target, pose, base, load, fly, zone, speed, made.plain
+                one, via, target, pose, base, load, fly, zone, speed, plain, beside
             )
             self.steps.append(step)
+
+    def _form(self, one: Move) -> None:
+        """Take what an inline form of a plain move sets for all that follow."""
+        modes = self.modes
+        modes.tool, modes.base = one.tool, self.made.bases[one.base - 1]
+        modes.load = self._of_tool(one.tool)
+        if one.kind == "line":
+            modes.speed, modes.zone = one.speed, one.zone
+
+    def _of_tool(self, tool: int) -> Load:
+        """Return the load that LOAD_DATA has for a tool."""
+        mass = self.made.tool_loads[tool - 1]
+        return (mass, (0.0, 0.0, 100.0)) if mass > HEAVY else NOTHING
 
     def _load(self, tool: int) -> Load:
         """Return what the arm carries: in RAPID the tool and what it grips."""

@@ -126,7 +126,8 @@ class Move:
         mark: A number of its own.
         kind: joint, line, arc, axes (to joint angles) or step (line by `to`'s shift).
         zone: Size of the zone [mm]; 0: it stops, -1: the variable, or what holds.
-        tool, base: Their numbers; 0: the variable, or what holds.
+        tool, base: Their numbers; 0: the variable, or what holds. In KRL the move is
+            an inline form where they are named.
         trigger: It switches an output on its way.
         early: KRL blends it by joints (C_PTP).
     """
@@ -228,6 +229,13 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Note:
+    """A statement without consequence, one of several."""
+
+    way: int
+
+
+@dataclass(frozen=True)
 class MayFail:
     """An instruction that may raise an error: its own, or one of the program."""
 
@@ -305,10 +313,11 @@ class Skip:
 
 @dataclass(frozen=True)
 class Call:
-    """Calls a routine; arguments by kind of its parameters."""
+    """Calls a routine, maybe by its name in a text; arguments by kind."""
 
     name: str
     arguments: tuple[Expr | Point, ...] = ()
+    late: bool = False
 
 
 @dataclass(frozen=True)
@@ -320,8 +329,8 @@ class Return:
 
 Statement = (
     Move | SetTool | SetBase | Displace | SetLoad | SetSpeed | SetZone | Assign
-    | SetPoint | Lift | Wait | Output | MayFail | If | Switch | For | Count | Poll
-    | Loop | Skip | Call | Return
+    | SetPoint | Lift | Wait | Output | Note | MayFail | If | Switch | For | Count
+    | Poll | Loop | Skip | Call | Return
 )  # fmt: skip
 Body = tuple[Statement, ...]
 
@@ -336,6 +345,7 @@ class Routine:
         parameters: Name and kind: value, reference or point.
         own: Numbers of its own; one may hide a number of the program.
         handler: RETRY, TRYNEXT, RETURN, RAISE or "", and how it is written.
+        repair: What the handler does before.
         file: 0: that of the program.
     """
 
@@ -344,6 +354,7 @@ class Routine:
     body: Body = ()
     own: tuple[str, ...] = ()
     handler: tuple[str, int] = ("", 0)
+    repair: Body = ()
     file: int = 0
 
 
@@ -383,6 +394,8 @@ class Program:
         routines: The first is the program itself.
         ends: Whether it ends, or begins again.
         plain: KRL without splines.
+        interrupts: An interrupt switches an output.
+        interrupt: What it does besides, at any time.
         shared: Other programs may read the points of the program.
         fixed: Its array never changes.
     """
@@ -401,6 +414,7 @@ class Program:
     ends: bool = True
     plain: bool = False
     interrupts: bool = False
+    interrupt: Body = ()
     shared: bool = False
     fixed: bool = False
 
