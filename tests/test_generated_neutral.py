@@ -28,7 +28,8 @@ WRITTEN = {
         r"vVar.v_tcp:=", r"zVar:=", r"IF .* THEN", r"ELSEIF", r"TEST", r"DEFAULT",
         r"FOR .* STEP", r"WHILE di", r"GOTO", r"INOUT num", r"VAR num \w+[,)]", r"FUNC",
         r"ERROR \(", r"IF ERRNO", r"RETRY", r"TRYNEXT", r"RETURN;", r"RAISE;",
-        r"RAISE MY_ERR", r"WaitDI", r"WaitTime", r"TRAP", r"LOCAL CONST", r"\{i\d\}",
+        r"RAISE MY_ERR", r"%\"sub", r"TPWrite", r"WaitDI", r"WaitTime", r"TRAP",
+        r"LOCAL CONST", r"\{i\d\}",
     ),
     "krl": (
         r"\bPTP", r"\bLIN ", r"SPTP", r"SLIN ", r"SCIRC", r"LIN_REL", r"C_DIS",
@@ -37,7 +38,9 @@ WRITTEN = {
         r"IF .* THEN", r"ELSE", r"SWITCH", r"DEFAULT", r"FOR .* STEP", r"WHILE",
         r"REPEAT", r"LOOP", r"EXIT", r"GOTO", r":OUT", r":IN", r"DEFFCT INT",
         r"DEFFCT E6POS", r"TRIGGER", r"INTERRUPT", r"CONTINUE", r"WAIT SEC",
-        r"WAIT FOR", r"GI_PART", r"GLOBAL E6POS", r"DECL E6POS", r"\[i\d\]", r"SH:",
+        r"WAIT FOR", r"GI_PART", r"GLOBAL E6POS", r"FDAT_ACT=",
+        r"BAS\(#CP_PARAMS", r"STOOL2\(", r"SVEL_JOINT", r"DECL E6POS",
+        r"\[i\d\]", r"SH:",
     ),
 }  # fmt: skip
 
@@ -110,11 +113,13 @@ def test_numbers_are_read_back_where_they_stand(told_cell, language):
 def test_another_change_than_of_targets_is_found(told_cell, language):
     one = case(3, language, told_cell)
     name = next(iter(one.text.files))
-    for old, new in ((b"END", b"ENX"), (b"n1", b"n2"), (b"0.2", b"0.3")):
-        if old in one.text.files[name]:
-            changed = {name: one.text.files[name].replace(old, new)}
-            with pytest.raises(AssertionError):
-                one.text.numbers({**one.text.files, **changed})
+    zone = {"rapid": b"FALSE,5", "krl": b"CDIS=5"}[language]
+    zones = zone, zone.replace(b"5", b"6")
+    for old, new in ((b"END", b"ENX"), (b"m1", b"m7"), zones):
+        assert old in one.text.files[name]
+        changed = {name: one.text.files[name].replace(old, new)}
+        with pytest.raises(AssertionError):
+            one.text.numbers({**one.text.files, **changed})
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
