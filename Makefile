@@ -4,9 +4,9 @@
 # make lock    pin what is installed, in requirements/; UPGRADE=1: to the newest versions
 # make chaos   kill 200 batches of 300 files at random moments and resume them; end 50 long runs by signals
 # make awkward   200 drawn surveys of every awkward kind: fitted, or refused in words
-# make fuzz    20,000 damaged programs, PDL2 and RAPID: refused, or rewritten byte for byte; the parsers by coverage
+# make fuzz    20,000 damaged programs, PDL2, RAPID and KRL: refused, or rewritten byte for byte; the parsers by coverage
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
-# make generated    1,000 random programs: followed as they run, landing where they say
+# make generated    1,000 random programs a language: followed as they run, landing where they say
 # make golden  what the commands write, here and at BASE=<commit>: a changed byte fails
 # make bench   where the time goes on this machine: docs/benchmarks.md
 # make growth  how the time to read a program grows with its lines, variables and branches
@@ -141,7 +141,8 @@ awkward: $(STAMP)
 	@$(PYTHON_BIN) -m tests.awkward --count $(or $(COUNT),200)
 
 generated: $(STAMP)
-	@$(PYTHON_BIN) -m tests.generated --count $(or $(COUNT),1000)
+	@for language in pdl2 rapid krl; do $(PYTHON_BIN) -m tests.generated \
+		--count $(or $(COUNT),1000) --language $$language || exit 1; done
 
 clean:
 	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis native/target

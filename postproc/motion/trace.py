@@ -83,6 +83,10 @@ NO_PATH = np.empty((0, 6))
 
 STRAIGHT = 1e-3  # [rad] at axis 5, below this the two wrist branches are one
 PARTIAL = (TargetKind.PARTIAL_POSE, TargetKind.PARTIAL_JOINTS)
+STEPS = (
+    TargetKind.TOOL_STEP, TargetKind.BASE_STEP, TargetKind.JOINT_STEP,
+    TargetKind.TOWARDS,
+)  # fmt: skip
 PLACING = (TargetKind.TOOL_STEP, TargetKind.BASE_STEP, TargetKind.PARTIAL_POSE)
 CHUNK = 50_000  # poses solved at a time; solving needs room for copies
 SAME_POSE = 1e-7  # [m] and sines; poses that several predecessors agree on
@@ -745,7 +749,8 @@ def _one(work: Workspace, v: int) -> list[int]:
     edges = range(int(t.pred_start[v]), int(t.pred_start[v + 1]))
     known = [e for e in edges if work.is_known_before(v, int(work.source[e]))]
     later = [e for e in edges if e not in known and work.source[e] >= v]
-    if t.kind[v] in PARTIAL and len(known) < len(edges):
+    step = t.kind[v] in STEPS and not work.placed[v]
+    if (t.kind[v] in PARTIAL or step) and len(known) < len(edges):
         known = later = []  # it leads elsewhere from wherever else it may begin
     arrivals = [arrive(work, v, e) for e in known]
     for edge, arrival in zip(known, arrivals, strict=True):

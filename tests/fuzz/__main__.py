@@ -2,9 +2,9 @@
 
 python -m tests.fuzz --count 20000 --seed 0        (or: make fuzz)
 
-Of four one is a task of RAPID, one a job of KRL, the others are PDL2. Each is read and
-rewritten with other numbers in all of its targets; every ninth is compensated and
-restored. The same numbers give the same programs.
+Of four one is a task of RAPID, one a job of KRL, the others are PDL2, unless --language
+names one. Each is read and rewritten with other numbers in all of its targets; every
+ninth is compensated and restored. The same numbers give the same programs.
 """
 
 from __future__ import annotations
@@ -16,15 +16,16 @@ import time
 import traceback
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell
+from tests.any_controller import told
 from tests.conftest import CELL, make_job
 from tests.fuzz.case import HangError, compensated, rewrite
 from tests.fuzz.originals import damaged_of
 
-TOLD = "absolute_accuracy = false\n[tool]"  # without it RAPID and KRL are refused
 WHOLE = 9  # every so many are compensated, not only rewritten
 _SETUP: list[tuple[Cell, Model]] = []
 
@@ -37,10 +38,10 @@ def begin(folder: str) -> None:
     compensated(files, *_SETUP[0])
 
 
-def attempt(seed: int, number: int) -> tuple[int, str, str, float]:
+def attempt(language: str, seed: int, number: int) -> tuple[int, str, str, float]:
     """Damage one program; return its number, what came of it, why, and the time [s]."""
     cell, model = _SETUP[0]
-    files = damaged_of(seed, number)
+    files = damaged_of(seed, number, language)
     begun = time.process_time()
     said = ""
     try:
@@ -60,10 +61,10 @@ def where() -> str:
     return " < ".join(f"{Path(f.filename).name}:{f.lineno}" for f in frames[-2:-6:-1])
 
 
-def keep(folder: Path, seed: int, number: int) -> None:
+def keep(folder: Path, language: str, seed: int, number: int) -> None:
     """Write the files of a case for a closer look."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, data in damaged_of(seed, number).items():
+    for name, data in damaged_of(seed, number, language).items():
         (folder / f"{seed}-{number}-{name}").write_bytes(data)
 
 
@@ -73,25 +74,26 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=20_000)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--language", choices=("pdl2", "rapid", "krl"), default="")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", type=Path, help="write failing programs there")
     given = parser.parse_args()
     counted: Counter[str] = Counter()
     slowest = 0.0
     with tempfile.TemporaryDirectory() as name:
-        folder = str(make_job(Path(name), CELL.replace("[tool]", TOLD)))
+        folder = str(make_job(Path(name), told(CELL)))
         with ProcessPoolExecutor(given.jobs, None, begin, (folder,)) as pool:
             numbers = range(given.first, given.first + given.count)
             seeds = [given.seed] * len(numbers)
             for number, kind, said, took in pool.map(
-                attempt, seeds, numbers, chunksize=50
+                partial(attempt, given.language), seeds, numbers, chunksize=50
             ):
                 counted[kind] += 1
                 slowest = max(slowest, took)
                 if said:
                     print(f"{given.seed}:{number}: {kind}: {said}", flush=True)
                     if given.keep:
-                        keep(given.keep, given.seed, number)
+                        keep(given.keep, given.language, given.seed, number)
     said = ", ".join(f"{n} {kind}" for kind, n in sorted(counted.items()))
     print(f"{given.count} damaged programs: {said}; slowest {slowest:.2f} s")
     return 1 if counted["failed"] or counted["hang"] else 0

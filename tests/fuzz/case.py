@@ -146,7 +146,7 @@ def check_bytes(
             [literals.places.start[mine], literals.places.end[mine]], axis=-1
         )
         spans = sorted({(a, b) for a, b in places.reshape(-1, 2).tolist() if a >= 0})
-        rest = _without_stamp(name, after[name])
+        rest = without_stamp(name, after[name])
         at = end = 0
         for start, stop in spans:
             piece = before[name][end:start]
@@ -164,7 +164,7 @@ def check_bytes(
         assert rest[at:] == before[name][end:], f"{name}: after byte {end}"
 
 
-def _without_stamp(name: str, data: bytes) -> bytes:
+def without_stamp(name: str, data: bytes) -> bytes:
     """Take out the stamp: line 1, or the line behind the header of a module."""
     if name.endswith(".pdl") or name.endswith(".lsv"):
         found = re.match(rb"-- postproc [^\r\n]*(?:\r\n|\n|\r)", data)

@@ -10,6 +10,7 @@ from pathlib import Path
 from postproc.robot.cell import Cell, load_cell
 from tests.any_controller import any_controller
 from tests.fuzz.mutation import KRL_KINDS, RAPID_KINDS, mutated
+from tests.generated.neutral import landing
 from tests.language import neutral_job
 from tests.language.pdl2.generator import POINTS, Generator
 from tests.language.pdl2.generator.rarer import Rarer
@@ -135,7 +136,18 @@ def tasks() -> tuple[Mapping[str, bytes], ...]:
 
 
 def task(rng: random.Random) -> Files:
-    """Write a task at random, often with a header, and with a module of points."""
+    """Write a task at random: moves alone, or with all that programs have."""
+    return moves(rng) if rng.random() < 0.5 else drawn_files(rng, "rapid")
+
+
+def drawn_files(rng: random.Random, language: str) -> Files:
+    """Write a program as `tests.generated` draws it."""
+    drawn = landing.case(rng.randrange(1 << 30), language, cell())
+    return dict(drawn.text.files)
+
+
+def moves(rng: random.Random) -> Files:
+    """Write a task of moves, often with a header, and with a module of points."""
     job = neutral_job.drawn(cell(), rng.randrange(1 << 30), rng.randrange(3, 25))
     text = neutral_job.rapid(job)
     if rng.random() < 0.5:
@@ -198,7 +210,12 @@ def jobs() -> tuple[Mapping[str, bytes], ...]:
 
 
 def krl_job(rng: random.Random) -> Files:
-    """Write a job at random, often with a subprogram and with a list of the system."""
+    """Write a job at random: moves alone, or with all that programs have."""
+    return krl_moves(rng) if rng.random() < 0.5 else drawn_files(rng, "krl")
+
+
+def krl_moves(rng: random.Random) -> Files:
+    """Write a job of moves, often with a subprogram and with a list of the system."""
     drawn = neutral_job.drawn(cell(), rng.randrange(1 << 30), rng.randrange(3, 25))
     files = neutral_job.krl(drawn)
     if rng.random() < 0.5:
@@ -218,7 +235,8 @@ def damaged_job(seed: int, number: int) -> Files:
     return files
 
 
-def damaged_of(seed: int, number: int) -> Files:
-    """Return damaged files: of four one is a task of RAPID, one a job of KRL."""
-    kinds = (damaged, damaged_job, damaged, damaged_task)
-    return kinds[number % 4](seed, number)
+def damaged_of(seed: int, number: int, language: str = "") -> Files:
+    """Return damaged files; in no language: of four one is RAPID, and one KRL."""
+    kinds = {"pdl2": damaged, "krl": damaged_job, "": damaged, "rapid": damaged_task}
+    kind = kinds[language] if language else [*kinds.values()][number % 4]
+    return kind(seed, number)

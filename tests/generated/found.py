@@ -13,10 +13,12 @@ UNSURE = "compensated arrivals, a side listed as not sure"
 CLONED = "of these, at clones"
 FIRST = "of these, first moves of programs"
 ROUNDED = "compensated fly points, rounded on the way"
+LOADED = "compensated arrivals with a load that the program states"
 ALONG = "targets that move along with one (NEAR, FOR, POS_SHIFT)"
-PAIRS = (KNOWN, CLONED, UNSURE, FIRST, ROUNDED, ALONG)
+PAIRS = (KNOWN, CLONED, UNSURE, FIRST, ROUNDED, LOADED, ALONG)
 ALL = "all compensated arrivals"
 DONE = "compensated"
+MOST = 12  # reasons that are listed
 
 
 @dataclass
@@ -28,6 +30,9 @@ class Found:
         z: True errors after where a side is not sure, in standard errors that the
             report states for them.
         once: What came of targets that are seen at one value from one side.
+        visits, corrected: How many visits there are, and how many are corrected.
+        reasons: Why the others are not.
+        refused: Programs that are refused, by what is said.
         wrong: What must not be: seed, line and what it is.
     """
 
@@ -36,6 +41,10 @@ class Found:
     )
     z: list[float] = field(default_factory=list)
     once: Counter[str] = field(default_factory=Counter)
+    visits: int = 0
+    corrected: int = 0
+    reasons: Counter[str] = field(default_factory=Counter)
+    refused: Counter[str] = field(default_factory=Counter)
     wrong: list[tuple[int, int, str]] = field(default_factory=list)
 
     def add(self, other: Found) -> None:
@@ -44,6 +53,10 @@ class Found:
             self.error_mm[kind] += other.error_mm[kind]
         self.z += other.z
         self.once += other.once
+        self.visits += other.visits
+        self.corrected += other.corrected
+        self.reasons += other.reasons
+        self.refused += other.refused
         self.wrong += other.wrong
 
     def pairs(self, kind: str) -> np.ndarray:
@@ -64,6 +77,13 @@ def lines(found: Found) -> Iterable[str]:
             )
     if found.z:
         yield f"  not sure: within 2 stated standard errors {within(found.z):.1%}"
+    if found.visits:
+        share = found.corrected / found.visits
+        yield f"visits: {found.visits}, corrected {share:.1%}; not corrected as:"
+        yield from (f"  {n:6d} {text}" for text, n in found.reasons.most_common(MOST))
+    yield from (f"  refused {n}: {text}" for text, n in found.refused.most_common())
+    if not found.once:
+        return
     yield f"targets seen at one value from one side: {found.once.total()}"
     for text, count in found.once.most_common():
         yield f"  {count:6d} {text}"

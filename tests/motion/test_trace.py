@@ -284,6 +284,32 @@ def test_steps_move_the_arm(arm: Arm, tool: np.ndarray, home: np.ndarray) -> Non
     np.testing.assert_allclose(where, found.flange @ tool, atol=1e-9)
 
 
+STEPS = (TargetKind.TOOL_STEP, TargetKind.BASE_STEP, TargetKind.JOINT_STEP)
+
+
+@pytest.mark.parametrize("kind", STEPS)
+@pytest.mark.parametrize("known", [True, False])
+def test_a_step_leads_where_all_ways_to_it_lead(
+    arm: Arm, home: np.ndarray, kind: TargetKind, known: bool
+) -> None:
+    """From a place, and maybe from one that is not known."""
+    other = TargetKind.JOINTS if known else TargetKind.UNKNOWN
+    kinds = np.array([TargetKind.JOINTS, other, kind, TargetKind.POSE])
+    joints = np.full((4, 6), np.nan)
+    joints[0], joints[2] = home, np.deg2rad(2.0)
+    joints[1] = home if known else np.nan
+    tcp = np.full((4, 4, 4), np.nan)
+    tcp[2], tcp[3] = np.eye(4), arm.flange(home[None] + 0.05)[0]
+    tcp[2, 2, 3] = -0.01
+    targets = make_targets(
+        kinds, tcp, joints, move=np.array([0, 0, 1, 1]),
+        pred_start=np.array([0, 1, 2, 4, 5]), pred=np.array([-1, 0, 0, 1, 2]),
+    )  # fmt: skip
+    found = trace(arm, targets)
+    assert np.isnan(found.q[2]).all() != known
+    assert (found.edges.source[-1] == 2) == known
+
+
 def test_after_an_unknown_move_a_joint_target_is_known_again(
     arm: Arm, home: np.ndarray
 ) -> None:

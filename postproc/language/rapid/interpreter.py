@@ -122,15 +122,33 @@ class RapidMachine(TaskMachine):
         """Return how main begins again: from where, and with what, a cycle ends.
 
         The controller sets modes to what it starts with only where the program is
-        started from its beginning. What an unknown call leaves unknown does not count:
-        it would leave whole programs.
+        started from its beginning. What an unknown call leaves unknown does not count,
+        which would leave whole programs, unless the task itself sets that mode.
         """
-        modes, displaced = here.modes, "pdispon" in self.task.called
+        modes, own = here.modes, self._own_modes()
         for end in (*self.ends, *self.restarts):
-            modes = modes.continued(end.modes, modes.names(), displaced)
+            modes = modes.continued(end.modes, modes.names(), own)
         found = [here.origins, *(end.origins for end in self.ends)]
         found += [NOWHERE] if self.restarts else []
         return Arrived(frozenset().union(*found), modes)
+
+    def _own_modes(self) -> set[str]:
+        """Return the modes that the task sets to other values than it begins with."""
+        found = set[tuple[str, Any]]()
+        for file, module, routine in (
+            one for routines in self.task.routines.values() for one in routines
+        ):
+            scope = self.task.scope_of(file, module, routine)
+            for row in range(routine.first + 1, routine.last):
+                one = inside(self.texts[file].statement(row))
+                if isinstance(one, said.Instruction) and self._sets_modes(one.name):
+                    given = given_modes(partial(self._changed, one, row, scope))
+                    found |= set() if given >= ANYTHING else given
+        return {name for name, value in found if value != getattr(AT_START, name)}
+
+    def _sets_modes(self, name: str) -> bool:
+        own, kind = name in self.task.routines, known_instructions().get(name)
+        return kind == "modal" and not own and name not in STOPPED
 
     def _procedures(self) -> list[tuple[int, str, HeadedRows]]:
         routines = (one for found in self.task.routines.values() for one in found)

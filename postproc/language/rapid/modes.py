@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -76,19 +76,18 @@ class Modes:
         """Return the names of all modes."""
         return tuple(f.name for f in fields(cls) if f.name != "pending")
 
-    def continued(self, end: Modes, names: Iterable[str], displaced: bool) -> Modes:
+    def continued(self, end: Modes, names: Iterable[str], own: Container[str]) -> Modes:
         """Allow for what holds where a cycle ends.
 
         Args:
             end: What holds there; what is unknown there does not count.
             names: Modes that go on into the next cycle.
-            displaced: The displacement counts where it is unknown, too.
+            own: Those of them that count where they are unknown, too.
         """
         counted = {
             name: getattr(end, name)
             for name in names
-            if getattr(end, name) != getattr(LOST, name)
-            or (name == "shift" and displaced)
+            if getattr(end, name) != getattr(LOST, name) or name in own
         }
         return self.joined(replace(self, **counted))
 

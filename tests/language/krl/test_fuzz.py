@@ -9,7 +9,7 @@ import pytest
 
 from postproc.language.stamp import read_stamp
 from tests.fuzz.case import check_bytes, compensated, records_of, rewrite
-from tests.fuzz.originals import cell, damaged_job, jobs, krl_job
+from tests.fuzz.originals import cell, damaged_job, jobs, krl_moves
 from tests.language import neutral_job
 
 SEED = 1  # another one than that of `make fuzz`
@@ -35,7 +35,7 @@ def test_sound_jobs_are_compensated_and_given_back(bench_cell, bench_model) -> N
 
 
 def test_a_byte_that_changes_besides_is_seen(bench_cell, bench_model) -> None:
-    files = krl_job(random.Random(3))
+    files = krl_moves(random.Random(3))
     done = neutral_job.compensated("job.src", files, bench_cell, bench_model)
     records = records_of(done.sidecar)
     check_bytes(files, done.outputs, records, done.visits)

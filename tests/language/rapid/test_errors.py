@@ -17,7 +17,7 @@ def sub(*lines: str, name: str = "sub") -> str:
 
 def behind(handler, body, *routines, head="ERROR", call="sub;"):
     """Read a job whose second move stands behind a call that may fail."""
-    lines = (L.format("p1"), call, L.format("p2"), head, *handler)
+    lines = (L.format("p1"), call, L.format("p2"), "EXIT;", head, *handler)
     more = MORE + sub(*body) + "".join(routines)
     found = task(*lines, more=more)
     assert reasons(found)[0] == ""

@@ -8,7 +8,7 @@ import pytest
 
 from postproc.language.stamp import read_stamp
 from tests.fuzz.case import check_bytes, compensated, rewrite
-from tests.fuzz.originals import cell, damaged_of, damaged_task, task, tasks
+from tests.fuzz.originals import cell, damaged_of, damaged_task, moves, tasks
 
 SEED = 1  # another one than that of `make fuzz`
 READ, WHOLE = 240, 24
@@ -38,7 +38,7 @@ def test_a_byte_that_changes_besides_is_seen(bench_cell, bench_model) -> None:
     from postproc.compensation.compensate import compensate
     from tests.fuzz.case import records_of
 
-    files = task(random.Random(3))
+    files = moves(random.Random(3))
     name, *pages = files
     done = compensate(
         files[name], bench_cell, bench_model, name=name,

@@ -288,6 +288,23 @@ def test_all_modes_go_on_into_the_next_cycle():
     assert (v.care == Switch.UNKNOWN).all()
 
 
+SOMETIMES = {
+    "displacement": ("PDispSet [[0,0,9],[1,0,0,0]];", "displacement"),
+    "load": ("GripLoad [5,[0,0,9],[1,0,0,0],0,0,0];", "carries"),
+}
+
+
+@pytest.mark.parametrize("kind", SOMETIMES)
+def test_what_only_some_ways_set_goes_on_into_the_next_cycle(kind):
+    line, why = SOMETIMES[kind]
+    assert why in reasons(task(P1, "IF di1=1 THEN", line, "ENDIF"))[0]
+    assert not reasons(once(P1, "IF di1=1 THEN", line, "ENDIF"))[0]
+
+
+def test_what_an_unknown_call_may_set_does_not_go_on():
+    assert not reasons(task(P1, "ours;", "PDispOff;", "ours;"))[0]
+
+
 def test_a_main_that_sets_its_modes_first_knows_them():
     found = task("ConfL\\Off;", "SingArea\\Off;", P1, "ConfL\\On;", "SingArea\\Wrist;")
     v = found.visits
