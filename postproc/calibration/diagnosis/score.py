@@ -103,6 +103,8 @@ class Score:
         best: Its best candidate.
         best_evidence: Log evidence of that one alone.
         p_value: Of the score test of the best one alone.
+        law: Of a free curve the best law of the same part and driver, as the table has
+            it: a jump between two of its places may explain more.
     """
 
     family: Family
@@ -110,6 +112,7 @@ class Score:
     best: Candidate
     best_evidence: float
     p_value: float
+    law: Candidate | None = None
 
 
 def rank(

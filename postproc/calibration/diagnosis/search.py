@@ -88,6 +88,18 @@ def _plainer(projection: Projection, score: Score) -> Score:
     return _instead(projection, score, replace(score.best, effect=plain), HARDLY)
 
 
+def lawful(projection: Projection, score: Score, law: Candidate | None) -> Score:
+    """Take a law with a place instead of a free curve that is not clearly ahead."""
+    if law is None:
+        return score
+    square = float(projection.rest @ projection.rest)
+    (found,) = rank(reduce_some(projection, [law]), square, projection.rows)
+    found = refine(projection, found)
+    if found.best_evidence < score.best_evidence - NEAR:
+        return score
+    return replace(found, evidence=max(found.evidence, score.evidence))
+
+
 def readable(projection: Projection, score: Score, causes: Causes) -> Score:
     """Take what follows what a job can read, unless the other is clearly ahead."""
     form = score.best.effect.readable(projection.at, causes.without)
@@ -146,7 +158,8 @@ def ranking(projection: Projection, causes: Causes) -> list[Score]:
     refined = []
     for score in leading:
         view = views.of(score.family, score.best.effect)
-        refined.append(readable(view, refine(view, score), causes))
+        found = lawful(view, refine(view, score), score.law)
+        refined.append(readable(view, found, causes))
     rest = [s for s in scores if s not in leading]
     rest += jumps(refined[0].best.effect, projection)
     return sorted([*refined, *rest], key=lambda s: -s.evidence)

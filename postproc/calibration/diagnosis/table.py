@@ -46,7 +46,7 @@ from postproc.model.covariate import (
 from postproc.model.effects import EFFECTS
 from postproc.model.effects.curve import Curve
 from postproc.model.effects.effect import FREE, PART_MOTION, Candidate, Family
-from postproc.model.effects.part_motion import PASSING, STEPS, PartMotion
+from postproc.model.effects.part_motion import PASSING, PLACED, STEPS, PartMotion
 from postproc.model.kinematics import Batch
 
 ORDERS = 8  # waves per turn of an angle's harmonics that are tried
@@ -188,15 +188,24 @@ class MotionFamily:
 
     def plainest(self) -> MotionLaw:
         """Take the law with the fewest columns of those that explain as much."""
-        own = [
+        own = self._own()
+        least = max(e for e, _ in own) - PLAINER
+        alike = [x for x in own if x[0] >= least]
+        return min(alike, key=lambda x: (x[1].columns, -x[0]))[1]
+
+    def placed(self) -> MotionLaw | None:
+        """Take the best of the laws that have a place, None where there is none."""
+        own = [x for x in self._own() if x[1].cell[1] in PLACED]
+        return max(own, key=lambda x: x[0])[1] if own else None
+
+    def _own(self) -> list[tuple[float, MotionLaw]]:
+        """List the laws of the driver, and the evidence of each."""
+        return [
             (float(e[i, 0]), law)
             for e, (some, _, which) in zip(self.each, self.laws.widths, strict=True)
             for i, law in enumerate(some)
             if which[i] == self.driver
         ]
-        least = max(e for e, _ in own) - PLAINER
-        alike = [x for x in own if x[0] >= least]
-        return min(alike, key=lambda x: (x[1].columns, -x[0]))[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,10 +344,13 @@ class Table:
     def _score(self, view: Projection, family: MotionFamily) -> Score:
         """Put a family and its plainest law into a score."""
         loose = self.revised and not holds_mean(view, family.carrier)
-        candidate = family.plainest().on(family.carrier, loose)
+        plain = family.plainest()
+        candidate = plain.on(family.carrier, loose)
+        placed = family.placed() if isinstance(plain.effect, Curve) else None
+        law = None if placed is None else placed.on(family.carrier, loose)
         square = float(view.rest @ view.rest)
         score = rank(reduce_some(view, [candidate]), square, view.rows)[0]
-        return replace(score, evidence=family.evidence)
+        return replace(score, evidence=family.evidence, law=law)
 
     def maxima(self, projection: Projection, rows: Floats, square: Floats) -> Floats:
         """Return the largest evidence of any cell for every draw, (draws,).
