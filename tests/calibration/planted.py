@@ -125,7 +125,7 @@ def campaign(
     arrivals = (row_by_row if untold else survey)(clean, seed, rows)
     planted = tuple(Planted(kind) for kind in kinds)
     reached = tuple(_size(clean, seed, p, arrivals, rows) for p in planted)
-    if size > 0 and min(reached) < STILL:
+    if size > 0 and any(reach < STILL for reach in reached):
         raise PostprocError(f"one of {', '.join(kinds)} moves nothing")
     if size > 0:
         planted = tuple(

@@ -69,9 +69,10 @@ def _finer(projection: Projection, score: Score, width: float) -> tuple[Score, f
     if len(effects) == 1:
         return score, 0.0
     square = float(projection.rest @ projection.rest)
-    tries = [replace(score.best, effect=e, log_prior=0.0) for e in effects]
+    tries = [replace(score.best, effect=e, log_prior=-e.doubt()) for e in effects]
     found = rank(reduce_some(projection, tries), square, projection.rows)[0]
-    gained = found.best_evidence - score.best_evidence
+    charge = found.best.effect.doubt() - here.doubt()
+    gained = found.best_evidence - score.best_evidence - charge
     if gained <= 0.0:
         return score, gained
     covered = share + float(np.log(2.0 * width / len(tries)))

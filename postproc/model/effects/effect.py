@@ -347,6 +347,10 @@ class Effect(ABC):
         """List the settings that are not linear: value and unit, as people use them."""
         return {}
 
+    def doubt(self) -> float:
+        """Return what evidence its settings cost that are no usual ones [nats]."""
+        return 0.0
+
     def sentence(self, p: Floats, covariance: Floats) -> str:
         """Say place, driver, law and size of what has no name, "" of what has one.
 

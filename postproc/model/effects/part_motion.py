@@ -20,6 +20,7 @@ ANEW = 3e-4  # [rad], [m] by which a part may sit otherwise than a model has it
 PASSING = ("time", "order")
 OF_STATE = ("temperature", "payload", "speed")
 LOADS = ("torque", "moment")
+CHARGED = 3.0  # nats for a moment of a link: odds of 20 to 1
 UNSURE = 2.0  # times what is unsure of a link's moment that is tried at most
 ARMS_OWN = ("torque", "moment", "lambda", "way", "payload", "speed")
 
@@ -82,6 +83,10 @@ class CarriedEffect(Effect):
             for offset in offsets[::2]
             if offset
         ]
+
+    def doubt(self) -> float:
+        """Charge for every moment of a link that is another than in the arm file."""
+        return CHARGED * sum(bool(m) for _, moment in self.heavier for m in moment)
 
     def _heavier(self, link: int, axis: int, more: float) -> Self:
         """Add to one first moment of a link [kg m]."""
@@ -246,9 +251,11 @@ class PartMotion(CarriedEffect):
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
         """Move the place of a step or a bend, in parts of the range, and its width.
 
-        Where a load drives it the weights of links are others, too.
+        Where a load drives it the weights of links are others, too, but for a linear
+        law, which is hardly another one then.
         """
-        return [*self._placed(offsets, batch), *self.weighed(offsets, batch)]
+        weighed = [] if self.law == "linear" else self.weighed(offsets, batch)
+        return [*self._placed(offsets, batch), *weighed]
 
     def _placed(self, offsets: Floats, batch: Batch) -> list[PartMotion]:
         """Move the place of a step or a bend, and its width."""
