@@ -10,8 +10,8 @@ from postproc.calibration.diagnosis.library import Projection, reduce_some
 from postproc.calibration.diagnosis.score import Score, rank
 from postproc.model.carrier import every_carrier
 from postproc.model.covariate import covariate, varies, varies_enough
-from postproc.model.effects.effect import FREE, PART_MOTION, Candidate, Effect, Family
-from postproc.model.effects.part_motion import OF_STATE, PartMotion
+from postproc.model.effects.effect import Candidate, Effect
+from postproc.model.effects.part_motion import OF_STATE, PartMotion, family_of
 from postproc.model.effects.step import CampaignStep
 from postproc.model.kinematics import Batch
 
@@ -40,10 +40,10 @@ def _candidates(step: CampaignStep, batch: Batch) -> Iterator[Candidate]:
     for driver, value in _passed(step, batch):
         half = float(np.ptp(covariate(batch, driver))) / 2
         for moved in every_carrier():
-            part = str(moved)
-            along = None if moved.joint is not None else part
-            family = Family(PART_MOTION, moved.joint, driver, FREE, along)
-            jump = PartMotion(part, source=driver, law="step", middle=value, half=half)
+            family = family_of(moved, driver)
+            jump = PartMotion(
+                str(moved), source=driver, law="step", middle=value, half=half
+            )
             yield Candidate(family, jump, driver, 0.0)
 
 

@@ -46,7 +46,14 @@ from postproc.model.covariate import (
 from postproc.model.effects import EFFECTS
 from postproc.model.effects.curve import Curve
 from postproc.model.effects.effect import FREE, PART_MOTION, Candidate, Family
-from postproc.model.effects.part_motion import PASSING, PLACED, STEPS, PartMotion
+from postproc.model.effects.part_motion import (
+    LOADS,
+    PASSING,
+    PLACED,
+    STEPS,
+    PartMotion,
+    family_of,
+)
 from postproc.model.kinematics import Batch
 
 ORDERS = 8  # waves per turn of an angle's harmonics that are tried
@@ -99,8 +106,7 @@ class MotionLaw:
             carrier: The carrier.
             loose: Whether a model is given that may have its mean otherwise.
         """
-        along = None if carrier.joint is not None else str(carrier)
-        family = Family(PART_MOTION, carrier.joint, self.driver, FREE, along)
+        family = family_of(carrier, self.driver)
         more = loose and carrier.joint is None
         effect = replace(self.effect, direction=str(carrier), loose=more)
         return Candidate(family, effect, self.driver, self.log_prior)
@@ -448,7 +454,7 @@ def _drivers(batch: Batch) -> list[str]:
 def _varies(batch: Batch, name: str) -> bool:
     """Tell whether a driver varies enough to show."""
     x = covariate(batch, name)
-    if name.startswith(("torque", "moment")):
+    if name.startswith(LOADS):
         return varies(x) and float(np.ptp(x)) > LEAST_MOMENT
     return varies(x) and varies_enough(batch.states, name.partition(" ")[0])
 

@@ -12,7 +12,14 @@ from postproc.arrays import Floats
 from postproc.model.carrier import Carrier, carrier
 from postproc.model.covariate import by_weight, covariate, unit
 from postproc.model.effects.compliance import moments
-from postproc.model.effects.effect import PART_MOTION, Effect, Origin, Parameter
+from postproc.model.effects.effect import (
+    FREE,
+    PART_MOTION,
+    Effect,
+    Family,
+    Origin,
+    Parameter,
+)
 from postproc.model.kinematics import Batch
 
 TURN, SHIFT = 1e-4, 1e-4  # [rad], [m] prior size of a motion
@@ -23,6 +30,12 @@ LOADS = ("torque", "moment")
 CHARGED = 3.0  # nats for a moment of a link: odds of 20 to 1
 UNSURE = 2.0  # times what is unsure of a link's moment that is tried at most
 ARMS_OWN = ("torque", "moment", "lambda", "way", "payload", "speed")
+
+
+def family_of(moved: Carrier, driver: str) -> Family:
+    """Return the family of all that moves a part by a driver: no name has it."""
+    along = None if moved.joint is not None else str(moved)
+    return Family(PART_MOTION, moved.joint, driver, FREE, along)
 
 
 @dataclass(frozen=True)
