@@ -17,7 +17,7 @@ from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.base_shift import rigid_columns
 from postproc.model.effects.effect import Effect, Origin, Parameter
 from postproc.model.kinematics import Batch
-from postproc.simulation import VirtualArm, VirtualArrivals
+from postproc.simulation import VirtualArm, VirtualArrivals, stream
 from tests.calibration.planted import (
     ARM,
     NAMED,
@@ -164,14 +164,24 @@ Errors = tuple[float, float, float]
 
 
 def true_errors(
-    c: Campaign, seed: int, before: Fit, after: Fit
+    c: Campaign, seed: int, before: Fit, after: Fit, surveyed: bool = False
 ) -> tuple[Errors, Errors]:
     """True mean errors [mm] that three fits leave at fresh poses.
+
+    Args:
+        c: The campaign.
+        seed: Of the fresh poses.
+        before, after: Fits of its rows.
+        surveyed: Whether the fresh poses are visited at temperatures of the survey,
+            not at the later ones of an arm that still warms.
 
     Returns:
         As they are, and with the rigid displacement that fits each best taken out.
     """
     fresh = _fresh(c.arm, seed, len(c.states))
+    if surveyed:
+        seen = stream(seed, "temperature").choice(c.arrivals.temperature, FRESH)
+        fresh = replace(fresh, temperature=seen)
     truth, batch = c.arm.error(fresh), Batch(ARM, states_of(fresh))
     informed = _informed(c, seed, fresh, truth)
     told = ("arm", "state")

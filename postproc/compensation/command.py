@@ -349,7 +349,8 @@ def _outside_survey(
     """Say which visits lie outside of what was surveyed, whatever their directions."""
     rows, found = np.flatnonzero(known), dict[str, Bools]()
     here, ranges = states[rows], replace(model.ranges, payload=None)
-    reasons = ranges.outside(here, model.needs) | load_reasons(model, cell, here)
+    reasons = ranges.outside(here, model.needs, model.bent)
+    reasons |= load_reasons(model, cell, here)
     for text, mask in reasons.items():
         _mark(found, text, rows, mask, len(known))
     return found

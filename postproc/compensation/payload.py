@@ -97,6 +97,8 @@ def load_reasons(model: Model, cell: Cell, states: States) -> dict[str, Bools]:
     """Return which states the cell rejects for their load, (n,), by reason."""
     most = cell.limits.payload_mm
     error = np.linalg.norm(load_error(model, cell, states), axis=1) / MM
+    if "payload" in model.bent:
+        error[beyond_survey(model, cell, states)] = np.inf
     low, high = surveyed_loads(model, cell)
     text = (
         f"the load is outside of the surveyed {low:g} to {high:g} kg and adds more "

@@ -186,8 +186,14 @@ class Model:
     @property
     def needs(self) -> frozenset[str]:
         """Covariates that the compensated effects cannot do without."""
-        used = [e for e in self.effects.effects if e.belongs_to() in COMPENSATED]
+        used = self.compensable()[0].effects
         return frozenset(need for e in used for need in e.requires())
+
+    @property
+    def bent(self) -> frozenset[str]:
+        """Covariates that drive compensated effects by laws that are no lines."""
+        used = self.compensable()[0].effects
+        return frozenset(name for e in used for name in e.bent_by())
 
     def compensable(self) -> tuple[Combination, Floats, Floats]:
         """Return the effects that may be compensated, their values and covariance."""
@@ -286,7 +292,7 @@ class Model:
             model[rows], at = self._variance(arm, states[rows])
             arrival[rows] = model[rows] + self.noise.arrival_variance(at.jacobian)
         model, arrival = (np.sqrt(np.maximum(v, 0.0)) for v in (model, arrival))
-        outside = self.ranges.outside(states, self.needs)
+        outside = self.ranges.outside(states, self.needs, self.bent)
         unsure = _on_flanks(states) & any_in_rows(model > self._sure_up_to)
         if unsure.any():
             outside[UNSURE] = unsure

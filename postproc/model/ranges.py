@@ -19,6 +19,7 @@ SAME_TOOL = 1e-3  # [m] tools closer than this count as one
 REACH_OF_PLATE = 0.5  # [m] how far from three or more probe points a tool may be
 PAYLOAD_MARGIN = 0.5  # [kg]
 TEMPERATURE_MARGIN = 1.0  # [K] steel of 2.5 m grows by 0.03 mm
+BENT_MARGIN = 0.05  # of the surveyed range, where a law is no straight line
 
 
 @dataclass(frozen=True)
@@ -87,12 +88,19 @@ class Ranges:
     def _ends(self) -> list[Interval]:
         return list(zip(self.lower, self.upper, strict=True))
 
-    def outside(self, states: States, needs: frozenset[str]) -> dict[str, Bools]:
+    def outside(
+        self,
+        states: States,
+        needs: frozenset[str],
+        bent: frozenset[str] = frozenset(),
+    ) -> dict[str, Bools]:
         """Say which states lie outside, by reason; reasons without states are left out.
 
         Args:
             states: n states.
             needs: Covariates that the model cannot do without.
+            bent: Covariates of laws that are no straight lines: nobody knows how they
+                go on where no survey has been.
         """
         found = {**self._joints(states.q), **self._tools(states.tool)}
         for name, unit, margin in (
@@ -101,6 +109,8 @@ class Ranges:
         ):
             value, span = getattr(states, name), getattr(self, name)
             if span is not None:
+                if name in bent:
+                    margin = min(margin, BENT_MARGIN * (span[1] - span[0]))
                 low, high = span[0] - margin, span[1] + margin
                 text = f"{name} outside the surveyed {span[0]:g} to {span[1]:g} {unit}"
                 found[text] = (value < low) | (value > high)

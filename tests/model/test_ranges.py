@@ -83,3 +83,14 @@ def test_of_ranges_that_lie_apart_or_have_changed_the_fresh_ones_count() -> None
     some = of(-1.0, 1.0).joined(of(0.0, 1.5, (0.3, 0.0, 0.1)), {"5", "payload", "tool"})
     assert some.lower == (*(4 * (-1.0,)), 0.0, -1.0)
     assert some.payload == (0.0, 1.5) and some.tools == ((0.3, 0.0, 0.1),)
+
+
+def test_a_bent_law_of_temperature_ends_where_the_survey_ends() -> None:
+    states = survey()
+    ranges, bent = Ranges.of(states), frozenset({"temperature"})
+    warm = states.with_(temperature=np.full(100, 30.9))
+    assert list(ranges.outside(warm, NOTHING, bent)) == [
+        "temperature outside the surveyed 20 to 30 deg C"
+    ]
+    tenths = states.with_(temperature=np.full(100, 30.4))
+    assert ranges.outside(tenths, NOTHING, bent) == {}

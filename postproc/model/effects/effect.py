@@ -231,6 +231,10 @@ class Effect(ABC):
         """List the covariates of `States` without which it cannot be evaluated."""
         return ()
 
+    def bent_by(self) -> tuple[str, ...]:
+        """List the covariates of `States` that drive it by a law that is no line."""
+        return ()
+
     def refers_to(self) -> str:
         """Name the state that predictions are for, where it passes with time alone."""
         return ""

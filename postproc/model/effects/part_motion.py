@@ -142,6 +142,10 @@ class CarriedEffect(Effect):
         """Need the covariates that a program does not tell."""
         return tuple(name for name in self.covariates() if name in OF_STATE)
 
+    def bent_by(self) -> tuple[str, ...]:
+        """List what drives it: its law may be any."""
+        return self.requires()
+
     def has_mean(self) -> bool:
         """Return True for a joint's error."""
         return self.carrier.joint is not None
@@ -220,6 +224,12 @@ class PartMotion(CarriedEffect):
         """Name the source and the factor."""
         own = () if self.law == "constant" else (self.source,)
         return (*own, self.factor) if self.factor else own
+
+    def bent_by(self) -> tuple[str, ...]:
+        """List what drives it, but for what drives it along a line."""
+        if self.law == "linear":
+            return ()
+        return tuple(name for name in (self.source,) if name in OF_STATE)
 
     def law_parameters(self) -> tuple[Parameter, ...]:
         """Name the size, of a harmonic those of cosine and sine."""
