@@ -22,6 +22,8 @@ from postproc.calibration.diagnosis.table import Causes, loosened
 from postproc.calibration.regression import Fit, beside, fit_effects
 from postproc.model.carrier import Carrier, carrier
 from postproc.model.covariate import JOINTS, covariate
+from postproc.model.effects.compliance import WeightEffect
+from postproc.model.effects.curve import Curve
 from postproc.model.effects.effect import (
     FREE,
     NAMED,
@@ -31,6 +33,7 @@ from postproc.model.effects.effect import (
     Family,
 )
 from postproc.model.effects.joint_offset import JointOffset
+from postproc.model.effects.part_motion import PartMotion
 from postproc.model.kinematics import Batch
 
 # Finer settings around a candidate that a grid found.
@@ -126,6 +129,7 @@ def _instead(
 # Which candidate to take: families ranked, names before free forms.
 
 SAME = 0.5  # nats within which two carriers move alike
+EXPECTED = 3.0  # nats: odds of 20 to 1 for a law that other joints follow
 LAWFUL = 0.03  # the same share for a law without a name
 CLEARLY = (8.0, 0.1)  # nats, and share of the name's evidence, that a free form
 #                       must be ahead by
@@ -152,6 +156,7 @@ def ranking(projection: Projection, causes: Causes) -> list[Score]:
     if causes.table is not None:
         scores += causes.table.scores(views.of_carrier)
         scores += causes.table.moved_since(projection)
+    scores = [expected(s, projection) for s in scores]
     scores.sort(key=lambda s: -s.evidence)
     leading: list[Score] = []
     for tier in (NAMED, FREE):
@@ -164,6 +169,18 @@ def ranking(projection: Projection, causes: Causes) -> list[Score]:
     rest = [s for s in scores if s not in leading]
     rest += jumps(refined[0].best.effect, projection)
     return sorted([*refined, *rest], key=lambda s: -s.evidence)
+
+
+def expected(score: Score, projection: Projection) -> Score:
+    """Raise the evidence of a law of the weight that other joints follow.
+
+    Weight pulls at all joints at once: what yields at two of them does at a third.
+    """
+    effect = score.best.effect
+    followed = any(n.startswith(f"{effect.name}.") for n in projection.names)
+    if not (isinstance(effect, WeightEffect) and followed):
+        return score
+    return replace(score, evidence=score.evidence + EXPECTED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -666,7 +683,7 @@ def stand(found: Search, number: int) -> JudgedAddition:
     for s in scores:
         name = _name(s.family)
         within = _within(own, s.best)
-        if _same_load(own, s.best, projection.at):
+        if _same_load((own.source, s.best.source), projection.at):
             within = max(within, SAME_LOAD * here.evidence)
         if s.evidence >= here.evidence - within and name not in names:
             rivals.append(s)
@@ -675,7 +692,42 @@ def stand(found: Search, number: int) -> JudgedAddition:
     if found.additions[number].together:
         evidence = max(evidence, _of_cause(found, own.family.effect))
     p_value = found.null.p_of(replace(here, evidence=evidence))
+    rivals = apart(own, rivals, projection.at)
     return JudgedAddition(evidence, p_value, _told(own.family, rivals))
+
+
+def apart(own: Candidate, rivals: Sequence[Score], at: Batch) -> list[Score]:
+    """Leave out cells that a name in the group stands for, by whatever law.
+
+    A joint 4 that turns by the moment across joint 5 is no cause beside compliance of
+    joint 4, where the two loads are one.
+    """
+    names = [c for c in (own, *(s.best for s in rivals)) if c.family.tier == NAMED]
+    cells = [cell for name in names for cell in _cells_of(name)]
+    return [
+        s
+        for s in rivals
+        if not isinstance(s.best.effect, PartMotion | Curve)
+        or not any(_same_cell(cell, s.best, at) for cell in cells)
+    ]
+
+
+def _cells_of(name: Candidate) -> list[tuple[str, str]]:
+    """List carrier and driver of the cells that a name is, at its joint."""
+    own = str(name.family.joint)
+    every = type(name.effect).cells()
+    return [(c, driver) for c, driver, _ in every if own in f"{c} {driver}"]
+
+
+def _same_cell(cell: tuple[str, str], other: Candidate, at: Batch) -> bool:
+    """Tell whether a candidate moves what a cell moves, by the same driver."""
+    moves, driver = cell
+    if driver != other.source and not _same_load((driver, other.source), at):
+        return False
+    effect = other.effect
+    assert isinstance(effect, PartMotion | Curve)
+    one, two = (carrier(c).moved(at).reshape(-1) for c in (moves, effect.direction))
+    return bool(abs(one @ two) > ALIKE * np.linalg.norm(one) * np.linalg.norm(two))
 
 
 def _of_cause(found: Search, effect: str) -> float:
@@ -698,13 +750,12 @@ def _told(own: Family, rivals: Sequence[Score]) -> tuple[Score, ...]:
     return (*others, *cells[:most])
 
 
-def _same_load(own: Candidate, other: Candidate, at: Batch) -> bool:
+def _same_load(both: tuple[str, str], at: Batch) -> bool:
     """Tell whether two loads are one but for weights that nobody knows so well.
 
     About the axis of joint 4, say, that is the torque of joint 4 and the moment across
     joint 5 of an arm whose link 4 hangs on this axis.
     """
-    both = own.source, other.source
     if not all(LOAD.fullmatch(source) for source in both):
         return False
     along = np.corrcoef([covariate(at, source) for source in both])[0, 1]

@@ -80,10 +80,10 @@ def _further(found: Search) -> Search | None:
     """Add the best further joint of a law that was found, None where there is none."""
     kinds = {a.candidate.family.effect for a in found.additions if _of_weight(a.score)}
     for score in found.ranking_under(found.fit):
-        if score.evidence < ENOUGH:
-            return None
         if not _of_weight(score) or score.family.effect not in kinds:
             continue
+        if score.best_evidence < ENOUGH:
+            return None
         place = len(found.fit.combination.effects)
         fit = extend(found.fit, score.best)
         added = _judged(found, fit, place, score.best)

@@ -33,12 +33,12 @@ def joints(found: Search, effect: str) -> set[int | None]:
 @pytest.fixture(scope="module")
 def shaped() -> Search:
     """What a search finds where shapes take the weight of four joints."""
-    return searched(weight_laws.measured(31_000, 5.0, "plain").base)
+    return searched(weight_laws.measured(31_003, 5.0, "plain").base)
 
 
 def test_the_law_of_the_weight_stays_where_shapes_took_it(shaped):
     found = weigh_laws(shaped, silent)
-    assert joints(shaped, "compliance") == {2, 3}
+    assert joints(shaped, "compliance") == {2, 3, 5}
     assert joints(found, "compliance") == {2, 3, 4, 5}
     assert found.fit.log_evidence > shaped.fit.log_evidence
     assert sum(a.together for a in found.additions) >= 1
