@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.model.carrier import Carrier, carrier
-from postproc.model.covariate import by_weight, covariate, unit
+from postproc.model.covariate import JOINTS, by_weight, covariate, unit
 from postproc.model.effects.compliance import moments
 from postproc.model.effects.effect import (
     FREE,
@@ -91,7 +91,8 @@ class CarriedEffect(Effect):
             return []
         return [
             self._heavier(link, axis, float(offset) * UNSURE * spread)
-            for link, spread in moments(batch.arm, int(load.split()[1][0]))
+            for link in range(int(load.split()[1][0]), len(JOINTS) + 1)
+            for _, spread in moments(batch.arm, link)[:1]
             for axis in range(3)
             for offset in offsets[::2]
             if offset
