@@ -165,13 +165,14 @@ def _without_doubtful(fitted: Fit) -> Fit:
     """Drop effects that few poses hardly call for: held-out poses chose all or none.
 
     Many causes and joints are tried, and one of them is worth some nats by chance. Most
-    joints of most arms yield to the weight: of these no more is asked than of all.
+    joints of most arms yield to the weight: of these no more is asked than of all. Nor
+    of a set-up that stands still; that it moves with time is doubtful like the rest.
     """
     effects = fitted.combination.effects
     always = tuple(
         e for e in effects
-        if e.name in BASE_EFFECTS or e.belongs_to() == "setup"
-        or e.driven_by == "torque"
+        if e.name in BASE_EFFECTS or e.driven_by == "torque"
+        or (e.belongs_to() == "setup" and not e.refers_to())
     )  # fmt: skip
     needed = keep_needed(fitted, always, enough=HARDLY_CHANCE)
     return fitted if len(needed) == len(effects) else with_effects(fitted, needed)

@@ -31,6 +31,7 @@ PART_MOTION = "part_motion"  # what has no name but its place, its driver and it
 ANY = ("linear", "step", "saturating", "curve", "harmonic")
 
 FAR = 1e3  # [rad] a joint angle that no arm reaches: no range is known
+BEHIND_WEIGHT = 3.0  # nats by which what follows angles must beat the weight: 20 to 1
 
 
 @dataclass(frozen=True)
@@ -109,9 +110,11 @@ class Effect(ABC):
     def least_evidence(self) -> float:
         """Return the evidence beyond that of others that it must be worth [nats].
 
-        What few arms have, and what many columns tell, is a false name sooner.
+        What few arms have, and what many columns tell, is a false name sooner. Nearly
+        all arms yield to their weight, which follows the angles as well.
         """
-        return 0.0
+        follows_angles = self.driven_by == "joint" and self.unasked == "weighed"
+        return BEHIND_WEIGHT if follows_angles else 0.0
 
     @classmethod
     def may_show(cls, states: States) -> bool:
