@@ -53,15 +53,21 @@ KNOWING = {
     "calibration.published": {"elm", "geometry", "maps"},
     # How the rows were measured decides: frame, probe points, orientations, a slip.
     "calibration.fit": {"placement", "probe", "station_shift", "tool_shift"},
-    # A fit must leave less than registration alone.
-    "calibration.validation": {"placement"},
+    # A fit must leave less than registration alone; weight makes any arm yield.
+    "calibration.validation": {"compliance", "placement"},
     # Weight shows by what yields to it.
     "calibration.diagnosis.weight": {"compliance"},
     "calibration.weight_direction": {"compliance"},
     # The given model's zero of a joint holds the mean of what the model lacks.
     "calibration.diagnosis.refit": {"joint_offset"},
     "calibration.diagnosis.jumps": {"part_motion", "step"},
-    "calibration.diagnosis.search": {"joint_offset"},
+    # A law of the weight goes on to further joints; a cell is told beside no name.
+    "calibration.diagnosis.search": {
+        "compliance",
+        "curve",
+        "joint_offset",
+        "part_motion",
+    },
     # What has no name is a motion of a part, by a law or by a free curve.
     "calibration.diagnosis.table": {"curve", "part_motion"},
     # A registration is what that effect fits, by the rigid motions of a base.

@@ -27,6 +27,7 @@ from postproc.calibration.regression import Fit
 from postproc.calibration.selection import Progress, fit_survey, model_of, silent
 from postproc.calibration.weighing import SURE, keep_needed, worth
 from postproc.model.effects import BASE_EFFECTS
+from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.placement import Placement
 from postproc.model.model import Model
@@ -213,20 +214,33 @@ def _choose(
 def _plain_rungs(task: FitTask, used: Bools) -> tuple[Rung, ...]:
     """Return what more effects must beat, and what is simpler than that.
 
-    Where backlash is worth it by its evidence, it varies with the angle: priors keep
-    that small where rows say little. Fewer effects are tried where the rows hardly
-    determine these.
+    Where backlash is worth it by its evidence, it varies with the angle, and joints
+    yield to the weight: priors keep both small where rows say little. Fewer effects are
+    tried where the rows hardly determine these.
     """
     refined = task.fit(REFINED)
-    plain = tuple(
-        e for e in refined.combination.effects
-        if e.name in (*(USUAL.effects or ()), *task.setup)
-    )  # fmt: skip
-    usual = REFINED if worth(refined, plain) > SURE else USUAL
+    usual = REFINED if _added(refined, USUAL, task) > SURE else USUAL
+    loaded = _with_weight(usual)
+    if _added(task.fit(loaded), usual, task) > HARDLY_CHANCE:
+        usual = loaded
     independent = 3 * len(np.unique(task.survey.states.order[used]))
     if refined.effective < DETERMINED * independent:
         return (usual,)
     return SIMPLER, usual
+
+
+def _with_weight(rung: Rung) -> Rung:
+    """Return effects with joints that yield to the weight besides."""
+    name = Compliance.name
+    return Rung(f"{rung.name},{name}", (*(rung.effects or ()), name))
+
+
+def _added(fitted: Fit, rung: Rung, task: FitTask) -> float:
+    """Weigh what a fit has besides some effects and the set-up [nats]."""
+    names = (*(rung.effects or ()), *task.setup)
+    return worth(
+        fitted, tuple(e for e in fitted.combination.effects if e.name in names)
+    )
 
 
 def _conclude(task: FitTask, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Validated:
