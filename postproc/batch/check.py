@@ -19,6 +19,7 @@ from postproc.compensation.record import (
     sha256,
     sidecar_path,
 )
+from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.files import (
     KRL_DATA,
@@ -35,9 +36,7 @@ from postproc.files import (
     variables_of,
 )
 from postproc.language.stamp import read_stamp
-from postproc.language.visits import ASSUMED_STILL, line_ranges
-
-LEFT = "left-alone"  # code of targets that kept their value
+from postproc.language.visits import line_ranges
 
 Current = Callable[[str], str | None]  # program -> id of the model it should have
 
@@ -53,7 +52,7 @@ class CheckFinding:
     """
 
     place: str
-    code: str
+    code: Code
     message: str
 
 
@@ -76,7 +75,7 @@ class Checked:
 
     def accepting_left(self) -> Checked:
         """Return it without targets left alone: somebody has looked at them."""
-        kept = tuple(f for f in self.findings if f.code != LEFT)
+        kept = tuple(f for f in self.findings if f.code != Code.LEFT_ALONE)
         return Checked(self.programs, kept)
 
     def to_json(self, opinion: Mapping[str, Any] | None = None) -> str:
@@ -152,14 +151,14 @@ def _mixed(root: Path, places: Sequence[str]) -> Iterator[CheckFinding]:
                 f"was made with model {other}, and {place} beside it with {model}: "
                 "they are one job. Compensate it again"
             )
-            yield CheckFinding(at, "mixed-models", text)
+            yield CheckFinding(at, Code.MIXED_MODELS, text)
 
 
 def _absent(source: Path, places: set[str]) -> list[CheckFinding]:
     """Find programs of which there is no output."""
     return [
         CheckFinding(
-            place, "absent", "is in the source tree only: it was not compensated"
+            place, Code.ABSENT, "is in the source tree only: it was not compensated"
         )
         for place in _places(source)
         if is_program(place) and place not in places
@@ -187,13 +186,15 @@ class _Look:
     def at(self, place: str) -> Iterator[CheckFinding]:
         """Find what is wrong with a file."""
         if place.endswith(TEMPORARY):
-            yield CheckFinding(place, "unfinished", "was left by a run that was killed")
+            yield CheckFinding(
+                place, Code.UNFINISHED, "was left by a run that was killed"
+            )
         elif is_program(place) or self._is_own_list(place):
             yield from self._program(place)
         elif is_variables(place) and not self._existing(program_of(place)):
             if holds_targets(read_input(self.root / place)):
                 yield CheckFinding(
-                    place, "uncompensated", "its program is not beside it"
+                    place, Code.UNCOMPENSATED, "its program is not beside it"
                 )
         elif is_compiled(place) and self._existing(program_of(place)):
             yield from self._compiled(place)
@@ -217,16 +218,16 @@ class _Look:
         if not record_path.exists():
             if stamp is None:
                 yield CheckFinding(
-                    place, "uncompensated", "carries no stamp and no record"
+                    place, Code.UNCOMPENSATED, "carries no stamp and no record"
                 )
             else:
                 text = "its record is missing: it cannot be checked or restored"
-                yield CheckFinding(place, "no-record", text)
+                yield CheckFinding(place, Code.NO_RECORD, text)
             return
         try:
             sidecar = read_sidecar(record_path)
         except ProgramError as exc:
-            yield CheckFinding(place, "no-record", str(exc))
+            yield CheckFinding(place, Code.NO_RECORD, str(exc))
             return
         yield from self._model(place, sidecar)
         if self.strict_calls:
@@ -240,7 +241,7 @@ class _Look:
         wanted = self.current(place)
         if wanted is not None and sidecar.model != wanted:
             text = f"was made with model {sidecar.model}, the current one is {wanted}"
-            yield CheckFinding(place, "older-model", f"{text}: compensate it again")
+            yield CheckFinding(place, Code.OLDER_MODEL, f"{text}: compensate it again")
 
     def _content(
         self, place: str, data: bytes, sidecar: Sidecar
@@ -252,15 +253,17 @@ class _Look:
         if record is None:
             if stamp is not None:
                 text = "is stamped, and its record does not know it"
-                yield CheckFinding(place, "no-record", text)
+                yield CheckFinding(place, Code.NO_RECORD, text)
             yield from _left_alone(place, {}, sidecar.left_in(name))
             yield from self._source(place, sha256(data))
             return
         if sha256(data) != record.output_sha256:
-            yield CheckFinding(place, "changed", "was changed after it was compensated")
+            yield CheckFinding(
+                place, Code.CHANGED, "was changed after it was compensated"
+            )
         elif stamp is None or not _agree(stamp.source, stamp.model, record, sidecar):
             yield CheckFinding(
-                place, "no-record", "its stamp is not that of its record"
+                place, Code.NO_RECORD, "its stamp is not that of its record"
             )
         yield from _left_alone(place, record.targets, sidecar.left_in(name))
         yield from self._source(place, record.source_sha256)
@@ -271,17 +274,17 @@ class _Look:
             return
         path = self.source / place
         if not path.is_file():
-            yield CheckFinding(place, "no-source", "is not in the source tree")
+            yield CheckFinding(place, Code.NO_SOURCE, "is not in the source tree")
         elif sha256(read_input(path)) != digest:
             text = "its source has changed since: compensate it again"
-            yield CheckFinding(place, "source-changed", text)
+            yield CheckFinding(place, Code.SOURCE_CHANGED, text)
 
     def _compiled(self, place: str) -> Iterator[CheckFinding]:
         """Check that a compiled file is not that of the uncompensated program."""
         if self.source is not None and (self.source / place).is_file():
             if read_input(self.source / place) == read_input(self.root / place):
                 text = "is compiled from the uncompensated program: translate it anew"
-                yield CheckFinding(place, "uncompensated", text)
+                yield CheckFinding(place, Code.UNCOMPENSATED, text)
 
 
 def _left_alone(
@@ -296,14 +299,16 @@ def _left_alone(
         lines = line_ranges(sorted(line for _, line, _ in rows))
         text = f"{len(rows)} visits were left alone, lines {lines} of the source"
         cure = "look at them, then pass --accept-left"
-        yield CheckFinding(place, LEFT, f"{text}: {cure}; {_by_reason(rows, told)}")
+        yield CheckFinding(
+            place, Code.LEFT_ALONE, f"{text}: {cure}; {_by_reason(rows, told)}"
+        )
 
 
 def _assumed(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
     """Find routines that were taken as still because the shipped list says so."""
     for file, line, message in sidecar.assumed:
         text = f"line {line} of {file}: {message}; compensate it with --strict-calls"
-        yield CheckFinding(place, ASSUMED_STILL, text)
+        yield CheckFinding(place, Code.ASSUMED_STILL, text)
 
 
 def _by_reason(rows: list[tuple[str, int, int]], told: Mapping[str, Any]) -> str:

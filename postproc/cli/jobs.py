@@ -23,6 +23,7 @@ from postproc.compensation.compensate import compensate, name_files
 from postproc.compensation.options import Options, Progress, silent
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.record import sidecar_path
+from postproc.diagnostics import Code
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import (
     STREAM,
@@ -130,12 +131,12 @@ def archive_notes(program: Path, cell: Cell) -> tuple[Diagnostic, ...]:
                 f"Paste into the cell: [base] xyz_mm = [{x:.3f}, {y:.3f}, {z:.3f}] "
                 f"euler_zyz_deg = [{', '.join(f'{v:.4f}' for v in turns)}]"
             )
-            notes.append(Diagnostic(program.name, 1, "archive-base", text))
+            notes.append(Diagnostic(program.name, 1, Code.ARCHIVE_BASE, text))
     return tuple(notes)
 
 
 def _not_followed(program: Path, line: int, text: str) -> Diagnostic:
-    return Diagnostic(program.name, line, "not-followed", text)
+    return Diagnostic(program.name, line, Code.NOT_FOLLOWED, text)
 
 
 def _is_page(path: Path, outputs: bool) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.targets import few_frames
+from postproc.diagnostics import Code
 from postproc.language.visits import Diagnostic, Meaning, Visits
 from postproc.robot.cell import Cell
 from postproc.robot.pose import (
@@ -94,7 +95,7 @@ def contradicted_base(visits: Visits, cell: Cell) -> list[Diagnostic]:
                 "[base] the frame that the program was made with"
             )
             file, line = visits.files[visits.file[first]], int(visits.line[first])
-            return [Diagnostic(file, line, "base-contradicts", text)]
+            return [Diagnostic(file, line, Code.BASE_CONTRADICTS, text)]
     return []
 
 

@@ -13,6 +13,7 @@ from postproc.compensation.decide import Proposal
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import Reading, read_program
+from postproc.diagnostics import Code
 from postproc.language.interface import Cloner, NamedPoint
 from postproc.language.languages import language_of
 from postproc.language.source import CloneError, Edit, Source, apply
@@ -233,7 +234,7 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
     if visits is None or _stay(visits, list(work.names)):
         text = "clones would change what the program does: nothing is cloned"
         text = text if visits is None else STAYING
-        found = Diagnostic(reading.sources[0].name, 1, "not-cloned", text)
+        found = Diagnostic(reading.sources[0].name, 1, Code.NOT_CLONED, text)
         return replace(reading, diagnostics=(*reading.diagnostics, found))
     return Reading(
         again.texts, visits, notes, cloned, reading.sources, missed=reading.missed
@@ -312,7 +313,7 @@ class _CloneWork:
         followed = not literals.isdisjoint(self.reading.visits.follows.tolist())
         if followed and not original.stops:
             place = members[0].stop
-            self._note(place.file, place.line, "not-cloned", FOLLOWED)
+            self._note(place.file, place.line, Code.NOT_CLONED, FOLLOWED)
             return
         for group in others:
             self._clone([named[stop] for stop in group.stops], group)
@@ -341,7 +342,7 @@ class _CloneWork:
                     raise CloneError("this one move arrives in ways that disagree")
             except CloneError as problem:
                 if usable:
-                    self._note(stop.file, stop.line, "not-cloned", str(problem))
+                    self._note(stop.file, stop.line, Code.NOT_CLONED, str(problem))
             else:
                 named[stop] = one
                 found = replace(found, variable=one.key)
@@ -359,13 +360,13 @@ class _CloneWork:
             self.edits += edits
         except CloneError as problem:
             text = f"{variable.name} keeps its moves (lines {lines}): {problem}"
-            self._note(file, declared, "not-cloned", text)
+            self._note(file, declared, Code.NOT_CLONED, text)
             return
         text = f"{variable.name}: the moves of lines {lines} go to {name} now"
-        self._note(file, declared, "cloned", text)
+        self._note(file, declared, Code.CLONED, text)
         separated = np.concatenate([self.stops[stop] for stop in group.stops])
         self.names |= dict.fromkeys(separated.tolist(), name)
 
-    def _note(self, file: int, line: int, code: str, text: str) -> None:
+    def _note(self, file: int, line: int, code: Code, text: str) -> None:
         name = self.reading.sources[file].name
         self.notes.append(Diagnostic(name, line, code, text))

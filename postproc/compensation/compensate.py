@@ -53,13 +53,14 @@ from postproc.compensation.rewrite import (
     write_edits,
 )
 from postproc.compensation.targets import rounded_points, unknown_blends
+from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
 from postproc.files import variables_of
 from postproc.language.interface import Language
 from postproc.language.languages import language_of
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
-from postproc.language.visits import ASSUMED_STILL, Diagnostic, Visits, told_once
+from postproc.language.visits import Diagnostic, Visits, told_once
 from postproc.model.model import Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.cell import Cell
@@ -279,7 +280,7 @@ def _record(reading: Reading, draft: Draft, setting: Setting) -> Sidecar:
         assumed=tuple(
             (x.file, x.line, x.message)
             for x in reading.diagnostics
-            if x.code == ASSUMED_STILL
+            if x.code == Code.ASSUMED_STILL
         ),
         left=left_elsewhere(visits, d, files, reading.missed, reading.diagnostics),
     )

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.compensation.program import Reading, read_program
-from postproc.language.visits import MOTION_UNKNOWN, Diagnostic, Visits
+from postproc.diagnostics import Code
+from postproc.language.visits import Diagnostic, Visits
 from postproc.robot.cell import Cell
 
-FIRST_CAUSE = "first-cause"
-UNKNOWN_ROUTINE = "unknown-routine"
-CAUSES = (MOTION_UNKNOWN, UNKNOWN_ROUTINE)
+CAUSES = (Code.MOTION_UNKNOWN, Code.UNKNOWN_ROUTINE)
 
 
 def read_with_cause(files: Mapping[str, bytes], cell: Cell) -> Reading:
@@ -56,7 +55,7 @@ def first_cause(
         f"{total} targets. Say under [routines] of the cell what the routines do that "
         'no file holds (name = "still" or "moves"), or give their files'
     )
-    return (Diagnostic(first.file, first.line, FIRST_CAUSE, text),)
+    return (Diagnostic(first.file, first.line, Code.FIRST_CAUSE, text),)
 
 
 def _known(visits: Visits) -> int:

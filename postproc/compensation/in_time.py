@@ -16,6 +16,7 @@ from postproc.compensation.paths.corners import RoundOff, predict_corners
 from postproc.compensation.paths.points import Insertions
 from postproc.compensation.program import Reading
 from postproc.compensation.targets import targets_from_visits
+from postproc.diagnostics import Code
 from postproc.language.visits import Diagnostic, Visits
 from postproc.motion.cycle import ProgramCycle, run
 from postproc.motion.sampled import disagreements
@@ -24,14 +25,6 @@ from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 
-SLOWER = "slower"
-BEYOND_LIMIT = "beyond-limit"
-SLOWED = "slowed-down"  # codes of findings
-OTHER_SIDE = "side-in-time"
-PATH_POINTS = "path-points"
-NOT_TAKEN_UP = "not-taken-up"
-PATH_LEFT = "path-left"
-APPROACHED = "approached-anew"
 MOST_SLOWER = 0.03  # of the cycle time
 FEW = 5  # lines that a finding names
 _LIMITS = [CODE[text] for text in (*LIMITS, *PATH_LIMITS)]
@@ -133,11 +126,11 @@ class InTime:
                 f"the compensated program takes {self.after.seconds:.1f} s instead of "
                 f"{self.before.seconds:.1f} s"
             )
-            yield Diagnostic(visits.files[0], 1, SLOWER, text)
+            yield Diagnostic(visits.files[0], 1, Code.SLOWER, text)
         for v in self._beyond.tolist():
             text = "a joint comes beyond its limit, which the original program keeps"
             file = visits.files[visits.file[v]]
-            yield Diagnostic(file, int(visits.line[v]), BEYOND_LIMIT, text)
+            yield Diagnostic(file, int(visits.line[v]), Code.BEYOND_LIMIT, text)
         yield from self._slowed(visits)
         if self.inserted is not None:
             yield from self._points(visits, self.inserted)
@@ -146,14 +139,14 @@ class InTime:
     def _points(self, visits: Visits, told: Insertions) -> Iterator[Diagnostic]:
         """Say what was put on the ways, and which moves still leave their paths."""
         said = (
-            (PATH_POINTS, told.points, f"{told.count} points are put on the ways of "
-             f"{len(told.points)} moves; {verified(self.in_motion)}"),
-            (NOT_TAKEN_UP, told.unconfirmed, "play is not taken up before "
+            (Code.PATH_POINTS, told.points, f"{told.count} points are put on the ways "
+             f"of {len(told.points)} moves; {verified(self.in_motion)}"),
+            (Code.NOT_TAKEN_UP, told.unconfirmed, "play is not taken up before "
              f"{len(told.unconfirmed)} moves: neither reversals (survey --reversals) "
              "nor a measured path (diagnose --path) confirm how joints change their "
              "flanks there"),
-            (APPROACHED, told.approaches, f"{len(told.approaches)} targets are "
-             "approached anew, from a stop on the way already travelled"),
+            (Code.APPROACHED_ANEW, told.approaches, f"{len(told.approaches)} targets "
+             "are approached anew, from a stop on the way already travelled"),
         )  # fmt: skip
         for code, moves, text in said:
             if moves:
@@ -166,7 +159,7 @@ class InTime:
             why = told.left.get(v, "more points on its way do not help")
             text = f"the move is predicted to leave its path by {far:.3f} mm: {why}"
             place = visits.files[visits.file[v]], int(visits.line[v])
-            yield Diagnostic(*place, PATH_LEFT, text)
+            yield Diagnostic(*place, Code.PATH_LEFT, text)
 
     def _other_sides(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where joints arrive otherwise in time than along the path."""
@@ -178,7 +171,7 @@ class InTime:
                 "that of the path"
             )
             file = visits.files[visits.file[v]]
-            yield Diagnostic(file, int(visits.line[v]), OTHER_SIDE, text)
+            yield Diagnostic(file, int(visits.line[v]), Code.SIDE_IN_TIME, text)
 
     def _slowed(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where the joints cannot follow the programmed speed."""
@@ -198,7 +191,7 @@ class InTime:
             f"(lines {', '.join(map(str, [*lines][:FEW]))}{more})"
         )
         place = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
-        yield Diagnostic(*place, SLOWED, text)
+        yield Diagnostic(*place, Code.SLOWED_DOWN, text)
 
 
 def _round_off(corners: RoundOff) -> str:

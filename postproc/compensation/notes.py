@@ -9,6 +9,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, in_chunks
 from postproc.compensation.continuity import on_path
 from postproc.compensation.frames import taught_records
+from postproc.diagnostics import Code
 from postproc.files import (
     is_shared_list,
     is_submit,
@@ -33,7 +34,7 @@ SINGLY = 20  # findings of one kind that are listed line by line
 def assumed_off(name: str, cell: Cell) -> Diagnostic:
     """State that the controller is taken not to compensate on its own."""
     text = f"the controller's own absolute accuracy is taken to be off ({cell.path})"
-    return Diagnostic(name, 1, "absolute-accuracy", text)
+    return Diagnostic(name, 1, Code.ABSOLUTE_ACCURACY, text)
 
 
 def controller_unknown(name: str, cell: Cell) -> list[Diagnostic]:
@@ -46,7 +47,7 @@ def controller_unknown(name: str, cell: Cell) -> list[Diagnostic]:
         f"controller: it is assumed to run {language.name}. Write "
         f'controller = "{language.controller}" in the arm file'
     )
-    return [Diagnostic(name, 1, "controller", text)]
+    return [Diagnostic(name, 1, Code.CONTROLLER, text)]
 
 
 def tool_in_metres(visits: Visits) -> list[Diagnostic]:
@@ -62,7 +63,7 @@ def tool_in_metres(visits: Visits) -> list[Diagnostic]:
         Diagnostic(
             visits.files[visits.file[i]],
             int(visits.line[i]),
-            "tool-length",
+            Code.TOOL_LENGTH,
             f"the tool here is {longest[visits.tool[i]]:g} mm long, by the program or "
             "by [tool] of the cell: are these metres? Write millimetres",
         )
@@ -78,7 +79,7 @@ def followed_pages(visits: Visits) -> list[Diagnostic]:
     )
     names = [name for name in visits.files[1:] if not is_variables(name)]
     return [
-        Diagnostic(visits.files[0], 1, "page", f"{name} {texts[shared]}")
+        Diagnostic(visits.files[0], 1, Code.PAGE, f"{name} {texts[shared]}")
         for name in names
         if not is_system_module(name)
         for shared in (is_shared_list(name) or is_submit(name),)
@@ -97,7 +98,7 @@ def missing_file(visits: Visits) -> list[Diagnostic]:
     )
     first = visits.line[np.flatnonzero(lost)[:1]].tolist()
     return [
-        Diagnostic(visits.files[0], line, "no-variable-file", text) for line in first
+        Diagnostic(visits.files[0], line, Code.NO_VARIABLE_FILE, text) for line in first
     ]
 
 
@@ -108,13 +109,13 @@ def overruled_strings(visits: Visits, rows: Bools) -> list[Diagnostic]:
     or the target is left alone.
     """
     text = visits.dialect.terms.overruled
-    return _each(visits, rows, "configuration-overruled", text)
+    return _each(visits, rows, Code.CONFIGURATION_OVERRULED, text)
 
 
 def untimed_runs(visits: Visits, rows: Bools) -> list[Diagnostic]:
     """List targets in runs that no time law was found for, rows (n,)."""
     text = "no time law was found for this run: times and speeds are estimates"
-    return _each(visits, rows, "no-time-law", text)
+    return _each(visits, rows, Code.NO_TIME_LAW, text)
 
 
 def flank_steps(
@@ -155,7 +156,7 @@ def flank_steps(
         )
         line = int(visits.line[rows[i]])
         name = visits.files[visits.file[rows[i]]]
-        found.append(Diagnostic(name, line, "flank-acceleration", text))
+        found.append(Diagnostic(name, line, Code.FLANK_ACCELERATION, text))
     return found
 
 
@@ -194,7 +195,7 @@ def listing_cost(
         Diagnostic(
             visits.files[visits.literals.file[visits.literal[v]]],
             int(visits.literals.line[visits.literal[v]]),
-            "listing-digits",
+            Code.LISTING_DIGITS,
             f"a listing by the controller has 2 decimals (0.01 mm, 0.01 deg): to list "
             f"these values and load them again costs {'; '.join(found)}",
         )
@@ -213,7 +214,7 @@ def _reach(arm: Arm, q: Floats, tool: Floats) -> float:
     return float(np.linalg.norm(J, axis=1).sum(axis=1).max())
 
 
-def _each(visits: Visits, rows: Bools, code: str, text: str) -> list[Diagnostic]:
+def _each(visits: Visits, rows: Bools, code: Code, text: str) -> list[Diagnostic]:
     """Make one diagnostic for each visit, or one for all where they are many."""
     found = np.flatnonzero(rows)
     if len(found) > SINGLY:
@@ -251,7 +252,7 @@ def unsure_frames(
             "these directions as taught_lambda in the cell file"
         )
         where = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
-        found.append(Diagnostic(*where, CODE, text))
+        found.append(Diagnostic(*where, Code.SIDE_NOT_SURE, text))
     return found
 
 
@@ -290,21 +291,22 @@ def unsure_sides(
             f"that is not sure (up to +-{size[rows].max():.3f} mm, for instance lines "
             f"{lines}): {cure}"
         )
-        return [Diagnostic(visits.files[0], int(visits.line[rows[0]]), CODE, text)]
+        return [
+            Diagnostic(
+                visits.files[0], int(visits.line[rows[0]]), Code.SIDE_NOT_SURE, text
+            )
+        ]
     told = advice(rows)
     return [
         Diagnostic(
             visits.files[visits.file[i]],
             int(visits.line[i]),
-            CODE,
+            Code.SIDE_NOT_SURE,
             f"{_how(side[i])}, from a side that is not sure "
             f"(+-{size[i]:.3f} mm): {told.get(i, cure)}",
         )
         for i in rows.tolist()
     ]
-
-
-CODE = "side-not-sure"
 
 
 def _how(side: Floats) -> str:

@@ -19,10 +19,9 @@ from postproc.compensation.record import (
     read_without_edits,
     sidecar_path,
 )
+from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language.visits import (
-    MOTION_UNKNOWN,
-    NEVER_REACHED,
     NOT_FOLLOWED,
     Diagnostic,
     Visits,
@@ -427,8 +426,10 @@ def left_elsewhere(
         for i in np.flatnonzero(rows & ~told).tolist()
     ]
     for name, lines in missed.items():
-        found += [(name, line, NEVER_REACHED) for line in lines.tolist()]
-    found += [(x.file, x.line, x.code) for x in diagnostics if x.code == MOTION_UNKNOWN]
+        found += [(name, line, Code.NEVER_REACHED) for line in lines.tolist()]
+    found += [
+        (x.file, x.line, x.code) for x in diagnostics if x.code == Code.MOTION_UNKNOWN
+    ]
     return tuple(found)
 
 

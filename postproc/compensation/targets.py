@@ -9,6 +9,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.arc_angles import ArcAngles, place_ends
 from postproc.compensation.eligibility import Reasons
+from postproc.diagnostics import Code
 from postproc.language.visits import (
     Blend,
     Diagnostic,
@@ -60,7 +61,7 @@ def rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
     rows = np.flatnonzero(away > 0)
     if len(rows) == 0:
         return []
-    found = [_note(visits, int(rows[0]), "fly-assumed", text)
+    found = [_note(visits, int(rows[0]), Code.FLY_ASSUMED, text)
              for text in [_assumed(visits, rows)] if text]  # fmt: skip
     far = rows[away[rows] > FAR]
     if len(far):
@@ -69,7 +70,7 @@ def rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
             f"the path passes {len(far)} fly points by more than {FAR:g} mm, this one "
             f"by {away[worst]:.2f} mm, {visits.dialect.terms.corner}"
         )
-        found.append(_note(visits, worst, "fly-corner", text))
+        found.append(_note(visits, worst, Code.FLY_CORNER, text))
     return found
 
 
@@ -88,7 +89,7 @@ def unknown_blends(visits: Visits, corrected: Bools) -> list[Diagnostic]:
         "how early it leaves them. They are corrected for both cases; joints that turn "
         "back there are corrected for the middle of their play"
     )
-    return [_note(visits, int(found[0]), "fly-unknown", text)]
+    return [_note(visits, int(found[0]), Code.FLY_UNKNOWN, text)]
 
 
 def _assumed(visits: Visits, rows: Ints) -> str:
@@ -107,7 +108,7 @@ def _assumed(visits: Visits, rows: Ints) -> str:
     return taken and f"fly points are rounded as with {taken}: not set in the program"
 
 
-def _note(visits: Visits, row: int, code: str, text: str) -> Diagnostic:
+def _note(visits: Visits, row: int, code: Code, text: str) -> Diagnostic:
     return Diagnostic(visits.files[visits.file[row]], int(visits.line[row]), code, text)
 
 

@@ -11,11 +11,12 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from postproc.arrays import Ints
+from postproc.diagnostics import Code
 from postproc.language import syntax as said
 from postproc.language.flow import EXIT, HeadedRows, RoutineFlow, flow_of
 from postproc.language.interface import Start
 from postproc.language.statements import StatementText
-from postproc.language.visits import ELSEWHERE, MOTION_UNKNOWN, Diagnostic
+from postproc.language.visits import ELSEWHERE, Diagnostic
 
 MOST_STEPS = 4_000_000  # statements run, all in all
 MOST_ROUNDS = 10_000  # rounds of a loop that are followed one by one
@@ -548,11 +549,11 @@ class TaskMachine(ABC):
         self, context: CallContext, row: int, here: Arrived, what: str = NOT_FOLLOWED
     ) -> Arrived:
         """Say that a statement may move, and forget what was known."""
-        self.say(context.scope.file, row, MOTION_UNKNOWN, what, quote=True)
+        self.say(context.scope.file, row, Code.MOTION_UNKNOWN, what, quote=True)
         return here.lost()
 
     def say(
-        self, file: int, row: int, code: str, what: str, quote: bool = False
+        self, file: int, row: int, code: Code, what: str, quote: bool = False
     ) -> None:
         """Say something of a statement, with its beginning or without."""
         text = self.texts[file]

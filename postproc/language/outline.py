@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
+from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language.flow import HeadedRows
 from postproc.language.source import Source
@@ -118,7 +119,7 @@ class Outline:
 
     def _complain(self, row: int, what: str) -> None:
         message = f"{self.text.shown(row)} {what}"
-        self.diagnostics.append(self.text.diagnostic(row, "open-block", message))
+        self.diagnostics.append(self.text.diagnostic(row, Code.OPEN_BLOCK, message))
 
 
 class StatementFile(Protocol):
@@ -149,7 +150,7 @@ def read_once(
             return file
     file = read(source)
     for found in file.diagnostics:
-        if found.code == "open-block":
+        if found.code == Code.OPEN_BLOCK:
             cure = "Close it: what runs when is not known without"
             raise ProgramError(source.name, found.message, cure, line=found.line)
     return file

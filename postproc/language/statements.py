@@ -9,6 +9,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from postproc.arrays import Floats, Indices
+from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language.rewrite import Skeleton
 from postproc.language.shapes import ParsedShapes, find_shapes, parse_shapes
@@ -69,7 +70,7 @@ class StatementText(Generic[T]):
         words = " ".join(self.text(row).split())
         return words if len(words) <= SHOWN else f"{words[:SHOWN]} .."
 
-    def diagnostic(self, row: int, code: str, message: str) -> Diagnostic:
+    def diagnostic(self, row: int, code: Code, message: str) -> Diagnostic:
         """Say something of a statement."""
         return Diagnostic(self.source.name, self.line(row), code, message)
 

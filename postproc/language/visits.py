@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Indices, Ints, chunks, narrow, read_only
+from postproc.diagnostics import Code
 from postproc.language.dialect import Dialect
 
 START = -1  # predecessor: wherever the arm stands when the program starts
@@ -352,12 +353,8 @@ def line_ranges(lines: Ints | Sequence[int]) -> str:
 
 # What a user's program can contain is no exception: it is collected and reported.
 
-NEVER_REACHED = "never-reached"  # moves that no way from the start leads to
-OTHER_ARM = "other-arm"  # a target that is another arm's
-MOTION_UNKNOWN = "motion-unknown"  # a statement that may move and is not understood
-NOT_FOLLOWED = frozenset({NEVER_REACHED, MOTION_UNKNOWN, OTHER_ARM})
+NOT_FOLLOWED = frozenset({Code.NEVER_REACHED, Code.MOTION_UNKNOWN, Code.OTHER_ARM})
 """Findings that tell of targets without a visit, or may: they keep their values."""
-ASSUMED_STILL = "assumed-still"  # a routine that is taken to move nothing
 
 
 @dataclass(frozen=True, order=True)
@@ -367,13 +364,13 @@ class Diagnostic:
     Attributes:
         file: File name the line belongs to.
         line: 1-based line.
-        code: Short stable name, for instance ``unknown-statement``.
+        code: What kind of finding it is.
         message: What was found, what it means and what the user can do.
     """
 
     file: str
     line: int
-    code: str
+    code: Code
     message: str
 
 
@@ -383,7 +380,7 @@ def told_once(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     A line that is reached several times, in a routine or a loop, gives one for every
     visit.
 
-    >>> told_once([Diagnostic("a.pdl", 1, "x", "odd")] * 3)[0].message
+    >>> told_once([Diagnostic("a.pdl", 1, Code.PAGE, "odd")] * 3)[0].message
     'odd (3 times)'
     """
     return tuple(
@@ -410,7 +407,7 @@ def never_reached(
         Diagnostic(
             name,
             int(lines[0]),
-            NEVER_REACHED,
+            Code.NEVER_REACHED,
             f"{len(lines)} moves, lines {line_ranges(lines)}, are never reached from "
             f"{begin}: they are not compensated. Give the {caller} that calls them, "
             "or remove them",

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from postproc.diagnostics import Code
 from postproc.language.collect import FoundGoal, cell_pose
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
@@ -33,7 +34,7 @@ from postproc.language.krl.task import (
     parts_of,
 )
 from postproc.language.machine import Arrived, CallContext, Scope, TaskMachine
-from postproc.language.visits import ASSUMED_STILL, START
+from postproc.language.visits import START
 
 _PASSED = (
     said.AccessHeader, said.KrlDeclaration, said.OutsideName, said.SpeedPart,
@@ -83,7 +84,7 @@ class KrlMachine(TaskMachine):
         self.call(0, first.name, first.routines[0], None, -1, here)
         self.follow_all()
         for name, (file, row) in self._assumed.items():
-            self.say(file, row, ASSUMED_STILL, f"{name.upper()} {ASSUMED}")
+            self.say(file, row, Code.ASSUMED_STILL, f"{name.upper()} {ASSUMED}")
 
     # What a statement is.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from postproc.diagnostics import Code
 from postproc.files import base_name, is_submit
 from postproc.language.flow import HeadedRows
 from postproc.language.krl import syntax as said
@@ -143,7 +144,7 @@ class _KrlReader:
             case said.NotUnderstood():
                 message = f"{self.text.shown(row)} is not understood"
                 self.diagnostics.append(
-                    self.text.diagnostic(row, "unknown-statement", message)
+                    self.text.diagnostic(row, Code.UNKNOWN_STATEMENT, message)
                 )
             case _:
                 self._block(row, one)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from postproc.diagnostics import Code
 from postproc.language.interface import Record
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.disturbances import DISTURBING
@@ -51,7 +52,7 @@ from postproc.language.pdl2.values import (
     Value,
     points_of,
 )
-from postproc.language.visits import ASSUMED_STILL, ELSEWHERE
+from postproc.language.visits import ELSEWHERE
 
 # Routines that cannot be followed: their moves are listed, what they change forgotten.
 #
@@ -147,7 +148,7 @@ def _summarised(
         here.world.report_once(
             here.place.program,
             here.row,
-            "call-not-followed",
+            Code.CALL_NOT_FOLLOWED,
             name,
             f"{name} may move the arm where it is called in an expression: the next "
             "move is taken to come from an unknown place; call it as a statement",
@@ -159,7 +160,7 @@ def _refuse_recursion(machine: Machine, here: Execution, inside: Place) -> None:
     here.world.report_once(
         here.place.program,
         here.row,
-        "recursion",
+        Code.RECURSION,
         name,
         f"{name} calls itself: what it does is not followed; moves after it are taken "
         "to come from an unknown place",
@@ -227,10 +228,10 @@ def opaque_call(
         case RoutineEffect.TRACKS:
             _track(here, name, arguments)
         case RoutineEffect.KNOWN:
-            _say(here, ASSUMED_STILL, name, "is not in the files at hand: it is on "
-                 "the list of routines known neither to move the arm nor to set frames "
-                 "(docs/routines.md); if it does, say so under [routines] in the cell "
-                 "file, or pass --strict-calls")  # fmt: skip
+            _say(here, Code.ASSUMED_STILL, name, "is not in the files at hand: it is "
+                 "on the list of routines known neither to move the arm nor to set "
+                 "frames (docs/routines.md); if it does, say so under [routines] "
+                 "in the cell file, or pass --strict-calls")  # fmt: skip
         case RoutineEffect.UNKNOWN:
             report_unknown_routine(here.world, here.place.program, here.row, name)
             forget_surroundings(here, f"{name}, which is not in the files at hand, may "
@@ -238,7 +239,7 @@ def opaque_call(
                                 "does")  # fmt: skip
 
 
-def _say(here: Execution, code: str, name: str, text: str) -> None:
+def _say(here: Execution, code: Code, name: str, text: str) -> None:
     here.world.report_once(here.place.program, here.row, code, name, f"{name} {text}")
 
 
@@ -249,7 +250,7 @@ def _track(
     on = here.value(arguments[0]) if arguments else Nothing("")
     here.store.set(**{TRACKING: on})
     here.store.last = frozenset({ELSEWHERE})
-    _say(here, "position-unknown", name, "lets a sensor lead the arm, or ends that: "
+    _say(here, Code.POSITION_UNKNOWN, name, "lets a sensor lead the arm, or ends that: "
          "the next move comes from an unknown place")  # fmt: skip
 
 

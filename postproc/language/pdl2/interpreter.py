@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.diagnostics import Code
 from postproc.language.interface import Start
 from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
@@ -67,7 +68,6 @@ from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
 from postproc.language.visits import (
     ELSEWHERE,
-    MOTION_UNKNOWN,
     START,
     Diagnostic,
     Meaning,
@@ -125,7 +125,7 @@ def _unrolled(
     here.world.report_once(
         program,
         here.row,
-        "loop-not-unrolled",
+        Code.LOOP_NOT_UNROLLED,
         str(here.row),
         f"the loop runs {rounds} times: too often to be followed round by round; "
         "targets that depend on its counter are not compensated",
@@ -358,7 +358,7 @@ def _forget_by_text(here: Execution, why: str) -> None:
     here.world.report(
         here.place.program,
         here.row,
-        MOTION_UNKNOWN,
+        Code.MOTION_UNKNOWN,
         "where the arm is, its frames and its motion settings are not known after "
         "this statement, which is not understood: targets after it are left as they "
         "are until these are set again",
@@ -412,13 +412,13 @@ def _report_drift(world: World, place: Place, file: ValueFile) -> None:
     unused = [written[k] for k in np.flatnonzero(~used).tolist()]
     undeclared = [written[k] for k in np.flatnonzero(used & ~declared).tolist()]
     if names and len(unused) == len(names):
-        _say(world, file, "lsv-other-program", "none of its variables is used by "
+        _say(world, file, Code.LSV_OTHER_PROGRAM, "none of its variables is used by "
              f"{place.program.name}: is it the file of another program?")  # fmt: skip
     elif unused:
-        _say(world, file, "lsv-unused", f"never used: {_some(unused)}")
+        _say(world, file, Code.LSV_UNUSED, f"never used: {_some(unused)}")
     if undeclared:
         text = f"used by the program, but not declared there: {_some(undeclared)}"
-        _say(world, file, "lsv-undeclared", text)
+        _say(world, file, Code.LSV_UNDECLARED, text)
 
 
 def _bases(entries: Entries) -> tuple[NameColumn, Sequence[str]]:
@@ -430,7 +430,7 @@ def _bases(entries: Entries) -> tuple[NameColumn, Sequence[str]]:
     return NameColumn(names), [*names.values()]
 
 
-def _say(world: World, file: ValueFile, code: str, text: str) -> None:
+def _say(world: World, file: ValueFile, code: Code, text: str) -> None:
     world.diagnostics[Diagnostic(file.source.name, 1, code, text)] = None
 
 
@@ -582,8 +582,8 @@ def resolve(
     machine = _followed(world)
     if machine.exhausted:
         world.report_once(
-            program, 0, "too-complex", "", "the program has too many ways, or calls, "
-            f"to be followed to the end (more than {MAX_STEPS} steps): nothing "
+            program, 0, Code.TOO_COMPLEX, "", "the program has too many ways, or "
+            f"calls, to be followed to the end (more than {MAX_STEPS} steps): nothing "
             "in it is compensated",
         )  # fmt: skip
         machine = _listed(world)
@@ -681,7 +681,7 @@ def _cancelling_handler(
     machine.world.report_once(
         place.program,
         row,
-        "handler-cancels",
+        Code.HANDLER_CANCELS,
         str(row),
         "this condition handler may end a move on its way (CANCEL, EXIT CYCLE) at any "
         "time: no move's origin is sure",
@@ -695,7 +695,7 @@ def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> N
     machine.world.report_once(
         place.program,
         row,
-        "handler-moves",
+        Code.HANDLER_MOVES,
         str(row),
         "this condition handler may move the arm at any time: no move's origin is sure",
     )

@@ -10,6 +10,7 @@ from itertools import chain
 import numpy as np
 
 from postproc.arrays import Bools, Ints, give_back
+from postproc.diagnostics import Code
 from postproc.files import base_name
 from postproc.language.interface import Start
 from postproc.language.names import NameColumn
@@ -227,14 +228,14 @@ class World:
             found.setdefault(id(program), program)
         return list(found.values())
 
-    def report(self, program: Program, row: int, code: str, message: str) -> None:
+    def report(self, program: Program, row: int, code: Code, message: str) -> None:
         """Collect a finding at a logical line."""
         lines = program.lines
         line = int(lines.line[row]) if 0 <= row < len(lines) else 1
         self.diagnostics[Diagnostic(lines.source.name, line, code, message)] = None
 
     def report_once(
-        self, program: Program, row: int, code: str, what: str, message: str
+        self, program: Program, row: int, code: Code, what: str, message: str
     ) -> None:
         """Collect a finding about something the first time only."""
         if (code, what) not in self._said:

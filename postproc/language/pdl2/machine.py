@@ -10,6 +10,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from postproc.arrays import Ints
+from postproc.diagnostics import Code
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.context import CALLED, Context, Point
 from postproc.language.pdl2.effects import PURE, circles, invocations, references
@@ -227,7 +228,7 @@ class Machine:
 
     def _report_many(self, here: Execution) -> None:
         here.world.report_once(
-            here.place.program, here.row, "many-origins", str(here.row),
+            here.place.program, here.row, Code.MANY_ORIGINS, str(here.row),
             f"more than {MOST_ORIGINS} arrivals may come before this move: they are "
             "not told apart, and from which side it arrives is not known",
         )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from postproc.diagnostics import Code
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.effects import goes_to_target, references
 from postproc.language.pdl2.evaluate import SINGLE, parts_under
@@ -17,7 +18,7 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.store import Settings
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector, unsure
-from postproc.language.visits import ELSEWHERE, NO_TARGET, OTHER_ARM, Meaning
+from postproc.language.visits import ELSEWHERE, NO_TARGET, Meaning
 from postproc.robot.trajectory import Motion
 
 # Nodes of paths as destinations: where the one position of a node stands.
@@ -213,7 +214,7 @@ def _check_declared(here: Execution, name: str) -> None:
         here.world.report_once(
             here.place.program,
             here.row,
-            "undeclared-variable",
+            Code.UNDECLARED_VARIABLE,
             name,
             f"{name} is used and not declared",
         )
@@ -317,7 +318,7 @@ def _list_other(here: Execution, statement: ast.Move) -> None:
         f"this move is {whose}, and the cell is of arm {here.world.arm}: it is left as "
         f"it is. Compensate it with a cell of its arm{number}, and its model"
     )
-    here.world.report(here.place.program, here.row, OTHER_ARM, text)
+    here.world.report(here.place.program, here.row, Code.OTHER_ARM, text)
 
 
 def _with(here: Execution, statement: ast.Move) -> Settings:
@@ -346,7 +347,7 @@ def motion_of(
         here.world.report_once(
             here.place.program,
             here.row,
-            "assumed-joint",
+            Code.ASSUMED_JOINT,
             "move_type",
             "the move names no trajectory and $MOVE_TYPE is not set: taken as JOINT",
         )

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.arrays import Ints
+from postproc.diagnostics import Code
 from postproc.language.lines import Lines
 from postproc.language.names import NameColumn
 from postproc.language.pdl2.entries import (
@@ -286,7 +287,9 @@ def find_fields(
         row, end = int(own[at]), int(ends[at])
         if count[names[at]] > 1:
             text = "has two entries: it is not compensated; delete one"
-            findings.append((end, _finding(lines, said, row, row, "lsv-twice", text)))
+            findings.append(
+                (end, _finding(lines, said, row, row, Code.LSV_TWICE, text))
+            )
             unread.add(names[at])
             continue
         entry = Nested(lines, said, row)
@@ -296,7 +299,7 @@ def find_fields(
             unread.add(names[at])
             text = f"is not read: {odd}"
             findings.append(
-                (end, _finding(lines, said, row, odd.row, "lsv-parts", text))
+                (end, _finding(lines, said, row, odd.row, Code.LSV_PARTS, text))
             )
         else:
             findings += _unread(lines, said, entry, end)
@@ -313,7 +316,7 @@ def _unread(
         at, why = entry.unread[0]
         more = len(entry.unread) - 1
         text = f"is not read as a whole: {why}" + (f", and {more} more" if more else "")
-        yield end, _finding(lines, said, entry.row, at, "lsv-parts", text)
+        yield end, _finding(lines, said, entry.row, at, Code.LSV_PARTS, text)
 
 
 def _finding(
@@ -321,7 +324,7 @@ def _finding(
     said: ParsedShapes[EntryPart | None],
     row: int,
     at: int,
-    code: str,
+    code: Code,
     text: str,
 ) -> Diagnostic:
     entered = said[int(lines.shape[row])]

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Indices, Ints
+from postproc.diagnostics import Code
 from postproc.language.lines import Lines, read_lines, reread_lines
 from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
@@ -481,7 +482,7 @@ class _Reader:
     structure: str = ""  # its name, between RECORD and ENDRECORD
     nodes: dict[str, frozenset[str]] = field(default_factory=dict)
 
-    def report(self, row: int, code: str, message: str) -> None:
+    def report(self, row: int, code: Code, message: str) -> None:
         name = self.lines.source.name
         line = int(self.lines.line[row])
         self.diagnostics.append(Diagnostic(name, line, code, message))
@@ -560,7 +561,9 @@ class _Reader:
             self._drop_declared()
         else:
             name = scope.routine.name
-            self.report(row, "end-missing", f"END {name} is missing before this line")
+            self.report(
+                row, Code.END_MISSING, f"END {name} is missing before this line"
+            )
             self.close(row)
 
     def _drop_declared(self) -> None:
@@ -577,7 +580,7 @@ class _Reader:
         rows = self.structural[slice(*within)]
         blocks, problems = build_blocks(self.lines, self.statements, rows)
         for row, message in problems:
-            self.report(row, "block-structure", message)
+            self.report(row, Code.BLOCK_STRUCTURE, message)
         name = routine.name if routine else ""
         parameters = routine.parameters if routine else ()
         own = scope.variables if routine else Variables()
@@ -660,7 +663,7 @@ def _report_unknown(reader: _Reader, row: int) -> None:
     text = reader.lines.source.line_text(line).strip()
     reader.report(
         row,
-        "unknown-statement",
+        Code.UNKNOWN_STATEMENT,
         f"this statement is not understood and is kept as it is: {text[:60]!r}",
     )
 
@@ -671,10 +674,10 @@ def _close_open(reader: _Reader) -> None:
         scope = reader.scopes[-1]
         last = len(reader.lines) - 1
         name = scope.routine.name if scope.routine else reader.name
-        reader.report(last, "end-missing", f"END {name} is missing at the end")
+        reader.report(last, Code.END_MISSING, f"END {name} is missing at the end")
         if scope.begin < 0:
             reader.scopes.pop()
         else:
             reader.close(last + 1)
     if reader.main is None and not reader.routines and len(reader.lines):
-        reader.report(0, "no-program", "the file holds no BEGIN .. END")
+        reader.report(0, Code.NO_PROGRAM, "the file holds no BEGIN .. END")

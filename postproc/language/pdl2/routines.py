@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 from functools import cache, lru_cache
 from pathlib import Path
 
+from postproc.diagnostics import Code
 from postproc.files import base_name
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.program import Program
@@ -110,4 +111,4 @@ def report_unknown_routine(world: World, program: Program, row: int, name: str) 
         f"sets frames, under [frames.routines.{name}] a row for each call: "
         '"1,2" = { tool = [x, y, z, a, e, r], uframe = [x, y, z, a, e, r] }'
     )
-    world.report_once(program, row, "unknown-routine", name, text)
+    world.report_once(program, row, Code.UNKNOWN_ROUTINE, name, text)

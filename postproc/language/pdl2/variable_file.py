@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Ints
+from postproc.diagnostics import Code
 from postproc.language.lines import Lines, read_lines, reread_lines
 from postproc.language.names import NameColumn
 from postproc.language.pdl2.entries import (
@@ -144,7 +145,7 @@ def _not_understood(
             line = int(lines.line[row])
             text = lines.source.line_text(line).strip()[:60]
             message = f"not understood, kept: {text!r}"
-            yield row, Diagnostic(lines.source.name, line, "lsv-line", message)
+            yield row, Diagnostic(lines.source.name, line, Code.LSV_LINE, message)
 
 
 def _named_twice(
@@ -152,7 +153,7 @@ def _named_twice(
 ) -> Iterator[Finding]:
     for row in twice:
         text = f"{entries.name[row]} has two entries: it is not compensated; delete one"
-        found = Diagnostic(source.name, int(entries.line[row]), "lsv-twice", text)
+        found = Diagnostic(source.name, int(entries.line[row]), Code.LSV_TWICE, text)
         yield int(records.closed[row]), found
 
 
@@ -166,11 +167,11 @@ def _incomplete(
         if row in twice:
             continue
         name, seen = entries.name[row], entries.layouts[entries.layout[row]].seen
-        code, text = "lsv-uninitialised", f"{name} is not initialised (*)"
+        code, text = Code.LSV_UNINITIALISED, f"{name} is not initialised (*)"
         if seen < 6:
-            code = "lsv-incomplete"
+            code = Code.LSV_INCOMPLETE
             text = f"{name} has {seen} of 6 values: is the file cut?"
         elif seen > 6:
-            code, text = "lsv-too-many", f"{name} has {seen} values in place of 6"
+            code, text = Code.LSV_TOO_MANY, f"{name} has {seen} values in place of 6"
         found = Diagnostic(source.name, int(entries.line[row]), code, text)
         yield int(records.closed[row]), found

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeGuard
 
+from postproc.diagnostics import Code
 from postproc.language.collect import FoundGoal
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
@@ -104,9 +105,9 @@ class RapidMachine(TaskMachine):
         if len(mains) != 1:
             here = here.lost()
             self.say(
-                0, 0, "no-main", "no single PROC main: from where these routines are "
-                "called, and with what settings, is not known. Give the module that "
-                "holds main, with the others of its task in the same folder",
+                0, 0, Code.NO_MAIN, "no single PROC main: from where these routines "
+                "are called, and with what settings, is not known. Give the module "
+                "that holds main, with the others of its task in the same folder",
             )  # fmt: skip
         if self._trapped():
             here = replace(here, modes=replace(here.modes, blocked=frozenset([_TRAP])))

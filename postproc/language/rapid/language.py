@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.files import MODULES, is_system_module
 from postproc.language.archive import Archive
@@ -33,7 +34,7 @@ from postproc.language.source import Source
 from postproc.language.visits import never_reached
 
 # What the interpreter says of a statement where it is reached, knowing all modules.
-_SAID_AGAIN = ("unknown-instruction", "late-binding")
+_SAID_AGAIN = (Code.UNKNOWN_INSTRUCTION, Code.LATE_BINDING)
 _BEGIN = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|![^\r\n]*[\r\n])*(?:%%%|MODULE\s)", re.I)
 
 

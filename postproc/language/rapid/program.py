@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from postproc.diagnostics import Code
 from postproc.language.flow import HeadedRows
 from postproc.language.outline import BlockWords, Outline
 from postproc.language.rapid.signatures import MOTIONS, Signature, known_instructions
@@ -195,9 +196,9 @@ class _Calls:
                 self._instruction(row, name, arguments, condition)
             case LateCall():
                 what = "calls a procedure whose name shows when it runs: it may move"
-                self._complain(row, "late-binding", what)
+                self._complain(row, Code.LATE_BINDING, what)
             case NotUnderstood():
-                self._complain(row, "unknown-statement", "is not understood")
+                self._complain(row, Code.UNKNOWN_STATEMENT, "is not understood")
 
     def _instruction(
         self, row: int, name: str, arguments: tuple[Argument, ...], condition: bool
@@ -209,11 +210,11 @@ class _Calls:
                 MotionCall(row, name, signature, to, via, arguments, condition)
             )
             if to is None or (signature.via >= 0 and via is None):
-                self._complain(row, "unknown-statement", "has too few positions")
+                self._complain(row, Code.UNKNOWN_STATEMENT, "has too few positions")
         elif known_instructions().get(name, "left") == "left" and name not in self.own:
             what = "is neither a known instruction nor a routine here: it may move"
-            self._complain(row, "unknown-instruction", what)
+            self._complain(row, Code.UNKNOWN_INSTRUCTION, what)
 
-    def _complain(self, row: int, code: str, what: str) -> None:
+    def _complain(self, row: int, code: Code, what: str) -> None:
         message = f"{self.text.shown(row)} {what}"
         self.diagnostics.append(self.text.diagnostic(row, code, message))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from postproc.diagnostics import Code
 from postproc.language.interface import Start
 from postproc.language.krl.routines import package_routines
-from postproc.language.visits import ASSUMED_STILL, ELSEWHERE, START
+from postproc.language.visits import ELSEWHERE, START
 from tests.language.krl.test_visits import codes, job, origins, reasons
 
 SEARCH = "INTERRUPT DECL 10 WHEN $IN[1]==TRUE DO found_it( )"
@@ -126,7 +127,7 @@ ARC = [
 def test_routines_of_packages_are_still(name):
     found = job("LIN XP1", f"{name}(1, XP1)", "LIN XP1")
     assert reasons(found) == ["", ""] and origins(found) == [[START], [0]]
-    notes = [d for d in found.diagnostics if d.code == ASSUMED_STILL]
+    notes = [d for d in found.diagnostics if d.code == Code.ASSUMED_STILL]
     assert len(notes) == (package_routines()[name] != "ahead")
     strict = job(
         "LIN XP1", f"{name}(1, XP2)", "LIN XP1", start=Start(strict_calls=True)
@@ -141,7 +142,7 @@ def test_routines_of_packages_are_still(name):
 def test_inline_forms_of_arc_welding_are_read():
     found = job("$APO.CDIS=5", *ARC, *ARC)
     assert reasons(found) == ["", ""]
-    assert len([d for d in found.diagnostics if d.code == ASSUMED_STILL]) == 1
+    assert len([d for d in found.diagnostics if d.code == Code.ASSUMED_STILL]) == 1
 
 
 def test_inline_forms_blend_across_the_collision_monitor():

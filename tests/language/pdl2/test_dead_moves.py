@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from postproc.diagnostics import Code
 from postproc.language.pdl2.effects import dead_lines
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.source import Source
-from postproc.language.visits import NEVER_REACHED, never_reached
+from postproc.language.visits import never_reached
 
 POINT = "MOVE LINEAR TO POS(1, 2, 3, 0, 180, 0, '')"
 
@@ -17,7 +18,7 @@ def lines(*body, routine=()):
     found = never_reached(
         dead_lines([program], resolve(program).visits), "the start", "program"
     )
-    assert {d.code for d in found} <= {NEVER_REACHED}
+    assert {d.code for d in found} <= {Code.NEVER_REACHED}
     return [(d.line, int(d.message.split()[0])) for d in found]
 
 

@@ -1,0 +1,498 @@
+"""The registry of findings: each has a code, a severity, a meaning and a cure."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Self
+
+
+class Severity(StrEnum):
+    """What a finding asks for."""
+
+    NOTE = "note"  # nothing: it tells what was done, or taken for granted
+    WARNING = "warning"  # a look: targets keep their values, or are less certain
+    ERROR = "error"  # a change: as it is the program must not be uploaded
+
+
+NOTE, WARNING, ERROR = Severity.NOTE, Severity.WARNING, Severity.ERROR
+
+
+class Code(StrEnum):
+    """What was found in a program, or in a tree of compensated programs.
+
+    Attributes:
+        severity: What it asks for.
+        meaning: What it says of the program.
+        cure: What can be done, "" where nothing has to be.
+
+    >>> Code("tool-length").severity
+    <Severity.WARNING: 'warning'>
+    """
+
+    severity: Severity
+    meaning: str
+    cure: str
+
+    def __new__(
+        cls, code: str, severity: Severity, meaning: str, cure: str = ""
+    ) -> Self:
+        """Keep what is known of a code beside it."""
+        one = str.__new__(cls, code)
+        one._value_ = code
+        one.severity, one.meaning, one.cure = severity, meaning, cure
+        return one
+
+    # Text that is not understood.
+
+    UNKNOWN_STATEMENT = (
+        "unknown-statement",
+        WARNING,
+        "A statement that no grammar of the language knows. It is kept as it is; where "
+        "it may move the arm, what follows is taken to come from an unknown place.",
+        "Check its spelling. If the controller takes it, put it into a routine and "
+        "declare that routine under [routines] of the cell.",
+    )
+    UNKNOWN_INSTRUCTION = (
+        "unknown-instruction",
+        WARNING,
+        "A RAPID instruction that is neither known nor a routine of the modules at "
+        "hand; it may move the arm.",
+        'Give the module that holds it, or say name = "still" or "moves" under '
+        "[routines] of the cell.",
+    )
+    UNKNOWN_ROUTINE = (
+        "unknown-routine",
+        WARNING,
+        "A routine is called that is in no file at hand. It may move the arm and set "
+        "frames: targets after it keep their values until these are set again.",
+        "Give its file, or say under [routines] of the cell what it does.",
+    )
+    LATE_BINDING = (
+        "late-binding",
+        WARNING,
+        "A procedure is called whose name only the run tells; it may move the arm.",
+        "Call the procedures by name, for instance in the branches of a TEST.",
+    )
+    BLOCK_STRUCTURE = (
+        "block-structure",
+        WARNING,
+        "Blocks of a program do not close, or close what was not opened.",
+        "Close them: what runs when is not known otherwise.",
+    )
+    OPEN_BLOCK = (
+        "open-block",
+        ERROR,
+        "A block is not closed, so that it is not known what runs when.",
+        "Close it.",
+    )
+    END_MISSING = (
+        "end-missing",
+        WARNING,
+        "The END of a program or routine is missing; the next one, or the end of the "
+        "file, is taken to end it.",
+        "Add it. Was the file cut off?",
+    )
+    NO_PROGRAM = (
+        "no-program",
+        WARNING,
+        "The file holds no BEGIN .. END: there is nothing to follow.",
+        "Give the file that holds the program.",
+    )
+    NO_MAIN = (
+        "no-main",
+        WARNING,
+        "No single procedure main: from where routines are called, and with what "
+        "settings, is not known.",
+        "Put the module that holds main, and the others of its task, into the folder.",
+    )
+    UNDECLARED_VARIABLE = (
+        "undeclared-variable",
+        WARNING,
+        "A variable is used and not declared: it has no value here.",
+        "Declare it, or give the file that does.",
+    )
+    TOO_COMPLEX = (
+        "too-complex",
+        WARNING,
+        "The program has too many ways, or calls, to be followed to its end; nothing "
+        "in it is compensated.",
+        "Split it, or compensate its routines one by one.",
+    )
+    LOOP_NOT_UNROLLED = (
+        "loop-not-unrolled",
+        NOTE,
+        "A loop runs too often to be followed round by round; targets that depend on "
+        "its counter keep their values.",
+        "Where the targets in it matter, write them without the counter.",
+    )
+
+    # Where the arm is.
+
+    ASSUMED_STILL = (
+        "assumed-still",
+        NOTE,
+        "A routine that is in no file at hand is on the shipped list of routines that "
+        "neither move the arm nor set frames.",
+        "Where it does, say so under [routines] of the cell; --strict-calls takes no "
+        "routine from the list.",
+    )
+    MOTION_UNKNOWN = (
+        "motion-unknown",
+        WARNING,
+        "What happens here may move the arm and is not understood: place, frames and "
+        "settings of the motion are not known behind it.",
+        "Say what the routine does under [routines] of the cell, or give its file.",
+    )
+    FIRST_CAUSE = (
+        "first-cause",
+        WARNING,
+        "The first place at which what happens is not known, and how many targets keep "
+        "their values because of it.",
+        "Declare this one first.",
+    )
+    NEVER_REACHED = (
+        "never-reached",
+        WARNING,
+        "Moves that no way from the start of the program leads to: from where they are "
+        "reached is not known.",
+        "Compensate the program that calls their routine.",
+    )
+    OTHER_ARM = (
+        "other-arm",
+        WARNING,
+        "A move of another arm than the cell's; it is left as it is.",
+        "Compensate it with a cell of its arm ([robot] arm_number), and its model.",
+    )
+    CALL_NOT_FOLLOWED = (
+        "call-not-followed",
+        WARNING,
+        "A function that is called in an expression may move the arm: the next move is "
+        "taken to come from an unknown place.",
+        "Call it as a statement.",
+    )
+    RECURSION = (
+        "recursion",
+        WARNING,
+        "A routine calls itself: it is not followed, and moves behind it are taken to "
+        "come from an unknown place.",
+        "Write it as a loop.",
+    )
+    POSITION_UNKNOWN = (
+        "position-unknown",
+        WARNING,
+        "A sensor leads the arm, or stops to: the next move comes from an unknown "
+        "place.",
+        "Move to a known place behind it, before what has to be exact.",
+    )
+    HANDLER_MOVES = (
+        "handler-moves",
+        WARNING,
+        "A condition handler may move the arm at any time: no move's origin is sure.",
+        "Let the handler set a signal, and move in the program.",
+    )
+    HANDLER_CANCELS = (
+        "handler-cancels",
+        WARNING,
+        "A condition handler may end a move on its way at any time: no move's origin "
+        "is sure.",
+        "Let the handler set a signal, and end the move in the program.",
+    )
+    MANY_ORIGINS = (
+        "many-origins",
+        NOTE,
+        "So many arrivals may come before this move that they are not told apart; from "
+        "which side it arrives is not known.",
+        "Start the approach from one place.",
+    )
+    ASSUMED_JOINT = (
+        "assumed-joint",
+        NOTE,
+        "A move names no trajectory, and $MOVE_TYPE is not set: it is taken as JOINT.",
+        "Name the trajectory, or set $MOVE_TYPE.",
+    )
+    SIDE_NOT_SURE = (
+        "side-not-sure",
+        WARNING,
+        "A joint reaches a corrected target from a side that is not sure, soon after "
+        "it turned or from a place that is not known. Up to half of its backlash may "
+        "remain; the stated standard error holds it.",
+        "Start the approach farther away, or from the side that the joint moves to.",
+    )
+    SIDE_IN_TIME = (
+        "side-in-time",
+        WARNING,
+        "In the trajectory in time a joint arrives from the other side than along the "
+        "path; the correction is that of the path.",
+        "Stop before the target, or approach it from farther away.",
+    )
+    CONFIGURATION_OVERRULED = (
+        "configuration-overruled",
+        NOTE,
+        "The path arrives on another branch or turn than the configuration of the "
+        "target says; the path decides.",
+        "Write the configuration that the path arrives with.",
+    )
+
+    # Points that are passed.
+
+    FLY_ASSUMED = (
+        "fly-assumed",
+        NOTE,
+        "How points are rounded is not set in the program; the controller's usual "
+        "settings are assumed.",
+        "Set them in the program.",
+    )
+    FLY_CORNER = (
+        "fly-corner",
+        NOTE,
+        "The path passes points at a distance; a correction moves the corner, not the "
+        "path onto the point.",
+        "Where the point matters, stop there or make the zone smaller.",
+    )
+    FLY_UNKNOWN = (
+        "fly-unknown",
+        NOTE,
+        "The program does not show whether the arm stops at these points or passes "
+        "them. They are corrected for both cases.",
+        "Write the zone as a constant.",
+    )
+    NO_TIME_LAW = (
+        "no-time-law",
+        NOTE,
+        "No time law was found for a run: its times and speeds are estimates.",
+    )
+    SLOWED_DOWN = (
+        "slowed-down",
+        WARNING,
+        "The joints cannot follow the programmed speed; the controller slows down or "
+        "stops, near a singularity as a rule.",
+        "Go round the singularity, or program a lower speed.",
+    )
+    FLANK_ACCELERATION = (
+        "flank-acceleration",
+        NOTE,
+        "On the way to a point the correction follows the backlash faster than the "
+        "axis can accelerate; the controller may round the step off.",
+        "Program a lower speed there, or points that are farther apart.",
+    )
+    PATH_POINTS = (
+        "path-points",
+        NOTE,
+        "Points were put on the ways of moves, so that these keep their paths.",
+    )
+    NOT_TAKEN_UP = (
+        "not-taken-up",
+        NOTE,
+        "Play is not taken up before moves: no measurement confirms how joints change "
+        "their flanks there.",
+        "Measure it: survey --reversals, or diagnose --path.",
+    )
+    APPROACHED_ANEW = (
+        "approached-anew",
+        NOTE,
+        "Targets are approached once more, from a stop on the way already travelled.",
+    )
+    PATH_LEFT = (
+        "path-left",
+        WARNING,
+        "A move is predicted to leave its path by more than was asked for.",
+        "Program a lower speed, or approach the path from the side it moves to.",
+    )
+
+    # What the corrected program does.
+
+    SLOWER = (
+        "slower",
+        WARNING,
+        "The compensated program takes more than 3 % longer than the original.",
+        "Look at the corrections of its fastest moves.",
+    )
+    BEYOND_LIMIT = (
+        "beyond-limit",
+        ERROR,
+        "A joint comes beyond a limit that the original program keeps.",
+        "Move the target away from the limit.",
+    )
+    CLONED = (
+        "cloned",
+        NOTE,
+        "Moves got a point of their own, since another move to the same point needs "
+        "another correction (--clone).",
+    )
+    NOT_CLONED = (
+        "not-cloned",
+        WARNING,
+        "Moves to one point need different corrections, and the point cannot be "
+        "written twice.",
+        "Give the moves points of their own.",
+    )
+
+    # What is taken for granted.
+
+    ABSOLUTE_ACCURACY = (
+        "absolute-accuracy",
+        NOTE,
+        "The controller's own accuracy model is taken to be off, as the cell says.",
+        "Make sure that it is: two corrections add up.",
+    )
+    CONTROLLER = (
+        "controller",
+        NOTE,
+        "Neither the cell nor the arm file names the controller: it is assumed to be "
+        "one that runs the language of the program.",
+        "Write controller = .. in the arm file.",
+    )
+    TOOL_LENGTH = (
+        "tool-length",
+        WARNING,
+        "A tool is shorter than two millimetres: is it written in metres?",
+        "Write millimetres.",
+    )
+    BASE_CONTRADICTS = (
+        "base-contradicts",
+        WARNING,
+        "Joint angles and Cartesian targets of the program place the base elsewhere "
+        "than the cell.",
+        "Give [base] of the cell the frame that the program was made with.",
+    )
+    ARCHIVE_BASE = (
+        "archive-base",
+        WARNING,
+        "The archive places the arm otherwise than the cell.",
+        "Paste the lines of the message into [base] of the cell.",
+    )
+    LISTING_DIGITS = (
+        "listing-digits",
+        NOTE,
+        "The controller lists values with two decimals: to list corrected values and "
+        "to load them again costs what the message says.",
+        "Keep the files that were written, not listings of them.",
+    )
+    PAGE = ("page", NOTE, "Another file is read with the program, as a part of it.")
+    NOT_FOLLOWED = (
+        "not-followed",
+        NOTE,
+        "A file that the program names is not read.",
+        "Put it beside the program.",
+    )
+
+    # Variable files.
+
+    NO_VARIABLE_FILE = (
+        "no-variable-file",
+        WARNING,
+        "Targets have no value in the program, and its variable file is missing.",
+        "Put it beside the program, or give it with --lsv.",
+    )
+    LSV_LINE = (
+        "lsv-line",
+        NOTE,
+        "A line of the variable file is not understood; it is kept.",
+    )
+    LSV_TWICE = (
+        "lsv-twice",
+        WARNING,
+        "A variable has two entries: which one the controller takes is not known.",
+        "Delete one.",
+    )
+    LSV_PARTS = (
+        "lsv-parts",
+        WARNING,
+        "An entry of records or arrays is not read as a whole.",
+        "List it anew at the controller.",
+    )
+    LSV_INCOMPLETE = (
+        "lsv-incomplete",
+        WARNING,
+        "A position has fewer than six values.",
+        "Was the file cut off? List it anew at the controller.",
+    )
+    LSV_TOO_MANY = (
+        "lsv-too-many",
+        WARNING,
+        "A position has more than six values.",
+        "List it anew at the controller.",
+    )
+    LSV_UNINITIALISED = (
+        "lsv-uninitialised",
+        WARNING,
+        "A position has no value.",
+        "Teach it, or delete it.",
+    )
+    LSV_UNUSED = ("lsv-unused", NOTE, "Variables of the file that no program uses.")
+    LSV_UNDECLARED = (
+        "lsv-undeclared",
+        WARNING,
+        "The program uses variables of the file and does not declare them.",
+        "Declare them, or give the file of this program.",
+    )
+    LSV_OTHER_PROGRAM = (
+        "lsv-other-program",
+        WARNING,
+        "The program uses no variable of the file.",
+        "Is it the file of another program?",
+    )
+
+    # Trees of compensated programs (check).
+
+    UNCOMPENSATED = (
+        "uncompensated",
+        ERROR,
+        "The file carries no stamp and no record: it is not compensated.",
+        "Compensate it.",
+    )
+    ABSENT = (
+        "absent",
+        ERROR,
+        "A program of the source tree is not in the compensated one.",
+        "Compensate it.",
+    )
+    UNFINISHED = (
+        "unfinished",
+        ERROR,
+        "A run that was killed left the file.",
+        "Delete it, and run batch --resume.",
+    )
+    CHANGED = (
+        "changed",
+        ERROR,
+        "The file was changed after it was compensated.",
+        "Change the source, and compensate it again.",
+    )
+    NO_RECORD = (
+        "no-record",
+        ERROR,
+        "The record of the file is missing, damaged, or of another file: it cannot be "
+        "checked or restored.",
+        "Compensate it again.",
+    )
+    OLDER_MODEL = (
+        "older-model",
+        ERROR,
+        "The file was made with another model than the current one.",
+        "Compensate it again.",
+    )
+    MIXED_MODELS = (
+        "mixed-models",
+        ERROR,
+        "Files of one job were made with different models.",
+        "Compensate the job again.",
+    )
+    SOURCE_CHANGED = (
+        "source-changed",
+        ERROR,
+        "The source was changed after the file was made from it.",
+        "Compensate it again.",
+    )
+    NO_SOURCE = (
+        "no-source",
+        ERROR,
+        "The file has no source in the source tree.",
+        "Delete it, or give the tree it was made from.",
+    )
+    LEFT_ALONE = (
+        "left-alone",
+        ERROR,
+        "Targets that could have been compensated keep their values.",
+        "Look at them, then pass --accept-left.",
+    )
