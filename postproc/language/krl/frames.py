@@ -174,7 +174,9 @@ class FrameReader:
         return None if name in self.task.beside else self.store.get(key)
 
     def _is_chained(self, number: int) -> bool:
-        """Tell whether a base hangs on an external axis."""
+        """Tell whether a base hangs on an external axis, or may be hung on one."""
+        if "machine_frame_dat" in self.task.written:
+            return True
         found = self.task.datum("machine_frame_dat", self.here, (number,))
         if found is None:
             return False
