@@ -14,6 +14,7 @@ from postproc.language.krl.program import whole
 from postproc.language.krl.store import (
     CORRECTION_FRAMES,
     NOTHING_SET,
+    PERHAPS,
     SWITCHES,
     TABLES,
     KrlStore,
@@ -139,9 +140,9 @@ _SWITCHED_OFF: Sequence[tuple[str, object]] = (
     *((name, False) for name in sorted(SWITCHES)),
     *((name, ZERO) for name in sorted(CORRECTION_FRAMES)),
 )
+_KEPT_ON = "tool_corr_on"  # old controllers take the frame back, but not the switch
 BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
 """Commands of BAS that change neither frames nor blending nor speed."""
-INITIAL = "BAS(#INITMOV) may set {} anew: set it behind that"
 NO_LOAD = "which $LOAD holds here is not known: set it again on every way here"
 SOFT = "an axis is soft ($SOFT_PLCL)"
 GENERATOR = "a function generator ($TECH) moves the tool off its path"
@@ -504,24 +505,36 @@ class ModeReader:
         return modes if word in BAS_HARMLESS else modes.lost()
 
     def _initial(self, modes: KrlModes) -> KrlModes:
-        """Set all to what the controller starts with, as far as that is known."""
+        """Set what ``INITMOV`` of ``bas.src`` sets: no base, the first tool, no links.
+
+        Speeds and distances are those of ``$config.dat``. The load stays what it is.
+        """
         store = modes.store
+        linked = store.get(_KEPT_ON) in (True, PERHAPS)
         for name, value in _SWITCHED_OFF:
             store = store.with_(name, value)
+        if linked:
+            store = store.with_(_KEPT_ON, PERHAPS)
+        modes = replace(modes, store=store)
+        reader, given = self.frames(modes), self._default
+        advance = given("def_advance")
         return replace(
             modes,
-            store=store,
-            tool=KrlFrame((), INITIAL.format("$TOOL")),
-            base=KrlFrame((), INITIAL.format("$BASE")),
+            tool=reader.entry("tool_data", 1),
+            base=reader.numbered("$base", 0),
             interpolation="#base",
             speed=UNKNOWN,
-            share=UNKNOWN,
-            distance=UNKNOWN,
-            overlap=UNKNOWN,
+            share=_share(given("def_vel_ptp")),
+            distance=known(given("def_apo_cdis")),
+            overlap=known(given("def_apo_cptp")),
             orientation="#var",
             through=False,
-            ahead=True,
+            ahead=math.isnan(advance) or advance > 0,
         )
+
+    def _default(self, name: str) -> float:
+        """Return a number of ``$config.dat``, NaN where it is not known."""
+        return self._number(said.DataObject(name))
 
     def _frames(self, modes: KrlModes) -> KrlModes:
         """Take the frames of FDAT_ACT, and the load of its tool."""
