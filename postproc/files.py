@@ -433,7 +433,8 @@ def find_shared_list(program: Path, within: Path | None = None) -> Path | None:
 def find_shared(program: Path, within: Path | None = None) -> tuple[Path, ...]:
     """Find what a source shares with others: ``$config.dat``, and submit programs.
 
-    Submit programs stand beside the list; they may change what programs read.
+    Submit programs stand beside either, or anywhere in the archive that the list
+    belongs to; they may change what programs read.
 
     Args:
         program: The source.
@@ -442,8 +443,10 @@ def find_shared(program: Path, within: Path | None = None) -> tuple[Path, ...]:
     found = find_shared_list(program, within)
     if not data_list_of(program.name) or not program.parent.is_dir():
         return ()
+    in_archive = found is not None and found.parent.name.lower() == "system"
+    files = sorted(found.parent.parent.rglob("*.*")) if found and in_archive else []
     folders = dict.fromkeys([found.parent] if found else []) | {program.parent: None}
-    files = (p for folder in folders for p in sorted(folder.iterdir()))
+    files += [p for folder in folders for p in sorted(folder.iterdir())]
     names = {p.name.lower(): p for p in files if is_submit(p.name) and p.is_file()}
     return (*(() if found is None else (found,)), *names.values())
 

@@ -60,6 +60,14 @@ def _lines(archive: Archive, cell: Cell) -> Iterator[str]:
         yield "[payload]   # the first of the archive; that of the survey belongs here"
         yield f"mass_kg = {mass:g}"
         yield f"com_mm = {centre}"
-    if archive.external > 0 and not cell.aux:
-        yield f"[aux]   # {archive.external} external axes: gun, track or positioner"
-        yield from (f'{k} = "track"' for k in range(1, archive.external + 1))
+    yield from _axes(archive, cell)
+
+
+def _axes(archive: Archive, cell: Cell) -> Iterator[str]:
+    """Yield lines for the external axes that the cell does not declare."""
+    missing = {k: name for k, name in archive.external.items() if k not in cell.aux}
+    if missing:
+        head = "# under [aux]:" if cell.aux else "[aux]   #"
+        yield f"{head} {len(missing)} external axes: gun, track or positioner"
+    for axis, name in missing.items():
+        yield f'{axis} = "track"' + (f"   # {name}" if name else "")

@@ -24,8 +24,8 @@ from postproc.simulation import (
     DEFAULT,
     Campaign,
     GearKind,
+    Landing,
     Planted,
-    VirtualArm,
     VirtualCell,
     campaign_length,
     gravity_of,
@@ -54,6 +54,7 @@ class Simulation:
         paths: How far the tool was from the paths of the wanted program, or None.
         lines: Line of every visit of that program.
         track: Readings of a tracker that followed the tool, or None.
+        left_out: Fly points that the run does not go on from, which count nowhere.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Simulation:
     paths: PathScores | None = None
     lines: tuple[int, ...] = ()
     track: VirtualTrack | None = None
+    left_out: int = 0
 
     def write(self, path: Path) -> None:
         """Write the readings as a measurement file.
@@ -75,6 +77,7 @@ class Simulation:
         """Return the true error as JSON text."""
         error = None if self.true_error is None else asdict(self.true_error)
         told: dict[str, object] = {"program": self.name, "true_error": error}
+        told |= {"left_out": self.left_out} if self.left_out else {}
         if self.paths is not None:
             told |= {
                 "path_accuracy": asdict(self.path_accuracy),
@@ -132,6 +135,9 @@ class Simulation:
             f"{self.name}: true error mean {e.mean_mm:.4f} mm, std {e.std_mm:.4f}, "
             f"95 % {e.p95_mm:.4f}, max {e.max_mm:.4f} over {e.n} visits"
         )
+        if self.left_out:
+            why = "fly points left out: it does not go on from them"
+            said += f" ({self.left_out} {why})"
         if self.paths is None:
             return said
         if not len(self.paths.visit):
@@ -230,12 +236,13 @@ def simulate_file(
         return Simulation(program.name, campaign, None, track=track)
     original = visits if wanted is None else visits_of(wanted, cell)
     own = own if wanted is not None else np.arange(len(visits))
-    error = true_error(arm, setup, visits, original, own)
+    landing = land(arm, setup, original, visits, own)
+    error, left = true_error(landing, original), landing.left_out
     if not path:
-        return Simulation(program.name, campaign, error, track=track)
+        return Simulation(program.name, campaign, error, track=track, left_out=left)
     scores = score_paths(arm, setup, original, visits, own, skipped)
     lines = tuple(original.line.tolist())
-    return Simulation(program.name, campaign, error, scores, lines, track)
+    return Simulation(program.name, campaign, error, scores, lines, track, left)
 
 
 def visits_of(program: Path, cell: Cell) -> Visits:
@@ -263,14 +270,7 @@ def _read(program: Path, cell: Cell) -> tuple[Visits, Ints, Ints]:
     return visits, own, np.searchsorted(own, np.flatnonzero(stops))
 
 
-def true_error(
-    arm: VirtualArm,
-    setup: VirtualCell,
-    executed: Visits,
-    original: Visits,
-    own: Ints | None = None,
-) -> ErrorStatistics:
+def true_error(landing: Landing, original: Visits) -> ErrorStatistics:
     """Compare where the tool landed with where the original program says."""
-    landing = land(arm, setup, original, executed, own)
     targets = original.literal[landing.visit] >= 0
     return ErrorStatistics.of(landing.error[targets])

@@ -16,7 +16,8 @@ class Archive:
         load: The first load: mass [kg] and centre [mm], () for none.
         home: Joint angles of the home position [deg], () where there is none.
         root: Base of the arm as a position record, () where it is not known.
-        external: How many external axes there are, -1 where that is not known.
+        external: Its external axes by number, and what the archive calls them, if
+            anything.
     """
 
     place: str
@@ -24,4 +25,4 @@ class Archive:
     load: tuple[float, ...]
     home: tuple[float, ...]
     root: tuple[float, ...]
-    external: int
+    external: Mapping[int, str]

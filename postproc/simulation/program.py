@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.exceptions import PostprocError
-from postproc.language.visits import Visits
+from postproc.language.visits import ELSEWHERE, Visits
 from postproc.robot.trajectory import Motion
 from postproc.simulation.arm import (
     BRAKES,
@@ -40,12 +40,15 @@ class ProgramRun:
         tool_id: Number of the tool, (k,) from 0: that of the cell's probe points where
             all tools are probe points, else their order in the program.
         why: For each visit of the program, why it was not reached, or "".
+        left: Indices of fly points from which the program goes on, but not this run:
+            how the tool passes them is not known.
     """
 
     visit: Ints
     arrivals: VirtualArrivals
     tool_id: Ints
     why: tuple[str, ...]
+    left: Ints
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,27 @@ def run_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> ProgramR
         setup: Its cell.
         visits: The program.
     """
-    poses = _poses(visits)
-    places = [place for _, _, place in _places(arm, setup, visits, poses)]
-    return _collect(arm, setup, visits, poses, places)
+    poses, moves = _poses(visits), list[tuple[int, _ProgramPlace]]()
+    for drive, _, place in _places(arm, setup, visits, poses):
+        moves.append((drive.came_from, place))
+    places = [place for _, place in moves]
+    begun = {begin for begin, place in moves if not place.why}
+    return _collect(arm, setup, visits, poses, places, _not_passed(visits, begun))
+
+
+def _not_passed(visits: Visits, begun: Collection[int]) -> Ints:
+    """Find fly points that the program goes on from, but no move of a run.
+
+    Args:
+        visits: The program.
+        begun: Visits that moves of the run begin at.
+    """
+    goes_on = np.zeros(len(visits) + 1, dtype=bool)
+    goes_on[visits.pred[visits.pred >= 0]] = True
+    for i in range(1, len(visits)):  # before what is not followed
+        goes_on[i - 1] |= ELSEWHERE in visits.predecessors(i)
+    goes_on[[i for i in begun if i >= 0]] = False
+    return np.flatnonzero(goes_on[:-1] & visits.fly & ~visits.via)
 
 
 def _poses(visits: Visits) -> Floats:
@@ -222,6 +243,7 @@ def _collect(
     visits: Visits,
     poses: Floats,
     places: list[_ProgramPlace],
+    left: Ints,
 ) -> ProgramRun:
     """Gather the reached visits."""
     reached = [i for i, p in enumerate(places) if not p.why]
@@ -243,7 +265,8 @@ def _collect(
         payload=setup.payload,
         payload_com=setup.payload_com,
     )
-    return ProgramRun(visit, arrivals, tool_id, tuple(p.why for p in places))
+    why = tuple(p.why for p in places)
+    return ProgramRun(visit, arrivals, tool_id, why, left)
 
 
 def _tool_numbers(setup: VirtualCell, used: list[int], poses: Floats) -> dict[int, int]:
@@ -266,11 +289,14 @@ class Landing:
         visit: Index of the visit, (k,).
         wanted: TCP that the original program asks for, (k, 3) [m] in the arm base.
         landed: TCP where the executed program really lands, (k, 3), without noise.
+        left_out: How many fly points are left out: a run does not go on from them, so
+            that it does not show how the tool passes them.
     """
 
     visit: Ints
     wanted: Floats
     landed: Floats
+    left_out: int = 0
 
     @property
     def error(self) -> Floats:
@@ -286,6 +312,9 @@ def land(
     own: Ints | None = None,
 ) -> Landing:
     """Run a program and compare it with what the original asks for, visit by visit.
+
+    A point that the program flies past is left out where a run does not go on from it:
+    one history of several is run, and the arm of that one stops there.
 
     Args:
         arm: The arm that runs it.
@@ -308,11 +337,17 @@ def land(
                 f"{len(original)}: they are not two versions of one program"
             )
         done = run_program(arm, setup, executed)
-    reached = done.visit
+    reached, left = done.visit, done.left
     if own is not None and done is not asked:
-        at = np.searchsorted(own, done.visit)
-        reached = np.where(own[np.minimum(at, len(own) - 1)] == done.visit, at, -1)
+        reached, left = _among(own, reached), _among(own, left)
     visit, here, there = np.intersect1d(asked.visit, reached, return_indices=True)
-    wanted = arm.nominal_tcp(asked.arrivals)[here]
-    landed = arm.tcp(done.arrivals)[there]
-    return Landing(visit, wanted, landed)
+    passed = ~np.isin(visit, np.union1d(asked.left, left))
+    wanted = arm.nominal_tcp(asked.arrivals)[here[passed]]
+    landed = arm.tcp(done.arrivals)[there[passed]]
+    return Landing(visit[passed], wanted, landed, int((~passed).sum()))
+
+
+def _among(own: Ints, visits: Ints) -> Ints:
+    """Number visits of an executed program as the original does, -1 for others."""
+    at = np.searchsorted(own, visits)
+    return np.where(own[np.minimum(at, len(own) - 1)] == visits, at, -1)

@@ -100,7 +100,7 @@ def lists(archive):
 def test_an_archive_tells_what_the_cell_lacks(lists):
     found = read_archive(lists / "KRC")
     assert found.entries == {"tools": (1,), "bases": (4,), "loads": (3,)}
-    assert found.load == (46.0, 62.0, 0.5, 214.0) and found.external == 1
+    assert found.load == (46.0, 62.0, 0.5, 214.0) and found.external == {1: ""}
     assert found.home == (0.0, -90.0, 90.0, 0.0, 45.0, 0.0)
     told = missing_in_cell(found, load_cell(lists / "own.toml"))
     assert told[0].endswith("gives tools 1; bases 4; loads 3")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from postproc.batch.archive import missing_in_cell
-from postproc.language.rapid.backup import read_backup
+from postproc.language.rapid.backup import read_axes, read_backup
 from postproc.robot.cell import load_cell
 from tests.language.rapid.test_backup import GIVEN, MOC, backup  # noqa: F401
 from tests.written import cli
@@ -68,3 +68,55 @@ def test_a_backup_of_two_arms_places_none(tree):
 
 def test_a_folder_without_settings_is_no_backup(tmp_path):
     assert read_backup(tmp_path) is None and read_backup(tmp_path / "none") is None
+
+
+AXES = ONE_ARM.replace(
+    '-name "STN1" -base_frame_pos_x 9',
+    r"""-name "STN1" -use_single_type "STN" -use_joint "stn_1" \
+      -base_frame_coordinated ""
+
+      -name "TRACK_1" -use_single_type "TRACK" -use_joint "trk_1"
+""",
+)
+JOINTS = """#
+JOINT:
+      -name "rob1_1" -logical_axis 1
+      -name "trk_1" -logical_axis 7
+      -name "stn_1" -logical_axis 9
+"""
+
+
+def test_a_batch_asks_once_for_external_axes(tree):
+    (tree / "backup" / "SYSPAR" / "MOC.cfg").write_text(AXES + JOINTS)
+    told = run(tree).output
+    assert told.count("[aux]") == 1
+    pasted = [line.strip() for line in told.splitlines() if ' = "track"' in line]
+    assert pasted == ['1 = "track"   # TRACK_1', '3 = "track"   # STN1']
+    cell = tree / "cell.toml"
+    cell.write_text(cell.read_text() + "\n[aux]\n" + "\n".join(pasted) + "\n")
+    assert load_cell(cell).aux == {1: "track", 3: "track"}
+    assert "[aux]" not in run(tree).output
+
+
+def test_axes_that_the_cell_declares_are_not_asked_for(tree):
+    (tree / "backup" / "SYSPAR" / "MOC.cfg").write_text(AXES + JOINTS)
+    cell = tree / "cell.toml"
+    cell.write_text(cell.read_text() + '\n[aux]\n1 = "gun"\n')
+    told = run(tree).output
+    assert "# under [aux]: 1 external axes" in told
+    assert '3 = "track"   # STN1' in told and "TRACK_1" not in told
+
+
+@pytest.mark.parametrize(
+    ("text", "axes"),
+    [
+        (AXES, {1: "STN1", 2: "TRACK_1"}),
+        (AXES + JOINTS, {1: "TRACK_1", 3: "STN1"}),
+        (AXES + JOINTS.replace(" 9", " 7"), {1: "STN1", 2: "TRACK_1"}),
+        (AXES + JOINTS.replace(" 9", " x"), {1: "STN1", 2: "TRACK_1"}),
+        (ONE_ARM.partition("SINGLE")[0], {}),
+        ("EIO:CFG_1.0\n", {}),
+    ],
+)
+def test_axes_are_numbered_by_their_joints(text, axes):
+    assert read_axes(text) == axes

@@ -82,6 +82,22 @@ def test_a_compensated_program_misses_less(desk):
     assert errors[1]["mean_mm"] < 0.2 * errors[0]["mean_mm"]
 
 
+FLY = f"MOVEFLY {POSE.removeprefix('MOVE ')} ADVANCE"
+
+
+@pytest.mark.parametrize(
+    ("lines", "left"),
+    [(["IF a THEN", FIRST, "ELSE", FLY, "ENDIF"], 1), ([FIRST, FLY], 0)],
+)
+def test_fly_points_that_the_run_does_not_go_on_from_are_told(desk, lines, left):
+    source = desk.put("job.pdl", program(FIRST, *lines, NEXT))
+    given = "simulate", source, "--cell", desk.cell, "--wanted", source
+    told = json.loads(cli(*given, "--json", "-").stdout)
+    assert told.get("left_out", 0) == left and told["true_error"]["n"] == 4 - left
+    said = "1 fly points left out: it does not go on from them"
+    assert (said in cli(*given).output) == bool(left)
+
+
 def test_another_program_cannot_be_the_wanted_one(desk):
     source, other = (desk.put(n, program(*lines)) for n, lines in (
         ("a.pdl", (FIRST, POSE)), ("b.pdl", (FIRST,))))  # fmt: skip

@@ -50,7 +50,7 @@ def read_archive(folder: Path) -> Archive | None:
         next(iter(loads), ()),
         _home(task),
         _root(text),
-        int(axes[1]) if axes else -1,
+        {axis: "" for axis in range(1, 1 + int(axes[1] if axes else 0))},
     )
 
 

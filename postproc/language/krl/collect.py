@@ -18,9 +18,9 @@ from postproc.language.collect import (
 from postproc.language.krl.dialect import COMMENTS, KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.modes import (
-    IGNORED,
     LOST_LOAD,
     NO_LOAD,
+    OF_TRACK,
     UNKNOWN,
     KrlModes,
     ModeReader,
@@ -110,7 +110,7 @@ def _conditions(
     active = {why for _, why in modes.active}
     blocked = modes.blocked | active | machine.everywhere | early
     if "track" not in machine.start.aux.values():
-        blocked -= {IGNORED}
+        blocked -= OF_TRACK
     given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
     if v.goal.target != Meaning.JOINTS:
         given += (modes.base.why, "" if modes.interpolation else _IPO)

@@ -15,6 +15,7 @@ from postproc.language.krl.program import whole
 from postproc.language.krl.store import (
     CORRECTIONS,
     NOTHING_SET,
+    PERHAPS,
     KrlStore,
     entry_name,
 )
@@ -132,13 +133,13 @@ class FrameReader:
         on = self._held(switch, switch)
         if on is None:
             on = self.task.initial_switch(switch)
-        if on is False:
+        found = self._held(frame, frame)
+        if on is False or (on == PERHAPS and found == ZERO):
             return ZERO
         shown = name.upper()
-        if on is None:
+        if on is not True:
             why = _MAY_BE_ON.format(switch.upper(), frame.upper(), shown)
             return KrlFrame((), why)
-        found = self._held(frame, frame)
         if isinstance(found, KrlFrame):
             return found
         return KrlFrame((), _CORRECTED.format(frame.upper(), shown))
@@ -174,7 +175,9 @@ class FrameReader:
         return None if name in self.task.beside else self.store.get(key)
 
     def _is_chained(self, number: int) -> bool:
-        """Tell whether a base hangs on an external axis."""
+        """Tell whether a base hangs on an external axis, or may be hung on one."""
+        if "machine_frame_dat" in self.task.written:
+            return True
         found = self.task.datum("machine_frame_dat", self.here, (number,))
         if found is None:
             return False

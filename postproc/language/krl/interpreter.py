@@ -79,6 +79,7 @@ class KrlMachine(TaskMachine):
     def run(self) -> None:
         """Follow every way from the first routine."""
         modes = KrlModes(tool=_frame(self.start.tool), base=_frame(self.start.uframe))
+        modes = modes.beside(self.task)
         first = self.task.files[0]
         here = Arrived(frozenset([START]), modes)
         self.call(0, first.name, first.routines[0], None, -1, here)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from typing import Any
 
 from postproc.language.krl import syntax as said
@@ -13,6 +14,7 @@ from postproc.language.krl.program import whole
 from postproc.language.krl.store import (
     CORRECTION_FRAMES,
     NOTHING_SET,
+    PERHAPS,
     SWITCHES,
     TABLES,
     KrlStore,
@@ -106,6 +108,13 @@ class KrlModes:
         """Return it with other values."""
         return replace(self, **changed)
 
+    def beside(self, task: KrlTask) -> KrlModes:
+        """Return it where submit programs may change what they set at any time."""
+        changed, why = _unsettled(task.beside, task.called_beside)
+        if not (changed or why):
+            return self
+        return replace(self, **changed, blocked=self.blocked | why)
+
     @property
     def law(self) -> OrientationLaw:
         """Return how the tool turns on lines."""
@@ -131,9 +140,9 @@ _SWITCHED_OFF: Sequence[tuple[str, object]] = (
     *((name, False) for name in sorted(SWITCHES)),
     *((name, ZERO) for name in sorted(CORRECTION_FRAMES)),
 )
+_KEPT_ON = "tool_corr_on"  # old controllers take the frame back, but not the switch
 BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
 """Commands of BAS that change neither frames nor blending nor speed."""
-INITIAL = "BAS(#INITMOV) may set {} anew: set it behind that"
 NO_LOAD = "which $LOAD holds here is not known: set it again on every way here"
 SOFT = "an axis is soft ($SOFT_PLCL)"
 GENERATOR = "a function generator ($TECH) moves the tool off its path"
@@ -153,6 +162,12 @@ PLANNED = frozenset(
     $deactivate_abs_accur $suppress_abs_accur
     """.split()
 )
+_SETTING = frozenset(
+    """
+    $load $ipo_mode $ori_type $circ_mode $tech $tech_c $load_a1 $load_a2 $load_a3 $world
+    $nullframe
+    """.split()
+)  # of those that are planned, what targets are left for where its value is not known
 HALTING = frozenset("$out $anout $in $anin $pos_act $axis_act $axis_act_meas".split())
 HARMLESS = frozenset(
     """
@@ -164,6 +179,49 @@ HARMLESS = frozenset(
     $torque_axis_act $curr_act $serv_off $move_enable $accu_state $outc
     """.split()
 )
+
+
+SUBMIT = "a submit program may set {} at any time"
+_TRACK_BESIDE = "a submit program may move external axes"
+_SENSOR_BESIDE = "a submit program may switch on a sensor that moves the arm"
+OF_TRACK = frozenset([IGNORED, _TRACK_BESIDE])
+"""Reasons that count where the cell has a track."""
+_ASYNCHRONOUS = frozenset("asyptp asycont asycancel asystop".split())
+_BAS_SETS = frozenset(["$tool", "$base"])  # without them nothing else counts
+_FIELDS: Mapping[str, Mapping[str, Any]] = {
+    "$tool": {"tool": KrlFrame((), SUBMIT.format("$TOOL"))},
+    "$base": {"base": KrlFrame((), SUBMIT.format("$BASE"))},
+    "$vel": {"speed": UNKNOWN},
+    "$vel_axis": {"share": UNKNOWN},
+    "$apo": {"distance": UNKNOWN, "overlap": UNKNOWN},
+    "$advance": {"ahead": None},
+}
+"""What is not known of modes where something beside the program sets a variable."""
+
+
+@cache
+def _unsettled(
+    written: frozenset[str], called: frozenset[str]
+) -> tuple[Mapping[str, Any], frozenset[str]]:
+    """Return the modes that submit programs unsettle, and why targets are left.
+
+    Args:
+        written: Names of data that they may change.
+        called: Names that they call.
+    """
+    if "bas" in called:
+        written |= _BAS_SETS
+    changed, why = dict[str, Any](), set[str]()
+    for name in sorted(n for n in written if n.startswith("$")):
+        if name in _FIELDS:
+            changed |= _FIELDS[name]
+        elif name == "$ex_ax_ignore":
+            why.add(IGNORED)
+        elif name in _SETTING or name not in PLANNED | HALTING | HARMLESS:
+            why.add(SUBMIT.format(name.upper()))
+    why |= {_TRACK_BESIDE} if called & _ASYNCHRONOUS else set()
+    senses = any(n.startswith("rsi_") or n == "touchsense" for n in called)
+    return changed, frozenset(why | ({_SENSOR_BESIDE} if senses else set()))
 
 
 @dataclass(frozen=True)
@@ -181,6 +239,11 @@ class ModeReader:
 
     def assigned(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
         """Carry out ``$name = value``, None where nobody knows what that does."""
+        found = self._assigned(modes, one)
+        return None if found is None else found.beside(self.task)
+
+    def _assigned(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
+        """Carry an assignment out where nothing runs beside the program."""
         own = self._own_function(one.value)
         if own:
             one = replace(one, value=said.FunctionCall(f"{own} of the files", ()))
@@ -408,6 +471,10 @@ class ModeReader:
 
     def bas(self, modes: KrlModes, arguments: Sequence[said.Argument]) -> KrlModes:
         """Carry out ``BAS(#command, value)``."""
+        return self._bas(modes, arguments).beside(self.task)
+
+    def _bas(self, modes: KrlModes, arguments: Sequence[said.Argument]) -> KrlModes:
+        """Carry a command out where nothing runs beside the program."""
         command = arguments[0].value if arguments else None
         word = command.name if isinstance(command, said.EnumValue) else ""
         value = self._number(arguments[1].value) if len(arguments) > 1 else math.nan
@@ -438,24 +505,36 @@ class ModeReader:
         return modes if word in BAS_HARMLESS else modes.lost()
 
     def _initial(self, modes: KrlModes) -> KrlModes:
-        """Set all to what the controller starts with, as far as that is known."""
+        """Set what ``INITMOV`` of ``bas.src`` sets: no base, the first tool, no links.
+
+        Speeds and distances are those of ``$config.dat``. The load stays what it is.
+        """
         store = modes.store
+        linked = store.get(_KEPT_ON) in (True, PERHAPS)
         for name, value in _SWITCHED_OFF:
             store = store.with_(name, value)
+        if linked:
+            store = store.with_(_KEPT_ON, PERHAPS)
+        modes = replace(modes, store=store)
+        reader, given = self.frames(modes), self._default
+        advance = given("def_advance")
         return replace(
             modes,
-            store=store,
-            tool=KrlFrame((), INITIAL.format("$TOOL")),
-            base=KrlFrame((), INITIAL.format("$BASE")),
+            tool=reader.entry("tool_data", 1),
+            base=reader.numbered("$base", 0),
             interpolation="#base",
             speed=UNKNOWN,
-            share=UNKNOWN,
-            distance=UNKNOWN,
-            overlap=UNKNOWN,
+            share=_share(given("def_vel_ptp")),
+            distance=known(given("def_apo_cdis")),
+            overlap=known(given("def_apo_cptp")),
             orientation="#var",
             through=False,
-            ahead=True,
+            ahead=math.isnan(advance) or advance > 0,
         )
+
+    def _default(self, name: str) -> float:
+        """Return a number of ``$config.dat``, NaN where it is not known."""
+        return self._number(said.DataObject(name))
 
     def _frames(self, modes: KrlModes) -> KrlModes:
         """Take the frames of FDAT_ACT, and the load of its tool."""

@@ -19,6 +19,8 @@ its switch is TRUE; likewise the base, ``FRAMES``, ``STOOL2`` and ``SBASE``.
 _PAIRS = [pair for both in CORRECTIONS.values() for pair in both]
 CORRECTION_FRAMES = frozenset(frame for frame, _ in _PAIRS)
 SWITCHES = frozenset(switch for _, switch in _PAIRS)
+PERHAPS = "perhaps"
+"""Value of a switch that is on or off by the release of the controller."""
 HELD = frozenset(TABLES) | CORRECTION_FRAMES | SWITCHES
 """Names of data that hold until the program sets them again."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,6 +23,7 @@ CONFIG = "$config"
 ANY = -1  # an entry of a table whose number is not known
 POSITIONS = ("pos", "e6pos")  # types
 DEEPEST = 20  # names that stand for names
+_WORD = re.compile(r"\$?\w+")
 
 
 @dataclass(frozen=True)
@@ -257,16 +259,33 @@ class KrlTask:
         return self._uses_beside[0]
 
     @cached_property
+    def called_beside(self) -> frozenset[str]:
+        """Names that submit programs call, and words of what is not understood."""
+        return frozenset().union(*(part.called for part in self._beside))
+
+    @cached_property
+    def _beside(self) -> list[_Beside]:
+        """Read submit programs, and the routines at hand that they call."""
+        found = [_Beside.of_file(file) for file in self.files if file.is_submit]
+        waiting, seen = {name for part in found for name in part.called}, set[str]()
+        while waiting:
+            seen.add(name := min(waiting))
+            for number, scope, _ in self.routines.get(name, ()):
+                found.append(_Beside.of_routine(self.files[number], scope))
+                waiting |= found[-1].called
+            waiting -= seen
+        return found
+
+    @cached_property
     def _uses_beside(self) -> tuple[frozenset[str], frozenset[str]]:
         """Collect the names that submit programs may change, and those they take."""
         written, read = set[str](), set[str]()
-        for file in (f for f in self.files if f.is_submit):
-            own = {datum.name for datum in file.data if not datum.shared}
+        for part in self._beside:
             uses = _Uses(self.routines, self._points)
-            for one in file.text.said:
+            for one in part.said:
                 uses.note(one)
-            written |= uses.written - own
-            read |= uses.read - own
+            written |= (uses.written | part.words) - part.own
+            read |= uses.read - part.own
         return frozenset(written), frozenset(read)
 
     @cached_property
@@ -403,6 +422,63 @@ def _result(operator: str, numbers: Sequence[float]) -> float:
         case "*", [a, b]:
             return a * b
     return math.nan
+
+
+# What runs beside the program.
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """What runs in a submit program, or in a routine that one calls.
+
+    Attributes:
+        said: Its statements.
+        own: Names of data that nothing else knows.
+        words: Names in what is not understood: each may be set there, or called.
+    """
+
+    said: Sequence[said.SourceStatement]
+    own: frozenset[str]
+    words: frozenset[str]
+
+    @classmethod
+    def of_file(cls, file: KrlFile) -> _Beside:
+        """Read a submit program."""
+        own = frozenset(datum.name for datum in file.data if not datum.shared)
+        return cls._of_rows(file, range(len(file.text)), own)
+
+    @classmethod
+    def of_routine(cls, file: KrlFile, scope: HeadedRows) -> _Beside:
+        """Read a routine."""
+        own = (d.name for d in file.data if d.routine == scope.head.name)
+        return cls._of_rows(file, range(scope.first + 1, scope.last), frozenset(own))
+
+    @classmethod
+    def _of_rows(cls, file: KrlFile, rows: range, own: frozenset[str]) -> _Beside:
+        statements = [file.text.statement(row) for row in rows]
+        odd = [
+            r for r in rows if isinstance(file.text.statement(r), said.NotUnderstood)
+        ]
+        words = (_WORD.findall(file.text.text(row).lower()) for row in odd)
+        return cls(statements, own, frozenset().union(*words))
+
+    @property
+    def called(self) -> frozenset[str]:
+        """Names of routines that it may call."""
+        found = {name for one in self.said for name in called_by(one)}
+        return self.words | found
+
+
+def called_by(one: said.SourceStatement) -> Iterator[str]:
+    """Yield the names of the routines that a statement calls, also later."""
+    match one:
+        case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
+            yield from called_by(action)
+        case said.Instruction(name=name):
+            yield name
+    for part in parts_of(operands_of(one)):
+        if isinstance(part, said.FunctionCall):
+            yield part.name
 
 
 # What statements take and change.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from postproc.robot.pose import record_from_pose
 
 PROGRAMS, SYSTEM = "progmod", "sysmod"  # folders of a task
 SETTINGS = ("syspar", "moc.cfg")
+ARM_AXES = 6
 DEPTH = 4  # folders above a program in which the settings of its backup may lie
 _ENTRY = re.compile(r'-(\w+)\s+("[^"]*"|[^\s\\]+)')
 _PLACE = tuple(f"base_frame_pos_{axis}" for axis in "xyz")
@@ -78,13 +80,8 @@ def mounted_arms(program: Path) -> tuple[MountedArm, ...]:
 
 def read_arms(text: str) -> tuple[MountedArm, ...]:
     """Read the arms of ``MOC.cfg``."""
-    body = re.split(r"^ROBOT:", text, maxsplit=1, flags=re.MULTILINE)
-    if len(body) < 2:
-        return ()
-    own = re.split(r"^#", body[1], maxsplit=1, flags=re.MULTILINE)[0]
     arms = []
-    for part in re.split(r"(?=-name\s)", own)[1:]:
-        said = {key: value.strip('"') for key, value in _ENTRY.findall(part)}
+    for said in _entries(text, "ROBOT"):
         try:
             place = tuple(1000.0 * float(said.get(key, 0.0)) for key in _PLACE)
             turn = tuple(float(said.get(k, k == _TURN[0])) for k in _TURN)
@@ -93,6 +90,35 @@ def read_arms(text: str) -> tuple[MountedArm, ...]:
         kind = said.get("use_robot_type", "")
         arms.append(MountedArm(said["name"], kind, place, turn))
     return tuple(arms)
+
+
+def read_axes(text: str) -> dict[int, str]:
+    """Read the external axes of ``MOC.cfg``: their numbers, and the units they move.
+
+    ``SINGLE`` names them; ``JOINT`` gives their logical axes, of which the seventh is
+    the first external one. Those that it does not give are counted in their order.
+    """
+    joints = {
+        one["name"]: one.get("logical_axis", "") for one in _entries(text, "JOINT")
+    }
+    found: dict[int, str] = {}
+    for unit in _entries(text, "SINGLE"):
+        logical = joints.get(unit.get("use_joint", ""), "")
+        axis = int(logical) - ARM_AXES if logical.isdigit() else 0
+        if axis < 1 or axis in found:
+            axis = next(k for k in itertools.count(1) if k not in found)
+        found[axis] = unit["name"]
+    return dict(sorted(found.items()))
+
+
+def _entries(text: str, kind: str) -> list[dict[str, str]]:
+    """Return the entries of one kind, each with what it says."""
+    body = re.split(rf"^{kind}:", text, maxsplit=1, flags=re.MULTILINE)
+    own = re.split(r"^#", body[-1], maxsplit=1, flags=re.MULTILINE)[0]
+    parts = re.split(r"(?=-name\s)", own)[1:] if len(body) > 1 else []
+    said = [dict(_ENTRY.findall(part)) for part in parts]
+    named = (one for one in said if "name" in one)
+    return [{key: value.strip('"') for key, value in one.items()} for one in named]
 
 
 def _entry(folder: Path, name: str) -> Path | None:
@@ -115,7 +141,9 @@ def _is_readable(path: Path) -> bool:
 
 
 def read_backup(folder: Path) -> Archive | None:
-    """Read where ``MOC.cfg`` of a backup places its arm, None without a backup.
+    """Read what ``MOC.cfg`` of a backup gives, None without a backup.
+
+    That is where it places its arm, and the external axes.
 
     The backup is the folder, or lies in it. Of several arms no place is given.
     """
@@ -126,10 +154,12 @@ def read_backup(folder: Path) -> Archive | None:
         settings = _entry(place, SETTINGS[0])
         file = None if settings is None else _entry(settings, SETTINGS[1])
         if file is not None and file.is_file():
-            arms = read_arms(file.read_text(encoding="latin-1"))
+            text = file.read_text(encoding="latin-1")
+            arms = read_arms(text)
             one = [arm for arm in arms if len(arms) == 1]
             root = [tuple(record_from_pose(arm.pose[None])[0].tolist()) for arm in one]
             shown = file.relative_to(folder).as_posix()
             kinds = {"arms": tuple(range(1, len(arms) + 1))}
-            return Archive(shown, kinds, (), (), root[0] if root else (), -1)
+            base = root[0] if root else ()
+            return Archive(shown, kinds, (), (), base, read_axes(text))
     return None

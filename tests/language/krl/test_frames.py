@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.language.visits import ZoneRule
 from tests.language.krl.test_visits import CONFIG, NEW, frame, job, reasons
 
 SHIFT = "{X 0,Y 0,Z 5,A 0,B 0,C 0}"
@@ -106,6 +107,56 @@ def test_initial_moves_switch_corrections_off():
     found = job(*ON["tool_corr"], *ON["m_base_corr"], INIT, *SETS["BAS"])
     assert reasons(found) == [""]
     np.testing.assert_allclose(places(found), ([10, 20, 300], [1000, 100, 500]))
+
+
+def test_initial_moves_take_the_first_tool_and_no_base():
+    lines = ["BAS(#TOOL,2)", "$BASE=BASE_DATA[2]", "$IPO_MODE=#TCP", INIT, "LIN XP1"]
+    found = job(*lines)
+    assert reasons(found) == [""] and not found.visits.tool_remote.any()
+    np.testing.assert_allclose(places(found), ([10, 20, 300], [0, 0, 0]))
+    on = CONFIG.replace("ENDDAT", "BOOL M_BAS_COR_ON=TRUE\nENDDAT")
+    np.testing.assert_allclose(places(job(*lines, config=on))[1], 0.0)
+
+
+def test_initial_moves_link_no_correction_to_the_tool():
+    on = CONFIG.replace("ENDDAT", "BOOL TOOL_CORR_ON=TRUE\nENDDAT")
+    np.testing.assert_allclose(
+        places(job(INIT, "LIN XP1", config=on))[0], [10, 20, 300]
+    )
+
+
+@pytest.mark.parametrize("entry", ["TOOL_DATA[1].X=N2", "takes(TOOL_DATA[1])"])
+def test_the_first_tool_must_be_known(entry):
+    assert "TOOL_DATA[1]" in reasons(job(entry, INIT, "LIN XP1", "N2=1"))[0]
+    without = CONFIG.replace("TOOL_DATA[1]=", "TOOL_DATA[3]=")
+    assert "TOOL_DATA[1]" in reasons(job(INIT, "LIN XP1", config=without))[0]
+
+
+def test_initial_moves_leave_the_load():
+    found = job("$LOAD.M=50", INIT, "LIN XP1")
+    assert loads(found)[0, 0] == 50.0
+    assert "$LOAD" in reasons(job("$LOAD.M=N2", INIT, "LIN XP1", "N2=1"))[0]
+
+
+def test_old_controllers_do_not_switch_the_correction_of_the_tool_off():
+    """They take the frame back alone: it is linked again once it is set."""
+    later = ["TOOL_CORR_ON=TRUE", INIT, f"TOOL_CORR={SHIFT}", *SETS["BAS"]]
+    assert "TOOL_CORR_ON" in reasons(job(*later))[0]
+    assert "TOOL_CORR_ON" in reasons(job(*later[:2], *later[1:]))[0]
+    assert reasons(job(INIT, *later[2:])) == [""]
+
+
+def test_initial_moves_take_speeds_and_distances_of_the_controller():
+    given = "REAL DEF_APO_CDIS=7\nREAL DEF_APO_CPTP=40\nREAL DEF_VEL_PTP=80\n"
+    config = CONFIG.replace("ENDDAT", f"{given}ENDDAT")
+    lines = [INIT, "PTP XP1 C_PTP", "LIN XP2 C_DIS", "LIN XP1"]
+    found = job(*lines, config=config).visits
+    assert found.override[0] == 0.8 and found.overlap_percent[0] == 40.0
+    assert found.zone_mm[1] == 7.0
+    rules = [ZoneRule.UNKNOWN] * 2
+    assert job("$APO.CDIS=5", *lines).visits.zone_rule.tolist()[:2] == rules
+    still = config.replace("ENDDAT", "INT DEF_ADVANCE=0\nENDDAT")
+    assert not job(*lines, config=still).visits.fly.any()
 
 
 def test_a_switch_of_the_program_itself_is_not_that_of_the_controller():

@@ -9,12 +9,13 @@ from postproc.files import find_shared, is_system_source
 from postproc.language.interface import Start
 from postproc.language.krl.language import Krl
 from postproc.language.source import Source
+from postproc.language.visits import ZoneRule
 from tests.language.krl.test_visits import CONFIG, DATA, codes, reasons
 
 INIT = ["BAS(#INITMOV,0)", "BAS(#TOOL,1)", "BAS(#BASE,2)", "$IPO_MODE=#BASE"]
 
 
-def job(*lines, submit, more=""):
+def job(*lines, submit, more="", start=None):
     text = "DEF m ( )\n" + "\n".join(lines) + f"\nEND\n{more}"
     sources = [
         Source("m.src", text.encode()),
@@ -22,7 +23,7 @@ def job(*lines, submit, more=""):
         Source("$config.dat", CONFIG.encode()),
         Source("sps.sub", f"DEF sps( )\nBOOL own\n{submit}\nEND\n".encode()),
     ]
-    return Krl().read(sources, Start())
+    return Krl().read(sources, start or Start())
 
 
 @pytest.mark.parametrize(
@@ -51,6 +52,67 @@ def test_what_runs_beside_does_no_harm(submit):
 def test_what_it_may_change_is_not_known_at_any_time(submit, why):
     found = job(*INIT, "LIN XP1", submit=submit)
     assert why in reasons(found)[0]
+
+
+KNOWN = ["$TOOL=TOOL_DATA[1]", "$BASE=BASE_DATA[2]", "$LOAD=LOAD_DATA[1]", *INIT[3:]]
+
+
+@pytest.mark.parametrize(
+    ("submit", "why"),
+    [
+        ("$TOOL=TOOL_DATA[3]", "$TOOL"),
+        ("$TOOL.Z=$TOOL.Z+1", "$TOOL"),
+        ("IF $IN[7] THEN\n$BASE={X 1,Y 2,Z 3,A 0,B 0,C 0}\nENDIF", "$BASE"),
+        ("$LOAD.M=50", "$LOAD"),
+        ("$SOFT_PLCL[3]=TRUE", "$SOFT_PLCL"),
+        ("$SOFTN=1", "$SOFTN"),
+        ("$IPO_MODE=#TCP", "$IPO_MODE"),
+        ("$ORI_TYPE=#CONSTANT", "$ORI_TYPE"),
+        ("$ROBROOT={X 1,Y 2,Z 3,A 0,B 0,C 0}", "$ROBROOT"),
+        ("$TECH.MODE=#CYCLE", "$TECH"),
+        ("$LOAD_A3.M=5", "$LOAD_A3"),
+        ("$NOBODY=1", "$NOBODY"),
+        ("camera($BASE)", "$BASE"),
+        ("INTERRUPT DECL 91 WHEN $IN[1] DO $TOOL=$NULLFRAME", "$TOOL"),
+        ("BAS(#TOOL,2)", "$TOOL"),
+        ("RSI_ON(#ABSOLUTE)", "a sensor"),
+        ("own=TOUCHSENSE(1)", "a sensor"),
+        ("$BASE={X 1,Y 2,Z 3,A 0,B 0,C 0} ?? what", "$BASE"),
+        ("MACHINE_FRAME_DAT[2].MACH_DEF_INDEX=2", "MACHINE_FRAME_DAT[2]"),
+        ("part( )", "$BASE"),
+        ("own=asked( )", "$TOOL"),
+    ],
+)
+def test_what_moves_depend_on_may_change_at_any_time(submit, why):
+    more = "GLOBAL DEF part( )\n$BASE=BASE_DATA[3]\nEND\n"
+    more += "GLOBAL DEFFCT INT asked( )\nhelps( )\nRETURN 1\nENDFCT\n"
+    more += "DEF helps( )\n$TOOL=TOOL_DATA[3]\nEND\n"
+    lines = [*KNOWN[:1], "BAS(#BASE,2)", *KNOWN[2:], "LIN XP1"]
+    assert reasons(job(*lines, submit="own=TRUE", more=more)) == [""]
+    assert why in reasons(job(*lines, submit=submit, more=more))[0]
+
+
+@pytest.mark.parametrize("submit", ["$EX_AX_IGNORE=1", "ASYPTP {E1 5}", "ASYSTOP"])
+def test_what_runs_beside_may_leave_the_track_elsewhere(submit):
+    on_track = Start(aux={1: "track"})
+    found = reasons(job(*KNOWN, "LIN XP1", submit=submit, start=on_track))[0]
+    assert "the track need not" in found or "may move external axes" in found
+    assert reasons(job(*KNOWN, "LIN XP1", submit=submit)) == [""]
+
+
+def test_how_points_are_passed_may_change_beside_the_program():
+    lines = [*KNOWN, "$APO.CDIS=5", "LIN XP1 C_DIS", "LIN XP2"]
+    rules = [
+        job(*lines, submit=submit).visits.zone_rule[0]
+        for submit in ("own=TRUE", "$APO.CDIS=50", "$ADVANCE=0")
+    ]
+    assert rules == [ZoneRule.FROM, ZoneRule.UNKNOWN, ZoneRule.UNKNOWN]
+
+
+def test_own_data_of_a_called_routine_is_not_that_of_the_program():
+    more = "GLOBAL DEF part( )\nINT I\nI=2\nEND\n"
+    lines = ["FOR I=1 TO 2", "LIN XS[I]", "ENDFOR"]
+    assert reasons(job(*KNOWN, *lines, submit="part( )", more=more)) == ["", ""]
 
 
 def test_what_the_program_sets_may_be_changed_at_once():
@@ -104,8 +166,10 @@ def test_shared_files_of_an_archive_are_found(tmp_path):
     for folder in (program.parent, system):
         folder.mkdir(parents=True)
     for path in (program, program.with_name("own.sub"), system / "$config.dat",
-                 system / "SPS.SUB", system / "bas.src"):  # fmt: skip
+                 system / "SPS.SUB", system / "bas.src",
+                 tmp_path / "R1" / "Program" / "plc.sub"):  # fmt: skip
         path.write_bytes(b"")
     names = [path.name for path in find_shared(program)]
-    assert names == ["$config.dat", "SPS.SUB", "own.sub"]
+    assert names[0] == "$config.dat"
+    assert sorted(names[1:]) == ["SPS.SUB", "own.sub", "plc.sub"]
     assert find_shared(tmp_path / "R1" / "a.pdl") == ()

@@ -169,7 +169,6 @@ def test_the_cell_says_what_holds_at_first():
         (["$BASE=BASE_DATA[N]", "N=N+1", "LIN XP1"], "when the program runs"),
         (["$BASE=BASE_DATA[9]", "LIN XP1"], "BASE_DATA[9]"),
         (["$BASE.X=5", "LIN XP1"], "component"),
-        (["BAS(#INITMOV,0)", "LIN XP1"], "INITMOV"),
         (["$IPO_MODE=x", "LIN XP1"], "$IPO_MODE"),
         (["$ROBROOT={X 0,Y 0,Z 0,A 0,B 0,C 0}", "LIN XP1"], "$ROBROOT"),
         (["$SOFT_PLCL[1]=TRUE", "LIN XP1"], "soft"),
