@@ -15,6 +15,7 @@ sys.path.insert(0, str(ROOT / "docs" / "tools"))
 
 import architecture  # noqa: E402
 import causes  # noqa: E402
+import findings  # noqa: E402
 from sessions import BLOCK, PAGES, normal, run_page, steps_of  # noqa: E402
 
 from tests.report.html.browser import complaints, open_browser, requests  # noqa: E402
@@ -156,3 +157,8 @@ def test_the_table_of_causes_is_that_of_the_effects():
     page = causes.PAGE.read_text(encoding="utf-8")
     assert causes.BEGIN in page
     assert causes.written(page) == page, "run python docs/tools/causes.py"
+
+
+def test_the_page_of_findings_is_that_of_the_registry():
+    page = findings.PAGE.read_text(encoding="utf-8")
+    assert page == findings.written(), "run python docs/tools/findings.py"

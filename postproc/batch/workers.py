@@ -306,9 +306,6 @@ def facts_of(outcome: Outcome) -> dict[str, Any]:
     """Sum up an outcome for the log."""
     statuses = outcome.decisions.status
     left = outcome.left_alone()
-    findings = [
-        f"{d.file}:{d.line}: {d.code}: {d.message}" for d in outcome.diagnostics
-    ]
     return {
         "version": __version__,
         "model": outcome.model,
@@ -316,7 +313,7 @@ def facts_of(outcome: Outcome) -> dict[str, Any]:
         "safe": int((statuses == 0).sum()),
         "left": len(left),
         "left_alone": left[:LISTED],
-        "findings": findings[:LISTED],
+        "findings": [*map(str, outcome.diagnostics[:LISTED])],
         "largest_mm": _largest(outcome),
         "before_mm": _figures(asdict(outcome.before)),
         "after_mm": _figures(asdict(outcome.after)),

@@ -57,6 +57,9 @@ SecondOpinionOption = Annotated[
         show_default=False,
     ),
 ]
+EveryOption = Annotated[
+    bool, typer.Option("--all", help="A line for every finding, also for equal ones.")
+]
 StrictCallsOption = Annotated[
     bool,
     typer.Option(

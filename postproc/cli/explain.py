@@ -98,13 +98,9 @@ class Explanation:
         told = outcome.diagnostics
         return cls(outcome.visits, d.q, d.direction, travel, (), outcome, told)
 
-    def findings(self, line: int | None = None) -> list[str]:
-        """Return what was found in the program, or on one line of it, as messages."""
-        return [
-            f"{d.file}:{d.line}: {d.code}: {d.message}"
-            for d in self.diagnostics
-            if line in (None, d.line)
-        ]
+    def findings(self, line: int | None = None) -> list[Diagnostic]:
+        """Return what was found in the program, or on one line of it."""
+        return [d for d in self.diagnostics if line in (None, d.line)]
 
     def to_json(self, line: int | None = None) -> str:
         """Return one object per visit as JSON text.

@@ -13,6 +13,7 @@ from postproc.cli.common import (
     ApproachOption,
     CellOption,
     CloneOption,
+    EveryOption,
     HtmlOption,
     JsonOption,
     LsvOption,
@@ -40,6 +41,36 @@ if TYPE_CHECKING:
     from postproc.cli.jobs import Job
     from postproc.compensation.outcome import Outcome
 
+
+def _explain_code(code: str | None) -> None:
+    """Print what a code of findings means, and end.
+
+    Raises:
+        PostprocError: There is no such code.
+    """
+    from postproc.diagnostics import Code
+
+    if code is None:
+        return
+    with explained():
+        known = {one.value: one for one in Code}
+        if code not in known:
+            names = ", ".join(sorted(known))
+            raise PostprocError(f"--code {code}: no such code. Known: {names}")
+        found = known[code]
+        print(f"{found} ({found.severity})", found.meaning, found.cure, sep="\n")
+    raise typer.Exit
+
+
+CodeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--code",
+        help="Print what a finding's code means, and end.",
+        is_eager=True,
+        callback=_explain_code,
+    ),
+]
 CROWD = 8  # processes, each with a window of its own in memory
 SHOWN = 20  # targets left alone whose source lines are shown
 
@@ -82,6 +113,7 @@ def compensate(
     take_up: TakeUpOption = False,
     approach: ApproachOption = False,
     processes: ProcessesOption = 0,
+    every: EveryOption = False,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
     from postproc.cli import jobs
@@ -120,10 +152,10 @@ def compensate(
             if job.wants_opinion:
                 outcome = job.judged(outcome, options)
         if strict and outcome.exit_code:
-            _print_outcome(outcome)
+            _print_outcome(outcome, every)
             raise PostprocError(f"--strict: {_why_nothing(outcome)}")
         written = job.write(outcome, output, report, html, lsv_out)
-        _print_outcome(outcome)
+        _print_outcome(outcome, every)
         if report == Path(STREAM):
             write_text(STREAM, report_text(outcome))
         for path in written:
@@ -158,13 +190,13 @@ def _check_values(place: Path, job: Job) -> None:
         )
 
 
-def _print_outcome(outcome: Outcome) -> None:
+def _print_outcome(outcome: Outcome, every: bool) -> None:
     """Print what a person needs to know, on stderr."""
     from postproc.cli.carets import point_at_visits
+    from postproc.report.findings import listed
 
-    for finding in outcome.diagnostics:
-        place = f"{finding.file}:{finding.line}"
-        say(f"{place}: {finding.code}: {finding.message}")
+    for line in listed(outcome.diagnostics, every):
+        say(line)
     excerpts = point_at_visits(outcome, outcome.left_rows()[:SHOWN])
     left = Counter(zip_longest(outcome.left_alone(), excerpts, fillvalue=""))
     for (line, source), times in left.items():
@@ -230,11 +262,14 @@ def explain(
     temperature: TemperatureOption = None,
     strict_calls: StrictCallsOption = False,
     timing: TimingOption = None,
+    every: EveryOption = False,
+    code: CodeOption = None,
     json: JsonOption = None,
 ) -> None:
     """Show why every target moves: from where it is reached, and what that costs."""
     from postproc.cli.explain import explain_file
     from postproc.compensation.options import Options
+    from postproc.report.findings import listed
 
     with explained(program, lsv):
         check_places([as_path(json)], [program, cell, model, lsv])
@@ -246,8 +281,8 @@ def explain(
         )
         with busy("plan"):
             found = explain_file(program, cell, model, lsv, options)
-        for finding in found.findings(line):
-            say(finding)
+        for text in listed(found.findings(line), every):
+            say(text)
         if json:
             write_text(json, found.to_json(line))
         if json != "-":

@@ -373,6 +373,10 @@ class Diagnostic:
     code: Code
     message: str
 
+    def __str__(self) -> str:
+        """Write it as a line."""
+        return f"{self.file}:{self.line}: {self.code}: {self.message}"
+
 
 def told_once(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Join findings that say the same of the same line, and say how often.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation import program as planning
+from postproc.diagnostics import Code
 from postproc.model.combination import INTERACTION
 from tests.written import FIRST, NEXT, POSE, cli, program
 
@@ -170,3 +171,15 @@ def test_what_was_found_is_told_too(desk, model):
     assert said.count("job.pdl:6: unknown-statement: ") == 1
     of_line = cli("explain", source, *given, "--line", 7).stderr
     assert "unknown-statement" not in of_line
+
+
+def test_a_code_is_explained_without_a_program():
+    found = cli("explain", "--code", "tool-length")
+    assert found.exit_code == 0
+    assert found.stdout.splitlines()[0] == "tool-length (warning)"
+    assert Code.TOOL_LENGTH.meaning in found.stdout
+
+
+def test_a_code_that_is_none_is_refused():
+    found = cli("explain", "--code", "tool-lenght")
+    assert found.exit_code == 2 and "tool-length" in found.stderr

@@ -1,0 +1,43 @@
+"""Write docs/findings.md from the registry of findings.
+
+python docs/tools/findings.py
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from postproc.diagnostics import Code, Severity
+
+PAGE = Path(__file__).parents[1] / "findings.md"
+HEAD = """# Findings
+
+Written from `postproc/diagnostics.py` by `python docs/tools/findings.py`.
+
+A finding is one message about a program, or about a tree of compensated programs. It
+names a file and a line, and has a code: `job.pdl:12: unknown-routine: ..`. JSON outputs
+carry the code; `postproc explain --code CODE` prints what stands here. What is found at
+many lines is one line with the first of them; `--all` lists each.
+
+| severity | what it asks for |
+|---|---|
+| note | nothing: it tells what was done, or taken for granted |
+| warning | a look: targets keep their values, or are less certain |
+| error | a change: as it is the program must not be uploaded |
+"""
+
+
+def written() -> str:
+    """Write the page."""
+    parts = [HEAD]
+    for severity in (Severity.ERROR, Severity.WARNING, Severity.NOTE):
+        parts.append(f"## {severity.capitalize()}s\n")
+        parts.append("| code | meaning | cure |\n|---|---|---|")
+        rows = sorted(code for code in Code if code.severity == severity)
+        parts += [f"| `{one}` | {one.meaning} | {one.cure} |" for one in rows]
+        parts.append("")
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(written(), encoding="utf-8")
