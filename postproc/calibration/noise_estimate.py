@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -77,14 +77,24 @@ LEAST_BEND = 1e-6  # of the trace of the information, in every direction
 ENOUGH = 1e-3  # nats that a further step must bring
 
 
+@dataclass(frozen=True)
+class _Point:
+    """What some sizes of the components cost.
+
+    Attributes:
+        value: Minus the log likelihood.
+        slopes: Its slope by the sizes, and the Fisher information, where asked for.
+    """
+
+    value: float
+    slopes: Callable[[], tuple[Floats, Floats]]
+
+
 class _Cost(Protocol):
     """Minus the log likelihood of some rows, by the squared sizes of the components."""
 
-    def value(self, sizes: Floats) -> float:
+    def at(self, sizes: Floats) -> _Point:
         """Evaluate it."""
-
-    def slopes(self, sizes: Floats) -> tuple[Floats, Floats]:
-        """Return its slope by the sizes, and the Fisher information."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,16 +126,15 @@ class _RowCost:
         known = (whitener.extra + whitener.unseen)[used]
         return cls(parts, known, square[used], weight[used, None])
 
-    def value(self, sizes: Floats) -> float:
-        """Return minus the log likelihood."""
+    def at(self, sizes: Floats) -> _Point:
+        """Evaluate it."""
         v = np.tensordot(sizes, self.parts, axes=1) + self.known
-        return 0.5 * float((self.weight * (np.log(v) + self.square / v)).sum())
+        value = 0.5 * float((self.weight * (np.log(v) + self.square / v)).sum())
+        return _Point(value, lambda: self._slopes(v))
 
-    def slopes(self, sizes: Floats) -> tuple[Floats, Floats]:
-        """Return its slope by the sizes, and the Fisher information."""
-        v = np.tensordot(sizes, self.parts, axes=1) + self.known
+    def _slopes(self, v: Floats) -> tuple[Floats, Floats]:
         slope = 0.5 * self.weight * (1.0 / v - self.square / v**2)
-        scaled = (self.parts * np.sqrt(self.weight) / v).reshape(len(sizes), -1)
+        scaled = (self.parts * np.sqrt(self.weight) / v).reshape(len(self.parts), -1)
         return np.tensordot(self.parts, slope, axes=2), 0.5 * scaled @ scaled.T
 
 
@@ -134,12 +143,12 @@ class _BlockCost:
     """Of rows that share a pose.
 
     Attributes:
-        parts: Covariance per unit of each component, (kinds, groups, 3 m, 3 m).
+        parts: Covariance per unit of each component, (groups, kinds, 3 m, 3 m).
         known, square: Known covariance and expected products, (groups, 3 m, 3 m).
         weight: Of every group, (groups,).
     """
 
-    parts: tuple[Floats, ...]
+    parts: Floats
     known: Floats
     square: Floats
     weight: Floats
@@ -170,32 +179,27 @@ class _BlockCost:
         known[:, k, k] = extra * used + (1.0 - used)
         heaviness = np.where(weight[rows] > 0, weight[rows], np.inf).min(axis=1)
         heaviness = np.where(np.isfinite(heaviness), heaviness, 0.0)
-        return cls(tuple(parts), known, products * mask, heaviness)
+        return cls(np.stack(parts, axis=1), known, products * mask, heaviness)
 
-    def value(self, sizes: Floats) -> float:
-        """Return minus the log likelihood."""
-        root = np.linalg.cholesky(self._covariance(sizes))
+    def at(self, sizes: Floats) -> _Point:
+        """Evaluate it."""
+        V = self.known + np.einsum("k,gkij->gij", sizes, self.parts)
+        root = np.linalg.cholesky(V)
         log_det = 2.0 * np.log(np.einsum("gii->gi", root)).sum(axis=1)
-        inverse = np.linalg.inv(root)
-        square = np.einsum("gij,gji->g", inverse @ self.square, inverse.swapaxes(1, 2))
-        return 0.5 * float((self.weight * (log_det + square)).sum())
+        P = np.linalg.inv(V)
+        square = np.einsum("gij,gij->g", P, self.square)
+        value = 0.5 * float((self.weight * (log_det + square)).sum())
+        return _Point(value, lambda: self._slopes(P))
 
-    def slopes(self, sizes: Floats) -> tuple[Floats, Floats]:
-        """Return its slope by the sizes, and the Fisher information."""
-        P = np.linalg.inv(self._covariance(sizes))
+    def _slopes(self, P: Floats) -> tuple[Floats, Floats]:
+        """Take the inverse of the covariance, (groups, 3 m, 3 m)."""
         M = 0.5 * (P - P @ self.square @ P) * self.weight[:, None, None]
-        slope = np.array([float((M * p).sum()) for p in self.parts])
-        turned = [P @ p for p in self.parts]
-        weighed = [t * self.weight[:, None, None] for t in turned]
-        information = [
-            [float((a * b.swapaxes(1, 2)).sum()) for b in turned] for a in weighed
-        ]
-        return slope, 0.5 * np.array(information)
-
-    def _covariance(self, sizes: Floats) -> Floats:
-        """Sum the components, (groups, 3 m, 3 m)."""
-        parts = zip(sizes, self.parts, strict=True)
-        return np.asarray(self.known + sum(s * p for s, p in parts))
+        slope = np.einsum("gij,gkij->k", M, self.parts)
+        turned = P[:, None] @ self.parts
+        scaled = turned * np.sqrt(self.weight)[:, None, None, None]
+        a = scaled.reshape(*scaled.shape[:2], -1)
+        b = scaled.swapaxes(2, 3).reshape(a.shape)
+        return slope, 0.5 * (a @ b.swapaxes(1, 2)).sum(axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,15 +209,16 @@ class _ReadingCost:
     readings: ReadingScatter
     kinds: Sequence[str]
 
-    def value(self, sizes: Floats) -> float:
-        """Return minus the log likelihood."""
-        return 0.5 * self.readings.log_noise(float(np.sqrt(sizes[0])))
+    def at(self, sizes: Floats) -> _Point:
+        """Evaluate it."""
+        t2 = float(sizes[0])
+        value = 0.5 * self.readings.log_noise(float(np.sqrt(t2)))
+        return _Point(value, lambda: self._slopes(t2))
 
-    def slopes(self, sizes: Floats) -> tuple[Floats, Floats]:
-        """Return its slope by the sizes, and the Fisher information."""
-        slope, t2 = np.zeros(len(sizes)), float(sizes[0])
+    def _slopes(self, t2: float) -> tuple[Floats, Floats]:
+        slope = np.zeros(len(self.kinds))
         slope[0] = (self.readings.freedom - self.readings.square / t2) / (2.0 * t2)
-        information = np.zeros((len(sizes), len(sizes)))
+        information = np.zeros((len(slope), len(slope)))
         information[0, 0] = self.readings.freedom / (2.0 * t2**2)
         return slope, information
 
@@ -228,13 +233,15 @@ def _score(costs: Sequence[_Cost], begin: Floats, low: Floats, high: Floats) -> 
         high: Upper bounds, (kinds,).
     """
 
-    def value(u: Floats) -> float:
-        return sum(cost.value(np.exp(2.0 * u)) for cost in costs)
+    def at(u: Floats) -> tuple[float, list[_Point]]:
+        points = [cost.at(np.exp(2.0 * u)) for cost in costs]
+        return sum(point.value for point in points), points
 
-    u, here = begin, value(begin)
+    u = begin
+    here, points = at(u)
     for _ in range(SCORES):
         sizes = np.exp(2.0 * u)
-        parts = [cost.slopes(sizes) for cost in costs]
+        parts = [point.slopes() for point in points]
         slope = 2.0 * sizes * np.sum([p[0] for p in parts], axis=0)
         bend = 4.0 * np.outer(sizes, sizes) * np.sum([p[1] for p in parts], axis=0)
         free = ~((u <= low) & (slope > 0.0) | (u >= high) & (slope < 0.0))
@@ -244,11 +251,11 @@ def _score(costs: Sequence[_Cost], begin: Floats, low: Floats, high: Floats) -> 
         step *= min(1.0, FARTHEST / max(float(np.abs(step).max()), 1e-300))
         for _ in range(HALVINGS):
             there = np.clip(u + step, low, high)
-            found = value(there)
+            found, reached = at(there)
             if found < here:
                 break
             step = step / 2.0
         if not found < here - ENOUGH:
             break
-        u, here = there, found
+        u, here, points = there, found, reached
     return u

@@ -427,16 +427,22 @@ def _given_others(V: Floats, rotated: Floats, used: Bools) -> Floats:
     Returns:
         Mahalanobis distances, (groups, m).
     """
-    count, m = used.shape
-    out = np.zeros((count, m))
-    flat = rotated.reshape(count, -1)
-    for k in range(m):
-        asked = np.array(used)
+    out = _distances_of(V, rotated, used) * used
+    for k in np.flatnonzero(~used.all(axis=0)).tolist():  # beside those that are used
+        some = np.flatnonzero(~used[:, k])
+        asked = np.array(used[some])
         asked[:, k] = True
-        P = np.linalg.inv(_masked(V, asked))
-        kept = np.repeat(asked, 3, axis=1)
-        own = slice(3 * k, 3 * k + 3)
-        pulled = np.einsum("gij,gj->gi", P[:, own], flat * kept)
-        spread = np.linalg.solve(P[:, own, own], pulled[:, :, None])[:, :, 0]
-        out[:, k] = np.sqrt(np.maximum((pulled * spread).sum(axis=1), 0.0))
+        out[some, k] = _distances_of(V[some], rotated[some], asked)[:, k]
     return out
+
+
+def _distances_of(V: Floats, rotated: Floats, asked: Bools) -> Floats:
+    """Measure each of some rows against the others of them, (groups, m)."""
+    count, m = asked.shape
+    P = np.linalg.inv(_masked(V, asked))
+    kept = rotated.reshape(count, -1) * np.repeat(asked, 3, axis=1)
+    pulled = np.einsum("gij,gj->gi", P, kept).reshape(count, m, 3)
+    k = np.arange(m)
+    own = P.reshape(count, m, 3, m, 3)[:, k, :, k].swapaxes(0, 1)
+    spread = np.linalg.solve(own, pulled[..., None])[..., 0]
+    return np.asarray(np.sqrt(np.maximum((pulled * spread).sum(axis=2), 0.0)))
