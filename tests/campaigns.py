@@ -1,6 +1,6 @@
 """Campaigns as people measure: repeats, nests, rounds, walls, stations, lost clocks.
 
-python -m tests.campaigns [--count 50] [--first 0] [--poses LOW HIGH] [--jobs 2]
+python -m tests.campaigns [--count 50] [--first 0] [--jobs 2] [--log FILE]
 
 Every campaign is of an arm of its own, written as files and read by the product.
 Printed are the true errors at poses that no fit has seen: of the default fit, of
@@ -11,9 +11,10 @@ and of generalised least squares; and how many of the stated intervals hold them
 from __future__ import annotations
 
 import argparse
+import pickle
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -337,22 +338,38 @@ def _row(some: Sequence[Trial]) -> str:
     )
 
 
+def logged(log: Path) -> Iterator[Trial]:
+    """Yield the trials of a log."""
+    if not log.exists():
+        return
+    with log.open("rb") as file:
+        while True:
+            try:
+                yield pickle.load(file)
+            except EOFError:
+                return
+
+
 def main() -> None:
-    """Run campaigns, print a line for each and the table."""
+    """Run what the log does not hold yet; print a line for each and the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--poses", type=int, nargs=2, default=(20, 300))
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--log", type=Path, default=Path("build/campaigns.pickles"))
     asked = parser.parse_args()
-    trials = []
-    with ProcessPoolExecutor(asked.jobs) as pool:
-        seeds = range(asked.first, asked.first + asked.count)
-        low, high = asked.poses
-        for trial in pool.map(run, seeds, [low] * len(seeds), [high] * len(seeds)):
+    asked.log.parent.mkdir(parents=True, exist_ok=True)
+    known = {trial.seed: trial for trial in logged(asked.log)}
+    seeds = range(asked.first, asked.first + asked.count)
+    todo, (low, high) = [s for s in seeds if s not in known], asked.poses
+    with ProcessPoolExecutor(asked.jobs) as pool, asked.log.open("ab") as out:
+        for trial in pool.map(run, todo, [low] * len(todo), [high] * len(todo)):
             print(trial, flush=True)
-            trials.append(trial)
-    print("\n".join(summary(trials)))
+            pickle.dump(trial, out)
+            out.flush()
+            known[trial.seed] = trial
+    print("\n".join(summary([known[seed] for seed in seeds])))
 
 
 if __name__ == "__main__":
