@@ -175,6 +175,6 @@ def test_inputs_decide_which_way_is_run(told_cell):
         literals = {
             k: p.q if p.in_joints else np.eye(4) for k, p in enumerate(made.places)
         }
-        runs = [Run(made, literals, run, rapid=True).run() for run in range(3)]
+        runs = [Run(made, literals, {}, run, rapid=True).run() for run in range(3)]
         ways.add(len({tuple(s.move.mark for s in steps) for steps in runs}))
     assert max(ways) > 1

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows
+from postproc.compensation.agreement import LEVER_MM, Agreement, agree
 from postproc.compensation.arc_angles import ASTRAY
 from postproc.compensation.command import (
     Commands,
@@ -26,6 +27,7 @@ from postproc.compensation.eligibility import STRAYS, Reasons, strayed
 from postproc.compensation.options import Options, Setting
 from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.program import Planned, Reading
+from postproc.compensation.shifts import absorb, own_shifts, shifted_values
 from postproc.compensation.targets import moved_targets
 from postproc.language.visits import NO_TARGET, Meaning, Visits
 from postproc.motion.departure import Departure
@@ -35,86 +37,12 @@ from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell, LimitSection
 from postproc.robot.pose import MM, has_unknown, lengths
 
-# One literal, several arrivals: do their corrections agree?
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """What the arrivals at m literals have in common.
-
-    Attributes:
-        literal: The literals that are visited, (m,), ascending.
-        group: Index into `literal` of every visit, (n,), -1 where it has none.
-        usable: Every arrival can be corrected, (m,).
-        spread_mm: Largest distance between two arrivals' corrections, (m,) [mm],
-            bounded from above by the diagonal of their bounding box.
-        values: The mean of the arrivals' corrected numbers, (m, w).
-        change_mm: The mean of what must agree, (m, 3) [mm].
-        arrivals: Number of arrivals, (m,).
-    """
-
-    literal: Ints
-    group: Ints
-    usable: Bools
-    spread_mm: Floats
-    values: Floats
-    change_mm: Floats
-    arrivals: Ints
-
-
-def agree(
-    literal: Ints, usable: Bools, corrected: Floats, correction_mm: Floats
-) -> Agreement:
-    """Compare the corrections of all arrivals at every literal.
-
-    Args:
-        literal: Literal of every visit, (n,), -1 where it has none.
-        usable: The visit can be corrected, (n,).
-        corrected: Numbers that this visit would write, (n, w) in the file's units.
-        correction_mm: What must agree: the change of the target in its own frame,
-            (n, k) [mm], of which the first three are that of its place.
-    """
-    rows = np.flatnonzero(literal >= 0)
-    names, inverse, count = _counted(literal[rows])
-    group = np.full(len(literal), -1, dtype=np.int64)
-    group[rows] = inverse
-    m = len(names)
-    if m == len(rows):  # every literal has one arrival: nothing to compare
-        order = np.empty(m, dtype=np.int64)
-        order[inverse] = rows
-        mean, change = corrected.take(order, axis=0), correction_mm.take(order, axis=0)
-        spread = 0.0 * np.einsum("nk->n", np.abs(change))  # NaN where one is not known
-        mean += 0.0  # no -0.0, as in a mean
-        change = change[:, :3] + 0.0
-        return Agreement(names, group, usable[order], spread, mean, change, count)
-    all_usable = np.ones(m, dtype=bool)
-    np.logical_and.at(all_usable, inverse, usable[rows])
-    width = (m, correction_mm.shape[1])
-    low, high = np.full(width, np.inf), np.full(width, -np.inf)
-    np.minimum.at(low, inverse, correction_mm[rows])
-    np.maximum.at(high, inverse, correction_mm[rows])
-    total, moved = np.zeros((m, corrected.shape[1])), np.zeros((m, 3))
-    np.add.at(total, inverse, corrected[rows])
-    np.add.at(moved, inverse, correction_mm[rows, :3])
-    spread = np.linalg.norm(high - low, axis=1)
-    mean, change = total / count[:, None], moved / count[:, None]
-    return Agreement(names, group, all_usable, spread, mean, change, count)
-
-
-def _counted(literals: Ints) -> tuple[Ints, Ints, Ints]:
-    """Return what differs, ascending, where it stands, and how often it does."""
-    if (np.diff(literals) > 0).all():  # in the order of the program, each once
-        once = np.ones(len(literals), dtype=np.int64)
-        return literals, np.arange(len(literals)), once
-    return np.unique(literals, return_inverse=True, return_counts=True)
-
-
 # Targets that the program computes from others: they move along with them.
 
 
-def dependants(visits: Visits, agreement: Agreement) -> tuple[Ints, Ints]:
+def dependants(visits: Visits, agreement: Agreement, among: Bools) -> tuple[Ints, Ints]:
     """Find the visits that move along with a literal, and its row in the agreement."""
-    rows = np.flatnonzero(visits.follows >= 0)
+    rows = np.flatnonzero((visits.follows >= 0) & among)
     return rows, np.searchsorted(agreement.literal, visits.follows[rows])
 
 
@@ -124,6 +52,7 @@ def worsened(
     change_mm: Floats,
     trusted: Bools,
     agree_mm: float,
+    absorbing: Bools,
 ) -> Bools:
     """Tell which literals would carry a computed target farther off, (m,).
 
@@ -137,12 +66,20 @@ def worsened(
         change_mm: The change that every visit needs, (n, 3) [mm].
         trusted: The model can say what a visit needs, (n,).
         agree_mm: Changes that differ less are the same.
+        absorbing: Their move makes up for what the literal changes by, (n,).
     """
-    rows, at = dependants(visits, agreement)
-    whole = visits.target[rows] != Meaning.FOR
-    rows, at = rows[whole], at[whole]
+    carries = ~absorbing & (visits.target != Meaning.FOR)
+    rows, at = dependants(visits, agreement, carries)
     needed = change_mm[rows]
-    left = np.linalg.norm(agreement.change_mm[at] - needed, axis=1)
+    moved = agreement.change_mm[at]
+    shifted = visits.shift[rows] >= 0
+    if shifted.any():
+        after = shifted_values(
+            visits, agreement.literal, agreement.values, visits.values, own=False
+        )
+        own = rows[shifted]
+        moved[shifted] = (after - visits.values)[own, :3]
+    left = np.linalg.norm(moved - needed, axis=1)
     allowed = np.maximum(np.linalg.norm(needed, axis=1), agree_mm)
     worse = ~(trusted[rows] & (left <= allowed))
     found = np.zeros(len(agreement.literal), dtype=bool)
@@ -161,7 +98,7 @@ def move_dependants(
         chosen: Literals that do change, (m,).
         values: Numbers of every visit, (n, w).
     """
-    rows, at = dependants(visits, agreement)
+    rows, at = dependants(visits, agreement, visits.shift < 0)
     rows, at = rows[chosen[at]], at[chosen[at]]
     if len(rows) == 0:
         return
@@ -175,14 +112,22 @@ def move_dependants(
 
 
 def must_stay(
-    visits: Visits, agreement: Agreement, change: Floats, trusted: Bools, cell: Cell
+    visits: Visits,
+    agreement: Agreement,
+    change: Floats,
+    trusted: Bools,
+    cell: Cell,
+    absorbing: Bools,
 ) -> dict[str, Bools]:
     """Find literals that must keep their values for what else depends on them.
+
+    Args are those of `worsened`.
 
     Returns:
         The reasons, and which of the m literals of the agreement have each, (m,).
     """
-    hurt = worsened(visits, agreement, change, trusted, cell.limits.agree_mm)
+    limit = cell.limits.agree_mm
+    hurt = worsened(visits, agreement, change, trusted, limit, absorbing)
     found = {f"{why}: give the move a point of its own (see --clone)": rows
              for why, pins in visits.literals.pins.items()
              if (rows := np.isin(agreement.literal, pins)).any()}  # fmt: skip
@@ -252,7 +197,9 @@ def mark_disagreement(
         f"its arrivals differ by more than agree_mm = {limit:g}: give each move a "
         "point of its own (see --clone)"
     )
-    reasons.mark(unsafe & agreement.usable[at] & apart[at], text)
+    differ = unsafe & agreement.usable[at] & apart[at]
+    reasons.mark(differ & own_shifts(visits), SHIFTED_APART.format(limit))
+    reasons.mark(differ, text)
     for why, literals in stay.items():
         reasons.mark(unsafe & literals[at], why)
     reasons.mark(unsafe, "another arrival at the same point cannot be corrected")
@@ -449,7 +396,6 @@ def guard_turn(reasons: Reasons, limits: LimitSection, turn: Floats) -> None:
 
 # Which targets move, where to, and why the others do not.
 
-LEVER_MM = 100.0  # from the TCP, by which turns count where arrivals must agree
 FLAG_MM = 1e6  # [mm] that a flag counts for where arrivals must agree
 NONE = np.empty((0, 3))
 KNOWN = 0.5  # part of its play that a joint must have left behind to be on a side
@@ -458,6 +404,38 @@ SWUNG = (
     "corrected, the way to it or on from it would swing a joint, the elbow or the "
     "wrist centre by more than the cell's limits, or pass a singularity otherwise"
 )
+
+
+SHIFTED_APART = (
+    "its arrivals need numbers of its shift that differ by more than agree_mm = {:g}: "
+    "give each a move of its own"
+)
+NOT_ABSORBED = (
+    "the numbers of its shift cannot make up for how all of its points are corrected: "
+    "give each a move of its own"
+)
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What arrivals have in common, once it is known what makes up for what.
+
+    Attributes:
+        agreement: At m literals; the numbers of one that holds a shift are the shift's.
+        stay: Why literals must keep their values, and which of them have each reason,
+            (m,).
+        change: What had to agree at every visit, (n, k) [mm].
+    """
+
+    agreement: Agreement
+    stay: dict[str, Bools]
+    change: Floats
+
+    def together(self, agree_mm: float) -> Bools:
+        """Tell which literals can be given new numbers, (m,)."""
+        apart = ~(self.agreement.spread_mm <= agree_mm)
+        stays = np.any([apart, *self.stay.values()], axis=0)
+        return np.asarray(self.agreement.usable & ~stays)
 
 
 @dataclass(frozen=True)
@@ -564,9 +542,8 @@ class Round:
         unchanged = mark_unchanged(visits, reasons, self.setting.options)
         self._guard(reasons, strays)
         usable = reasons.none
-        agreement, change, both = self._agreement(usable)
-        cell = self.setting.cell
-        stay = must_stay(visits, agreement, change, self._trusted, cell)
+        settled = self._settled(usable)
+        agreement, stay = settled.agreement, settled.stay
         chosen, unsafe = mark_disagreement(
             visits, agreement, stay, self.setting.cell, reasons
         )
@@ -578,13 +555,15 @@ class Round:
         values = np.array(visits.values)
         values[corrected] = agreement.values[agreement.group[corrected]]
         move_dependants(visits, agreement, chosen, values)
+        literals, new = agreement.literal[chosen], agreement.values[chosen]
+        values = shifted_values(visits, literals, new, values)
         return Proposal(
-            agreement.literal[chosen],
-            agreement.values[chosen],
+            literals,
+            new,
             corrected,
             self._decisions(status, reasons, values),
             usable,
-            both,
+            settled.change,
             agreement.literal[np.any([*stay.values()], axis=0)],
         )
 
@@ -625,13 +604,46 @@ class Round:
         out: Bools = ~np.any([left, *self.solved.outside.values()], axis=0)
         return out
 
-    def _agreement(self, usable: Bools) -> tuple[Agreement, Floats, Floats]:
-        """Compare the arrivals that can be corrected.
+    def _settled(self, usable: Bools) -> Settled:
+        """Compare arrivals, until the shifts that make up for points do so for sure.
+
+        A shift that cannot moves along with its point, which may have to stay for it.
+        """
+        visits, limit = self.reading.visits, self.setting.cell.limits.agree_mm
+        numbers, change, both = self._needed()
+        points = agree(visits.literal, usable, numbers, both)
+        shifts, lost = own_shifts(visits), np.zeros(len(points.literal), dtype=bool)
+        absorbing = shifts & points.usable[points.group] if shifts.any() else shifts
+        while True:
+            stay = self._must_stay(points, change, absorbing)
+            found = Settled(points, stay, both)
+            if not shifts.any():
+                return found
+            stay |= {NOT_ABSORBED: lost} if lost.any() else {}
+            free = found.together(limit)
+            free[points.group[shifts]] = False  # what is left are points
+            own = absorb(visits, usable, numbers, both, points, free, limit)
+            found = Settled(own.agreement, stay | own.stay, own.change)
+            failed = absorbing & ~found.together(limit)[points.group]
+            if not failed.any():
+                return found
+            lost = np.array(lost)
+            lost[points.group[failed]] = True
+            absorbing = absorbing & ~failed
+
+    def _must_stay(
+        self, agreement: Agreement, change: Floats, absorbing: Bools
+    ) -> dict[str, Bools]:
+        """Find literals that must keep their values, see `must_stay`."""
+        visits, cell = self.reading.visits, self.setting.cell
+        return must_stay(visits, agreement, change, self._trusted, cell, absorbing)
+
+    def _needed(self) -> tuple[Floats, Floats, Floats]:
+        """Say what arrivals need, and what must agree.
 
         Returns:
-            What they have in common at every literal; what every visit would be
-            corrected by, (n, 3) [mm], and the same with turns beside it where tools
-            are turned, (n, k) [mm].
+            Corrected numbers, (n, w); what every visit would be corrected by, (n, 3)
+            [mm], and the same with turns beside it where tools are turned, (n, k) [mm].
         """
         visits, solved = self.reading.visits, self.solved
         plan, arm = self.planned.plan, self.setting.cell.arm
@@ -646,7 +658,7 @@ class Round:
             poses = (visits.target == Meaning.POSE)[:, None]
             anew = np.where(poses, numbers[:, flags] - visits.values[:, flags], 0.0)
             both = np.concatenate([both, anew * FLAG_MM], axis=1)
-        return agree(visits.literal, usable, numbers, both), change, both
+        return numbers, change, both
 
     def _decisions(self, status: Ints, reasons: Reasons, values: Floats) -> Decisions:
         """Say what was decided for every visit, but for standard errors."""

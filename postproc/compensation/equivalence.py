@@ -20,7 +20,7 @@ NO_CLONES: Mapping[int, str] = MappingProxyType({})
 
 _OTHERWISE = frozenset(
     "line values literal literals follows config configs name names reason reasons"
-    .split()
+    " shift shifts".split()
 )  # fmt: skip
 """Columns that edits change, that are numbered anew, or that speak of lines."""
 
@@ -60,6 +60,8 @@ def equivalent(
 
 def _same_literals(v: Visits, w: Visits, clones: Mapping[int, str]) -> bool:
     """Tell whether visits share literals as they did, but for those of clones."""
+    if not _same(v.shift >= 0, w.shift >= 0):
+        return False
     if not clones:
         return _same(v.literal, w.literal) and _same(v.follows, w.follows)
     if not np.array_equal(v.literal < 0, w.literal < 0):
@@ -80,7 +82,7 @@ def _other_number(v: Visits, w: Visits, edited: Ints, values: Floats) -> str:
         wanted, read = values[rows], w.values[rows]
         if not _same(v.values[rows][kept], read[kept]):
             return "a target changed that was to be kept"
-        computed = v.follows[rows] >= 0
+        computed = (v.follows[rows] >= 0) | (v.shift[rows] >= 0)
         if not _same(wanted[~computed], read[~computed]):
             return "a number does not read as it was meant"
         own = wanted[computed], read[computed]

@@ -14,6 +14,7 @@ from postproc.compensation.equivalence import equivalent
 from postproc.compensation.parallel import in_background
 from postproc.compensation.program import Reading
 from postproc.compensation.record import FileRecord, Sidecar, block_checksums, sha256
+from postproc.compensation.shifts import shifted_values
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
 from postproc.language.rewrite import Skeleton, difference
@@ -161,13 +162,14 @@ def read_back(visits: Visits, edited: Ints, edits: Sequence[Replacements]) -> Fl
     """
     values = np.array(visits.values)
     new, changed = edited_numbers(visits.literals, edited, edits)
-    rows, at = _among(visits.literal, edited)
+    plain = visits.shift < 0
+    rows, at = _among(visits.literal, edited, plain)
     values[rows] = np.where(changed[at], new[at], values[rows])
     moved = np.zeros((len(edited), visits.values.shape[1]))
     moved[at] = values[rows] - visits.values[rows]
-    rows, at = _among(visits.follows, edited)
+    rows, at = _among(visits.follows, edited, plain)
     values[rows] += moved[at]
-    return values
+    return shifted_values(visits, edited, np.where(changed, new, np.nan), values)
 
 
 def edited_numbers(
@@ -195,13 +197,13 @@ def edited_numbers(
     return new, changed
 
 
-def _among(column: Ints, edited: Ints) -> tuple[Ints, Ints]:
-    """Find the visits of edited literals, and which each has."""
+def _among(column: Ints, edited: Ints, some: Bools) -> tuple[Ints, Ints]:
+    """Find those of some visits that have edited literals, and which each has."""
     if len(edited) == 0:
         none = np.empty(0, dtype=np.int64)
         return none, none
     at = np.minimum(np.searchsorted(edited, column), len(edited) - 1)
-    rows = np.flatnonzero(edited[at] == column)
+    rows = np.flatnonzero((edited[at] == column) & some)
     return rows, at[rows]
 
 

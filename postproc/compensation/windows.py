@@ -30,6 +30,7 @@ TABLES = {
     "uframe": "frames",
     "reason": "reasons",
     "load": "loads",
+    "shift": "shifts",
     "block": "line",
     "pred": "line",
     "pred_start": "pred",
@@ -147,7 +148,7 @@ STEPS = (
 )  # fmt: skip
 SHARED = {
     "files", "configs", "names", "frames", "frame_taught", "reasons", "loads",
-    "pred_start", "pred", "literals", "dialect",
+    "pred_start", "pred", "literals", "dialect", "shifts",
 }  # fmt: skip
 
 
@@ -194,7 +195,7 @@ class Window:
             for f in fields(Visits)
             if f.name not in SHARED
         }
-        for name in ("literal", "follows"):
+        for name in ("literal", "follows", "shift"):
             values[name] = np.array(values[name])
             values[name][: self.seeds] = -1
         block = values["block"]

@@ -14,6 +14,7 @@ from postproc.arrays import Floats, Interned, Ints, slim
 from postproc.language.dialect import Dialect
 from postproc.language.machine import Scope, TaskMachine
 from postproc.language.marks import MEASURE, Comments
+from postproc.language.shifts import Shift
 from postproc.language.statements import StatementText
 from postproc.language.visits import (
     Blend,
@@ -54,6 +55,24 @@ def cell_pose(record: Sequence[float] | None) -> Pose:
 
 
 @dataclass(frozen=True)
+class FoundShift:
+    """How a move shifts the point that it names, and where that is written.
+
+    Attributes:
+        shift: The shift.
+        file: Index of the file that holds its numbers.
+        slots: Which numbers of that file they are, w as of a target, -1 where nothing
+            is written; the first one is -1 where the shift keeps its numbers.
+        pins: Why they must stay, "" where they need not.
+    """
+
+    shift: Shift
+    file: int = -1
+    slots: tuple[int, ...] = (-1,)
+    pins: str = ""
+
+
+@dataclass(frozen=True)
 class FoundGoal:
     """Where a move goes.
 
@@ -69,6 +88,7 @@ class FoundGoal:
         why: Why it cannot be compensated, "" where it can.
         pins: Why the numbers must stay, "" where they need not.
         shared: Other programs may read it too.
+        shift: How it is shifted from a point, None where it is not, or not known.
     """
 
     target: Meaning
@@ -81,6 +101,28 @@ class FoundGoal:
     why: str = ""
     pins: str = ""
     shared: bool = False
+    shift: FoundShift | None = None
+
+    @property
+    def writes(self) -> tuple[int, tuple[int, ...]]:
+        """The file and the numbers in it that may be written anew for this move."""
+        if self.is_rewritten_by_shift:
+            assert self.shift is not None
+            return self.shift.file, self.shift.slots
+        return self.file, self.slots
+
+    @property
+    def is_rewritten_by_shift(self) -> bool:
+        """Whether it is the numbers of the shift that may be written anew."""
+        return self.shift is not None and self.shift.slots[0] >= 0
+
+    @property
+    def point(self) -> tuple[int, int]:
+        """The file of its point, or the point that it is shifted from, and its place.
+
+        The place is that of the first number, -1 where it is not written.
+        """
+        return self.file, max(self.slots[0], self.follows[0])
 
 
 def not_reached(goal: FoundGoal, why: str) -> FoundGoal:
@@ -238,6 +280,7 @@ def visits_of(
         measure_id=tuple(_measured(found, texts, comments, moves)),
         literals=literals,
         dialect=dialect,
+        **_shifts(found),
         load=slim(np.array(loads.of([c.load or NO_LOAD for c in held]), np.int64)),
         loads=np.array(list(loads), float).reshape(-1, 4),
     )  # fmt: skip
@@ -360,30 +403,64 @@ def _literals(
     rows: list[FoundVisit] = []
     literal = np.full(len(found), -1, dtype=np.int64)
     for k, v in enumerate(found):
-        key = v.goal.file, v.goal.slots[0]
-        if key[1] >= 0:
-            if key not in index:
-                index[key] = len(rows)
+        file, slots = v.goal.writes
+        if slots[0] >= 0:
+            if (file, slots[0]) not in index:
+                index[file, slots[0]] = len(rows)
                 rows.append(v)
-            literal[k] = index[key]
+            literal[k] = index[file, slots[0]]
+    pinned = _pinned(found, rows, index, other)
+    taught = _taught(found, literal, len(rows), machine, comments)
+    literals = _places(rows, machine, pinned, taught, width)
+    return literals, literal, _followed(found, index)
+
+
+def _followed(
+    found: Sequence[FoundVisit], index: Mapping[tuple[int, int], int]
+) -> Ints:
+    """Find the literals that computed targets move along with, (n,), -1 for none.
+
+    Where a shift can make up for all, the point need be no move's own.
+    """
     follows = np.full(len(found), -1, dtype=np.int64)
+    for k, v in enumerate(found):
+        if v.goal.slots[0] < 0 <= v.goal.follows[0]:
+            none = -1 if v.goal.is_rewritten_by_shift else _NO_LITERAL
+            known = v.goal.target == Meaning.POSE
+            follows[k] = index.get(v.goal.point, none) if known else -1
+    return follows
+
+
+def _pinned(
+    found: Sequence[FoundVisit],
+    rows: Sequence[FoundVisit],
+    index: Mapping[tuple[int, int], int],
+    other: Sequence[tuple[FoundGoal, str]],
+) -> list[str]:
+    """Say why literals must stay, "" where they need not; args as of `_literals`."""
     goals = [(v.goal, ANY_ELEMENT.format(v.goal.name)) for v in found]
     elements = {goal.name: why for goal, why in (*goals, *other) if _is_loose(goal)}
-    stays = {(g.file, max(g.slots[0], g.follows[0])): why for g, why in other}
-    pinned = [
-        stays.get((v.goal.file, v.goal.slots[0]), "")
-        or elements.get(_array_of(v.goal.name), "")
-        for v in rows
-    ]
-    for k, v in enumerate(found):
-        key = v.goal.file, max(v.goal.slots[0], v.goal.follows[0])
-        at = index.get(key, -1)
-        if v.goal.slots[0] < 0 <= v.goal.follows[0]:
-            known = v.goal.target == Meaning.POSE
-            follows[k] = (at if at >= 0 else _NO_LITERAL) if known else -1
+    stays = {goal.point: why for goal, why in other}
+    stays |= {(f, slots[0]): why for g, why in other for f, slots in [g.writes]}
+    pinned = []
+    for v in rows:
+        file, slots = v.goal.writes
+        shift = v.goal.shift if v.goal.is_rewritten_by_shift else None
+        own = elements.get(_array_of(v.goal.name), "") if shift is None else shift.pins
+        pinned.append(stays.get((file, slots[0]), "") or own)
+    for v in found:
+        at = index.get(v.goal.point, -1)
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
-    return _places(rows, machine, pinned, width, comments), literal, follows
+    return pinned
+
+
+def _shifts(found: Sequence[FoundVisit]) -> dict[str, Any]:
+    """Columns of how targets are shifted from points."""
+    own = [v.goal.shift if v.goal.target == Meaning.POSE else None for v in found]
+    shifts = Interned[Shift]()
+    rows = [-1 if one is None else shifts[one.shift] for one in own]
+    return {"shift": slim(np.array(rows, np.int64)), "shifts": tuple(shifts)}
 
 
 def _goals_beside(
@@ -418,13 +495,15 @@ def _places(
     rows: Sequence[FoundVisit],
     machine: TaskMachine,
     pinned: Sequence[str],
+    taught: Sequence[bool],
     width: int,
-    comments: Comments,
 ) -> Literals:
     """Say where the numbers of literals stand."""
     m = len(rows)
-    file = np.array([v.goal.file for v in rows], np.int64)
-    slots = np.array([v.goal.slots for v in rows], np.int64).reshape(m, width)
+    held = [v.goal.writes for v in rows]
+    shifts = [v.goal.is_rewritten_by_shift for v in rows]
+    file = np.array([at for at, _ in held], np.int64)
+    slots = np.array([own for _, own in held], np.int64).reshape(m, width)
     start, end = np.full((m, width), -1), np.full((m, width), -1)
     line = np.zeros(m, dtype=np.int64)
     for number, one in enumerate(machine.texts):
@@ -434,21 +513,51 @@ def _places(
         end[mine] = np.where(written, np.append(one.stop, -1)[own], -1)
         starts = one.source.line_starts
         line[mine] = np.searchsorted(starts, start[mine, 0], side="right")
-    lines = [comments.taught(text.source) for text in machine.texts]
-    taught = [
-        _is_named(v.goal.name, machine.start.taught) or at in lines[v.goal.file]
-        for v, at in zip(rows, line.tolist(), strict=True)
-    ]
     return Literals(
         file=file,
         line=line,
         places=NumberPlaces.of(start, end),
         joints=np.array([v.goal.target == Meaning.JOINTS for v in rows], bool),
         name=tuple(v.goal.name for v in rows),
-        shared=np.array([v.goal.shared for v in rows], bool),
+        shared=np.array(
+            [v.goal.shared and not own for v, own in zip(rows, shifts, strict=True)],
+            bool,
+        ),
         taught=np.array(taught, bool),
         pinned=tuple(pinned),
     )
+
+
+def _taught(
+    found: Sequence[FoundVisit],
+    literal: Ints,
+    count: int,
+    machine: TaskMachine,
+    comments: Comments,
+) -> list[bool]:
+    """Tell which literals are those of taught points, or of targets shifted from one.
+
+    Args:
+        found: The visits.
+        literal: The literal of each, -1 where it has none.
+        count: Number of literals.
+        machine: It has followed all ways.
+        comments: How the language writes them.
+    """
+    lines = [comments.taught(text.source) for text in machine.texts]
+    starts = [text.source.line_starts for text in machine.texts]
+    out = [False] * count
+    for v, own in zip(found, literal.tolist(), strict=True):
+        if own < 0 or out[own]:
+            continue
+        file, slots = v.goal.writes
+        places = {(file, slots[0]), v.goal.point}
+        at = ((f, int(machine.texts[f].start[slot])) for f, slot in places if slot >= 0)
+        out[own] = _is_named(v.goal.name, machine.start.taught) or any(
+            int(np.searchsorted(starts[f], begin, side="right")) in lines[f]
+            for f, begin in at
+        )
+    return out
 
 
 def _is_named(name: str, names: Collection[str]) -> bool:

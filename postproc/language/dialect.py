@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+import numpy as np
+
 from postproc.arrays import Bools, Floats, Ints
 
 
@@ -91,6 +93,32 @@ class Dialect(ABC):
             values: Numbers of poses, (k, w).
             by: Rotations in the frame of the numbers, (k, 3, 3).
         """
+
+    def shift_rotations(self, angles: Floats) -> Floats:
+        """Return the rotations (k, 3, 3) that the angles (k, 3) [deg] of shifts say.
+
+        About x, about y as it is turned then, and about z likewise.
+        """
+        a, b, c = np.moveaxis(np.deg2rad(angles), -1, 0)
+        ca, sa, cb, sb, cc, sc = (f(x) for x in (a, b, c) for f in (np.cos, np.sin))
+        R = np.empty((*a.shape, 3, 3))
+        R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cb * cc, -cb * sc, sb
+        R[..., 1, 0], R[..., 1, 1] = sa * sb * cc + ca * sc, ca * cc - sa * sb * sc
+        R[..., 2, 0], R[..., 2, 1] = sa * sc - ca * sb * cc, ca * sb * sc + sa * cc
+        R[..., 1, 2], R[..., 2, 2] = -sa * cb, ca * cb
+        return R
+
+    def shift_angles(self, rotations: Floats, near: Floats) -> Floats:
+        """Return the angles of rotations (k, 3, 3) next to others (k, 3) [deg]."""
+        R = rotations
+        b = np.arctan2(R[:, 0, 2], np.hypot(R[:, 0, 0], R[:, 0, 1]))
+        a, c = np.arctan2(-R[:, 1, 2], R[:, 2, 2]), np.arctan2(-R[:, 0, 1], R[:, 0, 0])
+        one = np.rad2deg(np.stack([a, b, c], axis=1))
+        other = np.array([180.0, 180.0, 180.0]) + one * np.array([1.0, -1.0, 1.0])
+        both = np.stack([one, other])
+        both -= 360.0 * np.round((both - near) / 360.0)
+        gap = np.abs(both - near).max(axis=2)
+        return np.asarray(np.where((gap[0] <= gap[1])[:, None], both[0], both[1]))
 
     @abstractmethod
     def flags(

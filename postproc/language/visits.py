@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from postproc.arrays import Bools, Floats, Indices, Ints, chunks, narrow, read_only
 from postproc.diagnostics import Code
 from postproc.language.dialect import Dialect
+from postproc.language.shifts import ANGLES, Shift, Shifts
 
 START = -1  # predecessor: wherever the arm stands when the program starts
 NO_VALUE = "it has no value in the program or its variable file"  # ends a reason
@@ -257,6 +258,9 @@ class Visits:
         loads: Loads that the program states: mass [kg] and its centre in the flange
             frame [m], (k, 4), NaN for what it does not state; loads[0] states nothing.
         weaves: The tool weaves on the way, or may, (n,).
+        shift: Index into `shifts`, (n,), -1 where the move shifts no point. Where such
+            a visit has a literal, it is that of the numbers of its shift.
+        shifts: How moves shift the points that they name.
     """
 
     files: tuple[str, ...]
@@ -306,9 +310,15 @@ class Visits:
     load: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     loads: Floats = field(default_factory=lambda: np.full((1, 4), np.nan))
     weaves: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    shift: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    shifts: tuple[Shift, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, nothing in (("load", np.int8(0)), ("weaves", np.False_)):
+        for name, nothing in (
+            ("load", np.int8(0)),
+            ("weaves", np.False_),
+            ("shift", np.int8(-1)),
+        ):
             if len(getattr(self, name)) != len(self.line):
                 none = np.broadcast_to(nothing, (len(self.line),))
                 object.__setattr__(self, name, none)
@@ -321,6 +331,21 @@ class Visits:
     def predecessors(self, visit: int) -> Ints:
         """Return the possible predecessors of a visit."""
         return self.pred[self.pred_start[visit] : self.pred_start[visit + 1]]
+
+    @cached_property
+    def shifted(self) -> Shifts:
+        """The targets that are shifted from points, in columns."""
+        rows = np.flatnonzero(self.shift >= 0)
+        own = [self.shifts[k] for k in self.shift[rows].tolist()]
+        literal = self.literal[rows].astype(np.int64)
+        turns = np.zeros(len(rows), dtype=bool)
+        has = np.flatnonzero(literal >= 0)
+        written = self.literals.places.length[literal[has], ANGLES] > 0
+        turns[has] = written.all(axis=1)
+        return Shifts.of(
+            rows, own, literal, self.follows[rows].astype(np.int64),
+            self.values[rows], turns, self.dialect,
+        )  # fmt: skip
 
     @cached_property
     def before(self) -> Ints:

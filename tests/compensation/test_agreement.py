@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from postproc.compensation.decide import agree
+from postproc.compensation.agreement import agree
 
 
 def test_groups_by_literal():

@@ -50,6 +50,7 @@ def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int
             "an end of it is taught: it contains the arm's error",
         ),
         (~(ends & ends[before]), "its ends are not both corrected poses"),
+        (v.shift >= 0, "its end is shifted from a point"),
         (v.weaves, "it weaves, or may: what is counted along it would begin anew"),
         (v.load > 0, "the program states what the arm carries on it"),
         (~alike, "it begins with other frames or configuration flags"),

@@ -88,6 +88,14 @@ class KrlNumbers(Dialect):
         out[:, ANGLES] = np.rad2deg(new)
         return out
 
+    def shift_rotations(self, angles: Floats) -> Floats:
+        """Return the rotations of A, B, C (k, 3) [deg], see `Dialect`."""
+        return rotation_from_abc(np.deg2rad(angles))
+
+    def shift_angles(self, rotations: Floats, near: Floats) -> Floats:
+        """Return A, B, C of rotations, see `Dialect`."""
+        return np.rad2deg(abc_from_rotation(rotations, np.deg2rad(near)))
+
     def flags(
         self, config: Ints, configs: tuple[str, ...], values: Floats
     ) -> tuple[Ints, Floats]:

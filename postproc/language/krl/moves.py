@@ -9,7 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from postproc.language.collect import FoundGoal, FoundVisit, not_reached
+from postproc.language.collect import (
+    FoundGoal,
+    FoundShift,
+    FoundVisit,
+    not_reached,
+)
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import (
     COMPONENTS,
@@ -29,6 +34,7 @@ from postproc.language.krl.task import (
     KrlTask,
 )
 from postproc.language.machine import Scope
+from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.visits import NO_TARGET, Meaning
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
@@ -370,11 +376,38 @@ class _Goal:
                 name=base.name, why=NO_STATUS, pins=pins,
             )  # fmt: skip
         values, turns = _linked(base.values, shift, behind)
-        pins = base.pins or (f"{base.name} is turned too" if turns else "")
+        found = self._shift(base, other, shift, behind)
+        turned = turns and found.slots[0] < 0
+        pins = base.pins or (f"{base.name} is turned too" if turned else "")
         return FoundGoal(
             Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name, base.aux,
-            base.why, pins, base.shared,
+            base.why, pins, base.shared, found,
         )  # fmt: skip
+
+    def _shift(
+        self, base: FoundGoal, other: said.Operand, frame: KrlFrame, behind: bool
+    ) -> FoundShift:
+        """Say how a point is shifted, and where the numbers of that stand.
+
+        Those of data may serve other moves and sums too: they stay.
+        """
+        value = self.task.value(other, self.row, self.here)
+        record = value if isinstance(value, KrlRecord) else KrlRecord(())
+        numbers = _numbers(record, PLACE)
+        told = [n.value for n in numbers] if numbers else _six_numbers(frame)
+        kind = ShiftKind.OWN if behind else ShiftKind.FRAME
+        shift = Shift(kind, tuple(told), base.values, flagged=not behind)
+        written = isinstance(other, said.KrlAggregate) and numbers is not None
+        file, slots = _places(numbers) if numbers and written else (-1, ())
+        if base.why or base.slots[0] < 0 or file != self.here.file:
+            return FoundShift(shift)
+        return FoundShift(shift, file, (*slots, -1, -1), self._system(file))
+
+    def _system(self, file: int) -> str:
+        """Say that numbers stand in a system file, "" where they do not."""
+        if not self.task.files[file].is_system:
+            return ""
+        return "it stands in a system file, which is read and not rewritten"
 
     def _is_point(self, operand: said.DataObject) -> bool:
         """Tell whether data is a position, and no frame."""
@@ -435,6 +468,13 @@ def _places(numbers: Sequence[KrlNumber]) -> tuple[int, tuple[int, ...]]:
     if len(files) != 1 or -1 in files:
         return -1, (-1,) * len(numbers)
     return files.pop(), tuple(one.slot for one in numbers)
+
+
+def _six_numbers(frame: KrlFrame) -> list[float]:
+    """Return X, Y, Z [mm] and A, B, C [deg] of a frame."""
+    pose = np.array(frame.pose).reshape(4, 4)
+    angles = abc_from_rotation(pose[None, :3, :3], np.zeros((1, 3)))[0]
+    return [*(pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist()]
 
 
 def _linked(

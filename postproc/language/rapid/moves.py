@@ -13,6 +13,7 @@ from postproc.files import is_system_module
 from postproc.language.collect import (
     IDENTITY,
     FoundGoal,
+    FoundShift,
     FoundVisit,
     Pose,
     composed,
@@ -35,6 +36,7 @@ from postproc.language.rapid.task import (
     RapidTask,
     WrittenNumber,
 )
+from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
@@ -209,6 +211,7 @@ class Goals:
         scope: Scope,
     ) -> FoundGoal:
         """Read a destination."""
+        written = operand
         operand, row, scope = self.task.behind(operand, row, scope)
         match operand:
             case said.Composite() | said.DataObject():
@@ -218,7 +221,9 @@ class Goals:
                 and name not in self.task.routines
                 and not signature.joints
             ):
-                return self._shifted(name, arguments, row, scope)
+                shifted = self._shifted(name, arguments, row, scope)
+                own = operand is written  # not given to a routine, which may read it
+                return shifted if own else _fixed(shifted)
             case _:
                 return FoundGoal(Meaning.UNKNOWN, NOTHING, why=RUN_TIME)
 
@@ -366,11 +371,37 @@ class Goals:
             )  # fmt: skip
         values = _moved(np.array(base.values), name, shift, angles)
         turned = any(angles)
-        pins = base.pins or (f"{name} turns it" if turned else "")
+        kind = ShiftKind.AXES if name == "offs" else ShiftKind.OWN
+        found = self._found_shift(
+            Shift(kind, (*shift, *angles), base.values), base, [*placed[1:], *(
+                turns.get(axis) for axis in ("rx", "ry", "rz")
+            )], row, scope,
+        )  # fmt: skip
+        fixed = found.slots[0] < 0
+        pins = base.pins or (f"{name} turns it" if turned and fixed else "")
         return FoundGoal(
             Meaning.POSE, values, base.file, NO_SLOTS, _from(base), base.name, base.aux,
-            base.why, pins,
+            base.why, pins, shift=found,
         )  # fmt: skip
+
+    def _found_shift(
+        self,
+        shift: Shift,
+        base: FoundGoal,
+        numbers: Sequence[said.Operand | None],
+        row: int,
+        scope: Scope,
+    ) -> FoundShift:
+        """Say where the numbers of a shift stand, nowhere where they must stay."""
+        if base.shift is not None:
+            shift = shift.around(base.shift.shift, RAPID_DIALECT)
+        first = int(self.task.files[scope.file].text.first[row])
+        slots = [first + n.slot if isinstance(n, said.Num) else -1 for n in numbers]
+        if base.why or _from(base)[0] < 0 or not _is_written(numbers):
+            return FoundShift(shift)
+        rest = (-1,) * (WIDTH - len(slots))
+        pins = self._system(scope.file)
+        return FoundShift(shift, scope.file, (*slots, *rest), pins)
 
     # Tools and work objects.
 
@@ -412,6 +443,23 @@ class Goals:
             why = f"{name} {self._untold(name, arguments.scope)}"
             return FrameOfMove((), kind == "tool", why)
         return replace(read, taught=self.task.is_taught(name, found))
+
+
+def _is_written(numbers: Sequence[said.Operand | None]) -> bool:
+    """Tell whether x, y, z, and all angles that are there, are written as numbers."""
+    own = [isinstance(one, said.Num) for one in numbers]
+    return all(own[:3]) and all(
+        one is None or known for one, known in zip(numbers, own, strict=True)
+    )
+
+
+def _fixed(goal: FoundGoal) -> FoundGoal:
+    """Return a shifted goal whose shift keeps its numbers."""
+    if goal.shift is None:
+        return goal
+    turned = any(goal.shift.shift.numbers[3:])
+    pins = goal.pins or ("it is shifted and turned" if turned else "")
+    return replace(goal, shift=FoundShift(goal.shift.shift), pins=pins)
 
 
 def _from(base: FoundGoal) -> tuple[int, ...]:

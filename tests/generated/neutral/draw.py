@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tests.generated.neutral.text import SHIFTS
 from tests.generated.neutral.tree import (
     Ask,
     Assign,
@@ -79,6 +80,7 @@ class Draw:
         self.made = Program()
         self.features = {name for name in FEATURES if self.rng.random() < 0.5}
         self.marks = 0
+        self.shifts = 0
         self.inputs = seed % 2 == 1  # every other program has no inputs
         self.own: tuple[str, ...] = ()
         self.given: tuple[str, ...] = ()  # points that are arguments
@@ -253,7 +255,8 @@ class Draw:
                 return Element("row", Var(f"i{self.loops}"))
             case "offset" | "tool":
                 by = self._offset()
-                return Shifted(self._fixed(), by, kind == "tool")
+                self.shifts += 1
+                return Shifted(self._fixed(), by, kind == "tool", SHIFTS + self.shifts)
             case "fresh":
                 name = f"q{len(self.made.points)}"
                 self.made.points[name] = (self._literal(), self.file)

@@ -465,8 +465,10 @@ class Writer:
                 return f"{name}[{number_text(index)}]"
             case Inline(number):
                 return self._literal(number)
-            case Shifted(inner, by, in_tool):
+            case Shifted(inner, by, in_tool, mark):
                 shift = self._shift(by)
+                if mark and isinstance(by[2], int):
+                    shift = literal(mark, shift)
                 own = self._point(inner)
                 return f"{own}:{shift}" if in_tool else f"{shift}:{own}"
             case Made(name, argument):

@@ -368,8 +368,9 @@ class Writer:
                 return f"{name}{{{number_text(index)}}}"
             case Inline(number):
                 return self._literal(number)
-            case Shifted(inner, by, in_tool):
+            case Shifted(inner, by, in_tool, mark):
                 mm = ",".join(number_text(one) for one in by)
+                mm = literal(mark, mm) if mark and isinstance(by[2], int) else mm
                 return f"{'RelTool' if in_tool else 'Offs'}({self._point(inner)},{mm})"
             case Made(name, argument):
                 return f"{name}({number_text(argument)})"

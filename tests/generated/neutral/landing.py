@@ -29,7 +29,7 @@ from tests.generated.neutral import in_krl, in_rapid
 from tests.generated.neutral.draw import Draw
 from tests.generated.neutral.follow import follow
 from tests.generated.neutral.run import Run, Step
-from tests.generated.neutral.text import Printed
+from tests.generated.neutral.text import SHIFTS, Printed
 from tests.generated.neutral.tree import Program
 from tests.made_visits import visits as made_visits
 
@@ -56,8 +56,11 @@ class Case:
     def steps(self, outputs: Mapping[str, bytes], seed: int) -> list[Step]:
         """Run it with the numbers that stand in a text of it."""
         read = in_rapid.poses if self.rapid else in_krl.poses
-        literals = read(self.text.numbers(outputs), self.made)
-        return Run(self.made, literals, seed, self.rapid).run()
+        numbers = self.text.numbers(outputs)
+        shifts = {k: own[:3] for k, own in numbers.items() if k > SHIFTS}
+        points = {k: own for k, own in numbers.items() if k <= SHIFTS}
+        literals = read(points, self.made)
+        return Run(self.made, literals, shifts, seed, self.rapid).run()
 
 
 def case(seed: int, language: str, cell: Cell) -> Case:

@@ -159,14 +159,21 @@ class Run:
     Args:
         made: The program.
         literals: What the numbers in its text say.
+        shifts: The numbers of its shifts that stand in the text [mm], by mark.
         seed: Of the inputs.
         rapid: Whether it is run as RAPID or as KRL.
     """
 
     def __init__(
-        self, made: Program, literals: Mapping[int, np.ndarray], seed: int, rapid: bool
+        self,
+        made: Program,
+        literals: Mapping[int, np.ndarray],
+        shifts: Mapping[int, Sequence[float]],
+        seed: int,
+        rapid: bool,
     ) -> None:
         self.made, self.literals, self.rapid = made, literals, rapid
+        self.shifts = shifts
         self.rng = random.Random(f"inputs:{seed}")
         self.steps: list[Step] = []
         self.left = STEPS
@@ -394,9 +401,9 @@ class Run:
                 return self._literal(self.made.arrays[name][self._number(index) - 1])
             case Inline(number):
                 return self._literal(number)
-            case Shifted(inner, by, in_tool):
+            case Shifted(inner, by, in_tool, mark):
                 old = self._place(inner)
-                mm = [self._number(one) for one in by]
+                mm = self.shifts.get(mark) or [self._number(one) for one in by]
                 value = shifted(old.value, mm, in_tool)
                 return replace(old, value=value, computed=True)
             case Made(name, argument):

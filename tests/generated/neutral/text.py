@@ -11,6 +11,7 @@ import numpy as np
 NUMBER = re.compile(r"(?<![\w.$])-?\d+(?:\.\d+)?(?:E[+-]?\d+)?")
 _OPEN = re.compile("\x01(\\d+)\x02")
 _MARKS = re.compile("\x01\\d+\x02|\x03")
+SHIFTS = 1_000_000  # marks of the numbers of shifts begin behind this one
 Place = tuple[str, int, int]  # a file, the first number and how many
 
 

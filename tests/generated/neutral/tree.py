@@ -98,11 +98,15 @@ class Inline:
 
 @dataclass(frozen=True)
 class Shifted:
-    """A point that is shifted along the axes of the base, or of the tool [mm]."""
+    """A point that is shifted along the axes of the base, or of the tool [mm].
+
+    Its mark tells its numbers apart where they may be written anew; 0: they may not.
+    """
 
     point: Point
     by: tuple[Expr, Expr, Expr]
     in_tool: bool = False
+    mark: int = 0
 
 
 @dataclass(frozen=True)

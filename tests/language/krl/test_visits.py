@@ -188,7 +188,7 @@ def test_the_cell_says_what_holds_at_first():
         (["other(XP1)", "LIN XP1"], "may be changed"),
         (["PTP INVERSE(XP1,XA,I)"], "run"),
         (["LIN XP1:{X I,Y 0,Z 0,A 0,B 0,C 0}", "I=I+1"], "run"),
-        (["LIN XP2:{X 0,Y 0,Z 9,A 0,B 0,C 0}"], "no move goes to"),
+        (["LIN XP2:{X 0,Y 0,Z 4+5,A 0,B 0,C 0}"], "no move goes to"),
         (["PTP_SPLINE", "SPTP XP1", "SPTP XP2", "ENDSPLINE"], "spline of joint"),
         (["SPLINE", "SPTP XP1", "ENDSPLINE"], "spline of joint"),
         (["SPL XP1"], "spline of joint"),
@@ -401,12 +401,12 @@ def test_products_follow_their_point():
     )  # fmt: skip
     v = found.visits
     assert reasons(found) == [""] * 4
-    assert v.literal.tolist() == [0, -1, 1, -1] and v.follows.tolist() == [-1, 0, -1, 1]
+    assert v.literal.tolist() == [0, 1, 2, 3] and v.follows.tolist() == [-1, 0, -1, 2]
     np.testing.assert_allclose(v.values[1, :3], [1, 2, -47])  # XP1 looks down
     np.testing.assert_allclose(v.values[3, :3], [4.5, -5, 56])
     assert set(v.literals.pinned) == {""}
     assert v.values[1, 6:].tolist() == [-1, -1] and v.values[3, 6:].tolist() == [2, 35]
-    turned = job("LIN XP1", "LIN XP1:{X 0,Y 0,Z 5,A 9,B 0,C 0}").visits
+    turned = job("LIN XP1", "LIN XP1:{X 0,Y 0,Z 5,A 4+5,B 0,C 0}").visits
     assert "turned" in turned.literals.pinned[0]
 
 

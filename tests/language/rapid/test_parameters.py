@@ -52,7 +52,7 @@ def test_a_shift_of_a_shift():
     line = "MoveL RelTool(Offs(p2,1,0,0),0,0,-9),v200,fine,t\\WObj:=w;"
     found = once(line, L.format("p2"))
     np.testing.assert_allclose(found.visits.values[0, :3], [5.0, 5.0, 15.0])
-    assert found.visits.follows.tolist() == [0, -1] and free(found, "p2")
+    assert found.visits.follows.tolist() == [1, -1] and free(found, "p2")
 
 
 def test_a_loop_that_counts_what_it_calls_with():

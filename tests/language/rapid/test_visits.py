@@ -108,7 +108,7 @@ def test_frames_zone_and_speed_of_a_move():
         (["MoveL Offs(p1,n,0,0),v200,fine,t\\WObj:=w;"], "run"),
         (["MoveL CRobT(),v200,fine,t\\WObj:=w;"], "run"),
         (["MoveL p1,v200,fine,t\\WObj:=moved;"], "mechanical unit"),
-        (["MoveL Offs(p1,0,0,9),v200,fine,t\\WObj:=w;"], "no move goes to"),
+        (["MoveL Offs(p1,0,0,4+5),v200,fine,t\\WObj:=w;"], "no move goes to"),
     ],
 )
 def test_what_is_not_known_is_left(lines, why):
@@ -286,7 +286,7 @@ def test_shifted_points_follow_theirs():
         L.format("p2"), "MoveL RelTool(p2,0,0,50),v200,fine,t\\WObj:=w;",
     )  # fmt: skip
     v = found.visits
-    assert v.literal.tolist() == [0, -1, 1, -1] and v.follows.tolist() == [-1, 0, -1, 1]
+    assert v.literal.tolist() == [0, 1, 2, 3] and v.follows.tolist() == [-1, 0, -1, 2]
     assert v.values[1, :3].tolist() == [1, 2, 53]
     np.testing.assert_allclose(v.values[3, :3], [4, 5, -44])  # p2 looks down
     assert set(v.literals.pinned) == {""}
@@ -295,7 +295,7 @@ def test_shifted_points_follow_theirs():
 @pytest.mark.parametrize(
     ("lines", "more", "why"),
     [
-        (["MoveL RelTool(p1,0,0,5\\Rz:=9),v200,fine,t\\WObj:=w;"], "", "turns it"),
+        (["MoveL RelTool(p1,0,0,5\\Rz:=4+5),v200,fine,t\\WObj:=w;"], "", "turns it"),
         (["far:=Distance(p1.trans,p2.trans);"], "VAR num far;", "otherwise"),
         (['GetDataVal "p1",q;'], f"VAR robtarget q:=[[1,2,3],[1,0,0,0],{END};", "Get"),
         ([], f"CONST robtarget o_p1:=[[1,2,3],[1,0,0,0],{END};", "original"),

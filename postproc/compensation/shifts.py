@@ -1,0 +1,149 @@
+"""Targets that are shifted from points: what the numbers of a shift must make up for.
+
+The point keeps its own correction, or none, and the numbers in the move absorb the
+difference. So what they should be is told by what the point's numbers become.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.agreement import LEVER_MM, Agreement, agree
+from postproc.language.shifts import ANGLES, NUMBERS, Shifts
+from postproc.language.visits import Visits
+
+TURNS = (
+    "it would be turned otherwise than it must, as its shift keeps the orientation of "
+    "the point"
+)
+FLAGS = "it would need other configuration flags than the point that it is shifted from"
+
+
+@dataclass(frozen=True)
+class Absorbed:
+    """What the shifts of a program are to be.
+
+    Attributes:
+        change: What must agree at every visit, (n, k) [mm].
+        agreement: What arrivals have in common at all literals, those of shifts too.
+        stay: Why the numbers of shifts cannot do it, and which of the m literals of the
+            agreement have each reason, (m,).
+    """
+
+    change: Floats
+    agreement: Agreement
+    stay: dict[str, Bools]
+
+
+def own_shifts(visits: Visits) -> Bools:
+    """Tell which visits have a literal that holds the numbers of a shift, (n,)."""
+    return np.asarray((visits.shift >= 0) & (visits.literal >= 0))
+
+
+def origins(shifts: Shifts, literals: Ints, values: Floats) -> Floats:
+    """Return the numbers that the points of shifts get, (k, w).
+
+    Args:
+        shifts: k shifts.
+        literals: Literals that get new numbers, ascending, (m,).
+        values: Their numbers, (m, w).
+    """
+    out = np.array(shifts.origin)
+    if len(literals) == 0:
+        return out
+    at = np.minimum(np.searchsorted(literals, shifts.follows), len(literals) - 1)
+    rows = np.flatnonzero(literals[at] == shifts.follows)
+    out[rows] = np.where(np.isnan(values[at[rows]]), out[rows], values[at[rows]])
+    return out
+
+
+def absorb(
+    visits: Visits,
+    usable: Bools,
+    numbers: Floats,
+    change: Floats,
+    points: Agreement,
+    chosen: Bools,
+    agree_mm: float,
+) -> Absorbed:
+    """Let the numbers of shifts make up for what their points do not.
+
+    Args:
+        visits: n arrivals.
+        usable: Those that can be corrected, (n,).
+        numbers: Corrected numbers of the targets, (n, w).
+        change: What must agree at a literal, (n, k) [mm].
+        points: What arrivals have in common at the points.
+        chosen: Literals of it that get new numbers, (m,).
+        agree_mm: Changes that differ less are the same.
+    """
+    shifts = visits.shifted
+    new = origins(shifts, points.literal[chosen], points.values[chosen])
+    needed, off = shifts.needed(new, numbers[shifts.rows])
+    own = shifts.literal >= 0
+    rows, numbers = shifts.rows[own], np.array(numbers)
+    stay = {
+        TURNS: ~(off * LEVER_MM <= agree_mm),
+        FLAGS: _other_flags(shifts, shifts.carried(new, needed), numbers),
+    }
+    numbers[rows] = 0.0
+    numbers[rows, :NUMBERS] = needed[own]
+    change = _changes(rows, needed[own] - shifts.numbers[own], change)
+    found = agree(visits.literal, usable, numbers, change)
+    at = {why: np.isin(found.literal, shifts.literal[own & bad])
+          for why, bad in stay.items()}  # fmt: skip
+    return Absorbed(change, found, {why: k for why, k in at.items() if k.any()})
+
+
+def _other_flags(shifts: Shifts, got: Floats, numbers: Floats) -> Bools:
+    """Tell which of k shifted targets get other flags than they need, (k,)."""
+    flags = list(shifts.dialect.flag_columns)
+    return np.asarray((got != numbers[shifts.rows])[:, flags].any(axis=1))
+
+
+def _changes(rows: Ints, moved: Floats, change: Floats) -> Floats:
+    """Say of shifts what must agree: how far their numbers change, turns beside it.
+
+    Args:
+        rows: The visits whose shifts are written, (k,).
+        moved: What their numbers change by, (k, 6).
+        change: What must agree of targets that are written, (n, j) [mm].
+
+    Returns:
+        It for all visits, (n, j + 3) [mm].
+    """
+    out = np.concatenate([change, np.zeros((len(change), 3))], axis=1)
+    out[rows] = 0.0
+    out[rows, :3] = moved[:, :3] + 0.0
+    out[rows, -3:] = np.deg2rad(moved[:, ANGLES]) * LEVER_MM
+    return out
+
+
+def shifted_values(
+    visits: Visits, literals: Ints, values: Floats, numbers: Floats, own: bool = True
+) -> Floats:
+    """Give the numbers of all visits once points and shifts are written, (n, w).
+
+    Args:
+        visits: n arrivals.
+        literals: Literals that get new numbers, ascending, (m,).
+        values: Their numbers, (m, w); NaN where one stays what it is.
+        numbers: Numbers of every visit that count where nothing is shifted, (n, w).
+        own: Shifts get new numbers too; False: they stay, and only points do.
+    """
+    shifts = visits.shifted
+    if len(shifts) == 0 or len(literals) == 0:
+        return numbers
+    new = origins(shifts, literals, values)
+    at = np.minimum(np.searchsorted(literals, shifts.literal), len(literals) - 1)
+    mine = (literals[at] == shifts.literal) & own
+    by = np.array(shifts.numbers)
+    written = values[at[mine], :NUMBERS]
+    by[mine] = np.where(np.isnan(written), by[mine], written)
+    moved = mine | (new != shifts.origin).any(axis=1)
+    out = np.array(numbers)
+    out[shifts.rows[moved]] = shifts.carried(new, by)[moved]
+    return out
