@@ -6,8 +6,12 @@ PYTHONPATH=. python docs/studies/real_arms.py DATA [--jobs 2] [--quick]
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Iterator
+import csv
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
@@ -15,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from data_sets import SHIPPED, DataSet, Rows, Split, descriptions, read_set
+from real_files import fit_of, predict_of, write_fit, write_test
 
 from postproc import __version__
 from postproc.arrays import Floats
@@ -31,6 +36,7 @@ from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.model.model_file import Method
 from postproc.model.statistics import ErrorStatistics
+from postproc.robot.pose import MM
 
 OUT = Path(__file__).parents[1] / "real-arms.md"
 ACCOUNT = SHIPPED / "account.md"  # what was tried, and what came of it
@@ -125,26 +131,68 @@ def trials_of(path: Path, base: Path, quick: bool, traced: bool) -> list[Trial]:
 
 def run(trial: Trial) -> Tried:
     """Fit rows with every method, and judge the rows that are tested."""
-    began = time.process_time()
+    began = spent()
     data = read_once(trial.path, trial.base)
     assert data is not None
     number, draw = trial.draws[0]
     split = data.splits[number]
     inside = split.draws[draw][0]
     rows = data.series[split.fit][thinned(inside, QUICK) if trial.quick else inside]
-    fits = {name: fitted(data, rows, name) for name in ORDER[1:-1]}
+    fits = {name: fitted(data, rows, name) for name in ORDER[1:-2]}
     models = {NOMINAL: without_effects(fits[GEOMETRY].model)}
     models |= {name: found.model for name, found in fits.items()}
-    found = traced(data, fits[DEFAULT]) if trial.traced else None
+    found = traced(data, fitted(data, rows, DEFAULT)) if trial.traced else None
     if found is not None:
         models[TRACED] = found.model
     outcomes = {
         (k, n): {name: judged(m, data, data.splits[k], n) for name, m in models.items()}
         for k, n in trial.draws
     }
-    seconds = time.process_time() - began
+    for at, outcome in by_command_line(trial, data, rows):
+        outcomes[at][DEFAULT] = outcome
+    seconds = spent() - began
     told = None if found is None else found.diagnosis
     return Tried(trial, outcomes, told, len(rows), seconds)
+
+
+def spent() -> float:
+    """Return the processor time of this process and of those it has called [s]."""
+    return sum(os.times()[:4])
+
+
+def by_command_line(
+    trial: Trial, data: DataSet, rows: Measurements
+) -> Iterator[tuple[tuple[int, int], Outcome]]:
+    """Fit and predict as a user does, with files and commands."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        write_fit(data, trial.path, rows, place)
+        call(fit_of(data, place))
+        for k, n in trial.draws:
+            write_test(data, data.splits[k], n, place)
+            call(predict_of(data, data.splits[k], place))
+            yield (k, n), predicted(place / "predicted.csv")
+
+
+def call(arguments: Sequence[str]) -> None:
+    """Run postproc; what it says is shown where it fails."""
+    done = subprocess.run(
+        [Path(sys.executable).with_name("postproc"), *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode not in (0, 1):
+        raise PostprocError(done.stderr)
+
+
+def predicted(path: Path) -> Outcome:
+    """Read residuals and their stated deviations from what `predict` wrote."""
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = [*csv.DictReader(file)]
+    columns = [np.array([[float(row[f"{name}{a}_mm"]) for a in "xyz"] for row in rows])
+               for name in ("r", "reading_s")]  # fmt: skip
+    return Outcome(columns[0] * MM, columns[1] * MM)
 
 
 def thinned(rows: Rows, most: int) -> Rows:
@@ -246,8 +294,8 @@ are not part of the project; every set below says where they come from.
 *{nominal}* is the arm as its maker gives it; *{geometry}* has its
 lengths and angles fitted; the next five are [published methods](reproduction.md)
 (40 neurons, seed 0; kriging of {centres} rows at the most, evenly taken);
-*{default}* is `postproc fit`{after}. Errors are distances in
-mm. *Intervals hold* is the share of coordinates in the 95 % interval that is stated
+*{default}* is `postproc fit` and `postproc predict`, on files{after}.
+Errors are distances in mm. *Intervals hold* is the share of coordinates in the 95 % interval that is stated
 for them (of a published method: by ten folds of cross-validation). Published maps
 of the position error hold for the probe that they were fitted with, at its place;
 another series may have another.

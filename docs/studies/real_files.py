@@ -14,7 +14,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from data_sets import SHIPPED, DataSet, descriptions, read_set
+from data_sets import SHIPPED, DataSet, Split, descriptions, read_set
 
 from postproc.calibration.measurements import Measurements
 from postproc.robot.pose import MM
@@ -56,29 +56,52 @@ def _numbers(values: np.ndarray) -> list[str]:
 
 def write_set(data: DataSet, path: Path, folder: Path) -> list[str]:
     """Write the files of a set, and return its commands."""
-    about, commands = data.about, []
+    commands = []
+    for k, split in enumerate(data.splits):
+        for n, (inside, _) in enumerate(split.draws):
+            place = folder / f"{path.stem}-{k + 1}-{n + 1}"
+            write_fit(data, path, data.series[split.fit][inside], place)
+            write_test(data, split, n, place)
+            commands.append(f"# {data.about.name}: {split.title}")
+            for one in (fit_of(data, place), predict_of(data, split, place)):
+                commands.append(" ".join(("postproc", *one)))
+    return commands
+
+
+def write_fit(data: DataSet, path: Path, rows: Measurements, place: Path) -> None:
+    """Write rows that are fitted, and the cell."""
+    about = data.about
     arm = (path.parent / about.arm).resolve()
     name = str(arm) if arm.suffix == ".toml" else about.arm
     tool = list(about.tool_mm or (0.0, 0.0, 0.0))
-    for k, split in enumerate(data.splits):
-        for n, (inside, tested) in enumerate(split.draws):
-            place = folder / f"{path.stem}-{k + 1}-{n + 1}"
-            place.mkdir(parents=True, exist_ok=True)
-            write_rows(data.series[split.fit][inside], place / "fit.csv")
-            write_rows(data.series[split.test][tested], place / "test.csv")
-            (place / "cell.toml").write_text(
-                f'[robot]\narm = "{name}"\n[tool]\nxyz_mm = {tool}\n', encoding="utf-8"
-            )
-            how = f"--frame {about.frame}" if split.same else "--refit registration"
-            given = f"--cell {place}/cell.toml"
-            commands.append(
-                f"# {about.name}: {split.title}\n"
-                f"postproc fit {place}/fit.csv {given} --frame {about.frame} "
-                f"-o {place}/model.json\n"
-                f"postproc predict {place}/test.csv {given} --model {place}/model.json "
-                f"{how} -o {place}/predicted.csv"
-            )
-    return commands
+    place.mkdir(parents=True, exist_ok=True)
+    write_rows(rows, place / "fit.csv")
+    (place / "cell.toml").write_text(
+        f'[robot]\narm = "{name}"\n[tool]\nxyz_mm = {tool}\n', encoding="utf-8"
+    )
+
+
+def write_test(data: DataSet, split: Split, draw: int, place: Path) -> None:
+    """Write rows that are tested."""
+    write_rows(data.series[split.test][split.draws[draw][1]], place / "test.csv")
+
+
+def fit_of(data: DataSet, place: Path) -> tuple[str, ...]:
+    """Return what `postproc` is given to fit a folder."""
+    given = ("--cell", f"{place}/cell.toml", "--frame", data.about.frame)
+    return ("fit", f"{place}/fit.csv", *given, "-o", f"{place}/model.json")
+
+
+def predict_of(data: DataSet, split: Split, place: Path) -> tuple[str, ...]:
+    """Return what `postproc` is given to predict the tested rows of a folder.
+
+    In another set-up the registration is found from the tested rows themselves.
+    """
+    frame = ("--frame", data.about.frame)
+    how = frame if split.same else ("--refit", "registration")
+    given = ("--cell", f"{place}/cell.toml", "--model", f"{place}/model.json")
+    out = ("-o", f"{place}/predicted.csv")
+    return ("predict", f"{place}/test.csv", *given, *how, *out)
 
 
 def main() -> None:

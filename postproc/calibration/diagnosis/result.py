@@ -248,7 +248,7 @@ class Diagnosis:
 def _causes(findings: Sequence[Finding]) -> list[str]:
     """List causes, each with its joints."""
     joints: dict[str, list[int]] = {}
-    nameless = [str(f.family) for f in findings if f.told and f.family is not None]
+    cells = [str(f.family) for f in findings if f.told and f.family is not None]
     for f in findings:
         if f.told:
             continue
@@ -258,7 +258,7 @@ def _causes(findings: Sequence[Finding]) -> list[str]:
         places = ", ".join(map(str, sorted(set(own))))
         of = "" if not own else f" of joint{'s' * (len(set(own)) > 1)} {places}"
         out.append(effect + of)
-    return out + nameless
+    return out + [*dict.fromkeys(cells)]
 
 
 def statistics(spread: ErrorStatistics) -> dict[str, float]:
