@@ -581,7 +581,7 @@ def spreadsheet_text(text: str) -> str:
     return text
 
 
-SYSTEM_MODULES = "SYSMOD/"
+SYSTEM_MODULES, SYSTEM_SUFFIXES = "SYSMOD/", (".sys", ".sysx")
 
 
 def name_read(path: PurePath) -> str:
@@ -596,3 +596,12 @@ def name_read(path: PurePath) -> str:
 def is_system_module(name: str) -> bool:
     """Return True if a file is a system module that a job reads."""
     return name.startswith(SYSTEM_MODULES)
+
+
+def has_system_suffix(name: str) -> bool:
+    """Return True if a file is a system module by its suffix.
+
+    >>> has_system_suffix("BASE.SYS"), has_system_suffix("job.mod")
+    (True, False)
+    """
+    return _suffix(name) in SYSTEM_SUFFIXES

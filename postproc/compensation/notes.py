@@ -11,6 +11,7 @@ from postproc.compensation.continuity import on_path
 from postproc.compensation.frames import taught_records
 from postproc.diagnostics import Code
 from postproc.files import (
+    has_system_suffix,
     is_shared_list,
     is_submit,
     is_system_module,
@@ -73,17 +74,24 @@ def tool_in_metres(visits: Visits) -> list[Diagnostic]:
 
 def followed_pages(visits: Visits) -> list[Diagnostic]:
     """List the files that are one job with the program."""
-    texts = (
-        "is followed, and rewritten, as a page of this program",
-        "is read, and not rewritten: all programs share it",
-    )
-    names = [name for name in visits.files[1:] if not is_variables(name)]
     return [
-        Diagnostic(visits.files[0], 1, Code.PAGE, f"{name} {texts[shared]}")
-        for name in names
-        if not is_system_module(name)
-        for shared in (is_shared_list(name) or is_submit(name),)
+        Diagnostic(
+            visits.files[0], 1, Code.PAGE, f"{name} {_use(name, number, visits)}"
+        )
+        for number, name in enumerate(visits.files[1:], start=1)
+        if not (is_variables(name) or is_system_module(name))
     ]
+
+
+def _use(name: str, number: int, visits: Visits) -> str:
+    """Say what is done with a file of a job."""
+    if is_shared_list(name) or is_submit(name):
+        return "is read, and not rewritten: all programs share it"
+    pinned = [bool(why) for why in visits.literals.pinned]
+    own = np.array(pinned, dtype=bool)[visits.literals.file == number]
+    if has_system_suffix(name) or (len(own) and own.all()):
+        return "is read, and not rewritten: its numbers must stay"
+    return "is followed, and rewritten, as a page of this program"
 
 
 def missing_file(visits: Visits) -> list[Diagnostic]:

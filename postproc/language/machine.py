@@ -19,7 +19,7 @@ from postproc.language.statements import StatementText
 from postproc.language.visits import ELSEWHERE, Diagnostic
 
 MOST_STEPS = 4_000_000  # statements run, all in all
-MOST_ROUNDS = 10_000  # rounds of a loop that are followed one by one
+MOST_ROUNDS = 10_000  # rounds of loops within each other, followed one by one
 DEEPEST = 60  # calls within calls
 
 
@@ -92,6 +92,16 @@ class CallContext:
         if self.caller is not None:
             return (*self.caller.way(), self.back - 1)
         return (self.scope.file, self.routine.first)
+
+    def rounds_around(self) -> int:
+        """Return how often it is run by the loops around it, also those of callers."""
+        times, at = 1, self
+        while at.outer is not None or at.caller is not None:
+            times *= len(at.rounds) if at.outer is not None else 1
+            around = at.caller if at.outer is None else at.outer
+            assert around is not None
+            at = around
+        return times
 
     def running(self, file: int, routine: HeadedRows) -> CallContext | None:
         """Return the call of a routine that is being run here, None without one."""
@@ -354,9 +364,9 @@ class TaskMachine(ABC):
         """Begin a loop: round by round where its bounds are known."""
         behind = _after_block(context.flow, row)
         rounds = self._rounds(context, row, one)
-        if rounds is None:
-            self.enter(context, row + 1, here)
+        if rounds is None:  # the body is followed first, once for all behind it
             self.enter(context, behind, here)
+            self.enter(context, row + 1, here)
         elif rounds:
             first = self._round(context, row, one.name, rounds, 0)
             self.enter(first, row + 1, here)
@@ -376,10 +386,10 @@ class TaskMachine(ABC):
             step = self.number(one.step, row, scope)
         if first != first or last != last or step != step or step == 0.0:
             return None
-        count = max(int((last - first) / step + 1 + 1e-9), 0)
-        if count > MOST_ROUNDS:
+        count = (last - first) / step + 1 + 1e-9
+        if not count * context.rounds_around() < MOST_ROUNDS + 1:  # also if infinite
             return None
-        return tuple(first + k * step for k in range(count))
+        return tuple(first + k * step for k in range(int(max(count, 0.0))))
 
     def _round(
         self,
@@ -402,8 +412,8 @@ class TaskMachine(ABC):
         """Go on at the end of a round."""
         head = context.flow.head.get(row, row)
         if context.loop != head or context.outer is None:  # rounds are not told apart
-            self.enter(context, head + 1, here)
             self.enter(context, row + 1, here)
+            self.enter(context, head + 1, here)
         elif context.round + 1 < len(context.rounds):
             name = context.scope.loops[-1][0]
             after = context.round + 1

@@ -31,7 +31,7 @@ class StatementText(Generic[T]):
         begin, end: Byte offsets of every statement, (n,).
         first: CSR offsets into the numbers, (n + 1,).
         start, stop: Byte offsets of each number, its sign included, (m,).
-        value: What it is worth, NaN where it cannot be read, (m,).
+        value: What it is worth, NaN where it cannot be read or is infinite, (m,).
     """
 
     source: Source
@@ -114,8 +114,10 @@ def read_text(
     at_names = np.asarray(name_first[:-1])
     shapes, shape = find_shapes(forms, form, at_names, names[1], names[0])
     said = parse_shapes(shapes, parse)
+    start, stop, value = numbers
+    value = np.where(np.isfinite(value), value, np.nan)
     return StatementText(
-        source, said, shape.astype(np.int32), begin, end, first, *numbers
+        source, said, shape.astype(np.int32), begin, end, first, start, stop, value
     )
 
 

@@ -12,7 +12,7 @@ from postproc.exceptions import ProgramError
 from postproc.files import SHARED_LIST, read_input
 from postproc.language.archive import Archive
 from postproc.language.krl.dialect import KRL_DIALECT
-from postproc.language.krl.moves import AXES
+from postproc.language.krl.moves import AXES, OUTSIDE
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.task import KrlRecord, KrlTask
 from postproc.language.machine import Scope
@@ -40,6 +40,7 @@ def read_archive(folder: Path) -> Archive | None:
     except ProgramError:
         return None  # it is told where a program reads it
     axes = _AXES.search(text)
+    external = min(int(axes[1]), len(OUTSIDE)) if axes else 0
     loads = [_numbers_of_load(one) for _, one in _entries(task, "load_data")]
     return Archive(
         found.relative_to(folder).as_posix(),
@@ -50,7 +51,7 @@ def read_archive(folder: Path) -> Archive | None:
         next(iter(loads), ()),
         _home(task),
         _root(text),
-        {axis: "" for axis in range(1, 1 + int(axes[1] if axes else 0))},
+        dict.fromkeys(range(1, 1 + external), ""),
     )
 
 

@@ -9,7 +9,6 @@ from functools import cache
 
 import numpy as np
 
-from postproc.files import is_system_module
 from postproc.language.collect import (
     IDENTITY,
     FoundGoal,
@@ -68,6 +67,7 @@ AT_A_STOP = (
     "calibl",
     "calibj",
 )  # they weld standing still
+_SYSTEM = "it stands in a system module, which is read and not rewritten"
 
 
 @dataclass(frozen=True)
@@ -210,6 +210,19 @@ class Goals:
         row: int,
         scope: Scope,
     ) -> FoundGoal:
+        """Read a destination; numbers of system modules are to stay."""
+        found = self._goal(operand, signature, row, scope)
+        if found.pins or found.file < 0 or not self.task.files[found.file].is_system:
+            return found
+        return replace(found, pins=_SYSTEM)
+
+    def _goal(
+        self,
+        operand: said.Operand | None,
+        signature: Signature,
+        row: int,
+        scope: Scope,
+    ) -> FoundGoal:
         """Read a destination."""
         written = operand
         operand, row, scope = self.task.behind(operand, row, scope)
@@ -258,7 +271,7 @@ class Goals:
             name=shown,
             aux=aux,
             why=why or ("" if file >= 0 else "it is computed from other data"),
-            pins=self._pinned(name, operand) or self._system(file),
+            pins=self._pinned(name, operand),
         )
 
     def _own_places(
@@ -342,12 +355,6 @@ class Goals:
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
         return ""
-
-    def _system(self, file: int) -> str:
-        """Say that numbers stand in a system module, "" where they do not."""
-        if file < 0 or not is_system_module(self.task.files[file].text.source.name):
-            return ""
-        return "it stands in a system module, which is read and not rewritten"
 
     def _shifted(
         self, name: str, arguments: Sequence[said.Argument], row: int, scope: Scope

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from postproc.diagnostics import Code
+from postproc.files import has_system_suffix, is_system_module
 from postproc.language.flow import HeadedRows
 from postproc.language.outline import BlockWords, Outline
 from postproc.language.rapid.signatures import MOTIONS, Signature, known_instructions
@@ -30,6 +32,8 @@ from postproc.language.rapid.syntax import (
 )
 from postproc.language.source import Source
 from postproc.language.visits import Diagnostic
+
+_SYSTEM = "sysmodule"
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,17 @@ class RapidFile:
     data: tuple[Datum, ...]
     moves: tuple[MotionCall, ...]
     diagnostics: tuple[Diagnostic, ...]
+
+    @cached_property
+    def is_system(self) -> bool:
+        """Tell whether it is a system module, which is read and never rewritten.
+
+        It is one by its place in a backup, by its suffix, or by what a module says.
+        """
+        heads = (scope.head for scope in self.modules)
+        said = any(isinstance(h, ModuleHead) and _SYSTEM in h.attributes for h in heads)
+        name = self.text.source.name
+        return said or is_system_module(name) or has_system_suffix(name)
 
 
 def read_rapid(source: Source) -> RapidFile:

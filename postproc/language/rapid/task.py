@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -229,7 +230,8 @@ class RapidTask:
                 return float(text.value[int(text.first[row]) + slot])
             case said.Operation(operator=operator, operands=operands):
                 parts = [self.number(one, row, here) for one in operands]
-                return _computed(operator, parts)
+                result = _computed(operator, parts)
+                return result if math.isfinite(result) else math.nan
             case said.DataObject(name=name, steps=()):
                 loops = dict(here.loops)
                 if name in loops:
