@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
-from postproc.files import is_system_module
 from postproc.language.interface import Cloner, NamedPoint
 from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
@@ -166,7 +165,7 @@ class RapidCloner(Cloner):
         start, stop = self._named(point.file, row, point.datum.declared.name)
         declared = source.text[begin:start] + name + source.text[stop:end]
         declared += "" if declared.endswith(";") else ";"
-        if is_system_module(source.name):
+        if self.task.files[point.file].is_system:
             return self._beside(points, declared)
         first, last = source.line_of(begin), source.line_of(max(end - 1, begin))
         before = source.text[int(source.line_starts[first - 1]) : begin]
@@ -181,7 +180,7 @@ class RapidCloner(Cloner):
             raise CloneError("its moves stand in several modules")
         file = files.pop()
         text, modules = self.task.files[file].text, self.task.files[file].modules
-        if len(modules) != 1 or is_system_module(text.source.name):
+        if len(modules) != 1 or self.task.files[file].is_system:
             raise CloneError("its moves stand in no module that is rewritten")
         rows = (text.statement(row) for row in range(modules[0].first, modules[0].last))
         if any(isinstance(one, said.RecordHead | said.TypeAlias) for one in rows):

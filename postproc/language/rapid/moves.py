@@ -9,7 +9,6 @@ from functools import cache
 
 import numpy as np
 
-from postproc.files import is_system_module
 from postproc.language.collect import (
     IDENTITY,
     FoundGoal,
@@ -239,7 +238,7 @@ class Goals:
         if isinstance(operand, said.Composite):
             plain = self._written(operand, joints, row, scope)
             if plain is not None:
-                return plain
+                return replace(plain, pins=self._system(scope.file))
         found = _numbers(self.task.record(operand, row, scope), joints)
         if found is None:
             why = f"{name} {self._untold(name, scope)}" if name else RUN_TIME
@@ -345,7 +344,7 @@ class Goals:
 
     def _system(self, file: int) -> str:
         """Say that numbers stand in a system module, "" where they do not."""
-        if file < 0 or not is_system_module(self.task.files[file].text.source.name):
+        if file < 0 or not self.task.files[file].is_system:
             return ""
         return "it stands in a system module, which is read and not rewritten"
 

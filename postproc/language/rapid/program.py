@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from postproc.files import is_system_module
 from postproc.language.flow import HeadedRows
 from postproc.language.outline import BlockWords, Outline
 from postproc.language.rapid.signatures import MOTIONS, Signature, known_instructions
@@ -88,6 +89,13 @@ class RapidFile:
     data: tuple[Datum, ...]
     moves: tuple[MotionCall, ...]
     diagnostics: tuple[Diagnostic, ...]
+
+    @property
+    def is_system(self) -> bool:
+        """Whether it belongs to the system: by its folder, or as a SYSMODULE."""
+        heads = (scope.head for scope in self.modules)
+        marked = any("sysmodule" in getattr(one, "attributes", ()) for one in heads)
+        return marked or is_system_module(self.text.source.name)
 
 
 def read_rapid(source: Source) -> RapidFile:
