@@ -297,8 +297,8 @@ lengths and angles fitted; the next five are [published methods](reproduction.md
 *{default}* is `postproc fit` and `postproc predict`, on files{after}.
 Errors are distances in mm. *Intervals hold* is the share of coordinates in the 95 %
 interval that is stated for them (of a published method: by ten folds of
-cross-validation). Published maps of the position error hold for the probe that they were fitted with, at its place;
-another series may have another.
+cross-validation). Published maps of the position error hold for the probe that they
+were fitted with, at its place; another series may have another.
 
 ## In short: mean error of the tested rows, mm
 

@@ -258,7 +258,7 @@ def _causes(findings: Sequence[Finding]) -> list[str]:
         places = ", ".join(map(str, sorted(set(own))))
         of = "" if not own else f" of joint{'s' * (len(set(own)) > 1)} {places}"
         out.append(effect + of)
-    return out + [*dict.fromkeys(cells)]
+    return [*out, *dict.fromkeys(cells)]
 
 
 def statistics(spread: ErrorStatistics) -> dict[str, float]:

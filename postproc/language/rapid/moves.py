@@ -407,7 +407,7 @@ class Goals:
         if base.why or _from(base)[0] < 0 or not _is_written(numbers):
             return FoundShift(shift)
         rest = (-1,) * (WIDTH - len(slots))
-        pins = self._system(scope.file)
+        pins = _SYSTEM if self.task.files[scope.file].is_system else ""
         return FoundShift(shift, scope.file, (*slots, *rest), pins)
 
     # Tools and work objects.
