@@ -35,14 +35,6 @@ __all__ = [
     "load_model",
 ]
 
-# Numerical libraries and their pools: processes use the cores, not threads.
-POOLS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "RAYON_NUM_THREADS",
-)
-
 _PLACES = {
     "Cell": "postproc.robot.cell",
     "Model": "postproc.model.model",

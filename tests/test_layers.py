@@ -15,7 +15,7 @@ PACKAGE = Path(postproc.__file__).parent
 # A chapter may import itself and what stands in the lines above its own; chapters of
 # one line know nothing of each other. The table of contents of the package.
 LAYERS = (
-    ("exceptions", "arrays", "_native"),
+    ("exceptions", "arrays", "threads", "_native"),
     ("files",),
     ("robot",),
     ("language", "motion", "model"),
@@ -26,7 +26,7 @@ LAYERS = (
     ("cli",),
 )
 LAYER = {chapter: k for k, layer in enumerate(LAYERS) for chapter in layer}
-LEAVES = {"exceptions", "arrays", "files"}
+LEAVES = {"exceptions", "arrays", "threads", "files"}
 
 # What a chapter may import less than its layer allows.
 ONLY = {

@@ -60,6 +60,7 @@ from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from postproc.robot.state import States
+from postproc.threads import in_one_thread
 
 Frame = Literal["base", "tracker"]
 
@@ -124,6 +125,7 @@ def fit(
     )
 
 
+@in_one_thread
 def fit_measurements(
     survey: Measurements,
     cell: Cell,

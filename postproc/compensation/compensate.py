@@ -63,12 +63,14 @@ from postproc.language.visits import ASSUMED_STILL, Diagnostic, Visits, told_onc
 from postproc.model.model import Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.cell import Cell
+from postproc.threads import in_one_thread
 
 # All of it: what is given, checked, corrected, written and told.
 
 NO_PAGES: Mapping[str, bytes] = MappingProxyType({})
 
 
+@in_one_thread
 def compensate(
     source: bytes,
     cell: Cell,

@@ -25,6 +25,7 @@ from postproc.compensation.program import Reading, prepared
 from postproc.compensation.windows import concatenate, first_visits, offsets
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
+from postproc.threads import in_one_thread
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -42,6 +43,7 @@ class Given:
     pages: Mapping[str, bytes]
 
 
+@in_one_thread
 def compensate_batch(
     programs: Sequence[Given], cell: Cell, model: Model, options: Options
 ) -> list[Outcome | Exception]:

@@ -64,6 +64,7 @@ from postproc.model.model import WORST_STD, Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
+from postproc.threads import in_one_thread
 
 # Before and after, on rows that took no part in choosing or fitting.
 #
@@ -202,6 +203,7 @@ class Extension:
     held_out: HeldOut
 
 
+@in_one_thread
 def diagnose(
     survey: Measurements,
     arm: Arm,
