@@ -11,6 +11,7 @@ import tempfile
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 from types import FrameType
 from typing import IO, BinaryIO, NoReturn, Self
@@ -192,6 +193,31 @@ def write_all(files: Mapping[Path, Content]) -> None:
             ready.rename()
     except OSError as exc:
         raise disk_error(exc, path) from None
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder with those above it, unless it is there.
+
+    Raises:
+        OutputError: It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as exc:
+        raise OutputError(folder, _reason(exc), "Name a folder") from None
+
+
+@dataclass(frozen=True)
+class NamedText:
+    """Text of a file that is given as bytes, with a name for messages."""
+
+    name: str
+    data: bytes
+
+
+def named_text(file: str | Path | bytes, name: str) -> Path | NamedText:
+    """Take a file as it is given: by its path, or as bytes with a name."""
+    return NamedText(name, file) if isinstance(file, bytes) else Path(file)
 
 
 class _Temporaries:

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Ints
-from postproc.cli.jobs import read_files
 from postproc.compensation.paths.insertions import points_on_ways
 from postproc.compensation.program import read_program
+from postproc.compensation.program_files import read_files
 from postproc.exceptions import CellError
 from postproc.language.languages import language_of
 from postproc.language.visits import Visits

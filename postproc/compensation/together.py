@@ -16,12 +16,13 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from postproc.compensation.compensate import finish, name_files, refuse
+from postproc.compensation.compensate import finish, refuse
 from postproc.compensation.correction import Correction, correct
 from postproc.compensation.first_cause import read_with_cause
 from postproc.compensation.options import Clock, Options, Setting, silent
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import Reading, prepared
+from postproc.compensation.program_files import name_files
 from postproc.compensation.windows import concatenate, first_visits, offsets
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
