@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from types import FrameType
-from typing import IO, BinaryIO, NoReturn, Self
+from typing import IO, Any, BinaryIO, NoReturn, Self
 
 from postproc.exceptions import DiskFullError, OutputError, ProgramError
 
@@ -602,6 +602,29 @@ def spreadsheet_text(text: str) -> str:
     except ValueError:
         return f"'{text}"
     return text
+
+
+# Of every JSON output the version of its keys: it grows where a reader must change.
+SCHEMAS = {
+    "check": 1,
+    "comparison": 1,
+    "diagnosis": 1,
+    "difference": 1,
+    "explanation": 1,
+    "fit": 1,
+    "history": 1,
+    "report": 1,
+    "simulation": 1,
+}
+
+
+def schema(kind: str) -> dict[str, Any]:
+    """Return the keys that a JSON output begins with.
+
+    >>> schema("report")
+    {'schema': 'postproc-report', 'version': 1}
+    """
+    return {"schema": f"postproc-{kind}", "version": SCHEMAS[kind]}
 
 
 SYSTEM_MODULES = "SYSMOD/"

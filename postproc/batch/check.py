@@ -35,6 +35,7 @@ from postproc.files import (
     is_variables,
     program_of,
     read_input,
+    schema,
     variables_of,
 )
 from postproc.language.stamp import read_stamp
@@ -101,7 +102,7 @@ class Checked:
     def to_json(self, opinion: Mapping[str, Any] | None = None) -> str:
         """Return it as JSON text, with a second opinion where there is one."""
         rows = [asdict(finding) for finding in self.findings]
-        told = {"programs": self.programs, "findings": rows}
+        told = {**schema("check"), "programs": self.programs, "findings": rows}
         if opinion is not None:
             told["second_opinion"] = opinion
         return json.dumps(told) + "\n"

@@ -21,7 +21,7 @@ from postproc.cli.common import (
     write_text,
 )
 from postproc.exceptions import PostprocError
-from postproc.files import check_places
+from postproc.files import check_places, schema
 
 if TYPE_CHECKING:
     from postproc.calibration.diagnosis.diagnose import Extension
@@ -85,7 +85,7 @@ def diagnose(
             told = evidence_of(found)
             if on_the_way is not None:
                 told |= {"path": on_the_way.to_dict()}
-            write_text(json, dumped(told))
+            write_text(json, dumped(schema("diagnosis") | told))
         if html is not None:
             from postproc.report.html import diagnosis_report
 

@@ -13,6 +13,7 @@ from postproc.compensation.paths.insertions import points_on_ways
 from postproc.compensation.program import read_program
 from postproc.compensation.program_files import read_files
 from postproc.exceptions import CellError
+from postproc.files import schema
 from postproc.language.languages import language_of
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
@@ -74,7 +75,11 @@ class Simulation:
     def to_json(self) -> str:
         """Return the true error as JSON text."""
         error = None if self.true_error is None else asdict(self.true_error)
-        told: dict[str, object] = {"program": self.name, "true_error": error}
+        told: dict[str, object] = {
+            **schema("simulation"),
+            "program": self.name,
+            "true_error": error,
+        }
         if self.paths is not None:
             told |= {
                 "path_accuracy": asdict(self.path_accuracy),

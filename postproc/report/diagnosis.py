@@ -12,6 +12,7 @@ import numpy as np
 from postproc.calibration.diagnosis.result import Diagnosis
 from postproc.calibration.diagnosis.trace import REMAINS
 from postproc.calibration.report import DirectionReport
+from postproc.files import schema
 from postproc.model.effects.effect import PART_MOTION
 from postproc.model.model import Model, load_model
 from postproc.model.statistics import ErrorStatistics
@@ -209,4 +210,5 @@ def _added(entry: dict[str, object]) -> str:
 def history_json(model_path: Path) -> str:
     """Return the chain as JSON."""
     model = load_model(model_path)
-    return json.dumps({"id": model.id, "history": list(model.history)}, indent=1)
+    told = {"id": model.id, "history": list(model.history)}
+    return json.dumps(schema("history") | told, indent=1)

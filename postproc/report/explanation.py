@@ -12,6 +12,7 @@ from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.explanation import Explanation
 from postproc.compensation.outcome import Status
 from postproc.exceptions import printable
+from postproc.files import schema
 from postproc.report.json import target_rows
 from postproc.report.terminal import Column, arrows, print_table, status_colour
 from postproc.robot.pose import MM
@@ -54,7 +55,7 @@ def explanation_json(found: Explanation, line: int | None = None) -> str:
         }
         for i, row in zip(chosen.tolist(), told, strict=True)
     ]
-    return json.dumps({"visits": rows}, indent=1) + "\n"
+    return json.dumps({**schema("explanation"), "visits": rows}, indent=1) + "\n"
 
 
 def _plan_row(found: Explanation, i: int) -> dict[str, object]:

@@ -13,7 +13,7 @@ import numpy as np
 from postproc.calibration.fit import Calibration
 from postproc.calibration.published import VOLUME_DEG, Comparison
 from postproc.calibration.report import FitReport, Found
-from postproc.files import write_all
+from postproc.files import schema, write_all
 from postproc.report.diagnosis import tell_directions
 from postproc.report.json import finite
 from postproc.report.terminal import Column, table_text
@@ -66,7 +66,12 @@ def fit_json(found: Calibration) -> str:
     A figure that is not known is null: JSON has no word for it.
     """
     verdict = "rejected" if found.rejected else "accepted"
-    said = {"model": found.model.id, "verdict": verdict, **asdict(found.report)}
+    said = {
+        **schema("fit"),
+        "model": found.model.id,
+        "verdict": verdict,
+        **asdict(found.report),
+    }
     return json.dumps(finite(said), indent=1, allow_nan=False) + "\n"
 
 
@@ -240,7 +245,7 @@ def _tell_parameters(report: FitReport) -> str:
 
 def comparison_json(found: Comparison) -> str:
     """Return a comparison as JSON text."""
-    return json.dumps(asdict(found), indent=1) + "\n"
+    return json.dumps({**schema("comparison"), **asdict(found)}, indent=1) + "\n"
 
 
 def tell_comparison(found: Comparison) -> str:
