@@ -11,9 +11,10 @@ import tempfile
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 from types import FrameType
-from typing import IO, BinaryIO, NoReturn, Self
+from typing import IO, Any, BinaryIO, NoReturn, Self
 
 from postproc.exceptions import DiskFullError, OutputError, ProgramError
 
@@ -192,6 +193,31 @@ def write_all(files: Mapping[Path, Content]) -> None:
             ready.rename()
     except OSError as exc:
         raise disk_error(exc, path) from None
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder with those above it, unless it is there.
+
+    Raises:
+        OutputError: It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as exc:
+        raise OutputError(folder, _reason(exc), "Name a folder") from None
+
+
+@dataclass(frozen=True)
+class NamedText:
+    """Text of a file that is given as bytes, with a name for messages."""
+
+    name: str
+    data: bytes
+
+
+def named_text(file: str | Path | bytes, name: str) -> Path | NamedText:
+    """Take a file as it is given: by its path, or as bytes with a name."""
+    return NamedText(name, file) if isinstance(file, bytes) else Path(file)
 
 
 class _Temporaries:
@@ -579,6 +605,29 @@ def spreadsheet_text(text: str) -> str:
     except ValueError:
         return f"'{text}"
     return text
+
+
+# Of every JSON output the version of its keys: it grows where a reader must change.
+SCHEMAS = {
+    "check": 1,
+    "comparison": 1,
+    "diagnosis": 1,
+    "difference": 1,
+    "explanation": 1,
+    "fit": 1,
+    "history": 1,
+    "report": 1,
+    "simulation": 1,
+}
+
+
+def schema(kind: str) -> dict[str, Any]:
+    """Return the keys that a JSON output begins with.
+
+    >>> schema("report")
+    {'schema': 'postproc-report', 'version': 1}
+    """
+    return {"schema": f"postproc-{kind}", "version": SCHEMAS[kind]}
 
 
 SYSTEM_MODULES, SYSTEM_SUFFIXES = "SYSMOD/", (".sys", ".sysx")

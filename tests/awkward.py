@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from postproc.calibration.diagnosis.diagnose import diagnose
-from postproc.calibration.fit import Frame, fit_measurements, read_surveys
+from postproc.calibration.diagnosis.diagnose import extend_model
+from postproc.calibration.fit import Frame, fit_measurements
+from postproc.calibration.survey_files import read_measurements
 from postproc.exceptions import PostprocError
 from postproc.robot.cell import load_cell
 from postproc.robot.state import States
@@ -257,7 +258,7 @@ def _fitted(
 ) -> str:
     """Fit and diagnose; return the verdict."""
     cell = load_cell(cell_path)
-    survey = read_surveys([data], cell)
+    survey = read_measurements(data, cell=cell)
     effects = EFFECTS[seed % len(EFFECTS)]
     found = fit_measurements(survey, cell, effects=effects, frame=frame)
     read_as = found.model.reading(cell.arm, found.survey.states)
@@ -267,7 +268,7 @@ def _fitted(
     if not diagnosed or len(found.survey) > 100:
         return ""
     setup = ("registration",) if frame == "tracker" else ()
-    told = diagnose(found.survey, cell.arm, found.model, setup=setup)
+    told = extend_model(found.survey, cell.arm, found.model, setup=setup)
     return f", {told.diagnosis.verdict}"
 
 

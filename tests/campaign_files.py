@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from postproc.calibration.fit import Frame, read_surveys
+from postproc.calibration.fit import Frame
 from postproc.calibration.measurements import Measurements
+from postproc.calibration.survey_files import read_measurements
 from postproc.robot.cell import Cell, load_cell
 from tests.calibration.simulator import PLATE
 
@@ -184,7 +185,7 @@ def as_filed(
     cell = write_cell(folder / "cell.toml", setup.weight, setup.said)
     written = ("time_s",) if clock else ()
     paths = write_files(folder, survey, setup, written, setup.rows)
-    return read_surveys(paths, cell), cell
+    return read_measurements(*paths, cell=cell), cell
 
 
 def as_informed(
@@ -194,4 +195,4 @@ def as_informed(
     cell = write_cell(folder / "cell.toml", setup.weight, "mounting")
     written = ("time_s", "visit")
     paths = write_files(folder, survey, setup, written, "as measured")
-    return read_surveys(paths, cell), cell
+    return read_measurements(*paths, cell=cell), cell

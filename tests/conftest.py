@@ -116,7 +116,7 @@ def make_job(
     campaign = measure_rows(arm, setup_of(cell), read_rows(rows))
     write_measurements(campaign, folder / "survey.csv")
     effects = BASE_EFFECTS  # all that this arm has: a search takes long
-    fit([folder / "survey.csv"], cell, effects=effects).model.save(
+    fit(folder / "survey.csv", cell=cell, effects=effects).model.save(
         folder / "model.json"
     )
     return folder
@@ -149,7 +149,7 @@ def job_model(job_folder):
 def free_model(job_folder, job_cell) -> Model:
     """A model of the same survey that has free forms, too."""
     effects = (*BASE_EFFECTS, "joint_map", "elm")
-    return fit([job_folder / "survey.csv"], job_cell, effects=effects).model
+    return fit(job_folder / "survey.csv", cell=job_cell, effects=effects).model
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ import numpy as np
 from postproc.calibration.fit import fit
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.survey_program import write_survey
 from postproc.cli.simulate import setup_of, simulate_file, visits_of
-from postproc.cli.survey import write_survey
 from postproc.compensation.command import new_numbers, solve_visits
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
@@ -101,7 +101,7 @@ def _surveyed(folder: Path, seed: int) -> Path:
 def _drilled(survey: Path, seed: int, how: dict[str, object]) -> np.ndarray:
     """Return the true errors [mm] of the compensated drilling job."""
     cell = load_cell(CELL)
-    model = fit([survey], cell, **how).model  # type: ignore[arg-type]
+    model = fit(survey, cell=cell, **how).model  # type: ignore[arg-type]
     source = ROOT / "programs" / "drilling.pdl"
     done = compensate(source.read_bytes(), cell, model, name=source.name)
     original = visits_of(source, cell)
@@ -117,7 +117,7 @@ def _drilled(survey: Path, seed: int, how: dict[str, object]) -> np.ndarray:
 def digits(seed: int = 41) -> str:
     """Tell what solving leaves and digits add on the drilling job's POS literals."""
     with tempfile.TemporaryDirectory() as name:
-        model = fit([_surveyed(Path(name), seed)], load_cell(CELL)).model
+        model = fit(_surveyed(Path(name), seed), cell=load_cell(CELL)).model
     left, added = solved_and_written(load_cell(CELL), model)
     return (
         f"digits: solving leaves {left.max():.3f} um at most, the digits written add "

@@ -44,6 +44,8 @@ def options():
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_commands_that_are_only_named_exist(page):
+    if page.parent.name == "history":
+        return  # names what is no more, too
     known, text = options(), page.read_text(encoding="utf-8")
     text = text.replace("\\\n", " ")
     named = r"(?m)(?:`|\$ |\| |^ {4})postproc ([a-z]+)([^`|\n]*)"
@@ -58,12 +60,44 @@ def test_commands_that_are_only_named_exist(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_files_that_are_only_named_exist(page):
-    if page.stem == "CHANGELOG":
-        return  # names what is no more, too
+    if page.parent.name == "history":
+        return
     text = page.read_text(encoding="utf-8")
     folders = "docs|grammars|native|postproc|programs|tests"
     for name in re.findall(rf"`((?:{folders})/[\w./-]*)`", text):
         assert (ROOT / name).exists(), f"{page}: there is no {name}"
+
+
+CHANGES = ["Added", "Changed", "Fixed"]
+ENTRY = re.compile(r"- [a-z]+: [^\n]+\.")
+SHORTEST, LONGEST = 20, 99  # characters of an entry
+MOST = 60  # lines of a release
+
+
+def releases():
+    """Return every release of the changelog, with its text."""
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    parts = re.split(r"(?m)^## (.*)\n", text)[1:]
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+def test_the_changelog_has_a_release_a_heading_and_no_other():
+    found = releases()
+    assert found
+    for name, text in found.items():
+        assert re.fullmatch(r"\d+\.\d+\.\d+", name), name
+        headings = re.findall(r"(?m)^#+ (.*)$", text)
+        assert headings == [c for c in CHANGES if c in headings], name
+        assert headings, name
+        assert len(text.strip().splitlines()) <= MOST, name
+
+
+def test_an_entry_of_the_changelog_is_one_line_of_an_area_and_what_it_does():
+    for text in releases().values():
+        for line in text.splitlines():
+            if line and not line.startswith("### "):
+                assert ENTRY.fullmatch(line), line
+                assert SHORTEST < len(line) <= LONGEST, f"{len(line)}: {line}"
 
 
 def test_the_drawing_of_the_chapters_is_that_of_the_code():

@@ -15,18 +15,19 @@ PACKAGE = Path(postproc.__file__).parent
 # A chapter may import itself and what stands in the lines above its own; chapters of
 # one line know nothing of each other. The table of contents of the package.
 LAYERS = (
-    ("exceptions", "arrays", "diagnostics", "_native"),
+    ("exceptions", "arrays", "threads", "diagnostics", "_native"),
     ("files",),
     ("robot",),
     ("language", "motion", "model"),
     ("verify",),
-    ("compensation", "calibration", "simulation"),
+    ("compensation", "simulation"),
+    ("calibration",),
     ("report",),
     ("batch",),
     ("cli",),
 )
 LAYER = {chapter: k for k, layer in enumerate(LAYERS) for chapter in layer}
-LEAVES = {"exceptions", "arrays", "files", "diagnostics"}
+LEAVES = {"exceptions", "arrays", "threads", "files", "diagnostics"}
 
 # What a chapter may import less than its layer allows.
 ONLY = {
@@ -35,6 +36,11 @@ ONLY = {
     "simulation": LEAVES | {"language", "robot.trajectory"},
     # A second opinion by the code that is judged would be the first one again.
     "verify": LEAVES | {"language", "robot.arm_file", "robot.trajectory"},
+}
+
+# Points that were measured while a program ran are joined with its visits.
+JOINED = {
+    "calibration.measured_program": {"program", "program_files"},
 }
 
 # Which modules know one effect in particular: all others take effects as they come.
@@ -75,7 +81,7 @@ KNOWING = {
     # A tracker that drifts moves fixed points rigidly.
     "calibration.references": {"base_shift", "tracker_drift"},
     "calibration.selection": {"probe_turn", "tool_shift"},
-    "cli.diagnose": {"placement"},
+    "calibration.diagnosis.files": {"placement"},
 }
 
 # Foreign libraries that every module may use.
@@ -144,6 +150,16 @@ def test_imports_point_down() -> None:
             if not down or not within(other, ONLY.get(chapter, {first})):
                 wrong.append(f"{name} imports {other}")
     assert not wrong, wrong
+
+
+def test_calibration_knows_compensation_where_a_program_was_measured() -> None:
+    found = {
+        name: {o.removeprefix("compensation.") for o in own}
+        for name, path in modules()
+        if name.startswith("calibration.")
+        and (own := {o for o in ours(name, path) if o.startswith("compensation.")})
+    }
+    assert found == JOINED
 
 
 def test_an_effect_is_known_to_its_own_file_and_to_the_list() -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from postproc.calibration.measurements import Measurements, read_measurements
+from postproc.calibration.measurements import Measurements, read_survey_file
 from postproc.calibration.tables import TableFormat, column_map
 from postproc.exceptions import MeasurementError
 from postproc.robot.arm_file import Strict, read_toml
@@ -153,7 +153,7 @@ def read_set(path: Path, base: Path) -> DataSet | None:
     series = {}
     for one in about.series:
         file = folder / one.file
-        series[one.name] = read_measurements(
+        series[one.name] = read_survey_file(
             file, cell.arm, cell.probes, reading=reading
         )
         _check_same(one, file)

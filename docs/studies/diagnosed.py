@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from measured import BLIND_TOOL, FLANGE, SETUP, _registered
 
-from postproc.calibration.diagnosis.diagnose import Extension, diagnose
+from postproc.calibration.diagnosis.diagnose import Extension, extend_model
 from postproc.calibration.diagnosis.result import Finding
 from postproc.calibration.fit import into_base_frame
-from postproc.calibration.measurements import Measurements, read_measurements
+from postproc.calibration.measurements import Measurements, read_survey_file
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS
@@ -49,10 +49,10 @@ def mean_length(error: np.ndarray) -> tuple[float, float, float]:
 
 def campaign(name: str, folder: Path, arm: Arm) -> str:
     """Diagnose one campaign; one row of the table."""
-    survey = read_measurements(folder / f"{name}_survey.csv", arm, BLIND_TOOL)
+    survey = read_survey_file(folder / f"{name}_survey.csv", arm, BLIND_TOOL)
     base = model_of(fit_survey(survey, arm, BASE_EFFECTS, None), survey)
-    found = diagnose(survey, arm, base)
-    verify = read_measurements(folder / f"{name}_verify.csv", arm, BLIND_TOOL)
+    found = extend_model(survey, arm, base)
+    verify = read_survey_file(folder / f"{name}_verify.csv", arm, BLIND_TOOL)
     before = mean_length(left(verify, arm, base))
     after = mean_length(left(verify, arm, found.model))
     d = found.diagnosis
@@ -88,13 +88,13 @@ def blind(folder: Path) -> list[str]:
 def ur10(folder: Path) -> list[str]:
     """Diagnose series B from geometry and backlash, and try the result on series D."""
     arm = load_arm("ur10")
-    series = read_measurements(
+    series = read_survey_file(
         folder / "measurements_joint_configurations.csv", arm, FLANGE
     )
     survey, placed = into_base_frame(series, arm)
     fit = fit_survey(survey, arm, UR10_BASE, placed.tracker, SETUP)
     base = model_of(fit, survey)
-    found = diagnose(survey, arm, base, tracker=placed.tracker, setup=SETUP)
+    found = extend_model(survey, arm, base, tracker=placed.tracker, setup=SETUP)
     d = found.diagnosis
     lines = [f"Verdict: {d.verdict}.", ""]
     lines += [f"- {describe(f)}" for f in d.findings] or ["- nothing"]
@@ -103,7 +103,7 @@ def ur10(folder: Path) -> list[str]:
               "|---|---|---|---|---|---|---|"]  # fmt: skip
     lines.append(_row("series B, blocks of rows held out", found.held_out.before,
                       found.held_out.after))  # fmt: skip
-    other = read_measurements(folder / "measurements_iso_cubes.csv", arm, FLANGE)
+    other = read_survey_file(folder / "measurements_iso_cubes.csv", arm, FLANGE)
     before, after = (
         _registered(arm, other, effects, values)
         for effects, values in (compensated(base), compensated(found.model))

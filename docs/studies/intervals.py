@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.calibration.fit import fit_measurements, into_base_frame
-from postproc.calibration.measurements import Measurements, read_measurements
+from postproc.calibration.measurements import Measurements, read_survey_file
 from postproc.calibration.registration import predict_registered
 from postproc.calibration.tables import TableFormat
 from postproc.exceptions import PostprocError
@@ -229,7 +229,7 @@ def loaded(shared: Path, folder: Path) -> dict[str, Series]:
 
 def _series(name: str, path: Path, cell_path: Path) -> Series:
     cell = load_cell(cell_path)
-    rows = read_measurements(path, cell.arm, cell.probes, reading=TableFormat())
+    rows = read_survey_file(path, cell.arm, cell.probes, reading=TableFormat())
     return Series(name, rows, cell)
 
 

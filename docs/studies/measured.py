@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.calibration.fit import into_base_frame
-from postproc.calibration.measurements import Measurements, read_measurements
+from postproc.calibration.measurements import Measurements, read_survey_file
 from postproc.calibration.registration import register
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.model.combination import Combination
@@ -62,7 +62,7 @@ def held_out(
 def ur10(folder: Path) -> list[str]:
     """Series B on itself, and on series D with only the registration refitted."""
     arm = load_arm("ur10")
-    b = read_measurements(folder / "measurements_joint_configurations.csv", arm, FLANGE)
+    b = read_survey_file(folder / "measurements_joint_configurations.csv", arm, FLANGE)
     lines, n = list(HEAD), len(b)
     for seed in range(3):
         test = np.sort(np.random.default_rng(seed).permutation(n)[int(0.7 * n) :])
@@ -83,7 +83,7 @@ def ur10(folder: Path) -> list[str]:
 
 
 def _other_series(folder: Path, arm: Arm, b: Measurements) -> list[str]:
-    d = read_measurements(folder / "measurements_iso_cubes.csv", arm, FLANGE)
+    d = read_survey_file(folder / "measurements_iso_cubes.csv", arm, FLANGE)
     survey, placed = into_base_frame(b, arm)
     fit = fit_survey(survey, arm, UR10_EFFECTS, placed.tracker, SETUP)
     effects, values, _ = model_of(fit, survey).compensable()
@@ -124,8 +124,8 @@ def blind(folder: Path) -> list[str]:
         "|---|---|---|---|---|---|---|---|",
     ]
     for name in "abcdefgh":
-        survey = read_measurements(folder / f"{name}_survey.csv", arm, BLIND_TOOL)
-        verify = read_measurements(folder / f"{name}_verify.csv", arm, BLIND_TOOL)
+        survey = read_survey_file(folder / f"{name}_survey.csv", arm, BLIND_TOOL)
+        verify = read_survey_file(folder / f"{name}_verify.csv", arm, BLIND_TOOL)
         error = verify.position - Batch(arm, verify.states).walk.tcp
         base = _model(survey, arm, BASE_EFFECTS)
         full = _model(survey, arm, None)

@@ -23,7 +23,7 @@ from real_files import fit_of, predict_of, write_fit, write_test
 
 from postproc import __version__
 from postproc.arrays import Floats
-from postproc.calibration.diagnosis.diagnose import Extension, diagnose
+from postproc.calibration.diagnosis.diagnose import Extension, extend_model
 from postproc.calibration.diagnosis.result import Diagnosis, Finding
 from postproc.calibration.fit import Calibration, fit_measurements
 from postproc.calibration.measurements import Measurements
@@ -231,7 +231,7 @@ def traced(data: DataSet, found: Calibration) -> Extension:
     placed = found.model.registration
     tracker = data.cell.tracker if placed is None else placed.tracker
     setup = () if placed is None else (Placement.name,)
-    more = diagnose(
+    more = extend_model(
         found.survey, data.cell.arm, found.model, tracker=tracker, setup=setup
     )
     model = replace(more.model, registration=placed)

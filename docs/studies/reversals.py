@@ -31,7 +31,9 @@ def verdicts(folder: Path, seed: int, gears: str, count: int) -> tuple[str, ...]
     paths.done("survey", *at, "--reversals", count, "-o", program)
     paths.done("simulate", program, *at, "--seed", seed, "--gears", gears, "-o", rows)
     cell = load_cell(place)
-    return verdicts_of_flanks(fit([rows], cell, effects=BASE_EFFECTS).model, cell.arm)
+    return verdicts_of_flanks(
+        fit(rows, cell=cell, effects=BASE_EFFECTS).model, cell.arm
+    )
 
 
 def main() -> None:

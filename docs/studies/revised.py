@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from postproc.calibration.diagnosis.diagnose import diagnose
+from postproc.calibration.diagnosis.diagnose import extend_model
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.model.kinematics import Batch
@@ -133,7 +133,7 @@ def outcome(seed: int, name: str, poses: int, whole: bool) -> Outcome:
     within = WORKING_RANGE if whole else around(seed)
     fresh = sample_survey(change.arm, poses, seed=seed + 1000, within=within)
     rows = measured(change.arm, fresh, "new", change)
-    found = diagnose(rows, ARM, model, tracker=TRACKER)
+    found = extend_model(rows, ARM, model, tracker=TRACKER)
     figures = [
         left(m, change, seed, place)
         for place in (WORKING_RANGE, around(seed))

@@ -18,10 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.calibration.fit import read_surveys, several_points
+from postproc.calibration.fit import several_points
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
 from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.survey_files import read_measurements
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
@@ -86,7 +87,7 @@ def means(seed: int, jobs: int) -> list[float]:
             cell, model = fitted(seed, folder, **survey)
             models.append(model)
             if not survey:
-                rows = read_surveys([folder / "survey.csv"], cell)
+                rows = read_measurements(folder / "survey.csv", cell=cell)
                 models.append(informed(cell, rows, virtual_arm(seed)))
     some = list(itertools.islice(driven(seed, cell), jobs))
     out = []

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from data_sets import DataSet, descriptions, read_set
 
-from postproc.calibration.diagnosis.diagnose import diagnose
+from postproc.calibration.diagnosis.diagnose import extend_model
 from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements
 from postproc.model.effects.placement import Placement
@@ -71,7 +71,7 @@ def trial(
             states=placed.on_probes(fresh.states),
             position=placed.to_base(fresh.position),
         )
-    found = diagnose(
+    found = extend_model(
         known, data.cell.arm, less,
         tracker=None if placed is None else placed.tracker,
         setup=() if placed is None else (Placement.name,),

@@ -28,7 +28,8 @@ LAYERS = (
     ("robot",),
     ("language", "motion", "model"),
     ("verify",),
-    ("compensation", "calibration", "simulation"),
+    ("compensation", "simulation"),
+    ("calibration",),
     ("report",),
     ("batch",),
     ("cli",),
@@ -80,7 +81,7 @@ FLOW = (
     Arrow("Measurements", "calibration", "report", (200, 225), (200, 182)),
     Arrow("Outcome", "compensation", "report", (370, 225), (370, 182)),
     Arrow("Outcome", "compensation", "batch", (540, 225), (540, 157)),
-    Arrow("Diagnosis", "calibration", "cli", (90, 225), (90, 63)),
+    Arrow("Extension", "calibration", "cli", (90, 225), (90, 63)),
     Arrow("Summary", "batch", "cli", (610, 95), (610, 63)),
 )
 LINES = {  # grey: upper chapter, lower chapter, from, to

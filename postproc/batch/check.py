@@ -7,10 +7,13 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from postproc.batch.pages import read_head
+from postproc.arrays import data_frame
+from postproc.batch.plan import make_plan
+from postproc.compensation.options import AS_USUAL
 from postproc.compensation.outcome import LEFT_ALONE, with_left
+from postproc.compensation.pages import program_arm, read_head
 from postproc.compensation.record import (
     FileRecord,
     LeftLine,
@@ -33,10 +36,15 @@ from postproc.files import (
     is_variables,
     program_of,
     read_input,
+    schema,
     variables_of,
 )
 from postproc.language.stamp import read_stamp
 from postproc.language.visits import line_ranges
+from postproc.model.model import Model, load_model
+
+if TYPE_CHECKING:
+    from postproc.arrays import DataFrame
 
 Current = Callable[[str], str | None]  # program -> id of the model it should have
 
@@ -73,6 +81,18 @@ class Checked:
         """Return 0 where all may be uploaded, 1 where something must not."""
         return 1 if self.findings else 0
 
+    def __str__(self) -> str:
+        """Say what was found, a line a finding, and how many programs there are."""
+        lines = [f"{f.place}: {f.code}: {f.message}" for f in self.findings]
+        count = f"{self.programs} programs, {len(self.findings)} findings"
+        return "\n".join([*lines, count])
+
+    def to_frame(self) -> DataFrame:
+        """Return a data frame of the findings: place, code, message."""
+        names = ("place", "code", "message")
+        found = self.findings
+        return data_frame({name: [getattr(f, name) for f in found] for name in names})
+
     def accepting_left(self) -> Checked:
         """Return it without targets left alone: somebody has looked at them."""
         kept = tuple(f for f in self.findings if f.code != Code.LEFT_ALONE)
@@ -81,25 +101,72 @@ class Checked:
     def to_json(self, opinion: Mapping[str, Any] | None = None) -> str:
         """Return it as JSON text, with a second opinion where there is one."""
         rows = [asdict(finding) for finding in self.findings]
-        told = {"programs": self.programs, "findings": rows}
+        told = {**schema("check"), "programs": self.programs, "findings": rows}
         if opinion is not None:
             told["second_opinion"] = opinion
         return json.dumps(told) + "\n"
 
 
 def check(
+    folder: str | Path,
+    *,
+    model: Model | str | Path | None = None,
+    plan: str | Path | None = None,
+    source: str | Path | None = None,
+    strict_calls: bool = False,
+) -> Checked:
+    """Check a tree of compensated programs before it is uploaded.
+
+    Args:
+        folder: The tree.
+        model: The model that all programs should be made with, or its file.
+        plan: Or the plan file that tells the model of each of them.
+        source: The tree that it was made from.
+        strict_calls: Find programs with calls that the shipped list took as still.
+
+    Raises:
+        ProgramError: A folder or a file cannot be read.
+        PostprocError: The plan or the model cannot be used.
+    """
+    folder = Path(folder)
+    current = _current_model(folder, model, plan)
+    return check_tree(
+        folder, current, None if source is None else Path(source), strict_calls
+    )
+
+
+def _current_model(
+    folder: Path, model: Model | str | Path | None, plan: str | Path | None
+) -> Current:
+    """Tell which model a program of a tree should have been made with."""
+    if plan is not None:
+        made = make_plan(Path(plan), None, None, AS_USUAL)
+        ids = [setup.model.id for setup in made.setups]
+
+        def current_of(place: str) -> str | None:
+            which = made.setup_of(place, program_arm(read_head(folder / place)))
+            return None if which is None else ids[which]
+
+        return current_of
+    if model is None:
+        return lambda place: None
+    current = (model if isinstance(model, Model) else load_model(model)).id
+    return lambda place: current
+
+
+def check_tree(
     folder: Path,
     current: Current = lambda place: None,
     source: Path | None = None,
     strict_calls: bool = False,
 ) -> Checked:
-    """Check a tree of compensated programs.
+    """Check a tree of compensated programs, see `check`.
 
     Args:
         folder: The tree.
         current: Tells the model that a program should be made with, None: any.
         source: The tree that it was made from.
-        strict_calls: Find programs with calls that the shipped list took as still.
+        strict_calls: As `check` takes it.
 
     Raises:
         ProgramError: A folder or a file cannot be read.

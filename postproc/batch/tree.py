@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from postproc.batch.pages import (
+from postproc.batch.plan import BatchPlan, Unit
+from postproc.compensation.pages import (
     group_pages,
     names_in,
     of_one_arm,
     program_arm,
     read_head,
 )
-from postproc.batch.plan import BatchPlan, Unit
 from postproc.compensation.record import SUFFIX
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import (

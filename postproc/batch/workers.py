@@ -24,7 +24,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from postproc import POOLS, __version__
+from postproc import __version__
 from postproc.batch.plan import JobSetup, Result, Task, Unit, failed
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.parallel import end_with_parent
@@ -33,6 +33,7 @@ from postproc.compensation.together import Given, compensate_batch
 from postproc.exceptions import PostprocError
 from postproc.files import name_read, variables_of
 from postproc.robot.pose import MM
+from postproc.threads import start_no_threads
 
 # Tasks in chunks that last about a second each.
 
@@ -201,8 +202,7 @@ READY = "postproc.batch.ready"
 
 def start_server() -> ForkServerContext:
     """Start the process unless it runs already, and do not wait for it."""
-    for name in POOLS:
-        os.environ.setdefault(name, "1")
+    start_no_threads()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([READY])
     # Ctrl-C goes to the whole group, and is for us to answer. The tracker comes first:

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.calibration.measurements import (
-    Measurements,
-    concatenate,
-    read_measurements,
-)
+from postproc.arrays import Floats, data_frame
+from postproc.calibration.measurements import Measurements
 from postproc.calibration.monument_frame import monuments_of
 from postproc.calibration.plausibility import (
     check_orientations,
@@ -23,6 +19,7 @@ from postproc.calibration.plausibility import (
     check_survey,
     lost_without,
 )
+from postproc.calibration.predict import predict
 from postproc.calibration.published import fit_method, too_wide
 from postproc.calibration.registration import (
     NEAR_FLANGE,
@@ -40,11 +37,13 @@ from postproc.calibration.reversals import (
 )
 from postproc.calibration.selection import Progress, model_of, silent
 from postproc.calibration.stops import pool_readings
+from postproc.calibration.survey_files import MeasurementFile, read_measurements
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.calibration.validation import FitTask, Validated, validate_fit
 from postproc.calibration.weighing import ENOUGH
 from postproc.calibration.weight_direction import direction_warning, level_warning
+from postproc.exceptions import MeasurementError, ModelError
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.placement import Placement
@@ -56,10 +55,15 @@ from postproc.model.model import Model, Monument
 from postproc.model.model_file import Method
 from postproc.model.noise import angle_step
 from postproc.model.registration import Registration
+from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
-from postproc.robot.cell import Cell
+from postproc.robot.cell import Cell, as_cell
 from postproc.robot.pose import MM
 from postproc.robot.state import States
+from postproc.threads import in_one_thread
+
+if TYPE_CHECKING:
+    from postproc.arrays import DataFrame
 
 Frame = Literal["base", "tracker"]
 
@@ -70,49 +74,132 @@ TURNED = 3e-3  # [rad] that a plate may be turned by, as far as a tracker can te
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A model, what the fit found, and the rows in the base frame."""
+    """A model, and what the fit found.
+
+    Attributes:
+        model: The model.
+        report: What the fit found, with the measured error before and after.
+        survey: The rows in the base frame.
+        cell: The cell that it was fitted in.
+        frame: The frame of the measured positions.
+    """
 
     model: Model
     report: FitReport
     survey: Measurements
+    cell: Cell
+    frame: Frame = "base"
 
     @property
     def rejected(self) -> str:
         """Why the model must not be used; "" where it may be."""
         return self.report.rejected
 
+    def __str__(self) -> str:
+        """Say in some lines what was found, and what new poses may expect."""
+        report = self.report
+        lines = [
+            f"model {self.model.id} of {self.model.arm_name}: "
+            f"{', '.join(dict.fromkeys(e.name for e in self.model.effects.effects))}",
+            "" if report.held_out is None else report.held_out.describe(),
+            f"measured error  {report.before.tell()}",
+            f"left by the fit {report.after.tell()}",
+            *(f"warning: {warning}" for warning in report.warnings),
+            f"not to be used: {self.rejected}" if self.rejected else "",
+        ]
+        return "\n".join(line for line in lines if line)
+
+    def score(
+        self,
+        file: str | Path | bytes,
+        *,
+        name: str = "measurements.csv",
+        reading: TableFormat = DETECT,
+    ) -> ErrorStatistics:
+        """Say what the model leaves of other measurements, which it has not seen.
+
+        Args:
+            file: Measurements in the frame of those that it was fitted to.
+            name: File name of measurements that are given as bytes.
+            reading: What the user knows of the file.
+
+        Raises:
+            PostprocError: It cannot be read, or has no positions.
+        """
+        found = predict(
+            file,
+            self.cell,
+            self.model,
+            frame=self.frame if self.frame == "tracker" else None,
+            name=name,
+            reading=reading,
+        )
+        if found.residual is None:
+            cure = "Give a file with x_mm, y_mm and z_mm"
+            raise MeasurementError(found.table.path, "has no positions", cure)
+        return ErrorStatistics.of(found.residual)
+
+    def save(self, path: str | Path) -> None:
+        """Write the model file.
+
+        Raises:
+            ModelError: The model must not be used.
+            OutputError: The place cannot be written to.
+        """
+        if self.rejected:
+            raise ModelError(path, "is not written: the fit is rejected", self.rejected)
+        self.model.save(path)
+
+    def to_frame(self) -> DataFrame:
+        """Return a data frame of the parameters, one a row.
+
+        Columns: name, value, std_error, unit, share (of the error explained) and
+        determined (part of what is known that these rows tell).
+        """
+        rows = self.report.parameters
+        names = ("name", "value", "std_error", "unit", "share", "determined")
+        return data_frame({name: [getattr(p, name) for p in rows] for name in names})
+
 
 def fit(
-    files: Sequence[str | Path],
-    cell: Cell,
-    *,
+    *files: MeasurementFile,
+    cell: Cell | str | Path,
     method: Method = "full",
     effects: Sequence[str] | None = None,
     frame: Frame = "base",
-    seed: int = 0,
+    program: str | Path | None = None,
+    name: str = "measurements.csv",
     reading: TableFormat = DETECT,
+    seed: int = 0,
     progress: Progress = silent,
 ) -> Calibration:
     """Fit a model to measurement files.
 
+    Nothing is written: `Calibration.save` does that.
+
     Args:
-        files: Measurement files, in visit order.
-        cell: The cell: arm, probe points, tracker.
+        files: Measurements in visit order, as `read_measurements` takes them.
+        cell: The cell, or its file: arm, probe points, tracker.
         method: "full" or one of the source's methods.
         effects: Names of the effects that "full" fits; None: geometry and backlash,
             and whatever else the survey gives evidence for.
         frame: Frame of the measured positions. In the tracker's, the tracker's place
             and the probe points are fitted too.
-        seed: Of random layers, for methods that have one.
+        program: The survey program, for files that hold ids and positions only.
+        name: File name of measurements that are given as bytes.
         reading: What the user knows of the files.
+        seed: Of random layers, for methods that have one.
         progress: Told what is being done.
 
     Raises:
         MeasurementError: A file that cannot be read or cannot determine the geometry.
         PostprocError: An unknown effect, or one whose covariate was not recorded.
     """
+    cell = as_cell(cell)
     progress("read measurements")
-    survey = read_surveys(files, cell, reading)
+    survey = read_measurements(
+        *files, cell=cell, program=program, name=name, reading=reading
+    )
     return fit_measurements(
         survey,
         cell,
@@ -124,6 +211,7 @@ def fit(
     )
 
 
+@in_one_thread
 def fit_measurements(
     survey: Measurements,
     cell: Cell,
@@ -150,7 +238,7 @@ def fit_measurements(
     """
     rows = _prepare(survey, cell, frame)
     if method != "full":
-        return _published(rows, cell.arm, method, seed)
+        return _published(rows, cell, frame, method, seed)
     task = FitTask(rows.survey, cell.arm, effects, rows.tracker, rows.setup)
     fitted = task.fit(progress=progress)
     found = Validated(fitted, None)
@@ -158,7 +246,7 @@ def fit_measurements(
         progress("predict poses that are held out")
         found = validate_fit(task, fitted)
     progress("report")
-    return _conclude(rows, found, cell.arm)
+    return _conclude(rows, found, cell, frame)
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,23 +304,28 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
     )
 
 
-def _published(rows: PreparedRows, arm: Arm, method: Method, seed: int) -> Calibration:
+def _published(
+    rows: PreparedRows, cell: Cell, frame: Frame, method: Method, seed: int
+) -> Calibration:
     """Fit a method of the literature."""
-    survey = rows.survey
+    survey, arm = rows.survey, cell.arm
     model = fit_method(method, survey, arm, seed)
     notes = (*survey.warnings, *too_wide(model, survey, arm))
     survey = replace(survey, warnings=notes)
     model = replace(model, registration=rows.placed)
-    return Calibration(model, report_method(model, survey, arm), survey)
+    report = report_method(model, survey, arm)
+    return Calibration(model, report, survey, cell, frame)
 
 
-def _conclude(rows: PreparedRows, found: Validated, arm: Arm) -> Calibration:
+def _conclude(
+    rows: PreparedRows, found: Validated, cell: Cell, frame: Frame
+) -> Calibration:
     """Make the model of a fit and its report.
 
     Where the cell does not state the mounting, and the rows contradict what follows
     from that, nobody but the user knows: no model is to be used.
     """
-    fitted, survey = found.fit, rows.survey
+    fitted, survey, arm = found.fit, rows.survey, cell.arm
     direction = direction_warning(fitted)
     asked = "" if rows.mounted or found.error is None else "".join(direction)
     model = model_of(fitted, survey, found.widening)
@@ -252,7 +345,8 @@ def _conclude(rows: PreparedRows, found: Validated, arm: Arm) -> Calibration:
     survey = replace(survey, warnings=notes)
     report = report_fit(fitted, survey, model)
     report = replace(report, held_out=found.error, rejected=found.rejected or asked)
-    return Calibration(model, report, survey.with_states(fitted.batch.states))
+    survey = survey.with_states(fitted.batch.states)
+    return Calibration(model, report, survey, cell, frame)
 
 
 def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
@@ -484,33 +578,3 @@ def probe_note(placed: Registration, arm: Arm, states: States) -> tuple[str, ...
         "hold for poses with the tool turned like this alone. Measure poses with other "
         "orientations",
     )
-
-
-def read_surveys(
-    files: Sequence[str | Path], cell: Cell, reading: TableFormat = DETECT
-) -> Measurements:
-    """Read measurement files as one survey, with what the cell knows of the load."""
-    parts = [
-        read_measurements(path, cell.arm, cell.nests, reading=reading) for path in files
-    ]
-    return carrying_load(replace(concatenate(parts), mounting=cell.mounting), cell)
-
-
-def carrying_load(rows: Measurements, cell: Cell) -> Measurements:
-    """Tell of every row where its payload has its weight, as the cell knows it.
-
-    Where the file does not tell the payload either, it is the cell's: compensation
-    takes that to hang there, and what joints yield by holds for one payload.
-    """
-    if cell.file.payload is None:
-        return rows
-    com = np.tile(cell.payload_com, (len(rows), 1))
-    untold = np.isnan(rows.states.payload)
-    mass = np.where(untold, cell.payload_mass, rows.states.payload)
-    loaded = rows.with_states(rows.states.with_(payload=mass, payload_com=com))
-    if not untold.any():
-        return loaded
-    which = "rows" if untold.all() else f"{untold.sum()} rows"
-    told = f"no payload_kg: {which} taken as measured with the payload of the cell, "
-    told += f"{cell.payload_mass:g} kg"
-    return replace(loaded, warnings=(*rows.warnings, told))

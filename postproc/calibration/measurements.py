@@ -40,6 +40,7 @@ from postproc.calibration.tables import (
     translate,
 )
 from postproc.exceptions import MeasurementError
+from postproc.files import NamedText
 from postproc.model.registration import rigid_fit
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
@@ -132,8 +133,8 @@ class Measurements:
         )
 
 
-def read_measurements(
-    path: str | Path,
+def read_survey_file(
+    path: str | Path | NamedText,
     arm: Arm,
     tools: Nests,
     *,
@@ -481,7 +482,9 @@ WHOLE = re.compile(r"^\d+$")
 AXIS = {a: re.compile(rf"^{a}(\s*[\[(]?\s*mm\s*[\])]?|_mm)?$", re.I) for a in "xyz"}
 
 
-def read_points(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
+def read_points(
+    path: str | Path | NamedText, reading: TableFormat = DETECT
+) -> TextTable:
     """Read names and positions as columns id, x_mm, y_mm, z_mm.
 
     A file that has these columns keeps its others, too.

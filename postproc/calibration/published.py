@@ -28,6 +28,7 @@ from postproc.model.ranges import Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States
+from postproc.threads import in_one_thread
 
 # The methods of the source, as models that predict like ours.
 #
@@ -284,6 +285,7 @@ def random_said(train: Rows, test: Rows, seed: int) -> str:
     )
 
 
+@in_one_thread
 def compare_in(trials: Sequence[Trial], arm: Arm, seed: int) -> tuple[MethodRow, ...]:
     """Fit every method in some trials; the errors on all test rows are put together.
 

@@ -130,6 +130,13 @@ class FreeForms:
         rms, std = (float(np.sqrt(v) / MM) for v in sizes)
         return cls(part.names, rms, std)
 
+    def tell(self) -> str:
+        """Say it in one line."""
+        if not self.names:
+            return "free forms: none, the named effects predict every correction"
+        names = ", ".join(self.names)
+        return f"free forms ({names}): {self.rms_mm:.3f} +- {self.std_mm:.3f} mm rms"
+
 
 @dataclass(frozen=True)
 class FitReport:

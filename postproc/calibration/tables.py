@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from postproc.arrays import Bools, Floats
 from postproc.exceptions import MeasurementError, PostprocError
+from postproc.files import NamedText
 from postproc.robot.arm import Arm
 from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.pose import MM
@@ -138,7 +139,7 @@ class TextTable:
 
 
 def read_table(
-    path: str | Path,
+    path: str | Path | NamedText,
     encoding: str | None = None,
     delimiter: str | None = None,
     decimal: str | None = None,
@@ -151,7 +152,7 @@ def read_table(
     above the header, empty rows and empty cells at the ends of rows are no data.
 
     Args:
-        path: The file.
+        path: The file, or its text.
         encoding: Name of a Python codec.
         delimiter: Between cells.
         decimal: "." or ",".
@@ -162,8 +163,7 @@ def read_table(
     Raises:
         MeasurementError: The file cannot be read, is empty, or its lines differ.
     """
-    path = Path(path)
-    raw = _read(path)
+    path, raw = _read(path)
     lines = [
         (i + 1, text)
         for i, text in enumerate(_decode(raw, encoding, path).splitlines())
@@ -192,7 +192,7 @@ def read_table(
     return TextTable(path, tuple(names), cells, line, sign, digest, headed)
 
 
-def read_headed(path: str | Path, **options: Any) -> TextTable:
+def read_headed(path: str | Path | NamedText, **options: Any) -> TextTable:
     """Read a table that may have no header; its columns are then 1, 2, ..
 
     Raises:
@@ -201,16 +201,17 @@ def read_headed(path: str | Path, **options: Any) -> TextTable:
     return read_table(path, **{"header": None, **options})
 
 
-def _read(path: Path) -> bytes:
-    """Read the bytes of a file."""
+def _read(file: str | Path | NamedText) -> tuple[Path, bytes]:
+    """Read a file, unless its bytes are given; return its path and its bytes."""
+    path = Path(file.name if isinstance(file, NamedText) else file)
     try:
-        raw = path.read_bytes()
+        raw = file.data if isinstance(file, NamedText) else path.read_bytes()
     except OSError as exc:
         problem = f"cannot be read ({exc.strerror})"
         raise MeasurementError(path, problem, "Check the path") from None
     if len(raw) > MAX_BYTES:
         raise MeasurementError(path, "is too large for a survey", "Check the path")
-    return raw
+    return path, raw
 
 
 def _decode(raw: bytes, encoding: str | None, path: Path) -> str:
@@ -936,7 +937,9 @@ IPA = Format(  # Fraunhofer IPA, UR10 series: joints in rad, T-Mac positions in 
 KNOWN = (IPA,)
 
 
-def read_foreign(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
+def read_foreign(
+    path: str | Path | NamedText, reading: TableFormat = DETECT
+) -> TextTable:
     """Read a measurement file in our columns, whatever tool wrote it.
 
     Args:

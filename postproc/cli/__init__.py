@@ -13,7 +13,7 @@ import signal
 import sys
 from typing import Any
 
-from postproc import POOLS
+from postproc.threads import start_no_threads
 
 __all__ = ["app", "main"]
 
@@ -35,7 +35,7 @@ def __getattr__(name: str) -> Any:
 def main() -> None:
     """Run the command line; a defect of ours ends with 2, like all that failed."""
     _leave_signals_to_the_system()
-    _leave_cores_to_processes()
+    start_no_threads()
     _give_large_arrays_back()
     _look_for_cycles_seldom()
     _look_for_no_plugins()
@@ -54,16 +54,6 @@ def main() -> None:
             "written. Set POSTPROC_DEBUG=1 for the trace, and please report it"
         )
         sys.exit(2)
-
-
-def _leave_cores_to_processes() -> None:
-    """Let numerical libraries start no threads, unless the user says otherwise.
-
-    For products of small matrices they cost more than they gain. They look when they
-    are loaded, and so do the processes that are started from here.
-    """
-    for name in POOLS:
-        os.environ.setdefault(name, "1")
 
 
 def _give_large_arrays_back() -> None:

@@ -11,22 +11,22 @@ from typing import Any
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.calibration.diagnosis.diagnose import Extension, diagnose
+from postproc.calibration.diagnosis.diagnose import Extension, extend_model
+from postproc.calibration.diagnosis.files import REGISTERED, PointFrame
 from postproc.calibration.diagnosis.search import Progress
 from postproc.calibration.diagnosis.trace import silent
 from postproc.calibration.measurements import POSITION, Measurements
 from postproc.calibration.tables import read_table
-from postproc.cli.diagnose import REGISTERED, Asked, extended_path
-from postproc.cli.jobs import read_files
 from postproc.compensation.paths.accuracy import PredictedWays, predicted_ways
 from postproc.compensation.paths.flanks import JointInMotion, in_motion, measured_steps
 from postproc.compensation.paths.measured import Aligned, OnTheWay, Track, align
 from postproc.compensation.paths.servo_lag import ServoLag, servo_lag
 from postproc.compensation.program import read_program, with_measured_play
+from postproc.compensation.program_files import read_files
 from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.language.visits import Visits
-from postproc.model.model import READING, Model, load_model
+from postproc.model.model import READING, Model, as_model
 from postproc.model.statistics import ErrorStatistics
 from postproc.motion.cycle import ProgramCycle, run
 from postproc.report.terminal import Column, table_text
@@ -158,35 +158,53 @@ def _of_lag(lag: ServoLag) -> str:
 
 def diagnose_path(
     track: Path,
-    cell_path: Path,
-    model_path: Path,
-    asked: Asked,
+    *,
+    cell: Path,
+    model: Path,
+    program: Path | None,
+    frame: PointFrame = "base",
+    seed: int = 0,
     progress: Progress = silent,
 ) -> PathDiagnosis:
     """Lay a tracker's readings along a program's ways, and diagnose what they say.
 
     Args:
         track: Columns time_s, x_mm, y_mm, z_mm, read while the program ran once.
-        cell_path: The cell.
-        model_path: The model that may lack something.
-        asked: What the user wants; its program is the one that ran.
+        cell: The cell's file.
+        model: The file of the model that may lack something.
+        program: The program that ran.
+        frame: What positions are given in.
+        seed: Of the bootstrap.
         progress: Told what is being done.
 
     Raises:
         PostprocError: A file cannot be used, or the model cannot be extended.
     """
-    if asked.program is None:
+    if program is None:
         raise PostprocError("--path: name the program that ran with --program")
-    cell, model = load_cell(cell_path), load_model(model_path)
-    model.check_arm(cell.arm, model_path)
+    place = load_cell(cell)
+    given = as_model(model, place.arm)
+    return _diagnosed(track, place, given, program, frame, seed, progress)
+
+
+def _diagnosed(
+    track: Path,
+    cell: Cell,
+    model: Model,
+    program: Path,
+    frame: PointFrame,
+    seed: int,
+    progress: Progress,
+) -> PathDiagnosis:
+    """Diagnose a track of a program in a cell."""
     read, digest = read_track(track)
-    read = replace(read, position=_in_base(read.position, asked, cell, model))
-    visits = read_program(read_files(asked.program), cell).visits
+    read = replace(read, position=_in_base(read.position, frame, cell, model))
+    visits = read_program(read_files(program), cell).visits
     own = with_measured_play(cell, model)
     cycle = run(own.arm, targets_from_visits(visits, own)[0])
     ways = predicted_ways(cycle, own, model, cell.temperature)
     found = align(read, ways, visits.fly)
-    _check(found, track, asked.measured_frame)
+    _check(found, track, frame)
     joints = in_motion(measured_steps(ways, found.on_the_way, read.scatter))
     lag = _lag(found, ways, visits, cycle, own)
     rows = _rows(found, ways, visits, cycle, cell)
@@ -195,15 +213,13 @@ def diagnose_path(
         np.zeros(len(rows.ids), dtype=bool), digest,
     )  # fmt: skip
     tracker, setup = cell.tracker, tuple[str, ...]()
-    if asked.measured_frame == "tracker" and model.registration is not None:
+    if frame == "tracker" and model.registration is not None:
         tracker, setup = model.registration.tracker, REGISTERED
-    extension = diagnose(
-        survey, cell.arm, model, tracker=tracker, setup=setup, seed=asked.seed,
+    extension = extend_model(
+        survey, cell.arm, model, tracker=tracker, setup=setup, seed=seed,
         progress=progress,
     )  # fmt: skip
     extension = _with_verdicts(_as_surveyed(extension, model), joints)
-    if extension.diagnosis.verdict != "rejected":
-        extension.model.save(asked.output or extended_path(model_path))
     size = ErrorStatistics.of_sizes(lengths(found.on_the_way.off))
     moves = np.unique(_move(found.on_the_way.sample, ways))
     stops = len(found.ended), found.missed
@@ -247,13 +263,12 @@ def read_track(path: Path) -> tuple[Track, str]:
     return track, hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _in_base(position: Floats, asked: Asked, cell: Cell, model: Model) -> Floats:
+def _in_base(position: Floats, frame: PointFrame, cell: Cell, model: Model) -> Floats:
     """Convert readings to the arm's base frame.
 
     Raises:
         MeasurementError: Where the tracker stood is not known.
     """
-    frame = asked.measured_frame
     if frame == "uframe":
         T = inverse(cell.base.pose) @ cell.uframe.pose
         return np.asarray(position @ T[:3, :3].T + T[:3, 3])

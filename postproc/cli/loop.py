@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,11 +21,10 @@ from postproc.cli.common import (
     write_text,
 )
 from postproc.exceptions import PostprocError
-from postproc.files import check_places
+from postproc.files import check_places, schema
 
 if TYPE_CHECKING:
     from postproc.calibration.diagnosis.diagnose import Extension
-    from postproc.cli.diagnose import Asked
     from postproc.cli.diagnose_path import PathDiagnosis
 
 
@@ -68,19 +67,25 @@ def diagnose(
 ) -> None:
     """Find what the model lacks, trace it to an effect, and add that effect."""
     from postproc.calibration.diagnosis.diagnose import dumped, evidence_of
-    from postproc.cli import diagnose
+    from postproc.report.diagnosis import tell
+    from postproc.report.terminal import stage_bar
 
     with explained():
         files = data or []
         inputs = [*files, cell, model, program, path]
         check_places([output, as_path(json), html, plot], inputs)
-        asked = diagnose.Asked(output, program, frame.value, seed)
-        on_the_way, found = _diagnosed(files, path, cell, model, asked)
+        how = {"program": program, "frame": frame.value, "seed": seed}
+        with stage_bar() as progress:
+            on_the_way, found = _diagnosed(
+                files, path, cell=cell, model=model, progress=progress, **how
+            )
+            if not found.rejected:
+                found.save(output or extended_path(model))
         if json:
             told = evidence_of(found)
             if on_the_way is not None:
                 told |= {"path": on_the_way.to_dict()}
-            write_text(json, dumped(told))
+            write_text(json, dumped(schema("diagnosis") | told))
         if html is not None:
             from postproc.report.html import diagnosis_report
 
@@ -93,40 +98,42 @@ def diagnose(
         if json != "-":
             if on_the_way is not None:
                 typer.echo(on_the_way.tell())
-            typer.echo(diagnose.tell(found.diagnosis))
-        if found.diagnosis.verdict == "rejected":
+            typer.echo(tell(found.diagnosis))
+        if found.rejected:
             raise typer.Exit(2)
 
 
 def _diagnosed(
-    files: list[Path], path: Path | None, cell: Path, model: Path, asked: Asked
+    files: list[Path], path: Path | None, **how: Any
 ) -> tuple[PathDiagnosis | None, Extension]:
     """Diagnose points, or a path."""
-    from postproc.cli import diagnose
+    from postproc.calibration.diagnosis.files import diagnose as diagnose_files
     from postproc.cli.diagnose_path import diagnose_path
-    from postproc.report.terminal import stage_bar
 
     if (path is None) == (not files):
         raise PostprocError("diagnose: give measurements, or --path and --program")
-    with stage_bar() as progress:
-        if path is None:
-            found = diagnose.diagnose_files(files, cell, model, asked, progress)
-            return None, found
-        told = diagnose_path(path, cell, model, asked, progress)
-        return told, told.extension
+    if path is None:
+        return None, diagnose_files(*files, **how)
+    told = diagnose_path(path, **how)
+    return told, told.extension
+
+
+def extended_path(model_path: Path) -> Path:
+    """Name the extended model's file when nobody did."""
+    return model_path.with_name(f"{model_path.stem}.extended.json")
 
 
 @app.command()
 def history(model: Path, json: JsonOption = None) -> None:
     """Print what was added to a model and its parents, with before and after."""
-    from postproc.cli import diagnose
+    from postproc.report.diagnosis import history_json, history_text
 
     with explained():
         check_places([as_path(json)], [model])
         if json:
-            write_text(json, diagnose.history_json(model))
+            write_text(json, history_json(model))
         if json != "-":
-            typer.echo(diagnose.history_text(model))
+            typer.echo(history_text(model))
 
 
 @app.command()

@@ -92,7 +92,7 @@ def survey(
     ] = 0,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
-    from postproc.cli.survey import write_survey
+    from postproc.calibration.survey_program import write_survey
 
     with explained():
         check_places([output], [cell])
@@ -182,31 +182,34 @@ def fit(
     ] = False,
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
+    from postproc.calibration import fit as calibration
     from postproc.calibration.tables import TableFormat
-    from postproc.cli import fit
+    from postproc.report.fit import fit_json, tell_fit_files, write_page
 
     names = None if effects is None else split_names(effects)
     with explained():
         check_places([output, html, as_path(json)], [*data, cell, program, columns])
         reading = TableFormat(columns, delimiter, decimal, encoding, unit)
         with stages(log=True) as progress:
-            found = fit.fit_files(
-                data,
-                cell,
-                output,
-                program,
-                html,
-                reading,
+            found = calibration.fit(
+                *data,
+                cell=cell,
                 method=method.value,
                 effects=names,
                 frame=frame.value,
+                program=program,
+                reading=reading,
                 seed=seed,
                 progress=progress,
             )
+            if not found.rejected:
+                found.save(output)
+                if html is not None:
+                    write_page(html, found)
         if json:
-            write_text(json, fit.fit_json(found))
+            write_text(json, fit_json(found))
         if json != "-":
-            typer.echo(fit.tell_fit_files(found, output, everything))
+            typer.echo(tell_fit_files(found, output, everything))
         if found.rejected:
             raise typer.Exit(2)
 
@@ -237,18 +240,24 @@ def predict(
     encoding: EncodingOption = None,
 ) -> None:
     """Add the predicted error of every row; with positions, also the residual."""
+    from postproc.calibration import predict as prediction
     from postproc.calibration.tables import TableFormat
-    from postproc.cli import fit
-    from postproc.cli.readings import Readings
 
     with explained():
         check_places([output], [states, cell, model, columns])
         reading = TableFormat(columns, delimiter, decimal, encoding)
-        asked = Readings(None if frame is None else frame.value, refit, after)
         with busy("predict"):
-            text, summary = fit.predict_file(states, cell, model, asked, reading)
-        write_text("-" if output is None else str(output), text)
-        say(summary)
+            found = prediction.predict(
+                states,
+                cell,
+                model,
+                frame=None if frame is None else frame.value,
+                refit=refit,
+                after=after,
+                reading=reading,
+            )
+        write_text("-" if output is None else str(output), found.to_csv())
+        say(found.summary())
 
 
 @app.command()
@@ -275,18 +284,19 @@ def compare(
     encoding: EncodingOption = None,
 ) -> None:
     """Fit every method to the same rows, and test it on the same others."""
+    from postproc.calibration.comparison import Held, compare_files
     from postproc.calibration.tables import TableFormat
-    from postproc.cli import fit
+    from postproc.report.fit import comparison_json, tell_comparison
 
     with explained():
         others = test or []
         check_places([as_path(json), html, plot], [*data, *others, cell, columns])
         reading = TableFormat(columns, delimiter, decimal, encoding)
-        held = fit.Held(others, blocks, seed)
+        held = Held(others, blocks, seed)
         with busy("fit every method"):
-            found = fit.compare_files(data, cell, frame.value, held, reading)
+            found = compare_files(data, cell, frame.value, held, reading)
         if json:
-            write_text(json, fit.comparison_json(found))
+            write_text(json, comparison_json(found))
         if html is not None:
             from postproc.report.html import comparison_report
 
@@ -296,4 +306,4 @@ def compare(
 
             say(f"plot {plot_comparison(found, plot)}")
         if json != "-":
-            typer.echo(fit.tell_comparison(found))
+            typer.echo(tell_comparison(found))

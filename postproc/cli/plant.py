@@ -27,7 +27,6 @@ from postproc.compensation.options import AS_USUAL
 from postproc.files import check_places, is_program
 
 if TYPE_CHECKING:
-    from postproc.batch.check import Current
     from postproc.batch.journal import Summary
     from postproc.batch.plan import BatchPlan
     from postproc.batch.run import Gather
@@ -181,8 +180,9 @@ def check(
     from postproc.batch.check import check as look
 
     with explained():
-        current = _current_model(folder, model, plan)
-        found = look(folder, current, source, strict_calls)
+        found = look(
+            folder, model=model, plan=plan, source=source, strict_calls=strict_calls
+        )
         if accept_left:
             found = found.accepting_left()
         judged = _second_opinion(folder, (cell, model, plan), second_opinion)
@@ -254,25 +254,3 @@ def _print_opinion(judged: TreeOpinion) -> None:
         print_opinion(judged.opinion)
     else:
         say("no second opinion: no program could be judged")
-
-
-def _current_model(folder: Path, model: Path | None, plan: Path | None) -> Current:
-    """Tell which model a program of a tree should have been made with."""
-    if plan is not None:
-        from postproc.batch.pages import program_arm, read_head
-        from postproc.batch.plan import make_plan
-
-        made = make_plan(plan, None, None, AS_USUAL)
-        ids = [setup.model.id for setup in made.setups]
-
-        def current_of(place: str) -> str | None:
-            which = made.setup_of(place, program_arm(read_head(folder / place)))
-            return None if which is None else ids[which]
-
-        return current_of
-    if model is not None:
-        from postproc.model.model import load_model
-
-        current = load_model(model).id
-        return lambda place: current
-    return lambda place: None

@@ -38,8 +38,8 @@ from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places, is_stream
 
 if TYPE_CHECKING:
-    from postproc.cli.jobs import Job
     from postproc.compensation.outcome import Outcome
+    from postproc.compensation.program_files import ProgramFiles
 
 
 def _explain_code(code: str | None) -> None:
@@ -116,12 +116,15 @@ def compensate(
     every: EveryOption = False,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
-    from postproc.cli import jobs
     from postproc.cli.common import stages
+    from postproc.cli.jobs import Destination
     from postproc.compensation import parallel
+    from postproc.compensation.compensate import compensate as run
     from postproc.compensation.options import Options
+    from postproc.compensation.program_files import ProgramFiles
+    from postproc.model.model import as_model
     from postproc.report.json import report_text
-    from postproc.verify.extra import load
+    from postproc.robot.cell import load_cell
 
     given = None if is_stream(program) else Path(program)
     with explained(given, lsv):
@@ -141,20 +144,22 @@ def compensate(
         if report == Path(STREAM) and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html, lsv_out], [given, lsv, cell, model])
-        job = jobs.Job.open(program, cell, model, lsv)
+        loaded = load_cell(cell)
+        fitted = as_model(model, loaded.arm)
+        files = ProgramFiles.open(program, lsv)
         if lsv_out is not None:
-            _check_values(lsv_out, job)
-        if job.wants_opinion:
-            load()
+            _check_values(lsv_out, files)
         crowd = processes or min(parallel.available(), CROWD)
         with stages() as progress:
-            outcome = job.run(options, progress, crowd)
-            if job.wants_opinion:
-                outcome = job.judged(outcome, options)
+            outcome = run(
+                files, loaded, fitted, options=options, progress=progress,
+                processes=crowd,
+            )  # fmt: skip
         if strict and outcome.exit_code:
             _print_outcome(outcome, every)
             raise PostprocError(f"--strict: {_why_nothing(outcome)}")
-        written = job.write(outcome, output, report, html, lsv_out)
+        places = Destination(files, (cell, model))
+        written = places.write(outcome, output, report, html, lsv_out)
         _print_outcome(outcome, every)
         if report == Path(STREAM):
             write_text(STREAM, report_text(outcome))
@@ -176,7 +181,7 @@ def _why_nothing(outcome: Outcome) -> str:
     )
 
 
-def _check_values(place: Path, job: Job) -> None:
+def _check_values(place: Path, files: ProgramFiles) -> None:
     """Refuse a place for a variable file that is none, or where there is no such file.
 
     Raises:
@@ -184,7 +189,7 @@ def _check_values(place: Path, job: Job) -> None:
     """
     if place == Path(STREAM):
         raise PostprocError("--lsv-out -: stdout holds the program. Name a file")
-    if job.variables is None:
+    if files.variables is None:
         raise PostprocError(
             "--lsv-out: the program has no variable file. Give it with --lsv"
         )
@@ -267,23 +272,28 @@ def explain(
     json: JsonOption = None,
 ) -> None:
     """Show why every target moves: from where it is reached, and what that costs."""
-    from postproc.cli.explain import explain_file
+    from postproc.compensation.explanation import explain as tell
     from postproc.compensation.options import Options
+    from postproc.compensation.program_files import ProgramFiles
+    from postproc.model.model import load_model
+    from postproc.report.explanation import explanation_json, print_explanation
     from postproc.report.findings import listed
+    from postproc.robot.cell import load_cell
 
     with explained(program, lsv):
         check_places([as_path(json)], [program, cell, model, lsv])
         options = Options(
             temperature=temperature,
             strict_calls=strict_calls,
-            explained=True,
             timing=timing,
         )
         with busy("plan"):
-            found = explain_file(program, cell, model, lsv, options)
+            files = ProgramFiles.open(program, lsv)
+            fitted = None if model is None else load_model(model)
+            found = tell(files, load_cell(cell), fitted, options=options)
         for text in listed(found.findings(line), every):
             say(text)
         if json:
-            write_text(json, found.to_json(line))
+            write_text(json, explanation_json(found, line))
         if json != "-":
-            found.print(line)
+            print_explanation(found, line)

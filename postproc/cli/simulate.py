@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Ints
-from postproc.cli.jobs import read_files
 from postproc.compensation.paths.insertions import points_on_ways
 from postproc.compensation.program import read_program
+from postproc.compensation.program_files import read_files
 from postproc.exceptions import CellError
+from postproc.files import schema
 from postproc.language.languages import language_of
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
@@ -76,7 +77,11 @@ class Simulation:
     def to_json(self) -> str:
         """Return the true error as JSON text."""
         error = None if self.true_error is None else asdict(self.true_error)
-        told: dict[str, object] = {"program": self.name, "true_error": error}
+        told: dict[str, object] = {
+            **schema("simulation"),
+            "program": self.name,
+            "true_error": error,
+        }
         told |= {"left_out": self.left_out} if self.left_out else {}
         if self.paths is not None:
             told |= {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
+from pathlib import Path
 
 import numpy as np
 
@@ -46,6 +46,11 @@ from postproc.compensation.program import (
     prepared,
     read_program,
 )
+from postproc.compensation.program_files import (
+    NO_PAGES,
+    ProgramFiles,
+    program_files,
+)
 from postproc.compensation.record import Sidecar
 from postproc.compensation.rewrite import (
     Output,
@@ -55,28 +60,28 @@ from postproc.compensation.rewrite import (
 from postproc.compensation.targets import rounded_points, unknown_blends
 from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
-from postproc.files import variables_of
 from postproc.language.interface import Language
 from postproc.language.languages import language_of
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
 from postproc.language.visits import Diagnostic, Visits, told_once
-from postproc.model.model import Model
+from postproc.model.model import Model, as_model
 from postproc.model.statistics import ErrorStatistics
-from postproc.robot.cell import Cell
+from postproc.robot.cell import Cell, as_cell
+from postproc.threads import in_one_thread
+from postproc.verify.extra import load
 
 # All of it: what is given, checked, corrected, written and told.
 
-NO_PAGES: Mapping[str, bytes] = MappingProxyType({})
 
-
+@in_one_thread
 def compensate(
-    source: bytes,
-    cell: Cell,
-    model: Model,
+    program: str | Path | bytes | ProgramFiles,
+    cell: Cell | str | Path,
+    model: Model | str | Path,
     *,
     name: str = "program.pdl",
-    variables: bytes | None = None,
+    variables: bytes | str | Path | None = None,
     pages: Mapping[str, bytes] = NO_PAGES,
     options: Options = AS_USUAL,
     progress: Progress = silent,
@@ -84,13 +89,16 @@ def compensate(
 ) -> Outcome:
     """Move every target of a program against the error the arm would make there.
 
+    Nothing is written: `Outcome.save` does that.
+
     Args:
-        source: The program.
-        cell: The robot's surroundings.
-        model: The arm's error.
-        name: File name of the program; its variable file is ``name.lsv``.
-        variables: The variable file, where there is one.
-        pages: Programs that it imports and that nobody else uses, by file name; they
+        program: The program: a path, beside which its pages and its variable file are
+            found, or its bytes.
+        cell: The robot's surroundings, or where they are described.
+        model: The arm's error, or its file.
+        name: File name of a program that is given as bytes.
+        variables: The variable file, where there is one: a path, or bytes.
+        pages: Programs that bytes import and that nobody else uses, by file name; they
             are followed and rewritten with it.
         options: What the user asked for.
         progress: Told the name of every stage as it begins.
@@ -100,8 +108,42 @@ def compensate(
         ProgramError: The source is no program text, or is compensated already.
         CellError: The controller compensates on its own.
         ModelError: The model was made for another arm.
+        PostprocError: The cell asks for a second opinion, and libraries for it are
+            missing.
     """
-    files = name_files(name, source, variables, pages)
+    cell = as_cell(cell)
+    model = as_model(model, cell.arm)
+    given = program_files(program, name, variables, pages)
+    judged = cell.file.verify.second_opinion
+    if judged:
+        load()
+    outcome = compensate_files(given, cell, model, options, progress, processes)
+    told = (*outcome.diagnostics, *given.told_of(cell))
+    outcome = replace(outcome, diagnostics=told, inputs=given.inputs)
+    if not judged:
+        return outcome
+    from postproc.compensation.second_opinion import second_opinion
+
+    output = {**outcome.sources, **outcome.outputs}
+    own = prepared(cell, model, options)
+    opinion = second_opinion(outcome.sources, output, own, outcome.record)
+    return replace(outcome, opinion=opinion)
+
+
+def compensate_files(
+    given: ProgramFiles,
+    cell: Cell,
+    model: Model,
+    options: Options = AS_USUAL,
+    progress: Progress = silent,
+    processes: int = 1,
+) -> Outcome:
+    """Compensate a program that was read, without a second opinion: see `compensate`.
+
+    Raises:
+        PostprocError: As there.
+    """
+    files = given.by_name
     refuse(files, cell, model)
     cell = prepared(cell, model, options)
     setting = Setting(cell, model, options, Clock(progress), processes)
@@ -109,20 +151,7 @@ def compensate(
         reading = read_with_cause(files, cell)
         give_back(len(reading.visits))
     reading, kept = correct(reading, setting)
-    return finish(name, reading, kept, setting)
-
-
-def name_files(
-    name: str,
-    source: bytes,
-    variables: bytes | None,
-    pages: Mapping[str, bytes] = NO_PAGES,
-) -> dict[str, bytes]:
-    """Name a program, its pages and its variable file, the program first."""
-    files = {name: source, **pages}
-    if variables is not None:
-        files[variables_of(name)] = variables
-    return files
+    return finish(given.name, reading, kept, setting)
 
 
 def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:

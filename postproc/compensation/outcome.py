@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, Indices, Ints, Signs
+from postproc.arrays import Floats, Indices, Ints, Signs, columns_of, data_frame
 from postproc.compensation.record import (
     LeftLine,
     Sidecar,
@@ -21,6 +21,14 @@ from postproc.compensation.record import (
 )
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
+from postproc.files import (
+    Content,
+    check_places,
+    is_stream,
+    make_folder,
+    variables_of,
+    write_all,
+)
 from postproc.language.visits import (
     NOT_FOLLOWED,
     Diagnostic,
@@ -30,6 +38,7 @@ from postproc.model.statistics import ErrorStatistics
 from postproc.robot.pose import MM
 
 if TYPE_CHECKING:  # it loads all of the planning, which a record does not want
+    from postproc.arrays import DataFrame
     from postproc.compensation.arrivals import ArrivalStates
     from postproc.compensation.in_time import InTime
     from postproc.verify.opinion import Opinion
@@ -117,6 +126,7 @@ class Outcome:
             effects in their errors; None where nobody knows.
         in_time: The program run in time, before and after; None where nobody asked.
         opinion: A second opinion on it; None where nobody asked.
+        inputs: Files that it was read from, which `save` must not write over.
     """
 
     program: str
@@ -135,6 +145,71 @@ class Outcome:
     arrivals: ArrivalStates | None = None
     in_time: InTime | None = None
     opinion: Opinion | None = None
+    inputs: tuple[Path, ...] = ()
+
+    def __str__(self) -> str:
+        """Say what came of it; see `summary`."""
+        said = [self.summary()]
+        if self.in_time is not None:
+            said.append(self.in_time.summary(self.visits))
+        return "\n".join(said)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write the program, what changed of its files, and the records of them.
+
+        Args:
+            folder: Where to; it is made unless it is there. Files keep their names.
+
+        Returns:
+            The files written, the program last.
+
+        Raises:
+            OutputError: One would be written over what it was read from, or cannot be
+                written.
+        """
+        names = {name: Path(folder, Path(name).name) for name in self.outputs}
+        own = [n for n in (variables_of(self.program), self.program) if n in names]
+        files: dict[Path, Content] = {}
+        for name in reversed([name for name in names if name not in own]):
+            files |= self.recorded({name: names[name]}, names[name])
+        files |= self.recorded({n: names[n] for n in own}, names[self.program])
+        make_folder(Path(folder))
+        check_places(files, self.inputs)
+        write_all(files)
+        return list(files)
+
+    def recorded(self, places: Mapping[str, Path], main: Path) -> dict[Path, Content]:
+        """Name the files of one program, behind the record that undoes them.
+
+        Args:
+            places: Where outputs go, by name.
+            main: The place beside which the record lies; none lies beside a pipe.
+        """
+        names = {name: place.name for name, place in places.items()}
+        record = self.record.renamed(names).to_json()
+        files = {place: self.outputs[name] for name, place in places.items()}
+        return {**({} if is_stream(main) else {sidecar_path(main): record}), **files}
+
+    def to_frame(self) -> DataFrame:
+        """Return a data frame, one row a visit, in the order of the program.
+
+        Columns: file, line, target, status, why, then the correction of the TCP in the
+        base frame (``dx_mm`` ..), its standard error (``std_x_mm`` ..) and the
+        commanded joint angles before correction (``q1_deg`` ..).
+        """
+        v, d = self.visits, self.decisions
+        return data_frame(
+            {
+                "file": [v.files[k] for k in v.file.tolist()],
+                "line": v.line,
+                "target": [v.names[k] for k in v.name.tolist()],
+                "status": [Status(k).name.lower() for k in d.status.tolist()],
+                "why": [d.reasons[k] for k in d.why.tolist()],
+                **columns_of(("dx_mm", "dy_mm", "dz_mm"), d.correction / MM),
+                **columns_of(("std_x_mm", "std_y_mm", "std_z_mm"), d.std_error / MM),
+                **columns_of([f"q{k}_deg" for k in range(1, 7)], np.rad2deg(d.q)),
+            }
+        )
 
     @property
     def sidecar(self) -> str:

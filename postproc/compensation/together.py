@@ -16,15 +16,17 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from postproc.compensation.compensate import finish, name_files, refuse
+from postproc.compensation.compensate import finish, refuse
 from postproc.compensation.correction import Correction, correct
 from postproc.compensation.first_cause import read_with_cause
 from postproc.compensation.options import Clock, Options, Setting, silent
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import Reading, prepared
+from postproc.compensation.program_files import name_files
 from postproc.compensation.windows import concatenate, first_visits, offsets
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
+from postproc.threads import in_one_thread
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -42,6 +44,7 @@ class Given:
     pages: Mapping[str, bytes]
 
 
+@in_one_thread
 def compensate_batch(
     programs: Sequence[Given], cell: Cell, model: Model, options: Options
 ) -> list[Outcome | Exception]:

@@ -21,9 +21,11 @@ from postproc.model.kinematics import Batch
 from postproc.model.model_file import (
     FORMAT,
     Method,
+    ModelFile,
     RegistrationSection,
     content_id,
     packed,
+    parse_model_file,
     read_model_file,
     square_of,
 )
@@ -493,13 +495,40 @@ class Model:
         write_all({Path(path): text.encode()})
 
 
-def load_model(path: str | Path) -> Model:
+def as_model(model: Model | str | Path, arm: Arm) -> Model:
+    """Return a model that is given itself, or by its file, which must be the arm's.
+
+    Raises:
+        ModelError: See `load_model`; or the file's is another arm's.
+    """
+    if isinstance(model, Model):
+        return model
+    found = load_model(model)
+    found.check_arm(arm, model)
+    return found
+
+
+def load_model(file: str | Path | bytes, *, name: str = "model.json") -> Model:
     """Read a model file.
+
+    Args:
+        file: Its path, or its text as bytes.
+        name: Of text, for messages.
 
     Raises:
         ModelError: It cannot be read or does not hold together.
     """
-    file = read_model_file(Path(path))
+    if isinstance(file, bytes):
+        return _model_of(Path(name), parse_model_file(Path(name), file))
+    return _model_of(Path(file), read_model_file(Path(file)))
+
+
+def _model_of(path: Path, file: ModelFile) -> Model:
+    """Make a model of what its file says.
+
+    Raises:
+        ModelError: It does not hold together.
+    """
     cure = "Make the model again with postproc fit"
     try:
         effects = Combination(tuple(restore(e.name, e.settings) for e in file.effects))

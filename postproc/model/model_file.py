@@ -209,6 +209,15 @@ def read_model_file(path: Path) -> ModelFile:
     except OSError as exc:
         cure = "Make a model with postproc fit"
         raise ModelError(path, f"cannot be read ({exc.strerror})", cure) from None
+    return parse_model_file(path, raw)
+
+
+def parse_model_file(path: Path, raw: bytes) -> ModelFile:
+    """Check the bytes of a model file.
+
+    Raises:
+        ModelError: As `read_model_file` does.
+    """
     if len(raw) > MAX_BYTES:
         raise ModelError(path, "is too large for a model", "Check the path")
     try:

@@ -35,3 +35,12 @@ class ErrorStatistics:
         return cls(
             float(size.mean()), float(size.std()), p95, float(size.max()), len(size)
         )
+
+    def tell(self) -> str:
+        """Say it in one line."""
+        return (
+            f"mean {self.mean_mm:.4f} mm, std {self.std_mm:.4f}, "
+            f"95 % {self.p95_mm:.4f}, max {self.max_mm:.4f} ({self.n} rows)"
+        )
+
+    __str__ = tell

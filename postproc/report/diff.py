@@ -9,12 +9,12 @@ from difflib import SequenceMatcher
 from functools import cached_property, partial
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Indices, Interned, Ints
+from postproc.arrays import Bools, Floats, Indices, Interned, Ints, data_frame
 from postproc.compensation.outcome import (
     LEFT_ALONE,
     LineOutcomes,
@@ -23,15 +23,20 @@ from postproc.compensation.outcome import (
 )
 from postproc.compensation.parallel import in_background
 from postproc.files import (
+    NamedText,
     find_data_list,
     find_variables,
     holds_values,
     is_variables,
+    named_text,
     read_input,
 )
 from postproc.language.languages import language_of
 from postproc.language.scan import BLANKS, mask_of, scan_lines
 from postproc.language.stamp import read_stamp, stamp_span, strip_stamp
+
+if TYPE_CHECKING:
+    from postproc.arrays import DataFrame
 
 # Rows of `diff` as columns: no object a line, whatever the length of a program.
 
@@ -381,9 +386,9 @@ def is_named_by_file(place: str) -> bool:
     return is_variables(place) or holds_values(place)
 
 
-def _read_lines(path: Path) -> tuple[TextLines, bool]:
+def _read_lines(file: Path | NamedText) -> tuple[TextLines, bool]:
     """Read a file's lines without their endings; the stamp line is dropped."""
-    data = read_input(path)
+    data = file.data if isinstance(file, NamedText) else read_input(file)
     stamped = read_stamp(data) is not None
     span = stamp_span(data)
     if span.start:  # it stands behind a header
@@ -393,14 +398,17 @@ def _read_lines(path: Path) -> tuple[TextLines, bool]:
     return TextLines.of(data, stamped and not span.start), stamped
 
 
-def compare_files(original: Path, compensated: Path) -> Compared:
+def compare_files(first: Path | NamedText, second: Path | NamedText) -> Compared:
     """Compare two files line by line.
 
     Raises:
         ProgramError: A file cannot be read.
     """
-    before, _ = _read_lines(original)
-    after, stamped = _read_lines(compensated)
+    before, _ = _read_lines(first)
+    after, stamped = _read_lines(second)
+    original, compensated = Path(first.name), Path(second.name)
+    if isinstance(first, Path) and isinstance(second, Path):
+        original, compensated = first, second
     rows = joined_rows(original.name, list(_rows(original.name, before, after)))
     if is_named_by_file(original.name):
         rows = _named_by_language(original.name, rows, before)
@@ -512,6 +520,24 @@ class Difference:
         """Tell whether a line differs."""
         return any(len(part) > 0 for part in self.differing)
 
+    def __str__(self) -> str:
+        """Say what differs; see `summary`."""
+        return self.summary()
+
+    def to_frame(self) -> DataFrame:
+        """Return a data frame, one row a line that differs or was left alone.
+
+        Columns: file, line, target, the numbers on the line in the first and the
+        second program (original, compensated), change_mm, text, status, why and
+        correction_mm, as `DiffRow` has them.
+        """
+        names = (
+            "file", "line", "target", "original", "compensated", "change_mm", "text",
+            "status", "why", "correction_mm",
+        )  # fmt: skip
+        rows = (*self.rows, *self.left)
+        return data_frame({name: [getattr(r, name) for r in rows] for name in names})
+
     def summary(self) -> str:
         """Say in one line what differs, and what came of the targets."""
         said = self._said() if self else "the targets are the same"
@@ -529,17 +555,31 @@ class Difference:
         return said + (f"; {texts} lines with other text" if texts else "")
 
 
-def diff(original: Path, compensated: Path) -> Difference:
+def diff(
+    original: str | Path | bytes,
+    compensated: str | Path | bytes,
+    *,
+    name: str = "program.pdl",
+) -> Difference:
     """Compare two programs, and the variable files beside them.
+
+    Args:
+        original: The first program: its path, or its bytes.
+        compensated: The second one; the record beside its path tells of every target.
+        name: File name of bytes.
 
     Raises:
         ProgramError: A file cannot be read.
     """
-    pairs = [(original, compensated)]
+    first, second = named_text(original, name), named_text(compensated, name)
+    if isinstance(first, NamedText) or isinstance(second, NamedText):
+        only = compare_files(first, second)
+        return Difference((only.rows,), only.stamped)
+    pairs = [(first, second)]
     old, new = (find_variables(p) or find_data_list(p) for p in pairs[0])
-    if not is_variables(original.name) and old is not None and new is not None:
+    if not is_variables(first.name) and old is not None and new is not None:
         pairs.append((old, new))
-    ask = in_background(partial(read_arrivals, compensated, pairs))
+    ask = in_background(partial(read_arrivals, second, pairs))
     files = [compare_files(*pair) for pair in pairs]
     told = ask()
     found = [(f, told.get(f.original.name)) for f in files]

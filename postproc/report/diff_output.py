@@ -21,7 +21,7 @@ from postproc.arrays import (
     text_of,
     whole,
 )
-from postproc.files import is_variables
+from postproc.files import is_variables, schema
 from postproc.report.diff import STATUSES, Difference, DiffRow, DiffRows
 from postproc.report.terminal import (
     ARROWS,
@@ -76,7 +76,11 @@ SIGN_NUMBERS = tuple(map(str, range(-1, 3)))
 
 def difference_pieces(found: Difference) -> Iterator[str]:
     """Write what differs as ``json.dumps(.., indent=1)`` would, piece by piece."""
-    head = {"stamped": found.stamped, "counts": dict(found.counts)}
+    head = {
+        **schema("difference"),
+        "stamped": found.stamped,
+        "counts": dict(found.counts),
+    }
     yield json.dumps(head, indent=1)[: -len("\n}")]
     for key, parts in (("rows", found.differing), ("left", found.untouched)):
         yield f',\n "{key}": ['

@@ -22,6 +22,7 @@ from postproc.arrays import (
 )
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.outcome import Outcome, Status
+from postproc.files import schema
 from postproc.language.visits import Meaning, Visits
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
@@ -39,7 +40,7 @@ def report_text(outcome: Outcome) -> str:
 def report_pieces(outcome: Outcome) -> Iterator[bytes]:
     """Write the report piece by piece."""
     outcome = outcome.reported
-    head = {"program": outcome.program, "model": outcome.model}
+    head = {**schema("report"), "program": outcome.program, "model": outcome.model}
     yield (json.dumps(head)[:-1] + ', "targets": [').encode()
     for rows in chunks(len(outcome.visits), AT_ONCE):
         yield b",\n" if rows.start else b"\n"

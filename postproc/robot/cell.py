@@ -25,6 +25,7 @@ from postproc.robot.arm_file import (
     Sextuple,
     Strict,
     Triple,
+    parse_toml,
     read_toml,
 )
 from postproc.robot.pose import MM, pose_from_record, rotation_from_zyz
@@ -364,16 +365,34 @@ def _frame(section: FrameSection | None) -> Frame:
     return Frame(pose_from_record(np.array(record)), record, section.source)
 
 
-def load_cell(path: str | Path) -> Cell:
+def as_cell(cell: Cell | str | Path) -> Cell:
+    """Return a cell that is given itself, or by its file.
+
+    Raises:
+        CellError, ArmError: See `load_cell`.
+    """
+    return cell if isinstance(cell, Cell) else load_cell(cell)
+
+
+def load_cell(file: str | Path | bytes, *, name: str = "cell.toml") -> Cell:
     """Read a cell file.
+
+    Args:
+        file: Its path, or its text as bytes.
+        name: Of text, for messages; an arm file it names lies beside this path.
 
     Raises:
         CellError: The file cannot be read, or a key, unit or value is wrong; the
             message names the place and the cure.
         ArmError: The arm it names cannot be loaded.
     """
-    path = Path(path)
-    file = read_toml(path, CellFile, CellError)
+    if isinstance(file, bytes):
+        return _cell_of(Path(name), parse_toml(Path(name), file, CellFile, CellError))
+    return _cell_of(Path(file), read_toml(Path(file), CellFile, CellError))
+
+
+def _cell_of(path: Path, file: CellFile) -> Cell:
+    """Make a cell of what its file says."""
     arm = load_arm(file.robot.arm, beside=path.parent).mounted(_weight(file))
     payload, tracker = file.payload, file.tracker
     return Cell(

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from typer.testing import CliRunner
 
-from postproc.batch.check import check
+from postproc.batch.check import check, check_tree
 from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, default_log
 from postproc.cli.commands import app
@@ -53,7 +53,7 @@ def codes(checked):
 
 def test_a_fresh_tree_may_be_uploaded(trees):
     source, target, model = trees
-    found = check(target, lambda place: model, source)
+    found = check_tree(target, lambda place: model, source)
     assert found.findings == ()
     assert (found.programs, found.exit_code) == (3, 0)
 
@@ -73,7 +73,7 @@ def test_uncompensated_programs_and_values_are_found(trees):
 
 def test_an_older_model_is_listed(trees):
     _, target, _ = trees
-    found = check(target, lambda place: "newer" if "spot" in place else None)
+    found = check_tree(target, lambda place: "newer" if "spot" in place else None)
     assert codes(found) == {("spot.pdl", "older-model")}
 
 
@@ -191,7 +191,7 @@ def test_modules_of_a_task_with_two_models_are_found(tmp_path):
         line = stamp_line("1.0", model, source, "!")
         path.write_bytes(b"MODULE m\n" + line + b"ENDMODULE\n")
     assert ("b.mod", "mixed-models") in codes(check(tmp_path))
-    assert not {place for place, code in codes(check(tmp_path, lambda place: "one"))
-                if code == "mixed-models"}  # fmt: skip
+    told = codes(check_tree(tmp_path, lambda place: "one"))
+    assert not {place for place, code in told if code == "mixed-models"}
     (tmp_path / "b.mod").unlink()
     assert "mixed-models" not in {code for _, code in codes(check(tmp_path))}

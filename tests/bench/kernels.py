@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
-from postproc.compensation.compensate import name_files
 from postproc.compensation.program import plan_visits, read_program
+from postproc.compensation.program_files import name_files
 from postproc.motion.ruckig import JointMoves
 from postproc.robot.arm import Arm
 from postproc.robot.cell import load_cell

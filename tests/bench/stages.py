@@ -8,9 +8,12 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from postproc.cli.jobs import Job
+from postproc.cli.jobs import Destination
 from postproc.compensation import parallel
-from postproc.compensation.options import AS_USUAL
+from postproc.compensation.compensate import compensate
+from postproc.compensation.program_files import ProgramFiles
+from postproc.model.model import load_model
+from postproc.robot.cell import load_cell
 from tests.bench.made import KINDS
 
 KIBI = 1024
@@ -32,14 +35,15 @@ def measure(kind: str, n: int, cell: Path, model: Path) -> dict[str, float]:
         lines = made.source.count(b"\n")
         del made
         start = time.perf_counter()
-        job = Job.open(str(place), cell, model)
+        given = ProgramFiles.open(place)
+        loaded, fitted = load_cell(cell), load_model(model)
         read = time.perf_counter() - start
         crowd = parallel.available()  # as the command line does
-        outcome = job.run(AS_USUAL, processes=crowd)
+        outcome = compensate(given, loaded, fitted, processes=crowd)
         pipeline = time.perf_counter() - start
         begin = time.perf_counter()
         out, told = place.with_name("out.pdl"), place.with_name("report.json")
-        job.write(outcome, out, told)
+        Destination(given, (cell, model)).write(outcome, out, told)
         write = time.perf_counter() - begin
     found = {
         "targets": len(outcome.visits), "lines": lines, "read": read,

@@ -10,9 +10,9 @@ from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
 from postproc.calibration.selection import fit_survey
-from postproc.cli.fit import tell_fit
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import Batch
+from postproc.report.fit import tell_fit
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import NJ, random_arm, random_states, survey_of
 

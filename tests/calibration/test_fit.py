@@ -9,16 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibration.fit import fit, read_surveys
+from postproc.calibration.fit import fit
 from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.report import FitReport, find, report_fit
 from postproc.calibration.selection import fit_survey, model_of
-from postproc.cli.fit import tell_fit
+from postproc.calibration.survey_files import read_measurements
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import Batch
 from postproc.model.model import load_model
 from postproc.model.statistics import ErrorStatistics
+from postproc.report.fit import tell_fit
 from postproc.robot.cell import Cell, load_cell
 from tests.calibration.simulator import (
     NJ,
@@ -62,7 +63,7 @@ def cell(tmp_path: Path, points: int = 1) -> Cell:
 
 
 def test_a_survey_becomes_a_model_with_a_report(tmp_path: Path) -> None:
-    found = fit([write(tmp_path / "s.csv")], cell(tmp_path), effects=BASE_EFFECTS)
+    found = fit(write(tmp_path / "s.csv"), cell=cell(tmp_path), effects=BASE_EFFECTS)
     report = found.report
     assert report.before.mean_mm > 1.0 > 0.06 > report.after.mean_mm
     assert [d.id for d in report.dropped] == ["8", "10"]
@@ -79,13 +80,15 @@ def test_a_survey_becomes_a_model_with_a_report(tmp_path: Path) -> None:
 
 def test_the_same_files_give_the_same_model(tmp_path: Path) -> None:
     path = write(tmp_path / "s.csv")
-    ids = {fit([path], cell(tmp_path), effects=BASE_EFFECTS).model.id for _ in range(2)}
+    ids = {
+        fit(path, cell=cell(tmp_path), effects=BASE_EFFECTS).model.id for _ in range(2)
+    }
     assert len(ids) == 1
 
 
 def test_a_probe_plate_has_nests_of_the_set_up(tmp_path: Path) -> None:
     path = write(tmp_path / "s.csv", points=3)
-    model = fit([path], cell(tmp_path, 3), effects=BASE_EFFECTS).model
+    model = fit(path, cell=cell(tmp_path, 3), effects=BASE_EFFECTS).model
     assert "probe" in {e.name for e in model.effects.effects}
     assert "probe" not in {e.name for e in model.compensable()[0].effects}
     assert model.ranges.see_all_rotations
@@ -93,7 +96,7 @@ def test_a_probe_plate_has_nests_of_the_set_up(tmp_path: Path) -> None:
 
 def test_methods_of_the_source_are_fitted_from_files(tmp_path: Path) -> None:
     path = write(tmp_path / "s.csv")
-    found = fit([path], cell(tmp_path), method="elm", seed=4)
+    found = fit(path, cell=cell(tmp_path), method="elm", seed=4)
     assert found.model.method == "elm" and not found.report.parameters
     held = random_states(10, np.random.default_rng(0), TOOL[None])
     assert found.model.predict(NJ, held).error.shape == (10, 3)
@@ -107,7 +110,7 @@ def test_all_rows_from_one_side_name_the_backlash(tmp_path: Path) -> None:
     for row in rows[1:]:
         row[7:13] = ["1"] * 6
     path.write_text("\n".join(",".join(r) for r in rows) + "\n")
-    report = fit([path], cell(tmp_path), effects=("geometry", "backlash")).report
+    report = fit(path, cell=cell(tmp_path), effects=("geometry", "backlash")).report
     named = {n for u in report.unseen for n in (u.name, *u.partners)}
     assert {"backlash.b1", "backlash.b2", "backlash.b3"} <= named
 
@@ -115,13 +118,13 @@ def test_all_rows_from_one_side_name_the_backlash(tmp_path: Path) -> None:
 def test_what_cannot_be_fitted_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "s.csv")
     with pytest.raises(PostprocError, match="needs the payload"):
-        fit([path], cell(tmp_path), effects=("geometry", "payload"))
+        fit(path, cell=cell(tmp_path), effects=("geometry", "payload"))
     with pytest.raises(PostprocError, match="no effect 'gravity'"):
-        fit([path], cell(tmp_path), effects=("gravity",))
+        fit(path, cell=cell(tmp_path), effects=("gravity",))
     few = tmp_path / "few.csv"
     few.write_text("\n".join(path.read_text().splitlines()[:7]) + "\n")
     with pytest.raises(MeasurementError, match="determine"):
-        fit([few], cell(tmp_path))
+        fit(few, cell=cell(tmp_path))
 
 
 def test_fit_prints_what_an_engineer_reads(tmp_path: Path) -> None:
@@ -214,7 +217,9 @@ def test_predict_knows_where_the_payload_hangs(tmp_path: Path) -> None:
     moved = np.stack([told[f"d{axis}_mm"] for axis in "xyz"], axis=1)
     kept, setups = ~np.isnan(moved[:, 0]), (load_cell(setup), bare)
     right, wrong = (
-        load_model(model).predict(one.arm, read_surveys([data], one).states).error
+        load_model(model)
+        .predict(one.arm, read_measurements(data, cell=one).states)
+        .error
         for one in setups
     )
     np.testing.assert_allclose(moved[kept], right * 1e3, atol=1e-5)
@@ -234,7 +239,9 @@ def test_rows_without_a_payload_carry_that_of_the_cell(tmp_path: Path) -> None:
     with (tmp_path / "cell.toml").open("a") as file:
         file.write("[payload]\nmass_kg = 120.0\ncom_mm = [-300.0, 0.0, -100.0]\n")
     given = load_cell(tmp_path / "cell.toml")
-    whole, *others = (read_surveys([path], given) for path in (told, bare, some))
+    whole, *others = (
+        read_measurements(path, cell=given) for path in (told, bare, some)
+    )
     assert not any("payload" in text for text in whole.warnings)
     for other, which in zip(others, ("rows", "20 rows"), strict=True):
         np.testing.assert_array_equal(other.states.payload, whole.states.payload)
@@ -304,10 +311,10 @@ def test_a_fit_says_what_the_arm_file_leaves_out(tmp_path: Path) -> None:
     )
     bare = file.model_copy(update={"links": None, "opw": None, "joints": joints})
     poor = replace(whole, arm=replace(whole.arm, file=bare))
-    told = fit([data], poor, effects=BASE_EFFECTS).report.warnings
+    told = fit(data, cell=poor, effects=BASE_EFFECTS).report.warnings
     assert [re.findall(r"no (\[?\w+\]?):", t) for t in told] == [["[links]"]]
-    assert fit([data], whole, effects=BASE_EFFECTS).report.warnings == ()
+    assert fit(data, cell=whole, effects=BASE_EFFECTS).report.warnings == ()
     lines = [line.split(",") for line in data.read_text().splitlines()]
     data.write_text("\n".join(",".join(x[:7] + x[13:]) for x in lines) + "\n")
-    told = fit([data], poor, effects=BASE_EFFECTS).report.warnings
+    told = fit(data, cell=poor, effects=BASE_EFFECTS).report.warnings
     assert "drive_coupling" in told[-1]

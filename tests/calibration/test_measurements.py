@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibration.measurements import concatenate, read_measurements
+from postproc.calibration.measurements import concatenate, read_survey_file
 from postproc.calibration.plausibility import check_survey
 from postproc.exceptions import MeasurementError
 from tests.calibration.simulator import NJ, PLATE, TOOL, random_states
@@ -36,7 +36,7 @@ def write(path: Path, lines: list[str], header: str = "") -> Path:
 
 def test_a_file_is_read_in_si_units(tmp_path: Path) -> None:
     path = write(tmp_path / "s.csv", rows())
-    found = read_measurements(path, NJ, TOOL[None])
+    found = read_survey_file(path, NJ, TOOL[None])
     states = random_states(30, np.random.default_rng(0), TOOL[None])
     np.testing.assert_allclose(found.states.q, states.q, atol=1e-5)
     np.testing.assert_array_equal(found.states.direction, states.direction)
@@ -53,8 +53,8 @@ def test_semicolons_commas_and_encodings_are_detected(
     other = plain.replace(",", ";").replace(".", ",").replace("\n", "\r\n")
     path = tmp_path / "b.csv"
     path.write_bytes(other.encode(encoding))
-    a = read_measurements(tmp_path / "a.csv", NJ, TOOL[None])
-    b = read_measurements(path, NJ, TOOL[None])
+    a = read_survey_file(tmp_path / "a.csv", NJ, TOOL[None])
+    b = read_survey_file(path, NJ, TOOL[None])
     np.testing.assert_array_equal(a.position, b.position)
     np.testing.assert_array_equal(a.states.q, b.states.q)
 
@@ -64,7 +64,7 @@ def test_directions_are_inferred_where_they_are_missing(tmp_path: Path) -> None:
     lines = [
         f"{k},{10 * k},{-5 * k},-90,0,30,{5 if k == 1 else 0},1,2,3" for k in range(3)
     ]
-    found = read_measurements(write(tmp_path / "s.csv", lines, header), NJ, TOOL[None])
+    found = read_survey_file(write(tmp_path / "s.csv", lines, header), NJ, TOOL[None])
     assert found.inferred.all() and "sorted" in found.warnings[0]
     assert found.states.direction[0].tolist() == [0] * 6
     assert found.states.direction[1].tolist() == [1, -1, 0, 0, 0, 1]
@@ -78,14 +78,14 @@ def test_travels_are_inferred_where_the_sides_are_those_of_straight_ways(
     bare = [",".join(c for k, c in enumerate(r.split(",")) if not 7 <= k < 13)
             for r in told]  # fmt: skip
     path = write(tmp_path / "bare.csv", bare, HEADER + ",x_mm,y_mm,z_mm")
-    straight = read_measurements(path, NJ, TOOL[None]).states
+    straight = read_survey_file(path, NJ, TOOL[None]).states
     assert np.isfinite(straight.travel).all()
 
     def with_sides(sides: np.ndarray) -> np.ndarray:
         cells = [",".join([*r.split(",")[:7], *map(str, s), *r.split(",")[13:]])
                  for r, s in zip(told, sides.astype(int), strict=True)]  # fmt: skip
         path = write(tmp_path / "sides.csv", cells)
-        return read_measurements(path, NJ, TOOL[None]).states.travel
+        return read_survey_file(path, NJ, TOOL[None]).states.travel
 
     np.testing.assert_array_equal(with_sides(straight.direction), straight.travel)
     once = straight.direction.copy()
@@ -99,7 +99,7 @@ def test_travels_are_inferred_where_the_sides_are_those_of_straight_ways(
 def test_lost_beams_are_dropped_and_listed(tmp_path: Path) -> None:
     lines = rows()
     lines[4] = ",".join([*lines[4].split(",")[:13], "0", "0", "0"])
-    found = read_measurements(write(tmp_path / "s.csv", lines), NJ, TOOL[None])
+    found = read_survey_file(write(tmp_path / "s.csv", lines), NJ, TOOL[None])
     assert len(found) == 29
     assert [(d.id, d.line) for d in found.dropped] == [("5", 6)]
     assert "beam" in found.dropped[0].why
@@ -125,14 +125,14 @@ def test_wrong_cells_are_named(
     tmp_path: Path, lines: list[str], line: int, match: str
 ) -> None:
     with pytest.raises(MeasurementError, match=match) as caught:
-        read_measurements(write(tmp_path / "s.csv", lines), NJ, TOOL[None])
+        read_survey_file(write(tmp_path / "s.csv", lines), NJ, TOOL[None])
     assert caught.value.line == line and caught.value.cure
 
 
 def test_wrong_files_are_named(tmp_path: Path) -> None:
     def refused(match: str, path: Path) -> None:
         with pytest.raises(MeasurementError, match=match):
-            read_measurements(path, NJ, TOOL[None])
+            read_survey_file(path, NJ, TOOL[None])
 
     refused("cannot be read", tmp_path / "none.csv")
     (tmp_path / "empty.csv").write_text("")
@@ -143,7 +143,7 @@ def test_wrong_files_are_named(tmp_path: Path) -> None:
     refused("column z_mm is missing", write(tmp_path / "c.csv", ["1,2"], header))
     short = [*rows(), "31,1,2"]
     with pytest.raises(MeasurementError):
-        read_measurements(write(tmp_path / "d.csv", short), NJ, TOOL[None])
+        read_survey_file(write(tmp_path / "d.csv", short), NJ, TOOL[None])
     twice = HEADER + ",q1_deg"
     refused("'q1_deg' appears twice", write(tmp_path / "e.csv", ["1,2"], twice))
 
@@ -152,32 +152,32 @@ def test_probe_points_by_id_or_by_columns(tmp_path: Path) -> None:
     header = HEADER + SIDES + ",x_mm,y_mm,z_mm,tool_id"
     lines = [f"{line},{k % 3}" for k, line in enumerate(rows())]
     path = write(tmp_path / "s.csv", lines, header)
-    found = read_measurements(path, NJ, PLATE)
+    found = read_survey_file(path, NJ, PLATE)
     np.testing.assert_allclose(found.states.tool[:3], PLATE)
     with pytest.raises(MeasurementError, match="tool_id 2 is not one of") as caught:
-        read_measurements(path, NJ, PLATE[:2])
+        read_survey_file(path, NJ, PLATE[:2])
     assert caught.value.line == 4
     more = header.replace("tool_id", "tool_x_mm,tool_y_mm,tool_z_mm")
     own = write(tmp_path / "t.csv", [f"{line},1,2,3" for line in rows()], more)
-    found = read_measurements(own, NJ, PLATE)
+    found = read_survey_file(own, NJ, PLATE)
     np.testing.assert_allclose(found.states.tool[0], [1e-3, 2e-3, 3e-3])
 
 
 def test_files_follow_each_other(tmp_path: Path) -> None:
-    a = read_measurements(write(tmp_path / "a.csv", rows()), NJ, TOOL[None])
+    a = read_survey_file(write(tmp_path / "a.csv", rows()), NJ, TOOL[None])
     later = [f"b{line}" for line in rows(seed=1)]
-    b = read_measurements(write(tmp_path / "b.csv", later), NJ, TOOL[None])
+    b = read_survey_file(write(tmp_path / "b.csv", later), NJ, TOOL[None])
     both = concatenate([a, b])
     assert len(both) == 60 and both.states.order[-1] == 59
     with pytest.raises(MeasurementError, match=r"c\.csv: holds the rows of .*a\.csv"):
-        again = read_measurements(write(tmp_path / "c.csv", rows()), NJ, TOOL[None])
+        again = read_survey_file(write(tmp_path / "c.csv", rows()), NJ, TOOL[None])
         concatenate([a, again])
 
 
 def test_ids_that_repeat_are_named_with_line_or_file(tmp_path: Path) -> None:
-    a = read_measurements(write(tmp_path / "a.csv", spoiled(3, 0, "2")), NJ, TOOL[None])
+    a = read_survey_file(write(tmp_path / "a.csv", spoiled(3, 0, "2")), NJ, TOOL[None])
     assert a.ids[1:4] == ("2", "3", "2 (line 5)")
-    b = read_measurements(write(tmp_path / "b.csv", rows(seed=1)), NJ, TOOL[None])
+    b = read_survey_file(write(tmp_path / "b.csv", rows(seed=1)), NJ, TOOL[None])
     assert concatenate([a, b]).ids[30:32] == ("1 of b.csv", "2 of b.csv")
 
 
@@ -194,19 +194,19 @@ def test_joint_angles_whose_header_says_radians_are_converted(
         for k in range(first, first + 6):
             cells[k] = repr(float(np.deg2rad(float(cells[k]))))
         lines.append(",".join(cells))
-    found = read_measurements(write(tmp_path / "r.csv", lines, header), NJ, TOOL[None])
-    there = read_measurements(write(tmp_path / "d.csv", rows()), NJ, TOOL[None])
+    found = read_survey_file(write(tmp_path / "r.csv", lines, header), NJ, TOOL[None])
+    there = read_survey_file(write(tmp_path / "d.csv", rows()), NJ, TOOL[None])
     np.testing.assert_allclose(found.states.q, there.states.q, rtol=0, atol=1e-14)
 
 
 def test_implausible_surveys_are_refused_with_the_reason(tmp_path: Path) -> None:
     def refused(match: str, lines: list[str]) -> None:
-        survey = read_measurements(write(tmp_path / "s.csv", lines), NJ, TOOL[None])
+        survey = read_survey_file(write(tmp_path / "s.csv", lines), NJ, TOOL[None])
         with pytest.raises(MeasurementError, match=match):
             check_survey(survey, NJ)
 
     check_survey(
-        read_measurements(write(tmp_path / "ok.csv", rows()), NJ, TOOL[None]), NJ
+        read_survey_file(write(tmp_path / "ok.csv", rows()), NJ, TOOL[None]), NJ
     )
     refused("look like metres", rows(length=1.0))
     radians = []

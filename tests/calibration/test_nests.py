@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibration.fit import read_surveys
-from postproc.calibration.measurements import Measurements, read_measurements
+from postproc.calibration.measurements import Measurements, read_survey_file
+from postproc.calibration.survey_files import read_measurements
 from postproc.exceptions import CellError, MeasurementError
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import NJ, PLATE
@@ -42,7 +42,7 @@ def written(
 def test_numbers_count_from_zero_or_clearly_from_one(
     tmp_path: Path, ids: list[str], points: list[int]
 ) -> None:
-    found = read_measurements(written(tmp_path / "s.csv", ids), NJ, PLATE)
+    found = read_survey_file(written(tmp_path / "s.csv", ids), NJ, PLATE)
     np.testing.assert_allclose(found.states.tool, PLATE[points])
 
 
@@ -52,12 +52,12 @@ def test_numbers_that_mean_two_points_are_refused(
 ) -> None:
     path = written(tmp_path / "s.csv", ids)
     with pytest.raises(MeasurementError, match=r"from 0, which .* or from 1") as e:
-        read_measurements(path, NJ, PLATE)
+        read_survey_file(path, NJ, PLATE)
     assert "[survey.points]" in str(e.value) and str(path) in str(e.value)
-    one = read_measurements(written(tmp_path / "o.csv", ["1"]), NJ, PLATE[:1])
+    one = read_survey_file(written(tmp_path / "o.csv", ["1"]), NJ, PLATE[:1])
     np.testing.assert_allclose(one.states.tool, PLATE[:1])
     own = written(tmp_path / "t.csv", ids, more="tool_x_mm,tool_y_mm,tool_z_mm")
-    assert read_measurements(own, NJ, PLATE).states.tool[0, 0] == pytest.approx(7e-3)
+    assert read_survey_file(own, NJ, PLATE).states.tool[0, 0] == pytest.approx(7e-3)
 
 
 @pytest.mark.parametrize("column", ["tool_id", "nest"])
@@ -67,7 +67,7 @@ def test_numbers_that_mean_two_points_are_refused(
 def test_names_are_those_of_the_cell(
     tmp_path: Path, ids: list[str], column: str
 ) -> None:
-    found = read_measurements(written(tmp_path / "s.csv", ids, column), NJ, NAMED)
+    found = read_survey_file(written(tmp_path / "s.csv", ids, column), NJ, NAMED)
     expected = [NAMED[i.strip().lower()] for i in ids]
     np.testing.assert_allclose(found.states.tool, expected)
     numbers = [list(NAMED).index(i.strip().lower()) for i in ids]
@@ -76,14 +76,14 @@ def test_names_are_those_of_the_cell(
 
 def test_names_that_are_numbers_are_names(tmp_path: Path) -> None:
     known = {"1": PLATE[0], "2": PLATE[1], "3": PLATE[2]}
-    found = read_measurements(written(tmp_path / "s.csv", ["1", "2"]), NJ, known)
+    found = read_survey_file(written(tmp_path / "s.csv", ["1", "2"]), NJ, known)
     np.testing.assert_allclose(found.states.tool, PLATE[:2])
 
 
 def test_numbers_beside_points_of_their_own_are_kept(tmp_path: Path) -> None:
     """The virtual arm writes them so."""
     own = written(tmp_path / "t.csv", ["0", "2"], more="tool_x_mm,tool_y_mm,tool_z_mm")
-    found = read_measurements(own, NJ, NAMED)
+    found = read_survey_file(own, NJ, NAMED)
     assert found.states.tool_id.tolist() == [0, 2]
     assert found.states.tool[0, 0] == pytest.approx(7e-3)
 
@@ -91,7 +91,7 @@ def test_numbers_beside_points_of_their_own_are_kept(tmp_path: Path) -> None:
 def test_what_the_cell_does_not_name_is_refused(tmp_path: Path) -> None:
     def refused(match: str, path: Path, tools: object = NAMED) -> None:
         with pytest.raises(MeasurementError, match=match):
-            read_measurements(path, NJ, tools)  # type: ignore[arg-type]
+            read_survey_file(path, NJ, tools)  # type: ignore[arg-type]
 
     refused("nest 'lft' is not one of", written(tmp_path / "a.csv", ["lft"], "nest"))
     refused("tool_id '1' is not one of", written(tmp_path / "b.csv", ["1"]))
@@ -104,7 +104,7 @@ def test_what_the_cell_does_not_name_is_refused(tmp_path: Path) -> None:
 def survey(tmp_path: Path, section: str, ids: list[str]) -> Measurements:
     cell = tmp_path / "cell.toml"
     cell.write_text(f'[robot]\narm = "nj220-2.7"\n{section}\n')
-    return read_surveys([written(tmp_path / "s.csv", ids)], load_cell(cell))
+    return read_measurements(written(tmp_path / "s.csv", ids), cell=load_cell(cell))
 
 
 def test_a_cell_names_its_points(tmp_path: Path) -> None:
@@ -133,5 +133,5 @@ def test_other_numbers_of_axes_have_one_message(
     cells = ",".join(["1"] * (count + 3))
     path.write_text(",".join(["id", *names, "x_mm,y_mm,z_mm"]) + f"\nM0,{cells}\n")
     with pytest.raises(MeasurementError, match=f"has {count} joint columns") as e:
-        read_measurements(path, NJ, PLATE)
+        read_survey_file(path, NJ, PLATE)
     assert cure in str(e.value)

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from postproc.calibration.fit import into_base_frame
-from postproc.calibration.measurements import Measurements, read_measurements
+from postproc.calibration.measurements import Measurements, read_survey_file
 from postproc.calibration.plausibility import check_orientations
 from postproc.calibration.report import weighed_down
 from postproc.calibration.selection import fit_survey, model_of
@@ -138,7 +138,7 @@ def test_orientations_are_read_as_turns_about_x_y_z(tmp_path) -> None:  # type: 
         f"id,{joints},x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\n"
         "1,1,2,3,4,5,6,7,8,9,90,0,90\n2,1,2,3,4,5,6,7,8,9,0,90,0\n"
     )
-    R = read_measurements(path, NJ, TOOL[None]).rotation
+    R = read_survey_file(path, NJ, TOOL[None]).rotation
     assert R is not None
     np.testing.assert_allclose(R[0] @ [1, 0, 0], [0, 0, 1], atol=1e-12)
     np.testing.assert_allclose(R[1] @ [1, 0, 0], [0, 0, -1], atol=1e-12)

@@ -8,22 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibration.diagnosis.diagnose import diagnose
+from postproc.calibration.diagnosis.diagnose import extend_model
 from postproc.calibration.fit import drifts
 from postproc.calibration.measurements import (
     Measurements,
     concatenate,
-    read_measurements,
+    read_survey_file,
 )
 from postproc.calibration.references import ReferenceRows, tracker_motion
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.calibration.tables import TableFormat
-from postproc.cli.diagnose import tell
 from postproc.exceptions import MeasurementError
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.thermal import Thermal
 from postproc.model.model import Model, load_model
+from postproc.report.diagnosis import tell
 from postproc.robot.state import make_states
 from postproc.simulation import stream
 from tests.calibration.planted import ARM, TRACKER, Campaign, campaign
@@ -186,7 +186,7 @@ def _untimed(c: Campaign):  # type: ignore[no-untyped-def]
 def test_a_diagnosis_says_whose_the_warm_up_is(places: np.ndarray | None) -> None:
     survey = survey_of(campaign(321, ("warmup",), 1.0), places)
     given = model_of(fit_survey(survey, ARM, BASE_EFFECTS, TRACKER), survey)
-    found = diagnose(survey, ARM, given, tracker=TRACKER)
+    found = extend_model(survey, ARM, given, tracker=TRACKER)
     (finding,) = (f for f in found.diagnosis.findings if f.effect == "thermal")
     assert finding.of_setup == (places is None)
     assert finding.settings["told"] == (places is not None)
@@ -243,7 +243,7 @@ def read(tmp_path: Path, lines: list[str], **reading: object) -> Measurements:
     path = tmp_path / "s.csv"
     path.write_text("\n".join(lines) + "\n")
     form = TableFormat(**reading)  # type: ignore[arg-type]
-    return concatenate([read_measurements(path, ARM, np.zeros((1, 3)), reading=form)])
+    return concatenate([read_survey_file(path, ARM, np.zeros((1, 3)), reading=form)])
 
 
 def test_rows_on_fixed_points_are_no_rows_of_the_arm(tmp_path: Path) -> None:

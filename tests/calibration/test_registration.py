@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from postproc.calibration.fit import into_base_frame
-from postproc.calibration.measurements import read_measurements, read_points
+from postproc.calibration.measurements import read_points, read_survey_file
 from postproc.calibration.registration import register
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.calibration.tables import TableFormat, read_column_map
@@ -109,7 +109,7 @@ def test_a_column_map_reads_the_rest(tmp_path: Path) -> None:
     )
     data = tmp_path / "d.txt"
     data.write_text("name|A1|A2|A3|A4|A5|A6|x|y|z\np|1|2|3|4|5|6|0.1|0.2|0.3\n")
-    found = read_measurements(data, NJ, PLATE[:1], reading=TableFormat(form))
+    found = read_survey_file(data, NJ, PLATE[:1], reading=TableFormat(form))
     np.testing.assert_allclose(found.position[0], [0.1, 0.2, 0.3])
     assert found.ids == ("p",)
     form.write_text("[columns]\nx_mm = 3\n")
@@ -126,7 +126,7 @@ def test_a_column_map_reads_the_rest(tmp_path: Path) -> None:
 def test_a_real_arm_is_calibrated_from_tracker_data() -> None:
     arm = load_arm("ur10")
     path = SHARED / "data" / "ipa-ur10" / "measurements_joint_configurations.csv"
-    series = read_measurements(path, arm, np.zeros((1, 3)))
+    series = read_survey_file(path, arm, np.zeros((1, 3)))
     assert len(series) == 1495
     rows = np.random.default_rng(0).permutation(1495)
     train, test = np.sort(rows[:500]), np.sort(rows[500:])

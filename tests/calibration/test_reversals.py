@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibration.fit import fit, read_surveys
+from postproc.calibration.fit import fit
 from postproc.calibration.reversals import (
     Reversals,
     flank_widths,
@@ -17,6 +17,7 @@ from postproc.calibration.reversals import (
     split_reversals,
     tell_widths,
 )
+from postproc.calibration.survey_files import read_measurements
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import CONFIRMED, NOT_SURE, UNTOLD, Model, load_model
 from postproc.model.play import ELASTIC, SHARP, on_the_way, verdicts_of_flanks
@@ -37,7 +38,7 @@ def surveyed(folder: Path, gears: str, seed: int = SEED) -> Path:
 
 
 def fitted(rows: Path) -> Model:
-    return fit([rows], load_cell(CELL), effects=BASE_EFFECTS).model
+    return fit(rows, cell=load_cell(CELL), effects=BASE_EFFECTS).model
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +77,7 @@ def test_other_gears_are_not_taken_for_sharp_ones(folder: Path, gears: str) -> N
 
 def test_reversals_are_no_rows_of_the_fit(sharp: Path) -> None:
     cell = load_cell(CELL)
-    all_rows = read_surveys([sharp], cell)
+    all_rows = read_measurements(sharp, cell=cell)
     rest, found = split_reversals(all_rows, cell.arm)
     assert found is not None
     many = np.bincount(found.drive)
@@ -92,7 +93,7 @@ def test_reversals_are_no_rows_of_the_fit(sharp: Path) -> None:
 
 def test_rows_without_reversals_stay_as_they_are(sharp: Path) -> None:
     cell = load_cell(CELL)
-    rest, _ = split_reversals(read_surveys([sharp], cell), cell.arm)
+    rest, _ = split_reversals(read_measurements(sharp, cell=cell), cell.arm)
     again, found = split_reversals(rest, cell.arm)
     assert found is None and again is rest
 
@@ -100,7 +101,7 @@ def test_rows_without_reversals_stay_as_they_are(sharp: Path) -> None:
 def test_steps_that_go_on_are_no_reversal(sharp: Path) -> None:
     """Steps the way a drive came tell nothing of its gap."""
     cell = load_cell(CELL)
-    rows = read_surveys([sharp], cell)
+    rows = read_measurements(sharp, cell=cell)
     other = rows.with_states(rows.states.with_(direction=-rows.states.direction))
     assert split_reversals(other, cell.arm)[1] is None
 
@@ -108,7 +109,7 @@ def test_steps_that_go_on_are_no_reversal(sharp: Path) -> None:
 def test_a_joint_that_steps_otherwise_than_its_gap_is_not_known(sharp: Path) -> None:
     cell = load_cell(CELL)
     model = fitted(sharp)
-    _, found = split_reversals(read_surveys([sharp], cell), cell.arm)
+    _, found = split_reversals(read_measurements(sharp, cell=cell), cell.arm)
     assert found is not None
     wider = replace(model, values=np.where(
         [name.startswith("backlash.") for name in model.effects.names],
@@ -145,7 +146,7 @@ def test_the_model_keeps_what_they_tell(sharp: Path, tmp_path: Path) -> None:
 
 def test_joints_without_new_reversals_stay_as_they_were_known(sharp: Path) -> None:
     cell, model = load_cell(CELL), fitted(sharp)
-    survey = read_surveys([sharp], cell)
+    survey = read_measurements(sharp, cell=cell)
     _, found = split_reversals(survey, cell.arm)
     assert found is not None
     few = Reversals(found.rows, found.first[: EACH + 1], found.drive[:EACH])

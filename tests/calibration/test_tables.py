@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.calibration.measurements import Measurements, read_measurements
+from postproc.calibration.measurements import Measurements, read_survey_file
 from postproc.calibration.tables import TableFormat
 from postproc.exceptions import MeasurementError, PostprocError
 from tests.calibration.simulator import NJ, PLATE, TOOL, random_arm, random_states
@@ -43,7 +43,7 @@ def test_the_table_of_robodk_is_recognised(
     tmp_path: Path, angles: float, header: bool
 ) -> None:
     R = robodk(tmp_path / "t.csv", angles, header)
-    found = read_measurements(tmp_path / "t.csv", NJ, TOOL[None])
+    found = read_survey_file(tmp_path / "t.csv", NJ, TOOL[None])
     assert [d.id for d in found.dropped] == ["5"] and len(found) == 11
     np.testing.assert_allclose(found.states.tool[:2], PLATE[:2], atol=1e-9)
     assert len(np.unique(found.states.tool_id)) == 2
@@ -54,7 +54,7 @@ def test_the_table_of_robodk_is_recognised(
 
 def test_a_table_of_points_only_has_no_orientations(tmp_path: Path) -> None:
     robodk(tmp_path / "t.csv", 0.0)
-    assert read_measurements(tmp_path / "t.csv", NJ, TOOL[None]).rotation is None
+    assert read_survey_file(tmp_path / "t.csv", NJ, TOOL[None]).rotation is None
 
 
 def test_our_columns_without_ids_are_no_table_of_robodk(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_our_columns_without_ids_are_no_table_of_robodk(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     path.write_text("\n".join([",".join(ours), *2 * [",".join(["1"] * 18)]]) + "\n")
     with pytest.raises(MeasurementError, match="column id is missing"):
-        read_measurements(path, NJ, TOOL[None])
+        read_survey_file(path, NJ, TOOL[None])
 
 
 def plain(path: Path, text: str, encoding: str = "utf-8") -> Path:
@@ -89,7 +89,7 @@ def test_what_the_user_says_of_a_file_holds(
     tmp_path: Path, written: str, encoding: str, said: TableFormat
 ) -> None:
     path = plain(tmp_path / "s.csv", written, encoding)
-    found: Measurements = read_measurements(path, NJ, TOOL[None], reading=said)
+    found: Measurements = read_survey_file(path, NJ, TOOL[None], reading=said)
     assert found.ids == ("é", "b")
     np.testing.assert_allclose(found.position[0], [7.25e-3, 8e-3, 9e-3])
     assert np.rad2deg(found.states.q[0, 0]) == pytest.approx(1.5)
@@ -98,10 +98,10 @@ def test_what_the_user_says_of_a_file_holds(
 def test_what_the_user_says_wins_over_what_is_detected(tmp_path: Path) -> None:
     path = plain(tmp_path / "s.csv", ";,")
     with pytest.raises(MeasurementError, match=r"s\.csv:2: '1,5' .* not a number"):
-        read_measurements(path, NJ, TOOL[None], reading=TableFormat(decimal="."))
+        read_survey_file(path, NJ, TOOL[None], reading=TableFormat(decimal="."))
     latin = plain(tmp_path / "l.csv", ",.", "latin-1")
     with pytest.raises(MeasurementError, match="cannot be decoded as utf-8"):
-        read_measurements(latin, NJ, TOOL[None], reading=TableFormat(encoding="utf-8"))
+        read_survey_file(latin, NJ, TOOL[None], reading=TableFormat(encoding="utf-8"))
     with pytest.raises(PostprocError, match=r"write \. or ,"):
         TableFormat(decimal="x")
     with pytest.raises(PostprocError, match="mm, m, inch"):
@@ -129,7 +129,7 @@ def mapped(folder: Path, **other: str) -> tuple[Path, Path]:
 
 def test_a_column_may_be_a_sum(tmp_path: Path) -> None:
     path, columns = mapped(tmp_path)
-    found = read_measurements(path, NJ, TOOL[None], reading=TableFormat(columns))
+    found = read_survey_file(path, NJ, TOOL[None], reading=TableFormat(columns))
     np.testing.assert_allclose(found.position, [[0.10075, 0.020, 0.007]], atol=1e-15)
 
 
@@ -141,10 +141,10 @@ def test_an_entry_of_a_map_that_means_nothing_is_refused(
     with pytest.raises(
         MeasurementError, match=r"map\.toml.*list of them @ \$\.columns\.z_mm"
     ):
-        read_measurements(path, NJ, TOOL[None], reading=TableFormat(columns))
+        read_survey_file(path, NJ, TOOL[None], reading=TableFormat(columns))
 
 
 def test_every_column_of_a_sum_must_be_there(tmp_path: Path) -> None:
     path, columns = mapped(tmp_path, z_mm='["zt", "zz"]')
     with pytest.raises(MeasurementError, match="zz"):
-        read_measurements(path, NJ, TOOL[None], reading=TableFormat(columns))
+        read_survey_file(path, NJ, TOOL[None], reading=TableFormat(columns))

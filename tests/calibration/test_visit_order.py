@@ -11,7 +11,7 @@ import pytest
 from postproc.calibration.measurements import (
     Measurements,
     concatenate,
-    read_measurements,
+    read_survey_file,
 )
 from postproc.exceptions import MeasurementError
 from postproc.model.effects.thermal import Thermal
@@ -38,7 +38,7 @@ def written(path: Path, rows: np.ndarray, **columns: np.ndarray) -> Path:
 
 
 def read(path: Path) -> Measurements:
-    return read_measurements(path, NJ, TOOL[None])
+    return read_survey_file(path, NJ, TOOL[None])
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ import shutil
 import numpy as np
 import pytest
 
+from postproc.files import SCHEMAS
 from postproc.model.model import load_model
 from tests.compensation.paths.test_accuracy import job
 from tests.conftest import SEED
@@ -44,6 +45,8 @@ def test_a_path_confirms_the_flanks_and_lacks_nothing(tracked):
     found = diagnosed(tracked, "plain.csv")
     assert found.exit_code == 0, found.output
     told = json.loads((tracked / "d.json").read_text())
+    head = {"schema": "postproc-diagnosis", "version": SCHEMAS["diagnosis"]}
+    assert list(told.items())[:2] == list(head.items())
     path = told["path"]
     assert path["stops_missed"] == 0 and path["rate_hz"] == pytest.approx(100)
     assert path["across_mm"]["mean_mm"] < 2.0 * path["scatter_mm"]

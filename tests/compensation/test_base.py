@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from postproc.compensation.base import contradicted_base
-from postproc.compensation.compensate import compensate, name_files
+from postproc.compensation.compensate import compensate
 from postproc.compensation.program import read_program
+from postproc.compensation.program_files import name_files
 from postproc.robot.pose import pose_from_record, record_from_pose
 from tests.bench.made import drilling, handling, milling, spot
 from tests.conftest import ROOT

@@ -108,7 +108,7 @@ def model_of(arm: str, cell: Path) -> Path:
         CACHE.mkdir(parents=True, exist_ok=True)
         survey = CACHE / f"{arm}-{SEED}.csv"
         write_measurements(_campaign(arm, cell), survey)
-        found = fit([survey], load_cell(cell), effects=BASE_EFFECTS)
+        found = fit(survey, cell=load_cell(cell), effects=BASE_EFFECTS)
         found.model.save(place)
     return place
 

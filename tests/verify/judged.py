@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.cli.jobs import read_files
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import AS_USUAL, Options
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import prepared
+from postproc.compensation.program_files import read_files
 from postproc.compensation.second_opinion import second_opinion
 from postproc.files import variables_of
 from postproc.model.model import Model, load_model

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, data_frame
 from postproc.calibration.diagnosis.held_out import (
     LENGTH,
     NoiseFloor,
@@ -57,6 +58,7 @@ from postproc.calibration.report import report_directions, weighed_down
 from postproc.calibration.reversals import newer_widths, split_reversals, tell_widths
 from postproc.calibration.selection import model_of, told_apart
 from postproc.calibration.stops import AVERAGED, pool_readings
+from postproc.exceptions import ModelError
 from postproc.model.combination import Combination
 from postproc.model.covariate import JOINTS
 from postproc.model.kinematics import Batch
@@ -64,6 +66,10 @@ from postproc.model.model import WORST_STD, Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
+from postproc.threads import in_one_thread
+
+if TYPE_CHECKING:
+    from postproc.arrays import DataFrame
 
 # Before and after, on rows that took no part in choosing or fitting.
 #
@@ -201,8 +207,49 @@ class Extension:
     search: Search
     held_out: HeldOut
 
+    @property
+    def rejected(self) -> bool:
+        """Whether the model must not be used: held-out rows are worse off with it."""
+        return self.diagnosis.verdict == "rejected"
 
-def diagnose(
+    def __str__(self) -> str:
+        """Say in some lines what was found, and what it leaves of held-out rows."""
+        found = self.diagnosis
+        lines = [
+            f"verdict: {found.verdict}",
+            found.story(),
+            f"before {found.before.tell()}",
+            f"after  {found.after.tell()}",
+            *found.notes,
+            *found.fixed_points,
+        ]
+        return "\n".join(lines)
+
+    def save(self, path: str | Path) -> None:
+        """Write the file of the extended model.
+
+        Raises:
+            ModelError: The model must not be used.
+            OutputError: The place cannot be written to.
+        """
+        if self.rejected:
+            problem = "is not written: held-out rows are worse off with this model"
+            raise ModelError(path, problem, "Keep the given one, or measure more")
+        self.model.save(path)
+
+    def to_frame(self) -> DataFrame:
+        """Return a data frame of what was found and added, one effect a row.
+
+        Columns: effect, joint, source (what drives it), p_value, share (of the squared
+        error) and peak_mm.
+        """
+        names = ("effect", "joint", "source", "p_value", "share", "peak_mm")
+        found = self.diagnosis.findings
+        return data_frame({name: [getattr(f, name) for f in found] for name in names})
+
+
+@in_one_thread
+def extend_model(
     survey: Measurements,
     arm: Arm,
     model: Model,

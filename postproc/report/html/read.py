@@ -9,7 +9,7 @@ from typing import Any
 
 from postproc.compensation.record import FileRecord, read_sidecar, restore, sidecar_path
 from postproc.exceptions import ProgramError
-from postproc.files import write_all
+from postproc.files import schema, write_all
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
 from postproc.report.html.diagnosis import diagnosis_report
@@ -112,7 +112,7 @@ def _read(path: Path) -> dict[str, Any]:
         raise ProgramError(path, "is not valid JSON", CURE) from None
     if not isinstance(data, dict):
         raise ProgramError(path, "holds no report", CURE)
-    return data
+    return {key: told for key, told in data.items() if key not in schema("report")}
 
 
 def _page(data: dict[str, Any], sources: Mapping[str, bytes] | None) -> str:

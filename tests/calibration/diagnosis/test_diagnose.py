@@ -11,9 +11,9 @@ import pytest
 
 from postproc.calibration.diagnosis.diagnose import (
     Extension,
-    diagnose,
     dumped,
     evidence_of,
+    extend_model,
 )
 from postproc.calibration.diagnosis.held_out import (
     multi_directional,
@@ -27,13 +27,13 @@ from postproc.calibration.diagnosis.result import periodogram, profile
 from postproc.calibration.diagnosis.score import leftovers
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.selection import fit_survey, model_of
-from postproc.cli.diagnose import tell
 from postproc.exceptions import ModelError, PostprocError
 from postproc.model.covariate import covariate, loops, unit
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.curve import Curve
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, load_model
+from postproc.report.diagnosis import tell
 from postproc.report.html import diagnosis_report
 from postproc.report.plots import plot_diagnosis
 from postproc.robot.arm import load_arm
@@ -63,7 +63,7 @@ def planted() -> tuple[Measurements, Model]:
 @pytest.fixture(scope="module")
 def found(planted: tuple[Measurements, Model]) -> Extension:
     rows, model = planted
-    return diagnose(rows, ARM, model, tracker=TRACKER)
+    return extend_model(rows, ARM, model, tracker=TRACKER)
 
 
 def test_report_has_the_keys_that_other_tools_read(found: Extension) -> None:
@@ -135,7 +135,7 @@ def test_extended_model_is_a_link_of_a_chain(
     assert record["data_sha256"] == rows.sha256
     assert record["added"][0]["effect"] == "transmission"
     assert record["after"]["mean_mm"] < record["before"]["mean_mm"]
-    twice = diagnose(rows, ARM, again, tracker=TRACKER)
+    twice = extend_model(rows, ARM, again, tracker=TRACKER)
     assert twice.diagnosis.verdict == "noise"
     assert [r["verdict"] for r in twice.model.history] == ["effect", "noise"]
 
@@ -154,7 +154,7 @@ def test_same_rows_same_answer(
     planted: tuple[Measurements, Model], found: Extension
 ) -> None:
     rows, model = planted
-    assert diagnose(rows, ARM, model, tracker=TRACKER).model.id == found.model.id
+    assert extend_model(rows, ARM, model, tracker=TRACKER).model.id == found.model.id
 
 
 def test_profile_and_periodogram_show_the_wave(found: Extension) -> None:
@@ -176,11 +176,11 @@ def test_other_methods_and_other_arms_are_refused(
 ) -> None:
     rows, model = planted
     with pytest.raises(PostprocError, match="--method full"):
-        diagnose(rows, ARM, replace(model, method="elm"))
+        extend_model(rows, ARM, replace(model, method="elm"))
     with pytest.raises(ModelError, match="was made for arm"):
-        diagnose(rows, load_arm("ur10"), model)
+        extend_model(rows, load_arm("ur10"), model)
     with pytest.raises(PostprocError, match="takes at least"):
-        diagnose(rows[np.arange(5)], ARM, model)
+        extend_model(rows[np.arange(5)], ARM, model)
 
 
 def test_few_points_revise_a_model_and_find_what_changed() -> None:
@@ -198,7 +198,7 @@ def test_few_points_revise_a_model_and_find_what_changed() -> None:
     fresh = measurements(
         states_of(points), changed.measure(points, TRACKER, stream(seed, "new")), "new"
     )
-    found = diagnose(fresh, ARM, model, tracker=TRACKER)
+    found = extend_model(fresh, ARM, model, tracker=TRACKER)
     named = {(f.effect, f.joint) for f in found.diagnosis.findings}
     named |= {g for f in found.diagnosis.findings for g in f.confusable_with}
     assert ("compliance", 2) in named
@@ -221,7 +221,7 @@ def test_a_given_model_of_other_data_is_judged_as_it_is() -> None:
         for a, name in ((old, "first"), (new, "second"))
     )
     model = base_model(first)
-    found = diagnose(second, ARM, model, tracker=TRACKER)
+    found = extend_model(second, ARM, model, tracker=TRACKER)
     assert found.diagnosis.verdict == "noise"
     error = second.position - Batch(ARM, second.states).walk.tcp
     left = error - model.error(ARM, second.states)
@@ -296,7 +296,7 @@ def test_whole_curves_have_functions_of_each_covariate_alone() -> None:
 def test_what_has_no_name_is_told_by_where_it_lives(tmp_path: Path) -> None:
     c = campaign(341, ("joint_product",), 1.5, rows=200)
     rows = measurements(c.states, c.position, "nameless")
-    found = diagnose(rows, ARM, base_model(rows), tracker=TRACKER)
+    found = extend_model(rows, ARM, base_model(rows), tracker=TRACKER)
     assert found.diagnosis.verdict == "unexplained"
     (curve,) = found.diagnosis.findings
     law = c.arm.laws[-1]
@@ -314,7 +314,7 @@ def test_wrong_directions_are_listed_and_held_out_rows_keep_theirs() -> None:
     clean, _ = flipped(2, 0.0)
     model = model_of(fit_survey(clean, NJ, BASE_EFFECTS, None), clean)
     rows, wrong = flipped(2, 0.05)
-    found = diagnose(rows, NJ, model)
+    found = extend_model(rows, NJ, model)
     listed = found.diagnosis.directions
     assert listed is not None and listed.turned > 20
     for likely in listed.likeliest[:20]:

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from postproc.calibration.diagnosis.diagnose import diagnose
+from postproc.calibration.diagnosis.diagnose import extend_model
 from postproc.calibration.diagnosis.result import Finding
 from postproc.model.effects.joint_offset import JointOffset
 from postproc.model.kinematics import Batch
@@ -47,7 +47,7 @@ def test_it_is_named_and_unseen_poses_are_left_less(joint: int) -> None:
     fresh = survey(arm, SEED + 1, ROWS)
     position = arm.measure(fresh, TRACKER, stream(SEED, "fresh"))
     rows = measurements(states_of(fresh), position, "fresh")
-    found = diagnose(rows, ARM, model, tracker=TRACKER)
+    found = extend_model(rows, ARM, model, tracker=TRACKER)
     named = [_named(f) for f in found.diagnosis.findings]
     assert [("joint_offset", joint) in names for names in named] == [True]
     tied = {1: ("base_shift", None), 6: ("tool_shift", None)}
@@ -83,7 +83,7 @@ def test_joints_that_always_yielded_are_no_offsets() -> None:
         )
         for name, rows in (("old", survey(arm, 5, 300)), ("new", survey(arm, 6, 300)))
     )
-    found = diagnose(second, ARM, base_model(first), tracker=TRACKER)
+    found = extend_model(second, ARM, base_model(first), tracker=TRACKER)
     named = {(f.effect, f.joint) for f in found.diagnosis.findings}
     assert named == {("compliance", 2), ("compliance", 3), ("compliance", 5)}
     assert found.diagnosis.verdict == "effect"

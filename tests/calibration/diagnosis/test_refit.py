@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from postproc.calibration.diagnosis.diagnose import Extension, diagnose
+from postproc.calibration.diagnosis.diagnose import Extension, extend_model
 from postproc.calibration.diagnosis.refit import (
     UNSEEN,
     Revision,
@@ -18,10 +18,10 @@ from postproc.calibration.diagnosis.refit import (
 )
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.selection import model_of
-from postproc.cli.diagnose import tell
 from postproc.model.effects import BY_NAME
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
+from postproc.report.diagnosis import tell
 from postproc.robot.pose import MM, lengths
 from postproc.simulation import (
     VirtualArm,
@@ -118,7 +118,7 @@ class Later:
         rows = measurements(
             states_of(self.arrivals), self.position + axes @ shift, "fresh"
         )
-        return diagnose(rows, ARM, self.model, tracker=TRACKER)
+        return extend_model(rows, ARM, self.model, tracker=TRACKER)
 
     def left(self, model: Model, within: np.ndarray) -> tuple[float, float]:
         """Return the true mean error [mm], and how many intervals hold it."""

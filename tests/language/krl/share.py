@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.cli.jobs import Job, find_pages
+from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
+from postproc.compensation.program_files import find_pages
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Meaning
 
@@ -34,7 +35,7 @@ NO_TARGET = (
 def outcomes(path: Path, cell: Path, model: Path) -> Counter[str]:
     """Count the motion lines of a job: corrected, without a target, and reasons."""
     found: Counter[str] = Counter()
-    done = Job.open(str(path), cell, model).run(Options(timing=False))
+    done = compensate(path, cell, model, options=Options(timing=False))
     v, status = done.visits, done.decisions.status
     for file in np.unique(v.file).tolist():
         for line in np.unique(v.line[v.file == file]).tolist():

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from postproc.batch.pages import named_programs
-from postproc.cli.jobs import find_pages
+from postproc.compensation.pages import named_programs
 from postproc.compensation.program import read_program
+from postproc.compensation.program_files import find_pages
 from postproc.exceptions import ProgramError
 from tests.plant import contents, pages
 from tests.written import cli

@@ -10,19 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibration.fit import fit, read_surveys
-from postproc.cli.diagnose import (
-    diagnose_files,
-    extended_path,
+from postproc.calibration.diagnosis.files import (
+    diagnose,
     from_tracker_frame,
     from_user_frame,
-    history_json,
-    history_text,
-    tell,
 )
+from postproc.calibration.fit import fit
+from postproc.calibration.survey_files import read_measurements
+from postproc.cli.loop import extended_path
 from postproc.exceptions import OutputError
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import load_model
+from postproc.report.diagnosis import history_json, history_text, tell
 from postproc.report.plots import plot_diagnosis
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import pose_from_record
@@ -72,7 +71,7 @@ def job(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "cell.toml").write_text(CELL)
     write_rows(folder / "rows.csv")
     cell = load_cell(folder / "cell.toml")
-    made = fit([folder / "rows.csv"], cell, effects=BASE_EFFECTS)
+    made = fit(folder / "rows.csv", cell=cell, effects=BASE_EFFECTS)
     made.model.save(folder / "model.json")
     return folder
 
@@ -81,13 +80,17 @@ def test_files_in_model_and_words_out(job: Path, tmp_path: Path) -> None:
     for name in ("cell.toml", "rows.csv", "model.json"):
         shutil.copy(job / name, tmp_path)
     told: list[float] = []
-    found = diagnose_files(
-        [tmp_path / "rows.csv"], tmp_path / "cell.toml", tmp_path / "model.json",
+    found = diagnose(
+        tmp_path / "rows.csv",
+        cell=tmp_path / "cell.toml",
+        model=tmp_path / "model.json",
         progress=lambda stage, share: told.append(share),
-    )  # fmt: skip
+    )
+    assert found.to_frame()["effect"].tolist() == ["coupling"]
     assert told == sorted(told)
     assert 0 <= told[0] < told[-1] < 1
     written = extended_path(tmp_path / "model.json")
+    found.save(written)
     better = load_model(written)
     assert better.id == found.model.id
     assert better.parent == load_model(tmp_path / "model.json").id
@@ -111,7 +114,7 @@ def test_files_in_model_and_words_out(job: Path, tmp_path: Path) -> None:
 
 def test_positions_in_the_user_frame_are_converted(job: Path) -> None:
     cell = load_cell(job / "cell.toml")
-    rows = read_surveys([job / "rows.csv"], cell)
+    rows = read_measurements(job / "rows.csv", cell=cell)
     base = pose_from_record((100.0, 200.0, 300.0, 10.0, 0.0, 0.0))
     frame = pose_from_record((1600.0, -300.0, 900.0, 30.0, 20.0, -10.0))
     inside = np.linalg.inv(frame) @ base
@@ -122,7 +125,7 @@ def test_positions_in_the_user_frame_are_converted(job: Path) -> None:
 
 def test_positions_in_the_tracker_frame_are_registered(job: Path) -> None:
     cell, model = load_cell(job / "cell.toml"), load_model(job / "model.json")
-    rows = read_surveys([job / "rows.csv"], cell)
+    rows = read_measurements(job / "rows.csv", cell=cell)
     turn = pose_from_record((-3000.0, 500.0, 200.0, 70.0, 5.0, 20.0))
     there = rows.position @ turn[:3, :3].T + turn[:3, 3]
     back, placed = from_tracker_frame(replace(rows, position=there), cell, model)

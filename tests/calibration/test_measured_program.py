@@ -7,8 +7,8 @@ import csv
 import numpy as np
 import pytest
 
+from postproc.calibration.measured_program import join_program
 from postproc.calibration.tables import TableFormat
-from postproc.cli.diagnose import join_program
 from postproc.compensation.program import plan_visits, read_program
 from postproc.exceptions import MeasurementError
 from tests.written import FIRST, NEXT, POSE, cli, program

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.cli.residuals import beside_all
+from postproc.calibration.residuals import beside_all
 from tests.calibration.simulator import random_states, survey_of
 
 

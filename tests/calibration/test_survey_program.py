@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from postproc.cli.survey import BACK, STEPS, write_survey
+from postproc.calibration.survey_program import BACK, STEPS, write_survey
 from postproc.compensation.program import plan_visits, read_program
 from tests.written import cli
 

@@ -1,0 +1,59 @@
+"""Every JSON output begins with what it is and the version of its keys."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from postproc.files import SCHEMAS
+from tests.plant import program
+from tests.written import cli
+
+COMMANDS = {
+    "check": ("check", "out", "--json", "-"),
+    "comparison": ("compare", "rows.csv", "--cell", "cell.toml", "--json", "-"),
+    "difference": ("diff", "job.pdl", "out/job.pdl", "--json", "-"),
+    "explanation": ("explain", "job.pdl", "--cell", "cell.toml", "--json", "-"),
+    "fit": (
+        "fit", "rows.csv", "--cell", "cell.toml", "-o", "m.json",
+        "--effects", "geometry", "--json", "-",
+    ),
+    "history": ("history", "model.json", "--json", "-"),
+    "report": (
+        "compensate", "job.pdl", "--cell", "cell.toml", "--model", "model.json",
+        "-o", "new.pdl", "--report", "-",
+    ),
+    "simulation": (
+        "simulate", "job.pdl", "--cell", "cell.toml", "--wanted", "job.pdl",
+        "--json", "-",
+    ),
+}  # fmt: skip
+SLOW = {"diagnosis"}  # looked at where one is made: tests/cli/test_diagnose_path.py
+
+
+@pytest.fixture(scope="module")
+def folder(job_folder, tmp_path_factory):
+    """A folder with a cell, a model, a survey, a program and its output."""
+    place = tmp_path_factory.mktemp("schemas")
+    for name in ("cell.toml", "model.json"):
+        (place / name).write_bytes((job_folder / name).read_bytes())
+    (place / "rows.csv").write_bytes((job_folder / "survey.csv").read_bytes())
+    (place / "job.pdl").write_bytes(program("job", 2, 1))
+    (place / "out").mkdir()
+    given = ("--cell", place / "cell.toml", "--model", place / "model.json")
+    cli("compensate", place / "job.pdl", *given, "-o", place / "out" / "job.pdl")
+    return place
+
+
+def test_every_schema_is_looked_at():
+    assert set(COMMANDS) | SLOW == set(SCHEMAS)
+
+
+@pytest.mark.parametrize("kind", COMMANDS)
+def test_a_json_output_says_what_it_is(folder, monkeypatch, kind):
+    monkeypatch.chdir(folder)
+    done = cli(*COMMANDS[kind])
+    assert done.exit_code in (0, 1), done.stderr
+    head = list(json.loads(done.stdout).items())[:2]
+    assert head == [("schema", f"postproc-{kind}"), ("version", SCHEMAS[kind])]
