@@ -64,7 +64,9 @@ def json_of(
 ) -> str:
     """Write all of it as JSON."""
     told = {"rows": [r._asdict() for r in rows], "left": [r._asdict() for r in left]}
-    return json.dumps({"stamped": stamped, "counts": counts, **told}, indent=1) + "\n"
+    head = {"schema": "postproc-difference", "version": 1}
+    found = {**head, "stamped": stamped, "counts": counts, **told}
+    return json.dumps(found, indent=1) + "\n"
 
 
 def list_rows(rows: Sequence[DiffRow], skip: int, told: bool, out: TextIO) -> None:
