@@ -221,7 +221,7 @@ def _plain_rungs(task: FitTask, used: Bools) -> tuple[Rung, ...]:
     refined = task.fit(REFINED)
     usual = REFINED if _added(refined, USUAL, task) > SURE else USUAL
     loaded = _with_weight(usual)
-    if _added(task.fit(loaded), usual, task) > HARDLY_CHANCE:
+    if _added(task.fit(loaded), usual, task) > SURE:
         usual = loaded
     independent = 3 * len(np.unique(task.survey.states.order[used]))
     if refined.effective < DETERMINED * independent:
