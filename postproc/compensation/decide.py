@@ -128,10 +128,11 @@ def must_stay(
     """
     limit = cell.limits.agree_mm
     hurt = worsened(visits, agreement, change, trusted, limit, absorbing)
-    found = {f"{why}: give the move a point of its own (see --clone)": rows
+    cloning = visits.dialect.terms.cloning
+    found = {f"{why}: give the move a point of its own ({cloning})": rows
              for why, pins in visits.literals.pins.items()
              if (rows := np.isin(agreement.literal, pins)).any()}  # fmt: skip
-    text = "a target computed from it would land farther off (see --clone)"
+    text = f"a target computed from it would land farther off ({cloning})"
     return found | {text: hurt}
 
 
@@ -158,7 +159,7 @@ def without_target(visits: Visits) -> Bools:
 def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
     """Mark moves without a target, taught points and shared variables, (n,)."""
     empty = without_target(visits)
-    reasons.mark(empty, "this move holds no target")
+    reasons.mark(empty, HOLDS_NONE)
     has = visits.literal >= 0
     literal = np.where(has, visits.literal, 0)
     if len(visits.literals) == 0:
@@ -193,17 +194,38 @@ def mark_disagreement(
         return together, np.zeros(len(visits), dtype=bool)
     at = np.where(has, agreement.group, 0)
     unsafe = reasons.none & has & ~together[at]
-    text = (
-        f"its arrivals differ by more than agree_mm = {limit:g}: give each move a "
-        "point of its own (see --clone)"
-    )
     differ = unsafe & agreement.usable[at] & apart[at]
     reasons.mark(differ & own_shifts(visits), SHIFTED_APART.format(limit))
+    text = f"its arrivals differ by more than agree_mm = {limit:g}: "
+    alone = has & _by_one_move(visits, agreement.group, len(together))[at]
+    reasons.mark(differ & alone, f"{text}{_ONE_MOVE}")
+    cloning = visits.dialect.terms.cloning
+    text += f"give each move a point of its own ({cloning})"
     reasons.mark(differ, text)
     for why, literals in stay.items():
         reasons.mark(unsafe & literals[at], why)
     reasons.mark(unsafe, "another arrival at the same point cannot be corrected")
     return together, unsafe
+
+
+HOLDS_NONE = "this move holds no target"
+_ONE_MOVE = (
+    "one move makes them all, and --clone does not help: write it once for every way "
+    "to it, or for all frames that it is made with"
+)
+
+
+def _by_one_move(visits: Visits, group: Ints, count: int) -> Bools:
+    """Tell which literals a single move of the program goes to, (count,).
+
+    Args:
+        visits: The program.
+        group: Literal of every visit, (n,), -1 where it has none.
+        count: How many there are.
+    """
+    places = np.stack([group, visits.file, visits.line])[:, group >= 0]
+    own = np.unique(places, axis=1)[0]
+    return np.asarray(np.bincount(own, minlength=count) == 1)
 
 
 # Targets that move although no number of theirs is written anew.

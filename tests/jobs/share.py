@@ -16,7 +16,7 @@ import re
 import tempfile
 import tomllib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -30,6 +30,7 @@ from postproc.batch.tree import scan
 from postproc.batch.workers import outcomes_of
 from postproc.calibration.fit import fit
 from postproc.cli.simulate import setup_of
+from postproc.compensation.decide import HOLDS_NONE
 from postproc.compensation.options import AS_USUAL, Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.program import read_program
@@ -309,9 +310,9 @@ def _landed(outcome: Outcome, cell: Cell) -> Misses:
 # The table.
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Print the share of every language, and the reasons for the rest."""
-    given = _arguments()
+    given = _arguments(arguments)
     options = Options(clone=given.clone)
     for language in given.language or LANGUAGES:
         folders = sorted((HERE / language).glob("job*"))
@@ -329,7 +330,7 @@ def main() -> None:
             _print_misses([landed(folder, options) for folder in folders])
 
 
-def _arguments() -> argparse.Namespace:
+def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--language", nargs="+", choices=LANGUAGES)
     parser.add_argument("--jobs", nargs="+", help="Numbers, as 01.")
@@ -341,7 +342,7 @@ def _arguments() -> argparse.Namespace:
         "--land", action="store_true", help="Let the arm run what is written."
     )
     parser.add_argument("--lines", action="store_true", help="List every other line.")
-    return parser.parse_args()
+    return parser.parse_args(arguments)
 
 
 def _print_lines(found: Iterable[JobCount]) -> None:
@@ -367,6 +368,9 @@ def _print_share(language: str, found: list[JobCount]) -> None:
     seconds = sum(job.seconds for job in found)
     share = 100.0 * done / max(total, 1)
     print(f"{language}: {done} of {total} motion lines ({share:.1f} %) are corrected")
+    elsewhere = total - reasons[HOLDS_NONE]
+    share = 100.0 * done / max(elsewhere, 1)
+    print(f"  {done} of the {elsewhere} ({share:.1f} %) that go to no home position")
     print(f"  in {seconds:.1f} s")
     for reason, times in reasons.most_common():
         print(f"{times:6d} {reason}")

@@ -9,7 +9,7 @@ import pytest
 
 from postproc.compensation.options import Options
 from postproc.robot.cell import load_cell
-from tests.jobs.share import HERE, LANGUAGES, count, counted, landed, pasted
+from tests.jobs.share import HERE, LANGUAGES, count, counted, landed, main, pasted
 
 JOBS = sorted(job for language in LANGUAGES for job in (HERE / language).glob("job*"))
 # Counted lines, and those that are corrected, of RAPID with --clone, at the least.
@@ -75,3 +75,10 @@ def test_what_messages_ask_for_is_pasted(tmp_path):
     assert load_cell(cell).aux == {1: "track"} != load_cell(job / "cell.toml").aux
     before, after = count(job, options=clone), count(job, cell, clone)
     assert after.corrected > before.corrected
+
+
+def test_lines_to_home_positions_are_told_apart(capsys):
+    main(["--language", "krl", "--jobs", "01"])
+    told = capsys.readouterr().out
+    assert "krl: 13 of 15 motion lines (86.7 %) are corrected" in told
+    assert "  13 of the 13 (100.0 %) that go to no home position" in told

@@ -1,0 +1,35 @@
+"""What messages advise for points that several moves share."""
+
+from __future__ import annotations
+
+import pytest
+
+from postproc.compensation.options import Options
+from tests.jobs.share import HERE, count
+
+OWN, NO_HELP = "give each move a point of its own", "--clone does not help"
+
+
+def advice(job, **options):
+    """Return the advice of every line whose arrivals differ."""
+    found = count(HERE / job, options=Options(**options)).reasons
+    return {line: why for (_, line), why in found.items() if "arrivals differ" in why}
+
+
+@pytest.mark.parametrize(
+    ("job", "said"), [("krl/job17", "(KRL has no --clone)"), ("rapid/job07", "(see --")]
+)
+def test_moves_that_share_a_point_are_told_what_parts_them(job, said):
+    found = advice(job)
+    assert found and all(OWN in why and said in why for why in found.values())
+
+
+def test_one_move_that_makes_all_arrivals_is_not_sent_to_cloning():
+    found = advice("krl/job40")
+    assert found and all(NO_HELP in why for why in found.values())
+
+
+def test_cloning_does_not_part_what_one_move_makes():
+    lost = {line for line, why in advice("rapid/job18").items() if NO_HELP in why}
+    left = count(HERE / "rapid/job18", options=Options(clone=True)).reasons
+    assert lost and lost <= {line for (_, line), why in left.items() if why}
