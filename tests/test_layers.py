@@ -41,6 +41,15 @@ ONLY = {
 # Points that were measured while a program ran are joined with its visits.
 JOINED = {
     "calibration.measured_program": {"program", "program_files"},
+    "calibration.diagnosis.measured_path": {
+        "paths.accuracy",
+        "paths.flanks",
+        "paths.measured",
+        "paths.servo_lag",
+        "program",
+        "program_files",
+        "targets",
+    },
 }
 
 # Which modules know one effect in particular: all others take effects as they come.

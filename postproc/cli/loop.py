@@ -25,7 +25,7 @@ from postproc.files import check_places, schema
 
 if TYPE_CHECKING:
     from postproc.calibration.diagnosis.diagnose import Extension
-    from postproc.cli.diagnose_path import PathDiagnosis
+    from postproc.calibration.diagnosis.measured_path import PathDiagnosis
 
 
 class PointFrame(StrEnum):
@@ -68,6 +68,7 @@ def diagnose(
     """Find what the model lacks, trace it to an effect, and add that effect."""
     from postproc.calibration.diagnosis.diagnose import dumped, evidence_of
     from postproc.report.diagnosis import tell
+    from postproc.report.measured_path import tell_path
     from postproc.report.terminal import stage_bar
 
     with explained():
@@ -97,7 +98,7 @@ def diagnose(
                 say(f"plot {path}")
         if json != "-":
             if on_the_way is not None:
-                typer.echo(on_the_way.tell())
+                typer.echo(tell_path(on_the_way))
             typer.echo(tell(found.diagnosis))
         if found.rejected:
             raise typer.Exit(2)
@@ -108,7 +109,7 @@ def _diagnosed(
 ) -> tuple[PathDiagnosis | None, Extension]:
     """Diagnose points, or a path."""
     from postproc.calibration.diagnosis.files import diagnose as diagnose_files
-    from postproc.cli.diagnose_path import diagnose_path
+    from postproc.calibration.diagnosis.measured_path import diagnose_path
 
     if (path is None) == (not files):
         raise PostprocError("diagnose: give measurements, or --path and --program")

@@ -29,8 +29,7 @@ from postproc.language.visits import Visits
 from postproc.model.model import READING, Model, as_model
 from postproc.model.statistics import ErrorStatistics
 from postproc.motion.cycle import ProgramCycle, run
-from postproc.report.terminal import Column, table_text
-from postproc.robot.cell import Cell, load_cell
+from postproc.robot.cell import Cell, as_cell
 from postproc.robot.pose import MM, inverse, lengths
 from postproc.robot.state import States, make_states
 
@@ -40,15 +39,6 @@ RATES = (20.0, 2000.0)  # [Hz]
 APART = 0.02  # [m] between readings on the way that enter the fit, at least
 MOST = 1500  # of them
 FOUND = 0.5  # of the program's stops, at least
-HEADS = (
-    Column("joint"),
-    Column("steps"),
-    Column("predicted mm"),
-    Column("measured / predicted"),
-    Column("+-"),
-    Column("later mm"),
-    Column("in motion", "left"),
-)
 
 
 @dataclass(frozen=True)
@@ -107,61 +97,18 @@ class PathDiagnosis:
             "lag_below_ms": _number(1e3 * self.lag.most),
         }
 
-    def tell(self) -> str:
-        """Write it for a terminal."""
-        a = self.across
-        lines = [
-            f"{self.name}: {self.readings} readings at {self.rate:.0f} Hz, scatter "
-            f"{self.scatter / MM:.4f} mm; {self.stops[0]} of {sum(self.stops)} stops "
-            f"found, {self.moves} moves",
-            f"across the way, from where the model has it: mean {a.mean_mm:.4f} mm, "
-            f"95 % {a.p95_mm:.4f}, max {a.max_mm:.4f} over {a.n} places",
-            "along the way nothing is told: the tracker's clock is its own",
-            _of_lag(self.lag),
-        ]
-        if not self.joints:
-            return "\n".join([*lines, "no joint changes its flank alone on a way"])
-        rows = (
-            (str(j.joint), str(j.steps), f"{j.predicted / MM:.3f}", f"{j.share:.2f}",
-             f"{j.error:.2f}", f"{j.later / MM:.0f}", j.verdict)
-            for j in self.joints
-        )  # fmt: skip
-        return "\n".join([*lines, table_text(HEADS, rows)])
-
 
 def _number(value: float) -> float | None:
     """Round a number; None where it is none."""
     return round(value, 2) if np.isfinite(value) else None
 
 
-def _of_lag(lag: ServoLag) -> str:
-    """Say what bends tell of the servos' lag.
-
-    >>> _of_lag(ServoLag(4e-4, 1e-5, 12))
-    'servos lag by 20.0 ms (+- 0.2), by how 12 moves cut their bends; not fitted'
-    >>> _of_lag(ServoLag(1e-5, 1e-4, 12))
-    'servos lag by less than 14.5 ms, as far as the bends of 12 moves tell'
-    """
-    if lag.is_told:
-        error = lag.error / (2.0 * lag.seconds)
-        return (
-            f"servos lag by {1e3 * lag.seconds:.1f} ms (+- {1e3 * error:.1f}), by how "
-            f"{lag.moves} moves cut their bends; not fitted"
-        )
-    if not np.isfinite(lag.error):
-        return "of the servos' lag nothing is told: too few moves bend"
-    return (
-        f"servos lag by less than {1e3 * lag.most:.1f} ms, as far as the bends of "
-        f"{lag.moves} moves tell"
-    )
-
-
 def diagnose_path(
     track: Path,
     *,
-    cell: Path,
-    model: Path,
-    program: Path | None,
+    cell: Cell | str | Path,
+    model: Model | str | Path,
+    program: str | Path | None,
     frame: PointFrame = "base",
     seed: int = 0,
     progress: Progress = silent,
@@ -170,8 +117,8 @@ def diagnose_path(
 
     Args:
         track: Columns time_s, x_mm, y_mm, z_mm, read while the program ran once.
-        cell: The cell's file.
-        model: The file of the model that may lack something.
+        cell: The cell, or its file.
+        model: The model that may lack something, or its file.
         program: The program that ran.
         frame: What positions are given in.
         seed: Of the bootstrap.
@@ -182,9 +129,9 @@ def diagnose_path(
     """
     if program is None:
         raise PostprocError("--path: name the program that ran with --program")
-    place = load_cell(cell)
-    given = as_model(model, place.arm)
-    return _diagnosed(track, place, given, program, frame, seed, progress)
+    cell = as_cell(cell)
+    model = as_model(model, cell.arm)
+    return _diagnosed(track, cell, model, Path(program), frame, seed, progress)
 
 
 def _diagnosed(
