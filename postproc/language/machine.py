@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -373,11 +374,13 @@ class TaskMachine(ABC):
         step = self.usual_step(first, last)
         if one.step is not None:
             step = self.number(one.step, row, scope)
-        if first != first or last != last or step != step or step == 0.0:
+        if not all(map(math.isfinite, (first, last, step))) or step == 0.0:
             return None
-        count = max(int((last - first) / step + 1 + 1e-9), 0)
-        if count > MOST_ROUNDS:
+        with np.errstate(over="ignore"):
+            many = np.float64(last - first) / step  # infinite for tiny steps
+        if not many < MOST_ROUNDS:
             return None
+        count = int(max(many + 1 + 1e-9, 0))
         return tuple(first + k * step for k in range(count))
 
     def _round(
