@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -384,7 +385,7 @@ class TaskMachine(ABC):
         step = self.usual_step(first, last)
         if one.step is not None:
             step = self.number(one.step, row, scope)
-        if first != first or last != last or step != step or step == 0.0:
+        if not all(map(math.isfinite, (first, last, step))) or step == 0.0:
             return None
         count = (last - first) / step + 1 + 1e-9
         if not count * context.rounds_around() < MOST_ROUNDS + 1:  # also if infinite

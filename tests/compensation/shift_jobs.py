@@ -19,7 +19,14 @@ from postproc.compensation.outcome import Outcome, Status
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
 from tests.any_controller import any_controller
-from tests.language.neutral_job import OUTSIDE, NeutralJob, confdata, place, quaternion
+from tests.language.neutral_job import (
+    OUTSIDE,
+    NeutralJob,
+    confdata,
+    place,
+    quaternion,
+    status,
+)
 
 MIDDLE = np.deg2rad([-20.0, 15.0, -100.0, 25.0, 58.0, 25.0])
 TURNS = {
@@ -266,3 +273,117 @@ def _named(goal: str, names: Mapping[str, str]) -> str:
     """Return the point that a destination begins with."""
     found = re.findall(r"\b(p\d|\w+)\b", goal)
     return next(names.get(n, n) for n in found if names.get(n, n) in TURNS)
+
+
+# The same in KRL.
+
+KRL_MOVE = re.compile(
+    r"^[ \t]*(S?(?:LIN|PTP|CIRC)) +([^;\n]*?)(?: C_\w+)?[ \t]*(?:;.*)?$", re.M
+)
+
+
+@dataclass(frozen=True)
+class KrlText:
+    """A source with its data list, and where its moves go.
+
+    Attributes:
+        text: The source.
+        data: The data list.
+    """
+
+    text: str
+    data: str
+
+    @property
+    def moves(self) -> list[list[str]]:
+        """The destinations of every move but those to axes."""
+        found = [parts_of(rest) for _, rest in self.heads]
+        return found
+
+    @property
+    def heads(self) -> list[tuple[str, str]]:
+        """Words and destinations of every move but those to axes."""
+        found = KRL_MOVE.findall(self.text.replace("\r", ""))
+        return [one for one in found if "A1" not in one[1]]
+
+    def at(self, goal: str) -> np.ndarray:
+        """Return the pose of a destination, (4, 4) [m]."""
+        if ":" in goal.replace("E6POS:", "").replace("FRAME:", ""):
+            first, second = re.split(r"(?<!E6POS)(?<!FRAME)\s*:\s*", goal, maxsplit=1)
+            return self.at(first) @ self.at(second)
+        if goal.startswith("{"):
+            pairs = re.findall(r"\b([XYZABC])\s+([-+.\dE]+)", goal)
+            n = {name: float(value) for name, value in pairs}
+            turn = Rotation.from_euler("ZYX", [n["A"], n["B"], n["C"]], degrees=True)
+            return pose([n["X"], n["Y"], n["Z"]], turn)
+        written = re.search(rf"(?i)\b{goal}=(\{{.*?\}})", self.data + self.text)
+        return self.at(written[1])
+
+
+def six(at: np.ndarray) -> str:
+    """Write X to C of a pose."""
+    x, y, z = (at[:3, 3] * 1000.0).tolist()
+    a, b, c = Rotation.from_matrix(at[:3, :3]).as_euler("ZYX", True).tolist()
+    return f"X {x:.6f},Y {y:.6f},Z {z:.6f},A {a:.9f},B {b:.9f},C {c:.9f}"
+
+
+def krl(
+    shop: Shop, lines: Sequence[str], more: str = "", data: str = ""
+) -> dict[str, bytes]:
+    """Write a source and a data list: three points, an approach, and what is given."""
+    points = [
+        f"DECL E6POS X{n}={{{six(shop.point(n))},{flags(shop, n)}}}" for n in TURNS
+    ]
+    starts = [
+        "PTP {" + ",".join(
+            f"A{k} {v:.4f}" for k, v in enumerate(np.rad2deg(MIDDLE) - off, start=1)
+        ) + "}"
+        for off in (24, 12)
+    ]  # fmt: skip
+    source = [
+        "&ACCESS RVP", "DEF job ( )", f"$TOOL={{{six(TOOL)}}}",
+        f"$BASE={{{six(FRAME)}}}", "$VEL.CP=0.2", *starts, *lines, "END", more,
+    ]  # fmt: skip
+    page = ["&ACCESS RVP", "DEFDAT job", *points, data, "ENDDAT", ""]
+    texts = {"job.src": source, "job.dat": page}
+    return {name: "\r\n".join(text).encode() for name, text in texts.items()}
+
+
+def flags(shop: Shop, name: str) -> str:
+    """Write S and T of a point."""
+    return status(shop.job, MIDDLE + np.deg2rad(TURNS[name]))
+
+
+def krl_landed(
+    shop: Shop,
+    lines: Sequence[str],
+    more: str = "",
+    runs: Sequence[int] = (),
+    data: str = "",
+) -> Landed:
+    """Compensate a KRL job and its twin, see `landed`; moves that run by number."""
+    files = krl(shop, lines, more, data)
+    plain = KrlText(*(text.decode() for text in files.values()))
+    order = runs or range(len(plain.moves))
+    spelt = [_krl_spelt(shop, plain, k) for k in order]
+    each = iter(spelt)
+    straight = [next(each) if KRL_MOVE.search(line) else line for line in lines]
+    twin = krl(shop, spelt if runs else straight, "", data)
+    done, other = shop.compensate(files), shop.compensate(twin)
+    now = KrlText(*(done.outputs.get(n, t).decode() for n, t in files.items()))
+    wanted = KrlText(*(other.outputs.get(n, t).decode() for n, t in twin.items()))
+    truth = [wanted.at(goal) for move in wanted.moves for goal in move]
+    got = [now.at(goal) for k in order for goal in now.moves[k]]
+    return Landed(done, now.text, *_compared(got, truth))
+
+
+def _krl_spelt(shop: Shop, plain: KrlText, k: int) -> str:
+    """Write a move with the numbers of its target."""
+    word, _ = plain.heads[k]
+    ends = []
+    for goal in plain.moves[k]:
+        point = re.search(r"(?i)X(p\d)\b", goal)[1].lower()
+        own = re.match(r"(?i)Xp\d\s*:", goal)  # a frame comes out: no S and T
+        more = "" if own else f",{flags(shop, point)}"
+        ends.append(f"{{{six(plain.at(goal))}{more}}}")
+    return f"{word} {','.join(ends)}"

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from postproc.compensation import windows
 from postproc.compensation.options import Options
 from postproc.compensation.record import restore
+from postproc.compensation.together import Given, compensate_batch
 from postproc.exceptions import ProgramError
 from tests.compensation.shift_jobs import (
     AGREED_MM,
@@ -272,3 +274,21 @@ def test_with_turns_a_tool_shift_is_turned_and_an_offs_only_where_it_agrees(
     assert found.off_mm[1] < EXACT_MM and found.turned_deg[1] < 1e-4
     kept = found.status[-1] != "SAFE"
     assert kept or np.deg2rad(found.turned_deg[2]) * 100.0 < AGREED_MM
+
+
+def test_programs_side_by_side_come_out_as_each_alone(shop):
+    jobs = [[P1, offs("p1")], [offs("p2"), P2, offs("p1", 9, 8, 7)], [P3]]
+    texts = [rapid(shop, lines) for lines in jobs]
+    given = [Given("m.mod", text, None, {}) for text in texts]
+    found = compensate_batch(given, shop.cell, shop.model, shop.options)
+    for one, text in zip(found, texts, strict=True):
+        assert one.outputs == shop.compensate({"m.mod": text}).outputs
+
+
+def test_a_long_program_in_windows_comes_out_as_one(shop, monkeypatch):
+    lines = [offs(p, 3 * k, 0, 60 + k) for k in range(40) for p in ("p1", "p2")]
+    text = rapid(shop, lines)
+    whole = shop.compensate({"m.mod": text}).outputs
+    for name, value in (("LEAST", 20), ("HALO", 8), ("BAND", 4), ("RUN_UP", 20)):
+        monkeypatch.setattr(windows, name, value)
+    assert shop.compensate({"m.mod": text}).outputs == whole

@@ -311,7 +311,7 @@ class Goals:
         values = text.value[places].tolist()
         count = len(slots) - 6
         main = values[:count] + [0.0] * (WIDTH - count)
-        if any(v != v for v in values) or not (joints or _is_unit(main[3:7])):
+        if not np.isfinite(values).all() or not (joints or _is_unit(main[3:7])):
             return None
         aux = tuple(np.nan if abs(v) > UNUSED else v for v in values[count:])
         at = tuple(places[:count] + [-1] * (WIDTH - count))

@@ -227,11 +227,10 @@ class RapidTask:
         match operand:
             case said.Num(slot=slot):
                 text = self.files[here.file].text
-                return float(text.value[int(text.first[row]) + slot])
+                return _finite(float(text.value[int(text.first[row]) + slot]))
             case said.Operation(operator=operator, operands=operands):
                 parts = [self.number(one, row, here) for one in operands]
-                result = _computed(operator, parts)
-                return result if math.isfinite(result) else math.nan
+                return _finite(_computed(operator, parts))
             case said.DataObject(name=name, steps=()):
                 loops = dict(here.loops)
                 if name in loops:
@@ -270,7 +269,8 @@ class RapidTask:
             case said.Num(slot=slot):
                 file = self.files[here.file].text
                 at = int(file.first[row]) + slot
-                return WrittenNumber(float(file.value[at]), here.file, at)
+                value = _finite(float(file.value[at]))
+                return WrittenNumber(value, here.file, at) if value == value else None
             case said.DataObject(name=name, steps=steps) if name not in CONSTANTS:
                 return self._data_object(name, steps, row, here, depth)
             case _:
@@ -334,6 +334,11 @@ def matched(
         return None
     pairs = [(optional[a.name], a) for a in named if not a.passed_on]
     return [*zip(required, placed, strict=True), *pairs]
+
+
+def _finite(value: float) -> float:
+    """Return a number, NaN for one that is too large for any."""
+    return value if math.isfinite(value) else math.nan
 
 
 def _computed(operator: str, parts: Sequence[float]) -> float:
