@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import hashlib
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -12,6 +13,7 @@ from collections.abc import Sequence
 from importlib.metadata import distributions
 from pathlib import Path
 
+from postproc import _native
 from tests.golden.case import HERE, ROOT, Case, kept
 from tests.golden.record import Record, differences
 from tests.golden.running import run_all
@@ -51,10 +53,17 @@ def records_of(
 
 
 def run_at(commit: str, cases: Sequence[Case], workers: int) -> dict[str, Record]:
-    """Run cases on the package of a commit."""
+    """Run cases on the package of a commit, with the core that is built here.
+
+    Raises:
+        SystemExit: The core was another one then.
+    """
+    if git("diff", "--stat", commit, "--", "native"):
+        sys.exit(f"{commit}: its core is another one: build it, and run check there")
     with tempfile.TemporaryDirectory(prefix="golden-base-") as name:
         archive = git("archive", commit, "postproc", "grammars")
         subprocess.run(["tar", "-x", "-C", name], input=archive, check=True)
+        shutil.copy(str(_native.__file__), Path(name) / "postproc")
         return run_all(cases, Path(name).resolve(), workers)
 
 
