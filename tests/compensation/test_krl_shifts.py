@@ -134,6 +134,13 @@ def test_a_taught_point_leaves_its_shifts_alone(shop):
     assert f"LIN Xp1:{by()}".encode() in done.outputs["job.src"]
 
 
+def test_a_shift_that_is_taught_holds_its_point(shop):
+    files = krl(shop, [P1, f"LIN Xp1:{by()} ; TAUGHT", P2])
+    done = shop.compensate(files)
+    status = [Status(s).name for s in done.decisions.status[2:].tolist()]
+    assert status == ["UNSAFE", "UNCHANGED", "SAFE"]
+
+
 def test_a_shared_point_stays_and_its_shift_makes_up_for_it(shop):
     files = krl(shop, [P1, f"LIN Xp1:{by()}"])
     files["job.dat"] = (
