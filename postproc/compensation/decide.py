@@ -59,6 +59,7 @@ def worsened(
     A target such as ``POS_SHIFT(p, ..)`` or ``NEAR p BY d`` needs a change of its own
     and gets that of ``p``. What it is then off must be no more than what it is off now.
     ``FOR d TO p`` only takes its direction from ``p``: it is a part of the way there.
+    A taught target needs none.
 
     Args:
         visits: n arrivals.
@@ -70,7 +71,7 @@ def worsened(
     """
     carries = ~absorbing & (visits.target != Meaning.FOR)
     rows, at = dependants(visits, agreement, carries)
-    needed = change_mm[rows]
+    needed = np.where(taught(visits)[rows, None], 0.0, change_mm[rows])
     moved = agreement.change_mm[at]
     shifted = visits.shift[rows] >= 0
     if shifted.any():
@@ -85,6 +86,14 @@ def worsened(
     found = np.zeros(len(agreement.literal), dtype=bool)
     found[at[worse]] = True
     return found
+
+
+def taught(visits: Visits) -> Bools:
+    """Tell which visits have a literal that holds a taught target, (n,)."""
+    if len(visits.literals) == 0:
+        return np.zeros(len(visits), dtype=bool)
+    has = visits.literal >= 0
+    return np.asarray(has & visits.literals.taught[np.where(has, visits.literal, 0)])
 
 
 def move_dependants(
@@ -164,12 +173,12 @@ def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
     literal = np.where(has, visits.literal, 0)
     if len(visits.literals) == 0:
         return empty
-    taught = has & visits.literals.taught[literal]
-    reasons.mark(taught, "a taught point already contains the arm's error")
+    held = taught(visits)
+    reasons.mark(held, "a taught point already contains the arm's error")
     if not options.shared:
         shared = has & visits.literals.shared[literal]
         reasons.mark(shared, "other programs may read this variable too (see --shared)")
-    return np.asarray(empty | taught)
+    return np.asarray(empty | held)
 
 
 def mark_disagreement(

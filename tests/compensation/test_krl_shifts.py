@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from postproc.compensation.options import Options
+from postproc.compensation.outcome import Status
 from postproc.compensation.record import restore
 from postproc.exceptions import ProgramError
 from tests.compensation.shift_jobs import (
@@ -132,6 +134,13 @@ def test_a_taught_point_leaves_its_shifts_alone(shop):
     assert f"LIN Xp1:{by()}".encode() in done.outputs["job.src"]
 
 
+def test_a_shift_that_is_taught_holds_its_point(shop):
+    files = krl(shop, [P1, f"LIN Xp1:{by()} ; TAUGHT", P2])
+    done = shop.compensate(files)
+    status = [Status(s).name for s in done.decisions.status[2:].tolist()]
+    assert status == ["UNSAFE", "UNCHANGED", "SAFE"]
+
+
 def test_a_shared_point_stays_and_its_shift_makes_up_for_it(shop):
     files = krl(shop, [P1, f"LIN Xp1:{by()}"])
     files["job.dat"] = (
@@ -141,6 +150,39 @@ def test_a_shared_point_stays_and_its_shift_makes_up_for_it(shop):
     done = shop.compensate(files)
     assert done.outputs.get("job.dat", files["job.dat"]) == files["job.dat"]
     assert f"LIN Xp1:{by()}".encode() not in done.outputs["job.src"]
+
+
+def on_track(shop, lines, places):
+    """Compensate a job of an arm on a track, given E1 of points."""
+    aux = shop.cell.file.model_copy(update={"aux": {"1": "track"}})
+    told = Shop(replace(shop.cell, file=aux, aux={1: "track"}), shop.model)
+    files = krl(told, lines)
+    data = files["job.dat"].decode()
+    for name in ("Xp1", "Xp2", "Xp3"):
+        place = f"\\1,E1 {places.get(name, 0)}}}"
+        data = re.sub(rf"({name}={{[^}}]*)}}", place, data)
+    return told.compensate({**files, "job.dat": data.encode()})
+
+
+def test_a_frame_behind_a_point_leaves_the_track_where_it_is(shop):
+    start = "PTP {A1 -29,A2 6,A3 -109,A4 16,A5 49,A6 16}"
+    lines = ["LIN Xp2", start, f"LIN Xp1:{by()}"]
+    found = on_track(shop, lines, {"Xp2": 500})
+    assert Status(found.decisions.status[-1]) != Status.SAFE
+    assert Status(on_track(shop, lines, {}).decisions.status[-1]) == Status.SAFE
+
+
+@pytest.mark.parametrize(("e1", "left"), [(0, False), (500, True)])
+def test_what_stands_behind_a_point_says_where_the_track_goes(shop, e1, left):
+    line = f"LIN Xp1:{{E6POS: X 0,Y 5,Z -80,A 0,B 0,C 0,E1 {e1}}}"
+    found = on_track(shop, [P1, line], {})
+    assert (Status(found.decisions.status[-1]) != Status.SAFE) == left
+
+
+def test_a_frame_before_a_point_leaves_the_track_to_the_point(shop):
+    line = "LIN {E6POS: X 0,Y 5,Z 80,A 0,B 0,C 0,E1 500}:Xp1"
+    found = on_track(shop, [P1, line], {})
+    assert Status(found.decisions.status[-1]) == Status.SAFE
 
 
 def test_with_turns_all_that_is_written_turns(job_cell, job_model):

@@ -167,6 +167,13 @@ def test_a_taught_point_leaves_its_shifts_alone(shop):
     assert b"Offs(p1,0,0,100)" in done.outputs["m.mod"]
 
 
+def test_a_shift_that_is_taught_holds_its_point(shop):
+    found = landed(shop, [P1, f"{offs('p1')} ! TAUGHT", P2])
+    assert found.status[2:] == ["UNSAFE", "UNCHANGED", "SAFE"]
+    source = rapid(shop, [])
+    assert shop_point(source, "p1") == shop_point(found.text.encode(), "p1")
+
+
 def test_a_function_of_the_program_by_that_name_is_no_shift(shop):
     own = "FUNC robtarget Offs(robtarget a,num x,num y,num z)\nRETURN a;\nENDFUNC\n"
     done = shop.compensate({"m.mod": rapid(shop, [P2, offs("p1")], own)})

@@ -380,9 +380,21 @@ class _Goal:
         turned = turns and found.slots[0] < 0
         pins = base.pins or (f"{base.name} is turned too" if turned else "")
         return FoundGoal(
-            Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name, base.aux,
+            Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name,
+            self._outside_of(base, other) if behind else base.aux,
             base.why, pins, base.shared, found,
         )  # fmt: skip
+
+    def _outside_of(self, base: FoundGoal, other: said.Operand) -> tuple[float, ...]:
+        """Return the external axes of ``point : other``: those that stand on the right.
+
+        A frame says nothing of them: they stay where they are, wherever the point has
+        them at 0. Where the point has them elsewhere it is left like the point itself.
+        """
+        value = self.task.value(other, self.row, self.here)
+        own = self._outside(value if isinstance(value, KrlRecord) else KrlRecord(()))
+        pairs = zip(own, base.aux, strict=True)
+        return tuple(b if math.isnan(a) and b != 0.0 else a for a, b in pairs)
 
     def _shift(
         self, base: FoundGoal, other: said.Operand, frame: KrlFrame, behind: bool
