@@ -81,6 +81,7 @@ LEFT = {
     "computed": "LIN Xp1:{X 0,Y 0,Z -2*80,A 0,B 0,C 0}",
     "named frame": "LIN Xp1:FUP",
     "partial": "LIN Xp1:{X 0,Y 0,Z -160}",
+    "twice": "LIN Xp1:{X 0,Y 0,Z -160,Z -100,A 0,B 0,C 0}",
     "by a variable": "LIN Xp1:{X 0,Y 0,Z NUP,A 0,B 0,C 0}",
     "joint move without S and T": f"PTP Xp1:{by(z=-160)}",
 }

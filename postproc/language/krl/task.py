@@ -354,10 +354,12 @@ class KrlTask:
     def _aggregate(
         self, fields: Sequence[said.NamedField], row: int, here: Scope, depth: int
     ) -> KrlRecord:
-        pairs = [(f.name, self.value(f.value, row, here, depth + 1)) for f in fields]
+        """Read components; what one is that is written twice is not known."""
+        times = Counter(f.name for f in fields)
+        once = [f for f in fields if times[f.name] == 1]
+        pairs = [(f.name, self.value(f.value, row, here, depth + 1)) for f in once]
         known = tuple((name, value) for name, value in pairs if value is not None)
-        twice = len({name for name, _ in pairs}) < len(pairs)
-        return KrlRecord(known, len(known) == len(pairs) and not twice)
+        return KrlRecord(known, len(known) == len(fields))
 
     def _data(
         self,
