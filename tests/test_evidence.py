@@ -32,7 +32,7 @@ def test_direction_matters_on_the_drilling_job(survey):
 
 def test_solving_leaves_1_um_and_digits_add_2(survey):
     cell = evidence.load_cell(evidence.CELL)
-    model = evidence.fit([survey], cell, effects=evidence.BASE_EFFECTS).model
+    model = evidence.fit(survey, cell=cell, effects=evidence.BASE_EFFECTS).model
     left, added = evidence.solved_and_written(cell, model)
     assert len(left) > 600
     assert left.max() <= 1.0 and added.max() <= 2.0

@@ -67,6 +67,10 @@ class Counterbalance(JointEffect):
         upright = float(self.upright) * float(np.degrees(1.0))
         return {"pin_ratio": (float(self.ratio), "1"), "upright": (upright, "deg")}
 
+    def least_evidence(self) -> float:
+        """Ask no more of a spring than of the weight that it carries [nats]."""
+        return 0.0
+
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the size, at u = 90 deg."""
         return (Parameter("c2", "rad", SCALE, "2", 2),)
