@@ -63,6 +63,10 @@ class CheckFinding:
     code: Code
     message: str
 
+    def __str__(self) -> str:
+        """Write it as a line."""
+        return f"{self.place}: {self.code}: {self.message}"
+
 
 @dataclass(frozen=True)
 class Checked:
@@ -83,7 +87,7 @@ class Checked:
 
     def __str__(self) -> str:
         """Say what was found, a line a finding, and how many programs there are."""
-        lines = [f"{f.place}: {f.code}: {f.message}" for f in self.findings]
+        lines = map(str, self.findings)
         count = f"{self.programs} programs, {len(self.findings)} findings"
         return "\n".join([*lines, count])
 

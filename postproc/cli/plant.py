@@ -189,7 +189,7 @@ def check(
         if json:
             write_text(json, found.to_json(None if judged is None else judged.told()))
         for finding in found.findings:
-            say(f"{finding.place}: {finding.code}: {finding.message}")
+            say(str(finding))
         if judged is not None:
             _print_opinion(judged)
         say(f"{folder}: {found.programs} programs, {len(found.findings)} findings")
