@@ -237,8 +237,9 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
         found = Diagnostic(reading.sources[0].name, 1, Code.NOT_CLONED, text)
         return replace(reading, diagnostics=(*reading.diagnostics, found))
     return Reading(
-        again.texts, visits, notes, cloned, reading.sources, missed=reading.missed
-    )
+        again.texts, visits, notes, cloned, reading.sources, missed=reading.missed,
+        untouched=reading.untouched,
+    )  # fmt: skip
 
 
 def _stay(visits: Visits, rows: Sequence[int]) -> bool:

@@ -85,6 +85,7 @@ class JobReading:
         diagnostics: What else was found.
         programs: What was parsed of the files, as `read` takes it for `known`.
         missed: Lines of moves that are never reached, by file.
+        untouched: Names of files that are read, and never rewritten.
     """
 
     texts: tuple[Skeleton, ...]
@@ -92,6 +93,7 @@ class JobReading:
     diagnostics: tuple[Diagnostic, ...]
     programs: tuple[Any, ...] = ()
     missed: Mapping[str, Ints] = field(default_factory=dict)
+    untouched: frozenset[str] = frozenset()
 
 
 class NamedPoint(Protocol):
