@@ -365,8 +365,9 @@ class _CloneWork:
             return
         text = f"{variable.name}: the moves of lines {lines} go to {name} now"
         self._note(file, declared, Code.CLONED, text)
-        separated = np.concatenate([self.stops[stop] for stop in group.stops])
-        self.names |= dict.fromkeys(separated.tolist(), name)
+        for row in np.concatenate([self.stops[stop] for stop in group.stops]).tolist():
+            _, bracket, index = visits.names[visits.name[row]].partition("[")
+            self.names[row] = f"{name}{bracket}{index}"
 
     def _note(self, file: int, line: int, code: Code, text: str) -> None:
         name = self.reading.sources[file].name

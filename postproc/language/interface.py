@@ -13,7 +13,7 @@ from postproc.arrays import Floats, Ints
 from postproc.language.archive import Archive
 from postproc.language.dialect import Dialect
 from postproc.language.rewrite import Skeleton
-from postproc.language.source import CloneError, Edit, Source
+from postproc.language.source import Edit, Source
 from postproc.language.visits import Diagnostic, Literals, Visits
 
 Record = tuple[float, ...] | None
@@ -146,31 +146,6 @@ class Cloner(ABC):
         Raises:
             CloneError: A value stands where it cannot be given twice.
         """
-
-
-@dataclass(frozen=True)
-class NoClones(Cloner):
-    """Of a language whose points are not cloned.
-
-    Attributes:
-        why: What the user is told.
-    """
-
-    why: str
-
-    def target(self, file: int, line: int, via: bool, name: str) -> NamedPoint:
-        """Refuse to clone what a move goes to."""
-        raise CloneError(self.why)
-
-    def declared(self, named: NamedPoint) -> int:
-        """Return no line."""
-        raise CloneError(self.why)
-
-    def clone(
-        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
-    ) -> tuple[str, list[tuple[int, Edit]]]:
-        """Refuse to clone."""
-        raise CloneError(self.why)
 
 
 @dataclass(frozen=True)
