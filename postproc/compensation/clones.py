@@ -215,7 +215,7 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
     """
     work = _CloneWork.of(reading, proposal)
     for literals in _disputed(work):
-        work.separate(literals, cell.limits.agree_mm)
+        work.separate(literals, cell.limits.conflict_mm)
     notes = (*reading.diagnostics, *work.notes)
     if not work.edits:
         return replace(reading, diagnostics=notes)

@@ -135,7 +135,7 @@ def must_stay(
     Returns:
         The reasons, and which of the m literals of the agreement have each, (m,).
     """
-    limit = cell.limits.agree_mm
+    limit = cell.limits.conflict_mm
     hurt = worsened(visits, agreement, change, trusted, limit, absorbing)
     cloning = visits.dialect.terms.cloning
     found = {f"{why}: give the move a point of its own ({cloning})": rows
@@ -194,7 +194,7 @@ def mark_disagreement(
         The literals that agree, (m,), and the visits that would be corrected if the
         others at their literal agreed, (n,).
     """
-    limit = cell.limits.agree_mm
+    limit = cell.limits.conflict_mm
     has = agreement.group >= 0
     apart = ~(agreement.spread_mm <= limit)
     stays = np.any([apart, *stay.values()], axis=0)
@@ -205,7 +205,7 @@ def mark_disagreement(
     unsafe = reasons.none & has & ~together[at]
     differ = unsafe & agreement.usable[at] & apart[at]
     reasons.mark(differ & own_shifts(visits), SHIFTED_APART.format(limit))
-    text = f"its arrivals differ by more than agree_mm = {limit:g}: "
+    text = f"its arrivals differ by more than conflict_mm = {limit:g}: "
     alone = has & _by_one_move(visits, agreement.group, len(together))[at]
     reasons.mark(differ & alone, f"{text}{_ONE_MOVE}")
     cloning = visits.dialect.terms.cloning
@@ -253,7 +253,7 @@ def strayed_along(
     if not planned.targets.via.any():
         return np.zeros(len(visits), dtype=bool)
     moves = with_dependants(visits, planned, cell, values, shift)
-    step = cell.limits.step_mm * MM
+    step = cell.limits.correction_step_mm * MM
     away = strayed(planned.targets, planned.plan, moves, step)
     return with_origins(visits, planned, away)
 
@@ -469,8 +469,8 @@ SWUNG = (
 
 
 SHIFTED_APART = (
-    "its arrivals need numbers of its shift that differ by more than agree_mm = {:g}: "
-    "give each a move of its own"
+    "its arrivals need numbers of its shift that differ by more than conflict_mm = "
+    "{:g}: give each a move of its own"
 )
 NOT_ABSORBED = (
     "the numbers of its shift cannot make up for how all of its points are corrected: "
@@ -555,7 +555,7 @@ class Round:
         return path_correction(
             self.reading.visits, setting.cell.arm, plan.q, plan.tcp,
             plan.tool[:, :3, 3], self.correction, self.solved.direction,
-            setting.gap, setting.cell.limits.step_mm,
+            setting.gap, setting.cell.limits.correction_step_mm,
         )  # fmt: skip
 
     @cached_property
@@ -647,7 +647,7 @@ class Round:
         reasons.mark(strays, STRAYS)
         astray = angles_astray(visits, self.planned.plan, solved, self.aside)
         reasons.mark(astray, ASTRAY)
-        keep_whole(reasons, self.path, visits, given, limits.step_mm)
+        keep_whole(reasons, self.path, visits, given, limits.correction_step_mm)
 
     def _guard_flags(self, reasons: Reasons) -> None:
         """Mark corrections that end where flags are not sure."""
@@ -671,7 +671,7 @@ class Round:
 
         A shift that cannot moves along with its point, which may have to stay for it.
         """
-        visits, limit = self.reading.visits, self.setting.cell.limits.agree_mm
+        visits, limit = self.reading.visits, self.setting.cell.limits.conflict_mm
         numbers, change, both = self._needed()
         points = agree(visits.literal, usable, numbers, both)
         shifts, lost = own_shifts(visits), np.zeros(len(points.literal), dtype=bool)

@@ -261,7 +261,7 @@ def unsure_frames(
             f"{len(rows)} targets stand in a user frame that was taught from sides "
             f"that are not known (up to +-{size:.3f} mm): teach its three points far "
             "apart, each reached by a move of all joints in one direction, and write "
-            "these directions as taught_lambda in the cell file"
+            "these directions as taught_direction in the cell file"
         )
         where = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
         found.append(Diagnostic(*where, Code.SIDE_NOT_SURE, text))

@@ -130,7 +130,7 @@ def start_of(cell: Cell) -> Start:
         base=cell.base.record,
         uframe=cell.uframe.record,
         routines=dict(cell.routines),
-        still=cell.still,
+        motionless=cell.motionless,
         constant=cell.constant,
         strict_calls=cell.strict_calls,
         payload_kg=cell.payload_mass,

@@ -25,9 +25,9 @@ class Start:
 
     Attributes:
         tool, base, uframe: Position records (6,) [mm, deg], None where unknown.
-        routines: Outside routine to ``still``, ``moves`` or ``sets-frames``.
-        still: Patterns of outside routines, ``name`` or ``program.name``, that neither
-            move the arm nor set frames.
+        routines: Outside routine to ``motionless``, ``moves`` or ``sets-frames``.
+        motionless: Patterns of outside routines, ``name`` or ``program.name``, that
+            neither move the arm nor set frames.
         constant: Patterns of exported variables, ``name`` or ``program.name``, that no
             other program changes.
         payload_kg: What the arm carries, NaN where that is not known.
@@ -44,7 +44,7 @@ class Start:
     base: Record = (0.0,) * 6
     uframe: Record = (0.0,) * 6
     routines: Mapping[str, str] = field(default_factory=dict)
-    still: tuple[str, ...] = ()
+    motionless: tuple[str, ...] = ()
     strict_calls: bool = False
     constant: tuple[str, ...] = ()
     payload_kg: float = math.nan
@@ -60,7 +60,7 @@ class Start:
         """No language tells cases apart: keep names in lower case."""
         lower = {name.lower(): said for name, said in self.routines.items()}
         object.__setattr__(self, "routines", lower)
-        object.__setattr__(self, "still", tuple(map(str.lower, self.still)))
+        object.__setattr__(self, "motionless", tuple(map(str.lower, self.motionless)))
         object.__setattr__(self, "constant", tuple(map(str.lower, self.constant)))
         tables = {name.lower(): table for name, table in self.frame_tables.items()}
         object.__setattr__(self, "frame_tables", tables)

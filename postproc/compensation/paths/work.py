@@ -232,7 +232,7 @@ class PathWork:
     def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""
         decided, via = self.latest.kept.decisions, self.latest.reading.visits.via
-        text = STEP.format(self.setting.cell.limits.step_mm)
+        text = STEP.format(self.setting.cell.limits.correction_step_mm)
         marked = np.array([why == text for why in decided.reasons])[decided.why]
         begin = int(self.own[self.source.reading.visits.before[v]])
         pieces = enumerate(pairwise([begin, *self.ends(v)]))
