@@ -58,7 +58,7 @@ class Code(StrEnum):
         WARNING,
         "A RAPID instruction that is neither known nor a routine of the modules at "
         "hand; it may move the arm.",
-        'Give the module that holds it, or say name = "still" or "moves" under '
+        'Give the module that holds it, or say name = "motionless" or "moves" under '
         "[routines] of the cell.",
     )
     UNKNOWN_ROUTINE = (

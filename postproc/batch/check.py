@@ -126,7 +126,7 @@ def check(
         model: The model that all programs should be made with, or its file.
         plan: Or the plan file that tells the model of each of them.
         source: The tree that it was made from.
-        strict_calls: Find programs with calls that the shipped list took as still.
+        strict_calls: Find programs with calls that the shipped list took as motionless.
 
     Raises:
         ProgramError: A folder or a file cannot be read.
@@ -376,7 +376,7 @@ def _left_alone(
 
 
 def _assumed(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
-    """Find routines that were taken as still because the shipped list says so."""
+    """Find routines that were assumed motionless because the shipped list says so."""
     for file, line, message in sidecar.assumed:
         text = f"line {line} of {file}: {message}; compensate it with --strict-calls"
         yield CheckFinding(place, Code.ASSUMED_STILL, text)

@@ -16,7 +16,7 @@ from postproc.robot.pose import MM, lengths
 from postproc.robot.trajectory import Motion
 
 LEAST_STEP = 0.1 * MM  # [m] a step that is never too large
-PER = 100.0 * MM  # [m] of path that `step_mm` is for
+PER = 100.0 * MM  # [m] of path that `correction_step_mm` is for
 TURNED = 0.5  # change of a side by which a joint has turned
 ARC = Reason(
     Code.PATH_BENT, "its arc is left as a whole: its other point cannot be corrected"
@@ -31,10 +31,12 @@ CURVE = Reason(
     "its curve is corrected whole, with the point before it, or not at all: another "
     "point of it cannot be corrected",
 )
-STEP = "the correction steps by more than step_mm = {:g} for 100 mm of the path"
+STEP = (
+    "the correction steps by more than correction_step_mm = {:g} for 100 mm of the path"
+)
 BENT = (
     "its neighbour on the path is left: correcting this one alone would bend the path "
-    "by more than step_mm = {:g} for 100 mm"
+    "by more than correction_step_mm = {:g} for 100 mm"
 )
 
 # Which visits follow each other on a continuous path.

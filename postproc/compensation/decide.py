@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, any_in_rows
+from postproc.arrays import Bools, Floats, Interned, Ints, any_in_rows
 from postproc.compensation.agreement import LEVER_MM, Agreement, agree
 from postproc.compensation.arc_angles import ASTRAY
 from postproc.compensation.command import (
@@ -136,7 +136,7 @@ def must_stay(
     Returns:
         The reasons, and which of the m literals of the agreement have each, (m,).
     """
-    limit = cell.limits.agree_mm
+    limit = cell.limits.conflict_mm
     hurt = worsened(visits, agreement, change, trusted, limit, absorbing)
     cloning = visits.dialect.terms.cloning
     found = {Reason(Code.NUMBERS_USED_ELSEWHERE,
@@ -196,7 +196,7 @@ def mark_disagreement(
         The literals that agree, (m,), and the visits that would be corrected if the
         others at their literal agreed, (n,).
     """
-    limit = cell.limits.agree_mm
+    limit = cell.limits.conflict_mm
     has = agreement.group >= 0
     apart = ~(agreement.spread_mm <= limit)
     stays = np.any([apart, *stay.values()], axis=0)
@@ -209,7 +209,7 @@ def mark_disagreement(
     code = Code.ARRIVALS_DIFFER
     apart_by = Reason(code, SHIFTED_APART.format(limit))
     reasons.mark(differ & own_shifts(visits), apart_by)
-    text = f"its arrivals differ by more than agree_mm = {limit:g}: "
+    text = f"its arrivals differ by more than conflict_mm = {limit:g}: "
     alone = has & _by_one_move(visits, agreement.group, len(together))[at]
     reasons.mark(differ & alone, Reason(code, f"{text}{_ONE_MOVE}"))
     cloning = visits.dialect.terms.cloning
@@ -265,7 +265,7 @@ def strayed_along(
     if not planned.targets.via.any():
         return np.zeros(len(visits), dtype=bool)
     moves = with_dependants(visits, planned, cell, values, shift)
-    step = cell.limits.step_mm * MM
+    step = cell.limits.correction_step_mm * MM
     away = strayed(planned.targets, planned.plan, moves, step)
     return with_origins(visits, planned, away)
 
@@ -290,6 +290,37 @@ def with_dependants(
         source = sources[np.argmax(np.linalg.norm(moves[sources], axis=1))]
         moves[v] = _carried(planned, v, int(source), moves)
     return moves
+
+
+ALONG = 1e-6  # [m]: what moves by less stays
+WITH_POINT = "it moves along with the point that it is computed from"
+WITH_BEGIN = "it moves along with the target that it begins at"
+
+
+def with_what_moves_along(
+    visits: Visits, planned: Planned, cell: Cell, found: Decisions
+) -> Decisions:
+    """Say of targets that are left where they move all the same.
+
+    Args:
+        visits: n arrivals.
+        planned: Their plan.
+        cell: The robot's surroundings.
+        found: What was decided for them.
+    """
+    own = (found.status == Status.SAFE)[:, None]
+    values, shift = found.corrected, np.where(own, found.correction, 0.0)
+    moves = np.nan_to_num(with_dependants(visits, planned, cell, values, shift))
+    along = ~own[:, 0] & (lengths(moves) > ALONG)
+    told = np.isin(visits.target, (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS))
+    rows = np.flatnonzero(along & ~told)
+    if len(rows) == 0:
+        return found
+    why, reasons = np.array(found.why), Interned(found.reasons)
+    for v in rows.tolist():
+        how = WITH_POINT if visits.follows[v] >= 0 else WITH_BEGIN
+        why[v] = reasons[found.reasons[why[v]].within(f"{{}}; {how}")]
+    return replace(found, why=why, reasons=tuple(reasons))
 
 
 def _carried(planned: Planned, v: int, source: int, moves: Floats) -> Floats:
@@ -465,8 +496,8 @@ SWUNG = Reason(
 
 
 SHIFTED_APART = (
-    "its arrivals need numbers of its shift that differ by more than agree_mm = {:g}: "
-    "give each a move of its own"
+    "its arrivals need numbers of its shift that differ by more than conflict_mm = "
+    "{:g}: give each a move of its own"
 )
 NOT_ABSORBED = Reason(
     Code.ARRIVALS_DIFFER,
@@ -552,7 +583,7 @@ class Round:
         return path_correction(
             self.reading.visits, setting.cell.arm, plan.q, plan.tcp,
             plan.tool[:, :3, 3], self.correction, self.solved.direction,
-            setting.gap, setting.cell.limits.step_mm,
+            setting.gap, setting.cell.limits.correction_step_mm,
         )  # fmt: skip
 
     @cached_property
@@ -644,7 +675,7 @@ class Round:
         reasons.mark(strays, STRAYS)
         astray = angles_astray(visits, self.planned.plan, solved, self.aside)
         reasons.mark(astray, ASTRAY)
-        keep_whole(reasons, self.path, visits, given, limits.step_mm)
+        keep_whole(reasons, self.path, visits, given, limits.correction_step_mm)
 
     def _guard_flags(self, reasons: Reasons) -> None:
         """Mark corrections that end where flags are not sure."""
@@ -669,7 +700,7 @@ class Round:
 
         A shift that cannot moves along with its point, which may have to stay for it.
         """
-        visits, limit = self.reading.visits, self.setting.cell.limits.agree_mm
+        visits, limit = self.reading.visits, self.setting.cell.limits.conflict_mm
         numbers, change, both = self._needed()
         points = agree(visits.literal, usable, numbers, both)
         shifts, lost = own_shifts(visits), np.zeros(len(points.literal), dtype=bool)

@@ -45,7 +45,7 @@ def first_cause(
     causes = sorted(one for one in reading.diagnostics if one.code in CAUSES)
     if not causes or not reading.visits.reason.any():
         return ()
-    free = replace(cell, still=("*",))
+    free = replace(cell, motionless=("*",))
     freed = _known(read_program(files, free).visits) - _known(reading.visits)
     if freed <= 0:
         return ()
@@ -53,7 +53,7 @@ def first_cause(
     text = (
         f"what happens here is not known, and with what follows it leaves {freed} of "
         f"{total} targets. Say under [routines] of the cell what the routines do that "
-        'no file holds (name = "still" or "moves"), or give their files'
+        'no file holds (name = "motionless" or "moves"), or give their files'
     )
     return (Diagnostic(first.file, first.line, Code.FIRST_CAUSE, text),)
 

@@ -30,7 +30,7 @@ class Options:
         shared: Edit variables that other programs may read too.
         orientation: Correct the orientation of targets as well as their position.
         temperature: Arm temperature [deg C]; default: the cell's.
-        strict_calls: Take no routine as still because the shipped list says so.
+        strict_calls: Take no routine as motionless because the shipped list says so.
         explained: Keep what explains every target, of long programs too.
         timing: Run the program in time, before and after; None: if it is no longer than
             `IN_TIME`.

@@ -150,7 +150,7 @@ class Sidecar:
         left: What may hold targets, was left, and no record of a file tells: targets
             in files that were not changed, moves that are never reached, statements
             that are not understood.
-        assumed: Routines that were taken as still because the shipped list says so:
+        assumed: routines that were assumed motionless because the shipped list says so:
             where the first call of each stands, and its message.
     """
 

@@ -13,7 +13,7 @@ from postproc.arrays import Floats, Ints
 from postproc.language.archive import Archive
 from postproc.language.dialect import Dialect
 from postproc.language.rewrite import Skeleton
-from postproc.language.source import CloneError, Edit, Source
+from postproc.language.source import Edit, Source
 from postproc.language.visits import Diagnostic, Literals, Visits
 
 Record = tuple[float, ...] | None
@@ -25,9 +25,9 @@ class Start:
 
     Attributes:
         tool, base, uframe: Position records (6,) [mm, deg], None where unknown.
-        routines: Outside routine to ``still``, ``moves`` or ``sets-frames``.
-        still: Patterns of outside routines, ``name`` or ``program.name``, that neither
-            move the arm nor set frames.
+        routines: Outside routine to ``motionless``, ``moves`` or ``sets-frames``.
+        motionless: Patterns of outside routines, ``name`` or ``program.name``, that
+            neither move the arm nor set frames.
         constant: Patterns of exported variables, ``name`` or ``program.name``, that no
             other program changes.
         payload_kg: What the arm carries, NaN where that is not known.
@@ -44,7 +44,7 @@ class Start:
     base: Record = (0.0,) * 6
     uframe: Record = (0.0,) * 6
     routines: Mapping[str, str] = field(default_factory=dict)
-    still: tuple[str, ...] = ()
+    motionless: tuple[str, ...] = ()
     strict_calls: bool = False
     constant: tuple[str, ...] = ()
     payload_kg: float = math.nan
@@ -60,7 +60,7 @@ class Start:
         """No language tells cases apart: keep names in lower case."""
         lower = {name.lower(): said for name, said in self.routines.items()}
         object.__setattr__(self, "routines", lower)
-        object.__setattr__(self, "still", tuple(map(str.lower, self.still)))
+        object.__setattr__(self, "motionless", tuple(map(str.lower, self.motionless)))
         object.__setattr__(self, "constant", tuple(map(str.lower, self.constant)))
         tables = {name.lower(): table for name, table in self.frame_tables.items()}
         object.__setattr__(self, "frame_tables", tables)
@@ -85,6 +85,7 @@ class JobReading:
         diagnostics: What else was found.
         programs: What was parsed of the files, as `read` takes it for `known`.
         missed: Lines of moves that are never reached, by file.
+        untouched: Names of files that are read, and never rewritten.
     """
 
     texts: tuple[Skeleton, ...]
@@ -92,6 +93,7 @@ class JobReading:
     diagnostics: tuple[Diagnostic, ...]
     programs: tuple[Any, ...] = ()
     missed: Mapping[str, Ints] = field(default_factory=dict)
+    untouched: frozenset[str] = frozenset()
 
 
 class NamedPoint(Protocol):
@@ -144,31 +146,6 @@ class Cloner(ABC):
         Raises:
             CloneError: A value stands where it cannot be given twice.
         """
-
-
-@dataclass(frozen=True)
-class NoClones(Cloner):
-    """Of a language whose points are not cloned.
-
-    Attributes:
-        why: What the user is told.
-    """
-
-    why: str
-
-    def target(self, file: int, line: int, via: bool, name: str) -> NamedPoint:
-        """Refuse to clone what a move goes to."""
-        raise CloneError(self.why)
-
-    def declared(self, named: NamedPoint) -> int:
-        """Return no line."""
-        raise CloneError(self.why)
-
-    def clone(
-        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
-    ) -> tuple[str, list[tuple[int, Edit]]]:
-        """Refuse to clone."""
-        raise CloneError(self.why)
 
 
 @dataclass(frozen=True)

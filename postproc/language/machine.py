@@ -465,9 +465,9 @@ class TaskMachine(ABC):
     def said_still(self, name: str) -> bool:
         """Tell whether the cell says that a routine neither moves nor sets frames."""
         start = self.start
-        if start.routines.get(name) == "still":
+        if start.routines.get(name) == "motionless":
             return True
-        return any(fnmatchcase(name, pattern) for pattern in start.still)
+        return any(fnmatchcase(name, pattern) for pattern in start.motionless)
 
     def outside(
         self, context: CallContext, row: int, name: str, here: Arrived
@@ -481,7 +481,7 @@ class TaskMachine(ABC):
         what = (
             "is neither a known instruction nor a routine of the files at hand: it may "
             f"move the arm. Say what it does under [routines] in the cell: {name} = "
-            '"still" or "moves"'
+            '"motionless" or "moves"'
         )
         return self.unknown(context, row, here, what)
 

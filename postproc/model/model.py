@@ -16,10 +16,12 @@ from postproc.arrays import Bools, Floats, all_in_rows, any_in_rows, chunks, in_
 from postproc.exceptions import ModelError
 from postproc.files import write_all
 from postproc.model.combination import Combination
+from postproc.model.doubt import Doubt
 from postproc.model.effects import restore
 from postproc.model.kinematics import Batch
 from postproc.model.model_file import (
     FORMAT,
+    DoubtSection,
     Method,
     ModelFile,
     RegistrationSection,
@@ -144,6 +146,8 @@ class Model:
             joints goes from flank to flank, by reversals of the survey; UNTOLD where
             they do not tell, empty where none were measured.
         weight: Direction in which weight pulled, unit vector in the base frame.
+        monuments: Fixed points that the survey read.
+        doubt: What may be there besides the effects; None where that is hardly any.
     """
 
     method: Method
@@ -165,6 +169,7 @@ class Model:
     flank_widths: tuple[Width, ...] = ()
     weight: Direction = FLOOR
     monuments: tuple[Monument, ...] = ()
+    doubt: Doubt | None = None
 
     @cached_property
     def id(self) -> str:
@@ -364,7 +369,16 @@ class Model:
         if self.noise.pose_joint or self.noise.pose:
             beyond = beyond + self.noise.pose_variance(at.jacobian)
         beyond += moment_variance(effects, at, values) + unknown_variance(effects, at)
+        if self.doubt is not None:
+            beyond += self._doubt_among(effects).variance(effects, at)
         return side_variance(effects, at, values) + np.square(self.spread) + beyond
+
+    def _doubt_among(self, effects: Combination) -> Doubt:
+        """Return the doubt beside all effects, or beside those to be compensated."""
+        assert self.doubt is not None
+        if effects is self.effects:
+            return self.doubt
+        return self.doubt.kept(self.effects.where(*COMPENSATED))
 
     def without_clock(self, known: Collection[str]) -> Model:
         """Return it for rows of an unknown moment: what passes with time at its mean.
@@ -447,9 +461,7 @@ class Model:
             "arm": {"name": self.arm_name, "id": self.arm_id},
             "data_sha256": self.data_sha256,
             "rows": self.rows,
-            "effects": [
-                {"name": e.name, "settings": e.settings()} for e in self.effects.effects
-            ],
+            "effects": _listed_effects(self.effects),
             "parameters": [
                 {
                     "name": name,
@@ -482,6 +494,11 @@ class Model:
             data["monuments"] = [
                 {"name": name, "xyz_m": xyz} for name, xyz in self.monuments
             ]
+        if self.doubt is not None:
+            data["doubt"] = {
+                "effects": _listed_effects(self.doubt.effects),
+                "covariance": packed(self.doubt.covariance),
+            }
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -562,10 +579,41 @@ def _model_of(path: Path, file: ModelFile) -> Model:
         flank_widths=tuple(UNTOLD if w is None else w for w in file.flank_widths),
         weight=file.weight,
         monuments=tuple((m.name, m.xyz_m) for m in file.monuments),
+        doubt=None if file.doubt is None else _doubt_of(path, file.doubt, count),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id
     return model
+
+
+def _doubt_of(path: Path, section: DoubtSection, count: int) -> Doubt:
+    """Read what may be there besides the effects of a model.
+
+    Args:
+        path: The file.
+        section: Its section.
+        count: Number of the model's own parameters.
+
+    Raises:
+        ModelError: It does not hold together.
+    """
+    cure = "Make the model again with postproc fit"
+    try:
+        effects = Combination(
+            tuple(restore(e.name, e.settings) for e in section.effects)
+        )
+        size = count + len(effects.parameters)
+    except (ValueError, TypeError) as exc:
+        raise ModelError(path, str(exc), cure, place="$.doubt.effects") from None
+    if len(section.covariance) != size * (size + 1) // 2:
+        problem = "covariance does not match the parameters"
+        raise ModelError(path, problem, cure, place="$.doubt.covariance")
+    return Doubt(effects, square_of(np.array(section.covariance), size))
+
+
+def _listed_effects(effects: Combination) -> list[dict[str, Any]]:
+    """Write effects as a file holds them."""
+    return [{"name": e.name, "settings": e.settings()} for e in effects.effects]
 
 
 def weight_of(arm: Arm) -> Direction:

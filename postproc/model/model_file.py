@@ -109,6 +109,13 @@ class MonumentSection(ModelSection):
     xyz_m: tuple[float, float, float]
 
 
+class DoubtSection(ModelSection):
+    """What may be there besides the effects, see `postproc.model.doubt.Doubt`."""
+
+    effects: tuple[EffectSection, ...]
+    covariance: tuple[float, ...]
+
+
 class RegistrationSection(ModelSection):
     """Where the survey's tracker stood: P_base = R P_tracker + t.
 
@@ -189,6 +196,7 @@ class ModelFile(ModelSection):
     flank_widths: Annotated[tuple[WidthSection | None, ...], Field(max_length=6)] = ()
     weight: tuple[float, float, float] = FLOOR
     monuments: tuple[MonumentSection, ...] = ()
+    doubt: DoubtSection | None = None
 
 
 def content_id(data: dict[str, Any]) -> str:

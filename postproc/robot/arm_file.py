@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, ClassVar, Literal, TypeVar
 
 import numpy as np
 import pydantic
@@ -23,12 +24,17 @@ Sextuple = Annotated[list[float], Field(min_length=6, max_length=6)]
 
 
 class Strict(BaseModel):
-    """A section of a file: unknown keys and non-finite numbers are errors."""
+    """A section of a file: unknown keys and non-finite numbers are errors.
+
+    Attributes:
+        RENAMED: Keys of earlier versions, and what they are called now.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    RENAMED: ClassVar[Mapping[str, str]] = {}
 
 
-Schema = TypeVar("Schema", bound=BaseModel)
+Schema = TypeVar("Schema", bound=Strict)
 
 
 def read_toml(path: Path, schema: type[Schema], error: type[FileError]) -> Schema:
@@ -85,7 +91,7 @@ def _syntax(path: Path, message: str, error: type[FileError]) -> FileError:
 def _explain(
     path: Path,
     exc: pydantic.ValidationError,
-    schema: type[Schema],
+    schema: type[Strict],
     error: type[FileError],
 ) -> FileError:
     """Turn the first validation error into a message with place and cure."""
@@ -97,7 +103,10 @@ def _explain(
         f"[{k + 1}]" if isinstance(k, int) else f".{k}" for k in first["loc"]
     )
     if first["type"] == "extra_forbidden":
-        allowed = ", ".join(_siblings(schema, first["loc"][:-1]))
+        section = _section(schema, first["loc"][:-1])
+        if (new := section.RENAMED.get(str(first["loc"][-1]))) is not None:
+            return error(path, f"is called {new}", "Rename the key", place=place)
+        allowed = ", ".join(section.model_fields)
         return error(path, "unknown key", f"Known here: {allowed}", place=place)
     if first["type"] == "missing":
         return error(path, "required key is missing", "Add it", place=place)
@@ -105,17 +114,17 @@ def _explain(
     return error(path, message, "Correct the value", place=place)
 
 
-def _siblings(schema: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
-    """List the keys that the schema knows at a place."""
-    here: type[BaseModel] = schema
+def _section(schema: type[Strict], place: tuple[int | str, ...]) -> type[Strict]:
+    """Return the section of a schema at a place."""
+    here = schema
     for key in place:
         field = here.model_fields.get(str(key))
         nested = field.annotation if field else None
         options = getattr(nested, "__args__", (nested,))
         for option in options:
-            if isinstance(option, type) and issubclass(option, BaseModel):
+            if isinstance(option, type) and issubclass(option, Strict):
                 here = option
-    return list(here.model_fields)
+    return here
 
 
 # The arm file: what is known of an arm, as plain numbers.

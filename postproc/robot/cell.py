@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import (
@@ -31,9 +31,10 @@ from postproc.robot.arm_file import (
 from postproc.robot.pose import MM, pose_from_record, rotation_from_zyz
 
 Source = Literal["cad", "tracker", "taught"]
-Effect = Literal["still", "moves", "sets-frames"]
+Effect = Literal["motionless", "moves", "sets-frames"]
 ArmNumber = PositiveInt  # which arm of its controller
-STILL = "still"  # beside names: the key whose value lists patterns
+MOTIONLESS = "motionless"  # beside names: the key whose value lists patterns
+STILL = "still"  # what that was called
 
 NO_ANGLES = [0.0, 0.0, 0.0]
 TAUGHT_POINTS = ("the origin", "a point on +x", "a point at +y")
@@ -52,7 +53,9 @@ class FrameSection(Strict):
     euler_zyz_deg: Triple = NO_ANGLES
     source: Source = "cad"
     taught_deg: list[Sextuple] | None = None
-    taught_lambda: list[Sextuple] | None = None
+    taught_direction: list[Sextuple] | None = None
+
+    RENAMED: ClassVar[Mapping[str, str]] = {"taught_lambda": "taught_direction"}
 
     @model_validator(mode="before")
     @classmethod
@@ -73,16 +76,16 @@ class FrameSection(Strict):
                 raise ValueError('taught_deg needs source = "taught"')
             if len(self.taught_deg) != len(TAUGHT_POINTS):
                 raise ValueError(f"taught_deg needs {', '.join(TAUGHT_POINTS)}")
-        if self.taught_lambda is not None:
-            self._check_sides(self.taught_lambda)
+        if self.taught_direction is not None:
+            self._check_sides(self.taught_direction)
         return self
 
     def _check_sides(self, sides: list[Sextuple]) -> None:
         """Refuse sides of other points than those of taught_deg."""
         if self.taught_deg is None or len(sides) != len(self.taught_deg):
-            raise ValueError("taught_lambda needs a row for each row of taught_deg")
+            raise ValueError("taught_direction needs a row for each row of taught_deg")
         if any(side not in (-1.0, 0.0, 1.0) for row in sides for side in row):
-            raise ValueError("taught_lambda holds -1, 0 (not known) or 1 per joint")
+            raise ValueError("taught_direction holds -1, 0 (not known) or 1 per joint")
 
     def record(self) -> tuple[float, ...]:
         """Return x, y, z [mm], a, e, r [deg]."""
@@ -190,29 +193,37 @@ class LimitSection(Strict):
 
     Attributes:
         correction_mm, correction_deg: Most that a target moves and turns.
-        agree_mm: Arrivals at one point that differ by more are not corrected together.
-        step_mm: Most that the correction changes along 100 mm of a continuous path.
+        conflict_mm: Arrivals at one point whose corrections differ by more are in
+            conflict: the point stays.
+        correction_step_mm: Most that the correction changes along 100 mm of a
+            continuous path.
         wrist_deg: Axis 5 nearer to zero than this is the wrist singularity.
         joint_deg: Most that every joint turns by a correction, at a target and on the
             way to it.
         elbow_mm, wrist_centre_mm: Most that elbow and wrist centre move likewise.
         segment_ms: What a piece of a move with points on its way lasts at the
             programmed speed, at least.
-        approach_mm: Most that a stop from which a target is approached anew is away.
+        reapproach_mm: Most that a stop that is inserted before a target is away.
         payload_mm: Most that a load which was not surveyed adds to the standard error.
     """
 
     correction_mm: PositiveFloat = 5.0
     correction_deg: PositiveFloat = 1.0
-    agree_mm: PositiveFloat = 0.02
+    conflict_mm: PositiveFloat = 0.02
     payload_mm: PositiveFloat = 0.1
-    step_mm: PositiveFloat = 0.5
+    correction_step_mm: PositiveFloat = 0.5
     wrist_deg: PositiveFloat = 3.0
     joint_deg: Limits = JOINT_DEG
     elbow_mm: PositiveFloat = 10.0
     wrist_centre_mm: PositiveFloat = 10.0
     segment_ms: PositiveFloat = 50.0
-    approach_mm: PositiveFloat = 10.0
+    reapproach_mm: PositiveFloat = 10.0
+
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "agree_mm": "conflict_mm",
+        "step_mm": "correction_step_mm",
+        "approach_mm": "reapproach_mm",
+    }
 
 
 class FrameTableEntry(Strict):
@@ -250,17 +261,26 @@ class CellFile(Strict):
     verify: VerifySection = VerifySection()
     taught: list[str] = Field(default_factory=list)
 
+    @field_validator("routines", mode="before")
+    @classmethod
+    def _no_old_word(cls, given: object) -> object:
+        """Refuse `still`, as a key of patterns or as what a routine does."""
+        for name, what in given.items() if isinstance(given, dict) else ():
+            if what == STILL or (name == STILL and isinstance(what, list)):
+                raise ValueError(f"{STILL} is called {MOTIONLESS}")
+        return given
+
     @field_validator("routines")
     @classmethod
-    def _one_list(cls, said: dict[str, Effect | list[str]]) -> dict[str, object]:
-        """Take a list of patterns under `still` alone."""
-        for name, what in said.items():
-            if isinstance(what, list) and name != STILL:
+    def _one_list(cls, given: dict[str, Effect | list[str]]) -> dict[str, object]:
+        """Take a list of patterns under `motionless` alone."""
+        for name, what in given.items():
+            if isinstance(what, list) and name != MOTIONLESS:
                 raise ValueError(
-                    f"{name} has a list: only `{STILL}` lists routines, such as "
-                    f'{STILL} = ["spot", "lrobot.*"]'
+                    f"{name} has a list: only `{MOTIONLESS}` lists routines, such as "
+                    f'{MOTIONLESS} = ["spot", "lrobot.*"]'
                 )
-        return dict(said)
+        return dict(given)
 
 
 @dataclass(frozen=True)
@@ -296,8 +316,8 @@ class Cell:
         aux: Kind of every declared auxiliary axis.
         limits: Guards, in the units of their names.
         routines: What outside routines do, by lower-case name.
-        still: Lower-case patterns of outside routines, ``name`` or ``program.name``,
-            that neither move the arm nor set frames.
+        motionless: Lower-case patterns of outside routines, ``name`` or
+            ``program.name``, that neither move the arm nor set frames.
         frame_tables: Frames set by routines, by lower-case name, then arguments.
         taught: Lower-case names of points that were taught with the robot.
         taught_sides: From which side the joints arrived at the three points of taught
@@ -330,7 +350,7 @@ class Cell:
     frame_tables: Mapping[str, Mapping[str, FrameTableEntry]]
     taught: frozenset[str]
     taught_frames: Mapping[tuple[float, ...], Floats | None]
-    still: tuple[str, ...] = ()
+    motionless: tuple[str, ...] = ()
     constant: tuple[str, ...] = ()
     strict_calls: bool = False
     taught_sides: Mapping[tuple[float, ...], Floats] = field(default_factory=dict)
@@ -419,7 +439,7 @@ def _cell_of(path: Path, file: CellFile) -> Cell:
             for name, what in file.routines.items()
             if not isinstance(what, list)
         },
-        still=_patterns(file.routines.get(STILL)),
+        motionless=_patterns(file.routines.get(MOTIONLESS)),
         constant=_patterns(file.variables.constant),
         frame_tables={k.lower(): v for k, v in file.frames.routines.items()},
         taught=frozenset(name.lower() for name in file.taught),
@@ -455,9 +475,9 @@ def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Floats | None]:
 def _taught_sides(file: CellFile) -> dict[tuple[float, ...], Floats]:
     """Collect from which sides the joints arrived at the points of taught frames."""
     return {
-        frame.record(): np.array(frame.taught_lambda, dtype=float)
+        frame.record(): np.array(frame.taught_direction, dtype=float)
         for frame in _frames_of(file)
-        if frame.taught_lambda is not None
+        if frame.taught_direction is not None
     }
 
 

@@ -271,7 +271,7 @@ def test_a_plan_maps_arms_to_cells_and_models(tmp_path, run, job_folder):
     cell = (job_folder / "cell.toml").read_text()
     for number in (1, 2):
         text = cell.replace("[robot]", f"[robot]\narm_number = {number}")
-        text += '\n[routines]\na = "still"\n'  # the other arm's program moves not ours
+        text += '\n[routines]\na = "motionless"\n'
         (tmp_path / f"r{number}.toml").write_text(text)
     model = (job_folder / "model.json").as_posix()
     rule = '[[rule]]\npattern = "**"\narm = {}\ncell = "r{}.toml"\nmodel = "{}"\n'

@@ -29,7 +29,7 @@ def test_targets_are_left_until_the_cell_says_what_a_routine_does(desk, name):
     found = desk.compensate(job)
     assert found.exit_code == 1
     assert "5 visits (2 safe, 3 display)" in found.stderr
-    (line,) = re.findall(rf'{name} = "still"', found.stderr)
+    (line,) = re.findall(rf'{name} = "motionless"', found.stderr)
     cell = desk.put("cell.toml", f"{desk.cell.read_text()}\n[routines]\n{line}\n")
     assert desk.compensate(job, "--cell", cell, "--model", desk.model).exit_code == 0
 

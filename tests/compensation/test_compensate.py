@@ -224,7 +224,7 @@ def test_a_variable_reached_from_two_sides_is_left_alone(run):
     )  # fmt: skip
     outcome = run(*lines)
     assert statuses(outcome) == ["SAFE", "UNSAFE", "SAFE", "UNSAFE"]
-    assert "agree_mm" in whys(outcome)[1]
+    assert "conflict_mm" in whys(outcome)[1]
     assert lines[0].encode() in outcome.outputs["job.pdl"]
 
 

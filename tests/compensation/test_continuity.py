@@ -159,7 +159,7 @@ def test_a_guarded_fly_point_takes_its_neighbours_along(job_cell, job_model):
 
 def test_a_weld_that_joints_lead_to_is_not_held_back_by_a_step(job_cell, job_model):
     """370 mm behind a fly point whose correction differs by more than 0.5 mm."""
-    limits = job_cell.limits.model_copy(update={"step_mm": 0.001})
+    limits = job_cell.limits.model_copy(update={"correction_step_mm": 0.001})
     cell = replace(job_cell, limits=limits)
     lines = [
         f"MOVEFLY JOINT TO {point(300, 450, 420)} ADVANCE",

@@ -31,7 +31,7 @@ HEAD += "  MOVE LINEAR TO POS(900, 0, 900, 0, 180, 0, '')\nEND there\nBEGIN\n"
 
 def read(text: str) -> Visits:
     program = parse(source_from_bytes("job.pdl", text.encode("latin-1")))
-    return resolve(program, Start(still=("drill_*", "tool_change"))).visits
+    return resolve(program, Start(motionless=("drill_*", "tool_change"))).visits
 
 
 def stop(x: float) -> str:

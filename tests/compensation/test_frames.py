@@ -89,12 +89,12 @@ def test_targets_in_a_taught_frame_land_on_the_part(tmp_path, taught, job_model)
     assert outcome.after.max_mm < 0.01
     stated = 1e3 * np.linalg.norm(outcome.decisions.std_error, axis=1)[3:]
     assert np.sqrt(np.mean(error**2)) < 2.0 * np.sqrt(np.mean(stated**2))
-    assert any("taught_lambda" in d.message for d in outcome.diagnostics)
-    text += f"\ntaught_lambda = {[[1] * 6] * 3}"
+    assert any("taught_direction" in d.message for d in outcome.diagnostics)
+    text += f"\ntaught_direction = {[[1] * 6] * 3}"
     stated_sides = with_uframe(tmp_path, "sides", section(record, text))
     outcome, surer = errors(source, stated_sides, part, job_model)
     assert surer.max() < 0.5 * error.max()
-    assert not any("taught_lambda" in d.message for d in outcome.diagnostics)
+    assert not any("taught_direction" in d.message for d in outcome.diagnostics)
 
 
 def taught_points(seed, sides, cell):
@@ -134,9 +134,9 @@ def test_taught_frames_say_how_unsure_they_are(job_cell, job_model):
 def test_stated_sides_stand_for_every_point(tmp_path, taught):
     joints, record = taught
     rows = np.round(np.degrees(joints), 6).tolist()
-    text = f'source = "taught"\ntaught_deg = {rows}\ntaught_lambda = '
+    text = f'source = "taught"\ntaught_deg = {rows}\ntaught_direction = '
     for wrong in ("[[1, 1, 1, 1, 1, 1]]", f"{[[2] * 6] * 3}"):
-        with pytest.raises(CellError, match="taught_lambda"):
+        with pytest.raises(CellError, match="taught_direction"):
             with_uframe(tmp_path, "wrong", section(record, text + wrong))
     cell = with_uframe(tmp_path, "right", section(record, text + f"{[[1] * 6] * 3}"))
     assert [s.tolist() for s in cell.taught_sides.values()] == [[[1.0] * 6] * 3]

@@ -11,7 +11,7 @@ from postproc.robot.arm import load_arm
 from postproc.robot.cell import LimitSection
 
 ARM = load_arm("nj220-2.7")
-LIMITS = LimitSection(correction_mm=2.0, step_mm=0.1, wrist_deg=3.0)
+LIMITS = LimitSection(correction_mm=2.0, correction_step_mm=0.1, wrist_deg=3.0)
 HOME = np.deg2rad([5.0, 10.0, -95.0, 20.0, 50.0, 30.0])
 
 

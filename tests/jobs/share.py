@@ -62,6 +62,8 @@ TURNING = np.radians(230.0)  # axes 4 and 6 are surveyed so far
 MOST_KG, WARM = 350.0, (5.0, 40.0)  # [deg C]
 PROBES = np.array([[80, -40, 150], [-120, 60, 180], [30, 130, 320]]) * 1e-3  # [m]
 
+OLD_WORD = re.compile(r'(?m)^still(?= *=)|(?<= ")still(?=")')  # in cells
+
 NOT_SEEN = "it is in no program that is compensated"
 
 Place = tuple[str, int]
@@ -95,6 +97,18 @@ def chain_of(arm: str) -> Chain:
 def arm_of(arm: str) -> VirtualArm:
     """Return the virtual arm that stands for a shipped one."""
     return virtual_arm(SEED, chain=chain_of(arm))
+
+
+def cell_of(folder: Path) -> Path:
+    """Return the cell of a job in today's words.
+
+    The jobs are frozen, and so are the words of their cells.
+    """
+    text = (folder / "cell.toml").read_text(encoding="utf-8")
+    place = CACHE / f"{folder.parent.name}-{folder.name}.toml"
+    CACHE.mkdir(parents=True, exist_ok=True)
+    place.write_text(OLD_WORD.sub("motionless", text), encoding="utf-8")
+    return place
 
 
 def model_of(arm: str, cell: Path) -> Path:
@@ -177,14 +191,14 @@ def count(
 
     Args:
         folder: The job.
-        cell: Its cell; default: the one in the folder.
+        cell: Its cell; default: the one in the folder, see `cell_of`.
         options: Of the compensation.
     """
     start = perf_counter()
     places = counted(folder)
     found: dict[Place, str] = {}
     codes, messages = [], []
-    for unit, outcome in compensated(folder, cell or folder / "cell.toml", options):
+    for unit, outcome in compensated(folder, cell or cell_of(folder), options):
         if isinstance(outcome, Exception):
             if not isinstance(outcome, PostprocError):
                 raise outcome
@@ -222,7 +236,7 @@ def pasted(folder: Path, place: Path) -> Path:
         folder: The job.
         place: The new cell file.
     """
-    cell = folder / "cell.toml"
+    cell = cell_of(folder)
     asked = {axis for reason in count(folder).reasons.values()
              for axis in ASKED.findall(reason)}  # fmt: skip
     archives = (language.read_archive(folder) for language in languages())
@@ -277,7 +291,7 @@ class Misses:
 def landed(folder: Path, options: Options = AS_USUAL) -> Misses:
     """Let the virtual arm that was surveyed run what is written for a job."""
     found = Misses(*(np.empty(0),) * 3)
-    cell_file = folder / "cell.toml"
+    cell_file = cell_of(folder)
     for _, outcome in compensated(folder, cell_file, options):
         if isinstance(outcome, Outcome):
             one = _landed(outcome, load_cell(cell_file))

@@ -31,7 +31,7 @@ xyz_mm = [3000.0, 1000.0, 1200.0]
 correction_mm = 4.0
 [routines]
 Dock = "moves"
-still = ["Spot", "LRobot.*"]
+motionless = ["Spot", "LRobot.*"]
 [variables]
 constant = ["VI_style", "Lib.*"]
 [frames.routines.TF]
@@ -52,10 +52,10 @@ def test_full_cell(tmp_path):
     assert cell.uframe.source == "taught"
     assert cell.base.record == (0.0,) * 6
     assert cell.aux == {1: "gun"}
-    assert cell.limits.correction_mm == 4.0 and cell.limits.agree_mm == 0.02
+    assert cell.limits.correction_mm == 4.0 and cell.limits.conflict_mm == 0.02
     assert cell.routines == {"dock": "moves"}
     assert cell.constant == ("vi_style", "lib.*")
-    assert cell.still == ("spot", "lrobot.*")
+    assert cell.motionless == ("spot", "lrobot.*")
     assert cell.frame_tables["tf"]["1,2"].uframe.record() == (4, 5, 6, 0, 90, 0)
     assert cell.taught == {"p_dock"}
     np.testing.assert_allclose(cell.tracker, [3.0, 1.0, 1.2])
@@ -63,7 +63,7 @@ def test_full_cell(tmp_path):
 
 def test_a_routine_has_no_list_of_its_own(tmp_path):
     text = '[robot]\narm = "nj220-2.7"\n[routines]\nspot = ["a"]\n'
-    with pytest.raises(CellError, match="only `still` lists routines"):
+    with pytest.raises(CellError, match="only `motionless` lists routines"):
         load_cell(write(tmp_path, text))
 
 
@@ -98,6 +98,27 @@ def test_wrong_cell_names_file_and_place(tmp_path, text, said):
     with pytest.raises(CellError, match=said) as caught:
         load_cell(write(tmp_path, text))
     assert "cell.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[limits]\nagree_mm = 0.1\n", r"is called conflict_mm @ \$\.limits\.agree_mm"),
+        ("[limits]\nstep_mm = 0.1\n", "is called correction_step_mm"),
+        ("[limits]\napproach_mm = 1.0\n", "is called reapproach_mm"),
+        ("[tool]\nxyz_mm = [0, 0, 0]\ntaught_lambda = []\n", "called taught_direction"),
+        ('[routines]\nspot = "still"\n', "still is called motionless"),
+        ('[routines]\nstill = ["spot*"]\n', "still is called motionless"),
+    ],
+)
+def test_an_old_word_has_the_new_one_named(tmp_path, text, said):
+    with pytest.raises(CellError, match=said):
+        load_cell(write(tmp_path, ROBOT + text))
+
+
+def test_a_routine_may_be_called_like_an_old_word(tmp_path):
+    cell = load_cell(write(tmp_path, ROBOT + '[routines]\nstill = "moves"\n'))
+    assert cell.routines == {"still": "moves"}
 
 
 def test_missing_cell(tmp_path):

@@ -65,7 +65,7 @@ def _place_to_approach(work: PathWork, v: int) -> Floats | None:
     visits, side = work.source.reading.visits, work.source.kept.decisions.side
     q = place_to_approach(
         cell.arm, cycle, v, int(visits.before[v]), np.abs(side[v]) < SURE,
-        cell.limits.approach_mm * MM,
+        cell.limits.reapproach_mm * MM,
     )  # fmt: skip
     if q is None:
         return None

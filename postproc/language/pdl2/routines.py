@@ -35,7 +35,7 @@ TRACKING = "sensor_trk"
 class RoutineEffect(StrEnum):
     """What a routine that is not at hand does."""
 
-    STILL = "still"  # it neither moves the arm nor sets frames
+    STILL = "motionless"  # it neither moves the arm nor sets frames
     KNOWN = "known"  # likewise, says the list that is shipped
     MOVES = "moves"
     SETS_FRAMES = "sets-frames"
@@ -73,7 +73,7 @@ def effect_of(world: World, program: Program, name: str) -> RoutineEffect:
     for said in (start.routines.get(one) for one in (name, *full)):
         if said is not None:
             return RoutineEffect(said)
-    if matches(start.still, (name, *full[:1])):
+    if matches(start.motionless, (name, *full[:1])):
         return RoutineEffect.STILL
     if name == TRACKING:
         return RoutineEffect.TRACKS
@@ -107,8 +107,8 @@ def report_unknown_routine(world: World, program: Program, row: int, name: str) 
         f"{name} is not in the files at hand and may move the arm and set frames: "
         "targets after it are left as they are until these are set again. To have them "
         "compensated, paste under [routines] in the cell file: "
-        f'{name} = "still" if it does neither, {name} = "moves" if it moves; if it '
-        f"sets frames, under [frames.routines.{name}] a row for each call: "
+        f'{name} = "motionless" if it does neither, {name} = "moves" if it moves; if '
+        f"it sets frames, under [frames.routines.{name}] a row for each call: "
         '"1,2" = { tool = [x, y, z, a, e, r], uframe = [x, y, z, a, e, r] }'
     )
     world.report_once(program, row, Code.UNKNOWN_ROUTINE, name, text)

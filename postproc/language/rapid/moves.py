@@ -285,7 +285,7 @@ class Goals:
             name=shown,
             aux=aux,
             why=why or (NO_REASON if file >= 0 else _COMPUTED),
-            pins=self._pinned(name, operand),
+            pins=self._pinned(name, scope),
         )
 
     def _own_places(
@@ -352,13 +352,16 @@ class Goals:
             text = "is no data of the files at hand, or of several of them"
         elif found[1].declared.value is None:
             code, text = Code.NO_VALUE, "has no value in the files at hand"
+        elif self.task.is_changed_beside(*found):
+            code = Code.BESIDE_PROGRAM
+            text = f"may be changed by another task at any time: {RUN_TIME}"
         elif self.task.constant(name, scope) is None:
             text = f"may be changed by the program: {RUN_TIME}"
         else:
             text = f"has an element or value that is not known: {RUN_TIME}"
         return Reason(code, f"{name} {text}")
 
-    def _pinned(self, name: str, operand: said.Operand) -> str:
+    def _pinned(self, name: str, scope: Scope) -> str:
         """Say why a point must keep its numbers."""
         if not name:
             return ""
@@ -369,6 +372,8 @@ class Goals:
             )
         if "getdataval" in self.task.called:
             return f"GetDataVal may take {name} by a name in a string"
+        if self.task.is_used_beside(name, scope):
+            return f"{name} is data of another task too, which has its numbers as well"
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
         return ""

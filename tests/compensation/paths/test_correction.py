@@ -526,7 +526,7 @@ def test_the_virtual_arm_lands_nearer_where_it_comes_anew(drilled: Path) -> None
 
 
 def test_a_stop_to_come_from_is_near_and_behind(drilled: Path) -> None:
-    report, most = told(drilled, "anew"), load_cell(CELL).limits.approach_mm
+    report, most = told(drilled, "anew"), load_cell(CELL).limits.reapproach_mm
     lines = (drilled / "anew.pdl").read_text().splitlines()
     rows = [k for k, line in enumerate(lines) if line.endswith("(approach)")]
     assert len(rows) == sum(p["inserted"] for p in report["path"])

@@ -476,7 +476,7 @@ def test_what_may_move_forgets_where_the_arm_is():
     found = job("LIN XP1", "grip( )", "LIN XP2")
     assert origins(found)[1] == [ELSEWHERE] and "motion-unknown" in codes(found)
     found = job(
-        "LIN XP1", "grip( )", "LIN XP2", start=Start(routines={"Grip": "still"})
+        "LIN XP1", "grip( )", "LIN XP2", start=Start(routines={"Grip": "motionless"})
     )
     assert origins(found) == [[START], [0]] and codes(found) == set()
     moves = Start(routines={"grip": "moves"})

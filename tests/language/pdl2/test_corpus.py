@@ -17,7 +17,7 @@ from postproc.robot.trajectory import Motion
 CORPUS = Path(__file__).parents[2] / "corpus"
 CELL = Start(
     aux={1: "gun"},
-    routines={"ext": "still", "outside": "still"},
+    routines={"ext": "motionless", "outside": "motionless"},
     frame_tables={"tf": {"1, 2": {"tool": (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)}}},
 )
 

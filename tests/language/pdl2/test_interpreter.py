@@ -159,7 +159,7 @@ def test_a_taught_frame_is_marked() -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "origin"), [("still", 0), ("moves", -2), ("sets-frames", 0)]
+    ("said", "origin"), [("motionless", 0), ("moves", -2), ("sets-frames", 0)]
 )
 def test_what_the_cell_says_of_outside_routines(said: str, origin: int) -> None:
     text = "MOVE LINEAR TO POS(1,2,3,4,5,6,'')\next\nMOVE LINEAR TO POS(2,2,3,4,5,6,'')"

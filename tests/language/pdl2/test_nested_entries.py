@@ -25,7 +25,7 @@ END go
 BEGIN
 """
 UNKNOWN = -1
-CELL = Start(aux={1: "gun"}, routines={"outside": "still"})
+CELL = Start(aux={1: "gun"}, routines={"outside": "motionless"})
 
 
 def place(x: float) -> str:

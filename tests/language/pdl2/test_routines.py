@@ -57,7 +57,7 @@ def test_what_is_to_be_pasted_is_said_once_and_helps() -> None:
     body = [FIRST, "tt_tool(1)", THEN, "tt_tool(2)", THEN]
     found = followed(*body)
     (said,) = found.diagnostics
-    (line,) = re.findall(r'tt_tool = "still"', said.message)
+    (line,) = re.findall(r'tt_tool = "motionless"', said.message)
     assert said.line == 6 and "[frames.routines.tt_tool]" in said.message
     name, what = line.replace('"', "").split(" = ")
     assert reasons(followed(*body, routines={name: what})) == [""] * 3
@@ -90,7 +90,7 @@ def test_settings_that_the_program_has_made_are_forgotten() -> None:
     ],
 )
 def test_patterns_of_the_cell(patterns: tuple[str, ...], still: bool) -> None:
-    found = followed(FIRST, "tt_tool(1)", THEN, still=patterns)
+    found = followed(FIRST, "tt_tool(1)", THEN, motionless=patterns)
     assert (reasons(found)[1] == "") is still
     assert codes(found) == ([] if still else ["unknown-routine"])
 
@@ -98,12 +98,12 @@ def test_patterns_of_the_cell(patterns: tuple[str, ...], still: bool) -> None:
 def test_a_pattern_means_the_one_program_that_is_imported() -> None:
     one = ["IMPORT 'TT_lib'"]
     for head, still in ((one, True), ([*one, "IMPORT 'b'"], False)):
-        found = followed(FIRST, "tt_tool(1)", THEN, head=head, still=("tt_lib.*",))
+        found = followed(FIRST, "tt_tool(1)", THEN, head=head, motionless=("tt_lib.*",))
         assert (reasons(found)[1] == "") is still
 
 
 def test_what_the_cell_says_by_name_holds_against_its_patterns() -> None:
-    found = followed(FIRST, "tt_tool(1)", THEN, still=("*",),
+    found = followed(FIRST, "tt_tool(1)", THEN, motionless=("*",),
                      routines={"TT_lib.tt_tool": "moves"})  # fmt: skip
     assert found.visits.predecessors(1).tolist() == [ELSEWHERE]
     assert reasons(found)[1] == ""
@@ -115,7 +115,7 @@ def test_the_shipped_list_counts_unless_calls_are_strict() -> None:
     assert codes(followed(*body)) == ["assumed-still"]
     strict = followed(*body, strict_calls=True)
     assert reasons(strict)[1] and codes(strict) == ["unknown-routine"]
-    assert reasons(followed(*body, strict_calls=True, still=("spot",))) == ["", ""]
+    assert reasons(followed(*body, strict_calls=True, motionless=("spot",))) == ["", ""]
 
 
 def test_the_shipped_list_names_no_routine_that_sets_frames_or_moves() -> None:
@@ -144,7 +144,7 @@ def test_a_function_that_calls_one_leaves_the_same_unknown() -> None:
     found = followed(FIRST, "n := f", THEN, head=inner)
     assert "$TOOL" in reasons(found)[1]
     assert "unknown-routine" in codes(found)
-    found = followed(FIRST, "n := f", THEN, head=inner, still=("tt_*",))
+    found = followed(FIRST, "n := f", THEN, head=inner, motionless=("tt_*",))
     assert reasons(found) == ["", ""]
 
 
@@ -153,6 +153,6 @@ def test_a_handler_that_calls_one_may_change_all_at_any_time() -> None:
     assert "a condition handler" in reasons(found)[0]
     assert ELSEWHERE in found.visits.predecessors(0).tolist()
     assert "unknown-routine" in codes(found)
-    still = followed(*handler("tt_tool(1)"), FIRST, still=("tt_tool",))
+    still = followed(*handler("tt_tool(1)"), FIRST, motionless=("tt_tool",))
     assert reasons(still) == [""]
     assert still.visits.predecessors(0).tolist() == [START]

@@ -57,7 +57,7 @@ CHECKS = {
         for one in followed(FIRST, LAST.replace("MOVE", "MOVE ARM[2]")).diagnostics},
     "a routine in no file, `CALL`": lambda: (
         left("dock", LAST) and left("CALL other", LAST)
-        and not left("dock", LAST, still=("dock",))),
+        and not left("dock", LAST, motionless=("dock",))),
     "a statement that is not understood": lambda: left("FROBNICATE it WITH 3", LAST),
     "`SENSOR_TRK`, `$SENSOR_ENBL`, `$CONV_ENBL`": lambda: all(
         left(line, LAST) for line in

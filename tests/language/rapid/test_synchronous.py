@@ -61,7 +61,7 @@ def test_a_procedure_that_is_not_given_may_do_anything():
     found = job([], *NEXT, name="other")
     assert SHIFT in reasons(found)[1] and origins(found)[1] == [ELSEWHERE]
     assert "motion-unknown" in codes(found)
-    still = job([], *NEXT, name="other", start=Start(still=("other",)))
+    still = job([], *NEXT, name="other", start=Start(motionless=("other",)))
     assert reasons(still) == [""] * 3
 
 

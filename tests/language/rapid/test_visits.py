@@ -266,7 +266,7 @@ def test_a_routine_of_another_module_does_not_see_local_data():
 def test_what_may_move_forgets_where_the_arm_is():
     found = once(L.format("p1"), "grip;", "PDispOff;", L.format("p2"))
     assert origins(found)[1] == [ELSEWHERE] and "motion-unknown" in codes(found)
-    still = Start(routines={"Grip": "still"})
+    still = Start(routines={"Grip": "motionless"})
     found = once(L.format("p1"), "grip;", L.format("p2"), start=still)
     assert origins(found) == [[START], [0]] and codes(found) == set()
     moves = Start(routines={"grip": "moves"})
