@@ -129,8 +129,8 @@ class Code(StrEnum):
 
     # Where the arm is.
 
-    ASSUMED_STILL = (
-        "assumed-still",
+    ROUTINE_ASSUMED_MOTIONLESS = (
+        "routine-assumed-motionless",
         NOTE,
         "A routine that is in no file at hand is on the shipped list of routines that "
         "neither move the arm nor set frames.",
@@ -211,16 +211,16 @@ class Code(StrEnum):
         "A move names no trajectory, and $MOVE_TYPE is not set: it is taken as JOINT.",
         "Name the trajectory, or set $MOVE_TYPE.",
     )
-    SIDE_NOT_SURE = (
-        "side-not-sure",
+    DIRECTION_UNCERTAIN = (
+        "direction-uncertain",
         WARNING,
         "A joint reaches a corrected target from a side that is not sure, soon after "
         "it turned or from a place that is not known. Up to half of its backlash may "
         "remain; the stated standard error holds it.",
         "Start the approach farther away, or from the side that the joint moves to.",
     )
-    SIDE_IN_TIME = (
-        "side-in-time",
+    DIRECTION_DISAGREES = (
+        "direction-disagrees",
         WARNING,
         "In the trajectory in time a joint arrives from the other side than along the "
         "path; the correction is that of the path.",
@@ -262,8 +262,8 @@ class Code(StrEnum):
         NOTE,
         "No time law was found for a run: its times and speeds are estimates.",
     )
-    SLOWED_DOWN = (
-        "slowed-down",
+    SPEED_NOT_REACHED = (
+        "speed-not-reached",
         WARNING,
         "The joints cannot follow the programmed speed; the controller slows down or "
         "stops, near a singularity as a rule.",
@@ -281,20 +281,20 @@ class Code(StrEnum):
         NOTE,
         "Points were put on the ways of moves, so that these keep their paths.",
     )
-    NOT_TAKEN_UP = (
-        "not-taken-up",
+    BACKLASH_PRELOAD_SKIPPED = (
+        "backlash-preload-skipped",
         NOTE,
         "Play is not taken up before moves: no measurement confirms how joints change "
         "their flanks there.",
         "Measure it: survey --reversals, or diagnose --path.",
     )
-    APPROACHED_ANEW = (
-        "approached-anew",
+    REAPPROACH_INSERTED = (
+        "reapproach-inserted",
         NOTE,
         "Targets are approached once more, from a stop on the way already travelled.",
     )
-    PATH_LEFT = (
-        "path-left",
+    PATH_TOLERANCE_EXCEEDED = (
+        "path-tolerance-exceeded",
         WARNING,
         "A move is predicted to leave its path by more than was asked for.",
         "Program a lower speed, or approach the path from the side it moves to.",
@@ -302,14 +302,14 @@ class Code(StrEnum):
 
     # What the corrected program does.
 
-    SLOWER = (
-        "slower",
+    CYCLE_TIME_INCREASED = (
+        "cycle-time-increased",
         WARNING,
         "The compensated program takes more than 3 % longer than the original.",
         "Look at the corrections of its fastest moves.",
     )
-    BEYOND_LIMIT = (
-        "beyond-limit",
+    JOINT_LIMIT_EXCEEDED = (
+        "joint-limit-exceeded",
         ERROR,
         "A joint comes beyond a limit that the original program keeps.",
         "Move the target away from the limit.",
@@ -349,8 +349,8 @@ class Code(StrEnum):
         "A tool is shorter than two millimetres: is it written in metres?",
         "Write millimetres.",
     )
-    BASE_CONTRADICTS = (
-        "base-contradicts",
+    BASE_FRAME_MISMATCH = (
+        "base-frame-mismatch",
         WARNING,
         "Joint angles and Cartesian targets of the program place the base elsewhere "
         "than the cell.",
@@ -362,8 +362,8 @@ class Code(StrEnum):
         "The archive places the arm otherwise than the cell.",
         "Paste the lines of the message into [base] of the cell.",
     )
-    LISTING_DIGITS = (
-        "listing-digits",
+    LSV_PRECISION = (
+        "lsv-precision",
         NOTE,
         "The controller lists values with two decimals: to list corrected values and "
         "to load them again costs what the message says.",
@@ -390,8 +390,8 @@ class Code(StrEnum):
         NOTE,
         "A line of the variable file is not understood; it is kept.",
     )
-    LSV_TWICE = (
-        "lsv-twice",
+    LSV_DUPLICATE = (
+        "lsv-duplicate",
         WARNING,
         "A variable has two entries: which one the controller takes is not known.",
         "Delete one.",

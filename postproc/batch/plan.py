@@ -35,15 +35,32 @@ class JobSetup:
 
         Contents count, places do not: a copy of the same cell file is the same cell.
         """
+        cell = self.cell.file.model_dump(mode="json", exclude={"verify"})
         parts = {
             "version": __version__,
-            "cell": self.cell.file.model_dump(mode="json", exclude={"verify"}),
+            "cell": _named_before(cell),
             "arm": self.cell.arm.file.model_dump(mode="json"),
             "model": self.model.id,
             "options": self.options.told(),
         }
         text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+_BEFORE = {
+    "conflict_mm": "agree_mm",
+    "correction_step_mm": "step_mm",
+    "reapproach_mm": "approach_mm",
+    "motionless": "still",
+    "taught_direction": "taught_lambda",
+}  # keys of cells as version 0.1.0 had them, whose runs are resumed
+
+
+def _named_before(value: Any) -> Any:
+    """Return what a cell says with its keys as they were first named."""
+    if isinstance(value, dict):
+        return {_BEFORE.get(k, k): _named_before(own) for k, own in value.items()}
+    return [*map(_named_before, value)] if isinstance(value, list) else value
 
 
 def open_setup(cell: Path, model: Path, options: Options) -> JobSetup:

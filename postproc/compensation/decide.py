@@ -204,8 +204,8 @@ def mark_disagreement(
     if len(together) == 0:
         return together, np.zeros(len(visits), dtype=bool)
     at = np.where(has, agreement.group, 0)
-    unsafe = reasons.none & has & ~together[at]
-    differ = unsafe & agreement.usable[at] & apart[at]
+    conflict = reasons.none & has & ~together[at]
+    differ = conflict & agreement.usable[at] & apart[at]
     code = Code.ARRIVALS_DIFFER
     apart_by = Reason(code, SHIFTED_APART.format(limit))
     reasons.mark(differ & own_shifts(visits), apart_by)
@@ -216,9 +216,9 @@ def mark_disagreement(
     text += f"give each move a point of its own ({cloning})"
     reasons.mark(differ, Reason(code, text))
     for why, literals in stay.items():
-        reasons.mark(unsafe & literals[at], why)
-    reasons.mark(unsafe, OTHER_ARRIVAL)
-    return together, unsafe
+        reasons.mark(conflict & literals[at], why)
+    reasons.mark(conflict, OTHER_ARRIVAL)
+    return together, conflict
 
 
 HOLDS_NONE = Reason(Code.NO_TARGET, "this move holds no target")
@@ -308,7 +308,7 @@ def with_what_moves_along(
         cell: The robot's surroundings.
         found: What was decided for them.
     """
-    own = (found.status == Status.SAFE)[:, None]
+    own = (found.status == Status.CORRECTED)[:, None]
     values, shift = found.corrected, np.where(own, found.correction, 0.0)
     moves = np.nan_to_num(with_dependants(visits, planned, cell, values, shift))
     along = ~own[:, 0] & (lengths(moves) > ALONG)
@@ -634,14 +634,14 @@ class Round:
         usable = reasons.none
         settled = self._settled(usable)
         agreement, stay = settled.agreement, settled.stay
-        chosen, unsafe = mark_disagreement(
+        chosen, conflict = mark_disagreement(
             visits, agreement, stay, self.setting.cell, reasons
         )
-        status = np.where(reasons.none, Status.SAFE, Status.GUARDED)
-        status[unsafe] = Status.UNSAFE
-        status[display] = Status.DISPLAY
+        status = np.where(reasons.none, Status.CORRECTED, Status.REJECTED)
+        status[conflict] = Status.CONFLICT
+        status[display] = Status.RUNTIME
         status[unchanged] = Status.UNCHANGED
-        corrected = status == Status.SAFE
+        corrected = status == Status.CORRECTED
         values = np.array(visits.values)
         values[corrected] = agreement.values[agreement.group[corrected]]
         move_dependants(visits, agreement, chosen, values)
@@ -753,7 +753,7 @@ class Round:
 
     def _decisions(self, status: Ints, reasons: Reasons, values: Floats) -> Decisions:
         """Say what was decided for every visit, but for standard errors."""
-        side, moves = self.solved.direction, (status == Status.SAFE)[:, None]
+        side, moves = self.solved.direction, (status == Status.CORRECTED)[:, None]
         turn = (
             np.where(moves, self.solved.turn, 0.0)
             if self.setting.options.orientation

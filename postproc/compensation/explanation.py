@@ -43,7 +43,7 @@ KEPT = frozenset(
     (
         "status",
         "code",
-        "why",
+        "reason",
         "dx_mm",
         "dy_mm",
         "dz_mm",
@@ -113,7 +113,7 @@ class Explanation:
 
         Columns: line, target, from (the lines it is reached from), the commanded
         joint angles (``q1_deg`` ..) and the sides they arrive from (``lambda1`` ..);
-        then status, code, why and correction as `Outcome.to_frame` has them, or,
+        then status, code, reason and correction as `Outcome.to_frame` has them, or,
         without a model, why a visit cannot be compensated.
         """
         v, rows = self.visits, range(len(self.visits))
@@ -127,7 +127,7 @@ class Explanation:
         if self.outcome is None:
             codes = [reason.name for reason in self.reasons]
             texts = [reason.text for reason in self.reasons]
-            return data_frame(columns | {"code": codes, "why": texts})
+            return data_frame(columns | {"code": codes, "reason": texts})
         told = self.outcome.to_frame()
         return data_frame(columns | {name: told[name] for name in told if name in KEPT})
 

@@ -208,7 +208,7 @@ def listing_cost(
         Diagnostic(
             visits.files[visits.literals.file[visits.literal[v]]],
             int(visits.literals.line[visits.literal[v]]),
-            Code.LISTING_DIGITS,
+            Code.LSV_PRECISION,
             f"a listing by the controller has 2 decimals (0.01 mm, 0.01 deg): to list "
             f"these values and load them again costs {'; '.join(found)}",
         )
@@ -265,7 +265,7 @@ def unsure_frames(
             "these directions as taught_direction in the cell file"
         )
         where = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
-        found.append(Diagnostic(*where, Code.SIDE_NOT_SURE, text))
+        found.append(Diagnostic(*where, Code.DIRECTION_UNCERTAIN, text))
     return found
 
 
@@ -306,7 +306,10 @@ def unsure_sides(
         )
         return [
             Diagnostic(
-                visits.files[0], int(visits.line[rows[0]]), Code.SIDE_NOT_SURE, text
+                visits.files[0],
+                int(visits.line[rows[0]]),
+                Code.DIRECTION_UNCERTAIN,
+                text,
             )
         ]
     told = advice(rows)
@@ -314,7 +317,7 @@ def unsure_sides(
         Diagnostic(
             visits.files[visits.file[i]],
             int(visits.line[i]),
-            Code.SIDE_NOT_SURE,
+            Code.DIRECTION_UNCERTAIN,
             f"{_how(side[i])}, from a side that is not sure "
             f"(+-{size[i]:.3f} mm): {told.get(i, cure)}",
         )

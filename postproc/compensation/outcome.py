@@ -52,10 +52,10 @@ SHARED = 40_000  # visits up to which reports tell the shares of the effects
 class Status(IntEnum):
     """How a visit came out."""
 
-    SAFE = 0  # corrected; every arrival at the literal agrees
-    UNSAFE = 1  # arrivals at one literal disagree: left alone
-    DISPLAY = 2  # the value is known only at run time
-    GUARDED = 3  # the correction is not trusted: left alone
+    CORRECTED = 0  # corrected; every arrival at the literal agrees
+    CONFLICT = 1  # arrivals at one literal disagree: left alone
+    RUNTIME = 2  # the value is known only at run time
+    REJECTED = 3  # the correction is not trusted: left alone
     UNCHANGED = 4  # nothing to correct, or not to be corrected
 
 
@@ -193,9 +193,9 @@ class Outcome:
     def to_frame(self) -> DataFrame:
         """Return a data frame, one row a visit, in the order of the program.
 
-        Columns: file, line, target, status, code, why, then the correction of the TCP
-        in the base frame (``dx_mm`` ..), its standard error (``std_x_mm`` ..) and the
-        commanded joint angles before correction (``q1_deg`` ..).
+        Columns: file, line, target, status, code, reason, then the correction of the
+        TCP in the base frame (``dx_mm`` ..), its standard error (``std_x_mm`` ..) and
+        the commanded joint angles before correction (``q1_deg`` ..).
         """
         v, d = self.visits, self.decisions
         return data_frame(
@@ -205,7 +205,7 @@ class Outcome:
                 "target": [v.names[k] for k in v.name.tolist()],
                 "status": [Status(k).name.lower() for k in d.status.tolist()],
                 "code": [d.reasons[k].name for k in d.why.tolist()],
-                "why": [d.reasons[k].text for k in d.why.tolist()],
+                "reason": [d.reasons[k].text for k in d.why.tolist()],
                 **columns_of(("dx_mm", "dy_mm", "dz_mm"), d.correction / MM),
                 **columns_of(("std_x_mm", "std_y_mm", "std_z_mm"), d.std_error / MM),
                 **columns_of([f"q{k}_deg" for k in range(1, 7)], np.rad2deg(d.q)),
@@ -233,7 +233,7 @@ class Outcome:
         Also where the compensated program does not run as the original does, or a
         second opinion disagrees.
         """
-        left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
+        left = (Status.CONFLICT, Status.RUNTIME, Status.REJECTED)
         missed = any(d.code in NOT_FOLLOWED for d in self.diagnostics)
         missed |= self.in_time is not None and self.in_time.falls_short
         missed |= self.opinion is not None and not self.opinion.agrees
@@ -256,7 +256,7 @@ class Outcome:
 
     def left_rows(self) -> list[int]:
         """Return the visits that kept their value although they hold a target."""
-        left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
+        left = (Status.CONFLICT, Status.RUNTIME, Status.REJECTED)
         rows: list[int] = np.flatnonzero(np.isin(self.decisions.status, left)).tolist()
         return rows
 
@@ -291,8 +291,14 @@ def largest_motion(departure: Floats) -> dict[str, float]:
 DIGIT = "0123456789"  # status of a visit
 SIGNS = "-0+"  # direction of a joint: -1, 0, 1
 BOTH = 2  # arrivals at one line from both sides of a joint
-URGENCY = (Status.UNSAFE, Status.GUARDED, Status.DISPLAY, Status.SAFE, Status.UNCHANGED)
-LEFT_ALONE = (Status.UNSAFE, Status.GUARDED, Status.DISPLAY)
+URGENCY = (
+    Status.CONFLICT,
+    Status.REJECTED,
+    Status.RUNTIME,
+    Status.CORRECTED,
+    Status.UNCHANGED,
+)
+LEFT_ALONE = (Status.CONFLICT, Status.REJECTED, Status.RUNTIME)
 DIGITS = 4  # of a correction [mm]
 
 
@@ -341,7 +347,7 @@ class LineOutcomes:
         status = _places(told["status"], DIGIT).astype(np.int64)
         sides = (_places(told["direction"], SIGNS) - 1).reshape(len(line), 6)
         size = np.array(told["correction_mm"], dtype=np.float64)
-        why = np.array(told["why"], dtype=np.int64)
+        why = np.array(_told_why(told), dtype=np.int64)
         rank = np.argsort(URGENCY)[status]
         order = np.lexsort((rank, line))
         first = np.flatnonzero(np.diff(line[order], prepend=-1))
@@ -362,6 +368,12 @@ class LineOutcomes:
             counts={s.name.lower(): int((status == s).sum()) for s in Status},
             mixed=_mixed(status[order], first),
         )
+
+
+def _told_why(told: Mapping[str, Any]) -> Sequence[int]:
+    """Take the index of the reason of every visit; `why` in records of 0.1.0."""
+    found: Sequence[int] = told.get("reason", told.get("why", ()))
+    return found
 
 
 def _told_reasons(told: Mapping[str, Any]) -> tuple[Reason, ...]:
@@ -437,7 +449,7 @@ def tell_arrivals(
             "status": _letters(d.status[rows], DIGIT),
             "direction": _letters(d.direction[rows] + 1, SIGNS),
             "correction_mm": np.round(np.nan_to_num(size[rows]), DIGITS),
-            "why": np.argsort(order)[why],
+            "reason": np.argsort(order)[why],
             "codes": [d.reasons[k].name for k in codes[order].tolist()],
             "reasons": [d.reasons[k].text for k in codes[order].tolist()],
         }
@@ -477,7 +489,7 @@ def corrected_directions(visits: Visits, record: Sidecar) -> Floats | None:
         if not np.array_equal(np.asarray(told.get("line", ())), line[rows]):
             return None
         sides = _places(str(told["direction"]), SIGNS) - 1.0
-        corrected = _places(str(told["status"]), DIGIT) == Status.SAFE
+        corrected = _places(str(told["status"]), DIGIT) == Status.CORRECTED
         out[rows[corrected]] = sides.reshape(len(rows), 6)[corrected]
     return out
 
@@ -531,11 +543,11 @@ def with_left(told: Mapping[str, Any], left: Sequence[LeftLine]) -> dict[str, An
     codes = list(told.get("codes", [""] * len(known)))
     return {
         "line": [*told.get("line", ()), *(line for _, line, _ in left)],
-        "status": str(told.get("status", "")) + str(int(Status.DISPLAY)) * len(left),
+        "status": str(told.get("status", "")) + str(int(Status.RUNTIME)) * len(left),
         "direction": str(told.get("direction", "")) + SIGNS[1] * 6 * len(left),
         "correction_mm": [*told.get("correction_mm", ()), *[0.0] * len(left)],
-        "why": [
-            *told.get("why", ()),
+        "reason": [
+            *_told_why(told),
             *(len(known) + whys.index(why) for _, _, why in left),
         ],
         "codes": [*codes, *(why.name for why in whys)],

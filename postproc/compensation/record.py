@@ -169,7 +169,7 @@ class Sidecar:
         """Write the record as JSON text, piece by piece."""
         head: dict[str, Any] = {"postproc": self.version, "model": self.model}
         left = [(file, line, why.text, why.name) for file, line, why in self.left]
-        head |= {"left": left} if left else {}
+        head |= {"uncorrected": left} if left else {}
         head |= {"assumed": self.assumed} if self.assumed else {}
         head["options"] = dict(self.options)
         yield (json.dumps(head)[:-1] + ', "files": {').encode()
@@ -241,7 +241,7 @@ def _record(path: Path, text: bytes) -> Sidecar:
         if not all(map(_is_name, files)):
             raise ValueError("a name that no file has")
         version, model = str(data["postproc"]), str(data["model"])
-        left = tuple(map(_left_line, data.get("left", ())))
+        left = tuple(map(_left_line, data.get("uncorrected", data.get("left", ()))))
         assumed = tuple(
             (str(f), int(n), str(text)) for f, n, text in data.get("assumed", ())
         )

@@ -82,7 +82,7 @@ def difference_pieces(found: Difference) -> Iterator[str]:
         "counts": dict(found.counts),
     }
     yield json.dumps(head, indent=1)[: -len("\n}")]
-    for key, parts in (("rows", found.differing), ("left", found.untouched)):
+    for key, parts in (("rows", found.differing), ("uncorrected", found.untouched)):
         yield f',\n "{key}": ['
         comma = len(",")
         for block in blocks_of(parts):
@@ -123,7 +123,7 @@ def _object(row: DiffRow) -> bytes:
 def _told(rows: DiffRows, some: slice) -> dict[str, Cells]:
     """Write what a record says of some rows."""
     told = rows.told
-    none = {key: b'""' for key in ("status", "code", "why")}
+    none = {key: b'""' for key in ("status", "code", "reason")}
     none |= {"direction": b"[]", "correction_mm": b"null"}
     if told is None or not len(told.line):
         return {key: Cells(text) for key, text in none.items()}
@@ -132,7 +132,7 @@ def _told(rows: DiffRows, some: slice) -> dict[str, Cells]:
     columns = {
         "status": named(STATUSES, told.status[entry], json.dumps),
         "code": named([r.name for r in told.reasons], told.why[entry], json.dumps),
-        "why": named([r.text for r in told.reasons], told.why[entry], json.dumps),
+        "reason": named([r.text for r in told.reasons], told.why[entry], json.dumps),
         "direction": signs.within(*LIST),
         "correction_mm": shortest(told.correction_mm[entry]),
     }
@@ -241,7 +241,7 @@ class _Writer:
         length = "" if size is None else f"{size:.3f}"
         place = [row.file, str(row.line or ""), row.target]
         cells = [*place, old, "->" if new else "", new, length]
-        told = [arrows(row.direction), _said(row.status, row.why, row.visits)]
+        told = [arrows(row.direction), _said(row.status, row.reason, row.visits)]
         return [*cells, *told] if self.told else cells
 
 

@@ -17,7 +17,7 @@ from postproc.report.json import target_rows
 from postproc.report.terminal import Column, arrows, print_table, status_colour
 from postproc.robot.pose import MM
 
-STATUS = "status, why"
+STATUS = "status, reason"
 FEW = 3  # places of origin that a row names
 COLUMNS = (
     Column("line"),
@@ -67,7 +67,7 @@ def _plan_row(found: Explanation, i: int) -> dict[str, object]:
         "q_deg": _known_deg(found.q[i]),
         "lambda": [int(s) for s in found.direction[i]],
         "code": found.reasons[i].name,
-        "why": found.reasons[i].text,
+        "reason": found.reasons[i].text,
     }
 
 

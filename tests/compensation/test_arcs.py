@@ -32,7 +32,7 @@ def run(job_cell, job_model):
     def status(source: bytes) -> list[str]:
         done = compensate(source, job_cell, job_model, name="job.pdl")
         d = done.decisions
-        return ["" if d.status[k] == Status.SAFE else d.reasons[d.why[k]].text
+        return ["" if d.status[k] == Status.CORRECTED else d.reasons[d.why[k]].text
                 for k in range(5)]  # fmt: skip
 
     return status
@@ -89,7 +89,7 @@ def whys(done) -> list[str]:
     d = done.decisions
     why = [d.reasons[k].text for k in d.why]
     return [
-        "" if status == Status.SAFE else text
+        "" if status == Status.CORRECTED else text
         for status, text in zip(d.status, why, strict=True)
     ]
 

@@ -49,7 +49,7 @@ def all_disagree(reading: Reading, seed: int) -> Proposal:
     visits, rng = reading.visits, np.random.default_rng(seed)
     usable = (visits.reason == 0) & (visits.literal >= 0)
     nothing = np.zeros((len(visits), 6))
-    status = np.where(usable, Status.UNSAFE, Status.DISPLAY)
+    status = np.where(usable, Status.CONFLICT, Status.RUNTIME)
     why = np.zeros(len(visits), dtype=np.int64)
     decisions = Decisions(status, why, (NO_REASON,), nothing, nothing, nothing, nothing,
                           nothing[:, :3], nothing[:, :3])  # fmt: skip

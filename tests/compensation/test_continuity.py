@@ -135,7 +135,7 @@ def test_an_arc_is_left_as_a_whole(job_cell, job_model):
     model = surveyed_up_to(job_model, (inner + end) / 2)
     assert inner < end, "the end is the one that lies outside"
     done = compensate(source, job_cell, model, name="job.pdl")
-    assert done.decisions.status[2:4].tolist() == [Status.GUARDED] * 2
+    assert done.decisions.status[2:4].tolist() == [Status.REJECTED] * 2
     assert reasons(done)[2] == ARC.text
 
 
@@ -169,7 +169,7 @@ def test_a_weld_that_joints_lead_to_is_not_held_back_by_a_step(job_cell, job_mod
     done = compensate(job(*lines), cell, job_model, name="job.pdl")
     step = np.diff(done.decisions.correction[1:3], axis=0)
     assert np.linalg.norm(step) > 0.2e-3, "there is a step to hold it back for"
-    assert done.decisions.status[:4].tolist() == [Status.SAFE] * 4
+    assert done.decisions.status[:4].tolist() == [Status.CORRECTED] * 4
 
 
 @pytest.mark.parametrize(("speed", "axes"), [(0.001, 0), (1.0, 6)])

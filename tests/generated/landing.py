@@ -68,7 +68,7 @@ def count_errors(
         if ran[k].values == step.values:
             continue
         mine, pair = sorted(rows[k]), (run.before[k], run.now[k])
-        if not mine or (d.status[mine] != Status.SAFE).any():
+        if not mine or (d.status[mine] != Status.CORRECTED).any():
             found.error_mm[ALONG].append(pair)
             why = {d.reasons[d.why[row]].text for row in mine}
             if not all(COMPUTED.search(one) for one in why):

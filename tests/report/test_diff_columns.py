@@ -91,7 +91,10 @@ def told_of(rng: np.random.Generator, lines: int) -> LineOutcomes:
         rng.integers(-1, 3, (len(line), 6)),
         np.where(rng.random(len(line)) < 0.1, np.nan, rng.random(len(line))),
         {s.name.lower(): int(s) for s in Status},
-        {k: {"guarded": 1, "safe": k} for k in rng.integers(0, len(line), 9).tolist()},
+        {
+            k: {"rejected": 1, "corrected": k}
+            for k in rng.integers(0, len(line), 9).tolist()
+        },
     )
 
 
@@ -103,7 +106,7 @@ def with_told(row: DiffRow, told: LineOutcomes) -> DiffRow:
     return row._replace(
         status=Status(told.status[at[0]]).name.lower(),
         code=told.reasons[told.why[at[0]]].name,
-        why=told.reasons[told.why[at[0]]].text,
+        reason=told.reasons[told.why[at[0]]].text,
         direction=tuple(told.direction[at[0]].tolist()),
         correction_mm=float(told.correction_mm[at[0]]),
         visits=dict(told.mixed.get(int(at[0]), {})),

@@ -223,7 +223,7 @@ class PathWork:
         """Say why points of a move cannot be corrected, "" where they can."""
         decided = self.latest.kept.decisions
         rows = self._on_way(v)
-        left = rows[decided.status[rows] != Status.SAFE]
+        left = rows[decided.status[rows] != Status.CORRECTED]
         if not len(left):
             return ""
         why = decided.reasons[decided.why[left[0]]]

@@ -88,7 +88,9 @@ class KrlMachine(TaskMachine):
         self.call(0, first.name, first.routines[0], None, -1, here)
         self.follow_all()
         for name, (file, row) in self._assumed.items():
-            self.say(file, row, Code.ASSUMED_STILL, f"{name.upper()} {ASSUMED}")
+            self.say(
+                file, row, Code.ROUTINE_ASSUMED_MOTIONLESS, f"{name.upper()} {ASSUMED}"
+            )
 
     # What a statement is.
 

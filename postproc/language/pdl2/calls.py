@@ -231,7 +231,8 @@ def opaque_call(
         case RoutineEffect.TRACKS:
             _track(here, name, arguments)
         case RoutineEffect.KNOWN:
-            _say(here, Code.ASSUMED_STILL, name, "is not in the files at hand: it is "
+            _say(here, Code.ROUTINE_ASSUMED_MOTIONLESS, name,
+                 "is not in the files at hand: it is "
                  "on the list of routines known neither to move the arm nor to set "
                  "frames (docs/routines.md); if it does, say so under [routines] "
                  "in the cell file, or pass --strict-calls")  # fmt: skip

@@ -46,7 +46,7 @@ def outcomes(path: Path, cell: Path, model: Path) -> Counter[str]:
                 or v.target[rows[0]] in NO_TARGETS
             ):
                 found["no target"] += 1
-            elif (status[rows] == Status.SAFE).all():
+            elif (status[rows] == Status.CORRECTED).all():
                 found["corrected"] += 1
             else:
                 found[why or "rejected where it is driven"] += 1

@@ -175,7 +175,7 @@ def test_each_routine_that_is_not_at_hand_is_listed_once() -> None:
     assert lines == [
         (4, "unknown-routine"),
         (7, "unknown-routine"),
-        (8, "assumed-still"),
+        (8, "routine-assumed-motionless"),
     ]
 
 

@@ -161,7 +161,7 @@ def test_elements_of_a_field_are_not_nodes():
 def test_a_name_that_a_path_and_something_else_have_is_neither():
     variables = read(path("NODE[1]") + "pth POS Priv\n" + place(5))
     assert not variables.entries
-    assert {d.code for d in variables.diagnostics} == {"lsv-twice"}
+    assert {d.code for d in variables.diagnostics} == {"lsv-duplicate"}
 
 
 def test_too_many_values_are_none():

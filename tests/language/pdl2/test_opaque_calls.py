@@ -90,7 +90,7 @@ def test_a_page_calls_a_routine_of_the_program_that_calls_it():
     head = ["IMPORT 'page'", "ROUTINE s EXPORTED FROM page"]
     head += routine("r", f"MOVE LINEAR TO {AT}")
     found = resolved(program("job", head, ["s"]), page=page)
-    assert "assumed-still" not in codes(found) and len(found.visits) == 1
+    assert "routine-assumed-motionless" not in codes(found) and len(found.visits) == 1
 
 
 def test_recursion_through_another_file_forgets_what_that_file_changes():

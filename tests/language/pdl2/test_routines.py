@@ -112,7 +112,7 @@ def test_what_the_cell_says_by_name_holds_against_its_patterns() -> None:
 def test_the_shipped_list_counts_unless_calls_are_strict() -> None:
     body = [FIRST, "spot(1)", THEN]
     assert reasons(followed(*body)) == ["", ""]
-    assert codes(followed(*body)) == ["assumed-still"]
+    assert codes(followed(*body)) == ["routine-assumed-motionless"]
     strict = followed(*body, strict_calls=True)
     assert reasons(strict)[1] and codes(strict) == ["unknown-routine"]
     assert reasons(followed(*body, strict_calls=True, motionless=("spot",))) == ["", ""]

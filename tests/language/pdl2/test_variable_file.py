@@ -83,7 +83,7 @@ def test_what_is_wrong_is_said() -> None:
     assert "arm 2" in reasons[7]
     codes = {d.code for d in found.diagnostics if d.file == "job.lsv"}
     assert codes == {
-        "lsv-twice",
+        "lsv-duplicate",
         "lsv-incomplete",
         "lsv-uninitialised",
         "lsv-undeclared",
