@@ -12,10 +12,11 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.diagnosis.diagnose import Extension, extend_model
-from postproc.calibration.diagnosis.files import REGISTERED, PointFrame
+from postproc.calibration.diagnosis.files import REGISTERED
 from postproc.calibration.diagnosis.search import Progress
 from postproc.calibration.diagnosis.trace import silent
 from postproc.calibration.measurements import POSITION, Measurements
+from postproc.calibration.survey_files import frame_of
 from postproc.calibration.tables import read_table
 from postproc.compensation.paths.accuracy import PredictedWays, predicted_ways
 from postproc.compensation.paths.flanks import JointInMotion, in_motion, measured_steps
@@ -29,7 +30,7 @@ from postproc.language.visits import Visits
 from postproc.model.model import READING, Model, as_model
 from postproc.model.statistics import ErrorStatistics
 from postproc.motion.cycle import ProgramCycle, run
-from postproc.robot.cell import Cell, as_cell
+from postproc.robot.cell import Cell, PointFrame, as_cell
 from postproc.robot.pose import MM, inverse, lengths
 from postproc.robot.state import States, make_states
 
@@ -109,7 +110,7 @@ def diagnose_path(
     cell: Cell | str | Path,
     model: Model | str | Path,
     program: str | Path | None,
-    frame: PointFrame = "base",
+    frame: PointFrame | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> PathDiagnosis:
@@ -120,7 +121,7 @@ def diagnose_path(
         cell: The cell, or its file.
         model: The model that may lack something, or its file.
         program: The program that ran.
-        frame: What positions are given in.
+        frame: What positions are given in; default: as `diagnose` has it.
         seed: Of the bootstrap.
         progress: Told what is being done.
 
@@ -130,7 +131,7 @@ def diagnose_path(
     if program is None:
         raise PostprocError("--path: name the program that ran with --program")
     cell = as_cell(cell)
-    model = as_model(model, cell.arm)
+    model, frame = as_model(model, cell.arm), frame_of(cell, frame)
     return _diagnosed(track, cell, model, Path(program), frame, seed, progress)
 
 
