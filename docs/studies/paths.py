@@ -177,8 +177,8 @@ def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
     paths: dict[str, PathScores] = {}
     for name in programs:
         run = simulate_file(
-            folder / f"{name}.pdl", place, seed, wanted=folder / "job.pdl", path=True,
-            gears=gears,
+            folder / f"{name}.pdl", place, seed,
+            reference=folder / "job.pdl", path=True, gears=gears,
         )  # fmt: skip
         assert run.paths is not None
         paths[name] = run.paths

@@ -58,6 +58,7 @@ from postproc.model.kinematics import Batch
 from postproc.model.model import Model, Monument
 from postproc.model.model_file import Method
 from postproc.model.noise import angle_step
+from postproc.model.provenance import Provenance
 from postproc.model.registration import Registration
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
@@ -244,7 +245,7 @@ def fit_measurements(
     """
     rows = _prepare(survey, cell, frame)
     if method != "full":
-        return _published(rows, cell, frame, method, seed)
+        return _dated(_published(rows, cell, frame, method, seed))
     task = FitTask(rows.survey, cell.arm, effects, rows.tracker, rows.setup)
     fitted = task.fit(progress=progress)
     found = Validated(fitted, None)
@@ -252,7 +253,13 @@ def fit_measurements(
         progress("predict poses that are held out")
         found = validate_fit(task, fitted)
     progress("report")
-    return _conclude(rows, found, cell, frame)
+    return _dated(_conclude(rows, found, cell, frame))
+
+
+def _dated(found: Calibration) -> Calibration:
+    """Return a calibration whose model tells where it comes from."""
+    model = replace(found.model, provenance=Provenance.today(found.cell))
+    return replace(found, model=model)
 
 
 @dataclass(frozen=True, eq=False)

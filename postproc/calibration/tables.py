@@ -869,7 +869,7 @@ class TableFormat:
         )
 
     @property
-    def given(self) -> dict[str, str]:
+    def given(self) -> dict[str, Any]:
         """Options of `read_table` that a user has given."""
         delimiter = self.delimiter and NAMED.get(self.delimiter, self.delimiter)
         options = {

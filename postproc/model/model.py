@@ -30,6 +30,7 @@ from postproc.model.model_file import (
     square_of,
 )
 from postproc.model.noise import Noise
+from postproc.model.provenance import Provenance
 from postproc.model.ranges import Ranges
 from postproc.model.registration import Registration
 from postproc.model.variance import (
@@ -144,6 +145,8 @@ class Model:
             joints goes from flank to flank, by reversals of the survey; UNTOLD where
             they do not tell, empty where none were measured.
         weight: Direction in which weight pulled, unit vector in the base frame.
+        provenance: When, for which robot and by what it was fitted, None where that is
+            not known; no part of the id.
     """
 
     method: Method
@@ -165,6 +168,7 @@ class Model:
     flank_widths: tuple[Width, ...] = ()
     weight: Direction = FLOOR
     monuments: tuple[Monument, ...] = ()
+    provenance: Provenance | None = None
 
     @cached_property
     def id(self) -> str:
@@ -482,6 +486,8 @@ class Model:
             data["monuments"] = [
                 {"name": name, "xyz_m": xyz} for name, xyz in self.monuments
             ]
+        if self.provenance is not None:
+            data["provenance"] = asdict(self.provenance)
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -562,6 +568,9 @@ def _model_of(path: Path, file: ModelFile) -> Model:
         flank_widths=tuple(UNTOLD if w is None else w for w in file.flank_widths),
         weight=file.weight,
         monuments=tuple((m.name, m.xyz_m) for m in file.monuments),
+        provenance=None
+        if (origin := file.provenance) is None
+        else Provenance(**origin.model_dump()),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id

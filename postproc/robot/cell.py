@@ -103,6 +103,7 @@ class RobotSection(Strict):
         arm_number: Which arm of its controller it is.
         controller: Whose controller runs the programs, or several; default: as the arm
             file has it.
+        serial_number: Of the robot, kept with the models that are fitted for it.
         absolute_accuracy: Whether the controller compensates the arm itself.
         mounting: Where weight pulls in the arm's base frame: "floor" along -z,
             "ceiling" along +z, "wall" along +x, or a vector of any length. Without it
@@ -112,6 +113,7 @@ class RobotSection(Strict):
     arm: str
     arm_number: ArmNumber = 1
     controller: Controller | list[Controller] | None = None
+    serial_number: str | None = None
     absolute_accuracy: bool = False
     mounting: Literal["floor", "ceiling", "wall"] | Triple | None = None
 
@@ -278,6 +280,7 @@ class MeasurementSection(Strict):
         encoding: Name of a Python codec.
         unit: Of coordinates in files that do not state it; default: mm.
         frame: Frame of the measured positions; default: the arm's base frame.
+        instrument: What measured, kept with the models that are fitted.
     """
 
     columns: str | None = None
@@ -286,6 +289,7 @@ class MeasurementSection(Strict):
     encoding: str | None = None
     unit: Literal["mm", "m", "inch"] | None = None
     frame: PointFrame | None = None
+    instrument: str | None = None
 
 
 AS_USUAL, DETECTED = CompensationSection(), MeasurementSection()

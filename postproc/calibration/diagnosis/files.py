@@ -27,6 +27,7 @@ from postproc.calibration.tables import DETECT, TableFormat
 from postproc.model.effects.placement import Placement
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, as_model
+from postproc.model.provenance import Provenance
 from postproc.model.registration import Registration
 from postproc.robot.cell import Cell, PointFrame, as_cell
 from postproc.robot.pose import MM, inverse
@@ -90,7 +91,9 @@ def diagnose(
     seen_fixed = (*found.diagnosis.fixed_points, *notes)
     return replace(
         found,
-        model=replace(found.model, registration=placed),
+        model=replace(
+            found.model, registration=placed, provenance=Provenance.today(cell)
+        ),
         diagnosis=replace(found.diagnosis, fixed_points=seen_fixed),
     )
 

@@ -17,7 +17,12 @@ from postproc.calibration.diagnosis.search import Progress
 from postproc.calibration.diagnosis.trace import silent
 from postproc.calibration.measurements import POSITION, Measurements
 from postproc.calibration.survey_files import frame_of
-from postproc.calibration.tables import read_table
+from postproc.calibration.tables import (
+    DETECT,
+    TableFormat,
+    read_foreign,
+    read_table,
+)
 from postproc.compensation.paths.accuracy import PredictedWays, predicted_ways
 from postproc.compensation.paths.flanks import JointInMotion, in_motion, measured_steps
 from postproc.compensation.paths.measured import Aligned, OnTheWay, Track, align
@@ -28,6 +33,7 @@ from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.language.visits import Visits
 from postproc.model.model import READING, Model, as_model
+from postproc.model.provenance import Provenance
 from postproc.model.statistics import ErrorStatistics
 from postproc.motion.cycle import ProgramCycle, run
 from postproc.robot.cell import Cell, PointFrame, as_cell
@@ -145,7 +151,7 @@ def _diagnosed(
     progress: Progress,
 ) -> PathDiagnosis:
     """Diagnose a track of a program in a cell."""
-    read, digest = read_track(track)
+    read, digest = read_track(track, DETECT.within(cell))
     read = replace(read, position=_in_base(read.position, frame, cell, model))
     visits = read_program(read_files(program), cell).visits
     own = with_measured_play(cell, model)
@@ -168,6 +174,8 @@ def _diagnosed(
         progress=progress,
     )  # fmt: skip
     extension = _with_verdicts(_as_surveyed(extension, model), joints)
+    named = replace(extension.model, provenance=Provenance.today(cell))
+    extension = replace(extension, model=named)
     size = ErrorStatistics.of_sizes(lengths(found.on_the_way.off))
     moves = np.unique(_move(found.on_the_way.sample, ways))
     stops = len(found.ended), found.missed
@@ -186,13 +194,18 @@ def _lag(
     return servo_lag(ways, nominal, found.on_the_way, visits.fly & ~visits.via)
 
 
-def read_track(path: Path) -> tuple[Track, str]:
+def read_track(path: Path, reading: TableFormat = DETECT) -> tuple[Track, str]:
     """Read a tracker's track; return its hash besides.
+
+    Args:
+        path: The file.
+        reading: What the user knows of it.
 
     Raises:
         MeasurementError: Columns are missing, or the times are none.
     """
-    table = read_table(path)
+    mapped = reading.columns is not None
+    table = read_foreign(path, reading) if mapped else read_table(path, **reading.given)
     table.require(*COLUMNS)
     time = table.numbers("time_s")
     cure = "Give readings of one run, in order, with their times in seconds"

@@ -221,7 +221,7 @@ def test_points_do_no_harm_where_no_measured_path_says_how_flanks_change(
     scores = []
     for name in ("cautious", "plain"):
         run = simulate_file(shop / f"{name}.pdl", CELL, SEED, path=True, gears=gears,
-                            wanted=shop / "job.pdl")  # fmt: skip
+                            reference=shop / "job.pdl")  # fmt: skip
         assert run.paths is not None
         scores.append(run.paths)
     new, old = scores
@@ -310,7 +310,7 @@ def test_reversals_that_say_sharp_gaps_let_play_be_taken_up(shop: Path) -> None:
     stops = [p for p in paths if p["points"] and p["points"][0]["at_mm"] < 1.0]
     assert len(stops) > LINES / 2
     run = simulate_file(shop / "reversed.pdl", CELL, SEED, path=True,
-                        wanted=shop / "job.pdl")  # fmt: skip
+                        reference=shop / "job.pdl")  # fmt: skip
     true = {m["visit"]: m["max_mm"] for m in json.loads(run.to_json())["path"]}
     plain = real(shop, "plain")
     mean = np.mean([true[path["visit"]] for path in paths])
