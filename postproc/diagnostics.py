@@ -133,8 +133,8 @@ class Code(StrEnum):
         NOTE,
         "A routine that is in no file at hand is on the shipped list of routines that "
         "neither move the arm nor set frames.",
-        "Where it does, say so under [routines] of the cell; --strict-calls takes no "
-        "routine from the list.",
+        "Where it does, say so under [routines] of the cell; assume_motion of "
+        "[compensation] takes no routine from the list.",
     )
     MOTION_UNKNOWN = (
         "motion-unknown",
@@ -317,7 +317,7 @@ class Code(StrEnum):
         "cloned",
         NOTE,
         "Moves got a point of their own, since another move to the same point needs "
-        "another correction (--clone).",
+        "another correction (--shared-points clone).",
     )
     NOT_CLONED = (
         "not-cloned",
@@ -382,7 +382,7 @@ class Code(StrEnum):
         "no-variable-file",
         WARNING,
         "Targets have no value in the program, and its variable file is missing.",
-        "Put it beside the program, or give it with --lsv.",
+        "Put it beside the program, or give it with --variables.",
     )
     LSV_LINE = (
         "lsv-line",
@@ -494,5 +494,5 @@ class Code(StrEnum):
         "left-alone",
         ERROR,
         "Targets that could have been compensated keep their values.",
-        "Look at them, then pass --accept-left.",
+        "Look at them, then pass --allow-uncorrected.",
     )

@@ -37,7 +37,7 @@ class JobSetup:
         """
         parts = {
             "version": __version__,
-            "cell": self.cell.file.model_dump(mode="json", exclude={"verify"}),
+            "cell": self.cell.file.model_dump(mode="json", exclude=NOT_DECIDING),
             "arm": self.cell.arm.file.model_dump(mode="json"),
             "model": self.model.id,
             "options": self.options.told(),
@@ -46,14 +46,19 @@ class JobSetup:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def open_setup(cell: Path, model: Path, options: Options) -> JobSetup:
+NOT_DECIDING = {"verify", "compensation", "measurements"}  # or told by the options
+
+
+def open_setup(
+    cell: Path, model: Path, options: Options, changes: Sequence[str] = ()
+) -> JobSetup:
     """Load a cell and a model, and refuse a pair that does not belong together.
 
     Raises:
         CellError: The cell cannot be used, or its controller compensates on its own.
         ModelError: The model cannot be used, or was made for another arm.
     """
-    loaded, fitted = load_cell(cell), load_model(model)
+    loaded, fitted = load_cell(cell, changes=changes), load_model(model)
     fitted.check_arm(loaded.arm, model)
     if loaded.file.robot.absolute_accuracy:
         raise CellError(
@@ -63,7 +68,8 @@ def open_setup(cell: Path, model: Path, options: Options) -> JobSetup:
             place="$.robot.absolute_accuracy",
         )
     # Only the name: messages must not depend on where a run was started.
-    return JobSetup(replace(loaded, path=Path(cell.name)), fitted, options)
+    named = replace(loaded, path=Path(cell.name))
+    return JobSetup(named, fitted, options.within(named))
 
 
 # The plan file: which programs of a tree belong to which arm.
@@ -132,7 +138,11 @@ def pattern_from_glob(glob: str) -> re.Pattern[str]:
 
 
 def make_plan(
-    plan: Path | None, cell: Path | None, model: Path | None, options: Options
+    plan: Path | None,
+    cell: Path | None,
+    model: Path | None,
+    options: Options,
+    changes: Sequence[str] = (),
 ) -> BatchPlan:
     """Load every cell and model that a run needs.
 
@@ -141,6 +151,7 @@ def make_plan(
         cell: Cell of the programs that no rule fits.
         model: Model of the programs that no rule fits.
         options: What the user asked for.
+        changes: Keys of all cells for this run, as `load_cell` takes them.
 
     Raises:
         PostprocError: Neither a plan nor both files are given, or one cannot be used.
@@ -152,7 +163,7 @@ def make_plan(
         raise PostprocError("Give --cell and --model, or --plan, or all three")
     if cell is not None and model is not None:
         rules.append(Rule("**", None, cell, model))
-    return _open_rules(rules, options)
+    return _open_rules(rules, options, changes)
 
 
 @dataclass(frozen=True)
@@ -178,14 +189,16 @@ def _read_rules(path: Path) -> list[Rule]:
     return [Rule(r.pattern, r.arm, here / r.cell, here / r.model) for r in file.rule]
 
 
-def _open_rules(rules: Sequence[Rule], options: Options) -> BatchPlan:
+def _open_rules(
+    rules: Sequence[Rule], options: Options, changes: Sequence[str]
+) -> BatchPlan:
     """Open each distinct pair of files once.
 
     Raises:
         PostprocError: A file cannot be used, or a cell is of another arm than its rule.
     """
     pairs = list(dict.fromkeys((rule.cell, rule.model) for rule in rules))
-    setups = tuple(open_setup(cell, model, options) for cell, model in pairs)
+    setups = tuple(open_setup(cell, model, options, changes) for cell, model in pairs)
     which = tuple(pairs.index((rule.cell, rule.model)) for rule in rules)
     for rule, index in zip(rules, which, strict=True):
         _check_number(rule, setups[index].cell)

@@ -175,9 +175,9 @@ def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
         return empty
     held = taught(visits)
     reasons.mark(held, "a taught point already contains the arm's error")
-    if not options.shared:
+    if not options.edit_exported:
         shared = has & visits.literals.shared[literal]
-        reasons.mark(shared, "other programs may read this variable too (see --shared)")
+        reasons.mark(shared, EXPORTED)
     return np.asarray(empty | held)
 
 
@@ -217,10 +217,12 @@ def mark_disagreement(
     return together, unsafe
 
 
+EXPORTED = "other programs may read this variable too (see edit_exported)"
 HOLDS_NONE = "this move holds no target"
+SEVERAL_MOVES = "several moves go to this point (shared_points = leave)"
 _ONE_MOVE = (
-    "one move makes them all, and --clone does not help: write it once for every way "
-    "to it, or for all frames that it is made with"
+    "one move makes them all, and --shared-points clone does not help: write it once "
+    "for every way to it, or for all frames that it is made with"
 )
 
 
@@ -698,7 +700,11 @@ class Round:
     ) -> dict[str, Bools]:
         """Find literals that must keep their values, see `must_stay`."""
         visits, cell = self.reading.visits, self.setting.cell
-        return must_stay(visits, agreement, change, self._trusted, cell, absorbing)
+        stay = must_stay(visits, agreement, change, self._trusted, cell, absorbing)
+        if self.setting.options.shared_points == "leave":
+            count = len(agreement.literal)
+            stay[SEVERAL_MOVES] = ~_by_one_move(visits, agreement.group, count)
+        return stay
 
     def _needed(self) -> tuple[Floats, Floats, Floats]:
         """Say what arrivals need, and what must agree.

@@ -106,7 +106,7 @@ def missing_file(visits: Visits) -> list[Diagnostic]:
     lost = np.array([text.endswith(NO_VALUE) for text in visits.reasons])[visits.reason]
     text = (
         f"{lost.sum()} targets have no value, and there is no {name}: put it beside "
-        "the program, or give it with --lsv"
+        "the program, or give it with --variables"
     )
     first = visits.line[np.flatnonzero(lost)[:1]].tolist()
     return [

@@ -32,6 +32,7 @@ from postproc.model.model_file import (
     square_of,
 )
 from postproc.model.noise import Noise
+from postproc.model.provenance import Provenance
 from postproc.model.ranges import Ranges
 from postproc.model.registration import Registration
 from postproc.model.variance import (
@@ -148,6 +149,8 @@ class Model:
         weight: Direction in which weight pulled, unit vector in the base frame.
         monuments: Fixed points that the survey read.
         doubt: What may be there besides the effects; None where that is hardly any.
+        provenance: When, for which robot and by what it was fitted, None where that is
+            not known; no part of the id.
     """
 
     method: Method
@@ -170,6 +173,7 @@ class Model:
     weight: Direction = FLOOR
     monuments: tuple[Monument, ...] = ()
     doubt: Doubt | None = None
+    provenance: Provenance | None = None
 
     @cached_property
     def id(self) -> str:
@@ -499,6 +503,8 @@ class Model:
                 "effects": _listed_effects(self.doubt.effects),
                 "covariance": packed(self.doubt.covariance),
             }
+        if self.provenance is not None:
+            data["provenance"] = asdict(self.provenance)
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -580,6 +586,9 @@ def _model_of(path: Path, file: ModelFile) -> Model:
         weight=file.weight,
         monuments=tuple((m.name, m.xyz_m) for m in file.monuments),
         doubt=None if file.doubt is None else _doubt_of(path, file.doubt, count),
+        provenance=None
+        if (origin := file.provenance) is None
+        else Provenance(**origin.model_dump()),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id

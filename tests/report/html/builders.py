@@ -14,7 +14,7 @@ from postproc.model.statistics import ErrorStatistics
 
 REASONS = (
     "",
-    "its arrivals differ by more than conflict_mm = 0.02 (see --clone)",
+    "its arrivals differ by more than conflict_mm = 0.02 (see --shared-points clone)",
     "its numbers are not written in the program",
     "joint 5 is within 3 deg of the wrist singularity",
     "this move holds no target",
