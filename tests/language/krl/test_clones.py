@@ -18,7 +18,8 @@ from tests.conftest import SEED
 from tests.fuzz.case import records_of
 from tests.language.neutral_job import drawn, krl
 
-CLONE, EXPORTED = Options(clone=True), Options(clone=True, shared=True)
+CLONE = Options(shared_points="clone")
+EXPORTED = replace(CLONE, edit_exported=True)
 
 
 def run(files, cell, model, options=CLONE):
