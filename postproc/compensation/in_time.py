@@ -27,7 +27,7 @@ from postproc.robot.pose import MM
 
 MOST_SLOWER = 0.03  # of the cycle time
 FEW = 5  # lines that a finding names
-_LIMITS = [CODE[text] for text in (*LIMITS, *PATH_LIMITS)]
+_LIMITS = [CODE[one] for one in (*LIMITS, *PATH_LIMITS)]
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from postproc.files import (
     variables_of,
 )
 from postproc.language.languages import language_of
-from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
+from postproc.language.visits import Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
@@ -101,9 +101,10 @@ def _use(name: str, number: int, visits: Visits, untouched: Collection[str]) -> 
 def missing_file(visits: Visits) -> list[Diagnostic]:
     """Tell that a program came without the variable file that holds its targets."""
     name = variables_of(visits.files[0])
-    if any(map(is_variables, visits.files)):
+    if not name or any(map(is_variables, visits.files)):
         return []
-    lost = np.array([text.endswith(NO_VALUE) for text in visits.reasons])[visits.reason]
+    none = np.array([one.code is Code.NO_VALUE for one in visits.reasons])
+    lost = none[visits.reason]
     text = (
         f"{lost.sum()} targets have no value, and there is no {name}: put it beside "
         "the program, or give it with --variables"

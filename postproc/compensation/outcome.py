@@ -19,7 +19,7 @@ from postproc.compensation.record import (
     read_without_edits,
     sidecar_path,
 )
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.exceptions import ProgramError
 from postproc.files import (
     Content,
@@ -66,7 +66,7 @@ class Decisions:
     Attributes:
         status: `Status`, (n,).
         why: Index into `reasons`, (n,).
-        reasons: Texts; reasons[0] is "".
+        reasons: Why visits keep their values; reasons[0] is `NO_REASON`.
         q: Commanded joint angles of the original program, (n, 6) [rad].
         direction: Arrival direction, (n, 6): +1, -1, or 0 where not known.
         side: Where every joint lies in its play, (n, 6) from -1 to 1.
@@ -79,7 +79,7 @@ class Decisions:
 
     status: Signs
     why: Indices
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     q: Floats
     direction: Signs
     side: Floats
@@ -193,8 +193,8 @@ class Outcome:
     def to_frame(self) -> DataFrame:
         """Return a data frame, one row a visit, in the order of the program.
 
-        Columns: file, line, target, status, why, then the correction of the TCP in the
-        base frame (``dx_mm`` ..), its standard error (``std_x_mm`` ..) and the
+        Columns: file, line, target, status, code, why, then the correction of the TCP
+        in the base frame (``dx_mm`` ..), its standard error (``std_x_mm`` ..) and the
         commanded joint angles before correction (``q1_deg`` ..).
         """
         v, d = self.visits, self.decisions
@@ -204,7 +204,8 @@ class Outcome:
                 "line": v.line,
                 "target": [v.names[k] for k in v.name.tolist()],
                 "status": [Status(k).name.lower() for k in d.status.tolist()],
-                "why": [d.reasons[k] for k in d.why.tolist()],
+                "code": [d.reasons[k].name for k in d.why.tolist()],
+                "why": [d.reasons[k].text for k in d.why.tolist()],
                 **columns_of(("dx_mm", "dy_mm", "dz_mm"), d.correction / MM),
                 **columns_of(("std_x_mm", "std_y_mm", "std_z_mm"), d.std_error / MM),
                 **columns_of([f"q{k}_deg" for k in range(1, 7)], np.rad2deg(d.q)),
@@ -303,7 +304,7 @@ class LineOutcomes:
         line: 1-based lines of the source, ascending, (k,).
         status: The most urgent `Status` of a line's visits, (k,).
         why: Index into `reasons`, of that visit, (k,).
-        reasons: Texts.
+        reasons: Why they keep their values; without codes in records of version 0.1.0.
         direction: In which every joint arrives, (k, 6): -1, 1, 0 where not known,
             `BOTH` where the visits differ.
         correction_mm: Largest correction of the TCP, (k,).
@@ -315,7 +316,7 @@ class LineOutcomes:
     line: Ints
     status: Ints
     why: Ints
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     direction: Signs
     correction_mm: Floats
     counts: Mapping[str, int]
@@ -353,7 +354,7 @@ class LineOutcomes:
             line=line[lead],
             status=status[lead],
             why=why[lead],
-            reasons=tuple(map(str, told["reasons"])),
+            reasons=_told_reasons(told),
             direction=np.where(least == most, least, BOTH),
             correction_mm=np.maximum.reduceat(size[order], first)
             if len(line)
@@ -361,6 +362,13 @@ class LineOutcomes:
             counts={s.name.lower(): int((status == s).sum()) for s in Status},
             mixed=_mixed(status[order], first),
         )
+
+
+def _told_reasons(told: Mapping[str, Any]) -> tuple[Reason, ...]:
+    """Take the reasons of a record; those of version 0.1.0 are texts without codes."""
+    texts = [str(text) for text in told["reasons"]]
+    codes = [str(code) for code in told.get("codes", [""] * len(texts))]
+    return tuple(map(Reason.named, codes, texts))
 
 
 def _mixed(status: Ints, first: Ints) -> dict[int, dict[str, int]]:
@@ -430,7 +438,8 @@ def tell_arrivals(
             "direction": _letters(d.direction[rows] + 1, SIGNS),
             "correction_mm": np.round(np.nan_to_num(size[rows]), DIGITS),
             "why": np.argsort(order)[why],
-            "reasons": [d.reasons[k] for k in codes[order].tolist()],
+            "codes": [d.reasons[k].name for k in codes[order].tolist()],
+            "reasons": [d.reasons[k].text for k in codes[order].tolist()],
         }
     return told
 
@@ -501,17 +510,25 @@ def left_elsewhere(
         for i in np.flatnonzero(rows & ~told).tolist()
     ]
     for name, lines in missed.items():
-        found += [(name, line, Code.NEVER_REACHED) for line in lines.tolist()]
+        found += [(name, line, _of_finding(Code.NEVER_REACHED)) for line in lines]
     found += [
-        (x.file, x.line, x.code) for x in diagnostics if x.code == Code.MOTION_UNKNOWN
+        (x.file, x.line, _of_finding(x.code))
+        for x in diagnostics
+        if x.code == Code.MOTION_UNKNOWN
     ]
-    return tuple(found)
+    return tuple((file, int(line), why) for file, line, why in found)
+
+
+def _of_finding(code: Code) -> Reason:
+    """Return the reason that a finding of the same code explains."""
+    return Reason(code, str(code))
 
 
 def with_left(told: Mapping[str, Any], left: Sequence[LeftLine]) -> dict[str, Any]:
     """Add lines that were left to what `tell_arrivals` says of their file."""
     whys = list(dict.fromkeys(why for _, _, why in left))
     known = list(told.get("reasons", ()))
+    codes = list(told.get("codes", [""] * len(known)))
     return {
         "line": [*told.get("line", ()), *(line for _, line, _ in left)],
         "status": str(told.get("status", "")) + str(int(Status.DISPLAY)) * len(left),
@@ -521,7 +538,8 @@ def with_left(told: Mapping[str, Any], left: Sequence[LeftLine]) -> dict[str, An
             *told.get("why", ()),
             *(len(known) + whys.index(why) for _, _, why in left),
         ],
-        "reasons": [*known, *whys],
+        "codes": [*codes, *(why.name for why in whys)],
+        "reasons": [*known, *(why.text for why in whys)],
     }
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from postproc.arrays import Floats, Interned, Ints, slim
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.dialect import Dialect
 from postproc.language.machine import Scope, TaskMachine
 from postproc.language.marks import MEASURE, Comments
@@ -29,8 +30,11 @@ from postproc.language.visits import (
 from postproc.robot.pose import pose_from_record
 from postproc.robot.trajectory import Motion
 
-TOO_COMPLEX = "the program is too complex to be followed"
-ONLY_SHIFTED = "it is shifted from a point that no move goes to: what to correct?"
+TOO_COMPLEX = Reason(Code.TOO_COMPLEX, "the program is too complex to be followed")
+ONLY_SHIFTED = Reason(
+    Code.NUMBERS_NOT_OWN,
+    "it is shifted from a point that no move goes to: what to correct?",
+)
 _NO_FRAME = -1
 NO_LOAD: tuple[float, ...] = (math.nan,) * 4  # one object: NaN differs from itself
 Pose = tuple[float, ...]
@@ -85,7 +89,7 @@ class FoundGoal:
         follows: Likewise of the point that it is shifted from.
         name: Of the point, "" where it is written in the move.
         aux: External axes, NaN where there is none.
-        why: Why it cannot be compensated, "" where it can.
+        why: Why it cannot be compensated.
         pins: Why the numbers must stay, "" where they need not.
         shared: Other programs may read it too.
         shift: How it is shifted from a point, None where it is not, or not known.
@@ -98,7 +102,7 @@ class FoundGoal:
     follows: tuple[int, ...] = (-1,)
     name: str = ""
     aux: tuple[float, ...] = (math.nan,) * 6
-    why: str = ""
+    why: Reason = NO_REASON
     pins: str = ""
     shared: bool = False
     shift: FoundShift | None = None
@@ -125,7 +129,7 @@ class FoundGoal:
         return self.file, max(self.slots[0], self.follows[0])
 
 
-def not_reached(goal: FoundGoal, why: str) -> FoundGoal:
+def not_reached(goal: FoundGoal, why: Reason) -> FoundGoal:
     """Return the goal of a move that need not reach it: its numbers stay.
 
     Args:
@@ -135,7 +139,8 @@ def not_reached(goal: FoundGoal, why: str) -> FoundGoal:
     numbers = (max(goal.slots[0], goal.follows[0]),)
     return FoundGoal(
         Meaning.UNKNOWN, tuple(math.nan for _ in goal.values), goal.file,
-        follows=numbers, name=goal.name, aux=goal.aux, why=why, pins=goal.pins or why,
+        follows=numbers, name=goal.name, aux=goal.aux, why=why,
+        pins=goal.pins or why.text,
     )  # fmt: skip
 
 
@@ -149,7 +154,7 @@ class FoundVisit:
         goal: Where it goes.
         modes: What holds there.
         origins: Where it may come from.
-        why: Why it cannot be compensated, "" where it can.
+        why: Why it cannot be compensated.
         arc_angle: As in `Visits` [rad].
         block: Tells the curves apart that visits are points of, None for none.
         curved: As in `Visits`.
@@ -162,7 +167,7 @@ class FoundVisit:
     goal: FoundGoal
     modes: Any
     origins: frozenset[int] = frozenset()
-    why: str = ""
+    why: Reason = NO_REASON
     arc_angle: float = math.nan
     block: Hashable = None
     curved: bool = False
@@ -176,7 +181,7 @@ class Conditions:
         tool, base, uframe: Frames.
         taught: Tool and user frame were taught with the arm, and contain its error.
         remote: The tool stands still, and the arm holds the part.
-        reasons: Why it cannot be compensated; empty texts do not count.
+        reasons: Why it cannot be compensated; `NO_REASON` does not count.
         flags: Whether its configuration flags are checked.
         flagged: It has such flags.
         law: How the tool turns on the way.
@@ -196,7 +201,7 @@ class Conditions:
     uframe: Pose
     taught: tuple[bool, bool]
     remote: bool
-    reasons: Sequence[str]
+    reasons: Sequence[Reason]
     flags: Switch
     flagged: bool
     law: OrientationLaw
@@ -215,7 +220,7 @@ class _Tables:
     """What columns point into."""
 
     frames: Interned[tuple[Pose, bool]]
-    reasons: Interned[str]
+    reasons: Interned[Reason]
     names: Interned[str]
 
     def frames_of(self, frames: Sequence[tuple[Pose, bool]]) -> Ints:
@@ -243,7 +248,7 @@ def visits_of(
     found = [machine.visits[k] for k in order]
     held = [conditions(v) for v in found]
     texts, n = machine.texts, len(found)
-    tables = _Tables(Interned(), Interned([""]), Interned([""]))
+    tables = _Tables(Interned(), Interned([NO_REASON]), Interned([""]))
     loads = Interned[tuple[float, ...]]([NO_LOAD])
     other = [*_goals_beside(machine, moves)]
     literals, literal, follows = _literals(
@@ -304,11 +309,11 @@ def _measured(
     return ["" if v.via else ids.get((v.scope.file, v.row), "") for v in found]
 
 
-def _reason(held: Conditions, exhausted: bool) -> str:
-    """Say why a visit cannot be compensated, "" where it can."""
+def _reason(held: Conditions, exhausted: bool) -> Reason:
+    """Say why a visit cannot be compensated."""
     if exhausted:
         return TOO_COMPLEX
-    return next((why for why in held.reasons if why), "")
+    return next((why for why in held.reasons if why), NO_REASON)
 
 
 def _moves(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> dict[str, Any]:

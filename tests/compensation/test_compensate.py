@@ -45,7 +45,7 @@ def statuses(outcome):
 
 def whys(outcome):
     d = outcome.decisions
-    return [d.reasons[k] for k in d.why]
+    return [d.reasons[k].text for k in d.why]
 
 
 JOINTS = "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 50.0, 30.0}"

@@ -148,7 +148,7 @@ def test_joint_targets_do_not_depend_on_the_frame(tmp_path, taught, job_model):
     outcome = compensate(program(FIRST, POSE), cell, job_model, name="job.pdl")
     d = outcome.decisions
     assert [Status(s) for s in d.status] == [Status.SAFE, Status.GUARDED]
-    assert "give taught_deg" in d.reasons[d.why[1]]
+    assert "give taught_deg" in d.reasons[d.why[1]].text
 
 
 def test_a_frame_marked_in_the_program_is_not_trusted(job_cell, job_model):

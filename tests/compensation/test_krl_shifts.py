@@ -123,7 +123,7 @@ def test_a_correction_beyond_the_limit_stays(shop):
     small = Shop(replace(shop.cell, limits=limits), shop.model)
     done = small.compensate(krl(small, [P1, f"LIN Xp1:{by(z=-33)}"]))
     assert f"LIN Xp1:{by(z=-33)}".encode() in done.outputs["job.src"]
-    assert "correction_mm" in " ".join(done.decisions.reasons)
+    assert "correction_mm" in " ".join(map(str, done.decisions.reasons))
 
 
 def test_a_taught_point_leaves_its_shifts_alone(shop):

@@ -21,8 +21,8 @@ def test_every_line_comes_back():
     assert np.array_equal(found.direction, decisions.direction)
     size = np.linalg.norm(decisions.correction, axis=1) * 1e3
     assert found.correction_mm == pytest.approx(size, abs=1e-4)
-    assert [found.reasons[k] for k in found.why] == [
-        decisions.reasons[k] for k in decisions.why
+    assert [found.reasons[k].text for k in found.why] == [
+        decisions.reasons[k].text for k in decisions.why
     ]
     assert sum(found.counts.values()) == 60
 

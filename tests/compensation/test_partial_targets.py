@@ -55,7 +55,7 @@ def places(k: int, seed: int) -> np.ndarray:
 
 
 def reasons(decided) -> list[str]:
-    return [decided.reasons[k] for k in decided.why.tolist()]
+    return [decided.reasons[k].text for k in decided.why.tolist()]
 
 
 def test_the_arm_stands_where_the_commanded_place_leads(cell, truth, model):

@@ -265,7 +265,7 @@ def reasons_of(unit: Unit, outcome: Outcome) -> dict[Place, str]:
     for k in range(len(v)):
         place = places.get(v.files[v.file[k]], ""), int(v.line[k])
         safe = d.status[k] == Status.SAFE or v.follows[k] in written
-        reason = "" if safe else d.reasons[d.why[k]] or Status(d.status[k]).name
+        reason = "" if safe else d.reasons[d.why[k]].text or Status(d.status[k]).name
         found[place] = found.get(place) or reason
     return found
 
@@ -382,7 +382,7 @@ def _print_share(language: str, found: list[JobCount]) -> None:
     seconds = sum(job.seconds for job in found)
     share = 100.0 * done / max(total, 1)
     print(f"{language}: {done} of {total} motion lines ({share:.1f} %) are corrected")
-    elsewhere = total - reasons[HOLDS_NONE]
+    elsewhere = total - reasons[HOLDS_NONE.text]
     share = 100.0 * done / max(elsewhere, 1)
     print(f"  {done} of the {elsewhere} ({share:.1f} %) that go to no home position")
     print(f"  in {seconds:.1f} s")

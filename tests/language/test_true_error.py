@@ -150,7 +150,7 @@ def test_t_is_that_of_the_rounded_numbers(bench_cell, bench_model):
         assert safe.sum() > 0 and (bits == (q < 0))[safe].all()
         assert np.abs(q[safe]).min() > 0.0199
         decisions = found.decisions
-        whys = [decisions.reasons[k] for k in decisions.why[rows[ends & ~safe]]]
+        whys = [decisions.reasons[k].text for k in decisions.why[rows[ends & ~safe]]]
         near += sum("within 0.02 deg of 0" in why for why in whys)
     assert anew > 5 and near > 5
 

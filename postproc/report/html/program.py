@@ -153,7 +153,7 @@ def columns_of(outcome: Outcome) -> PageColumns:
     return PageColumns(
         files=v.files,
         names=v.names,
-        reasons=d.reasons,
+        reasons=tuple(reason.text for reason in d.reasons),
         heads=v.dialect.heads,
         visit=np.arange(1, n + 1),
         file=v.file,

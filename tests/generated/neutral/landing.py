@@ -122,7 +122,7 @@ def given_back(files: Mapping[str, bytes], done: Outcome) -> dict[str, bytes]:
 def reasons(done: Outcome) -> list[str]:
     """Return why visits are not corrected."""
     d = done.decisions
-    return [d.reasons[w] for w in d.why[d.status != Status.SAFE].tolist()]
+    return [d.reasons[w].text for w in d.why[d.status != Status.SAFE].tolist()]
 
 
 def count(
@@ -152,7 +152,7 @@ def count(
         if not safe:
             found.error_mm[ALONG].append(pair)
             if not old.target.computed:
-                why = {d.reasons[d.why[row]] for row in mine}
+                why = {d.reasons[d.why[row]].text for row in mine}
                 text = f"went to new numbers, though: {' / '.join(why)}"
                 found.wrong.append((seed, line, text))
         elif (visits.tool[mine] < 0).any() or (

@@ -40,7 +40,7 @@ def outcomes(path: Path, cell: Path, model: Path) -> Counter[str]:
     for file in np.unique(v.file).tolist():
         for line in np.unique(v.line[v.file == file]).tolist():
             rows = np.flatnonzero((v.file == file) & (v.line == line))
-            why = next((v.reasons[k] for k in v.reason[rows].tolist() if k), "")
+            why = next((v.reasons[k].text for k in v.reason[rows].tolist() if k), "")
             if (
                 any(word in why for word in NO_TARGET)
                 or v.target[rows[0]] in NO_TARGETS

@@ -38,7 +38,7 @@ def last(found: Resolved, file: int = 0) -> tuple[Meaning, list[int], str]:
     """Return target, origins and reason of the last visit in a file."""
     v = found.visits
     row = max(n for n in range(len(v)) if v.file[n] == file)
-    reason = v.reasons[v.reason[row]]
+    reason = v.reasons[v.reason[row]].text
     return Meaning(v.target[row]), v.predecessors(row).tolist(), reason
 
 
@@ -114,7 +114,7 @@ def test_moves_that_a_function_may_make_are_listed_with_their_points():
     origins = [v.predecessors(n).tolist() for n in range(len(v))]
     assert sorted(origins) == [[ELSEWHERE], [-1]]
     unknown = origins.index([ELSEWHERE])
-    assert "f, which is not followed" in v.reasons[v.reason[unknown]]
+    assert "f, which is not followed" in v.reasons[v.reason[unknown]].text
     assert len(set(v.literal.tolist())) == 1  # so that its numbers stay
 
 

@@ -30,7 +30,7 @@ def followed(*body: str, head: list[str] = HEAD, **said: object) -> Resolved:
 
 
 def reasons(found: Resolved) -> list[str]:
-    return [found.visits.reasons[k] for k in found.visits.reason.tolist()]
+    return [found.visits.reasons[k].text for k in found.visits.reason.tolist()]
 
 
 def codes(found: Resolved) -> list[str]:

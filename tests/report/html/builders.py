@@ -8,16 +8,21 @@ import numpy as np
 
 from postproc.compensation.outcome import Decisions, Outcome, Status
 from postproc.compensation.record import Sidecar
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.visits import Diagnostic, Literals, NumberPlaces, Visits
 from postproc.model.statistics import ErrorStatistics
 
 REASONS = (
-    "",
-    "its arrivals differ by more than conflict_mm = 0.02 (see --shared-points clone)",
-    "its numbers are not written in the program",
-    "joint 5 is within 3 deg of the wrist singularity",
-    "this move holds no target",
+    NO_REASON,
+    Reason(
+        Code.ARRIVALS_DIFFER,
+        "its arrivals differ by more than conflict_mm = 0.02 "
+        "(see --shared-points clone)",
+    ),
+    Reason(Code.NUMBERS_NOT_OWN, "its numbers are not written in the program"),
+    Reason(Code.SINGULAR_WRIST, "joint 5 is within 3 deg of the wrist singularity"),
+    Reason(Code.NO_TARGET, "this move holds no target"),
 )
 FIRST_LINE = 4  # of the moves in `program_text`
 
