@@ -448,6 +448,7 @@ def find_shared_list(program: Path, within: Path | None = None) -> Path | None:
     """
     if not data_list_of(program.name):
         return None
+    program = program.absolute()
     found = _beside(program, SHARED_LIST)
     for folder in list(program.parent.parents)[:ARCHIVE_DEPTH]:
         if found is not None or (within is not None and not _is_below(folder, within)):
@@ -466,6 +467,7 @@ def find_shared(program: Path, within: Path | None = None) -> tuple[Path, ...]:
         program: The source.
         within: A folder that nothing outside of is looked at.
     """
+    program = program.absolute()
     found = find_shared_list(program, within)
     if not data_list_of(program.name) or not program.parent.is_dir():
         return ()
@@ -631,26 +633,54 @@ def schema(kind: str) -> dict[str, Any]:
 
 
 SYSTEM_MODULES, SYSTEM_SUFFIXES = "SYSMOD/", (".sys", ".sysx")
+OTHER_TASKS = "TASKS/"
 
 
-def name_read(path: PurePath) -> str:
+def name_read(path: PurePath, program: PurePath) -> str:
     """Return the name of a file that a job reads and never rewrites.
 
-    >>> name_read(Path("RAPID/TASK1/SYSMOD/user.sys")), name_read(Path("a/$config.dat"))
-    ('SYSMOD/user.sys', '$config.dat')
+    Args:
+        path: The file.
+        program: The program of the job.
+
+    >>> job = Path("RAPID/TASK1/PROGMOD/job.mod")
+    >>> name_read(Path("RAPID/TASK1/SYSMOD/user.sys"), job)
+    'SYSMOD/user.sys'
+    >>> name_read(Path("RAPID/TASK2/PROGMOD/plc.mod"), job)
+    'TASKS/TASK2/PROGMOD/plc.mod'
+    >>> name_read(Path("System/$config.dat"), Path("Program/job.src"))
+    '$config.dat'
     """
-    return f"{SYSTEM_MODULES}{path.name}" if is_module(path.name) else path.name
+    if not is_module(path.name):
+        return path.name
+    if is_beside(path, program):
+        return OTHER_TASKS + "/".join(path.parts[-3:])
+    return f"{SYSTEM_MODULES}{path.name}"
 
 
-def is_system_module(name: str) -> bool:
-    """Return True if a file is a system module that a job reads."""
-    return name.startswith(SYSTEM_MODULES)
+def is_beside(path: PurePath, program: PurePath) -> bool:
+    """Return True if a module belongs to another task of a backup than a program."""
+    return is_module(path.name) and path.parent.parent != program.parent.parent
 
 
-def has_system_suffix(name: str) -> bool:
-    """Return True if a file is a system module by its suffix.
+def task_beside(name: str) -> str:
+    """Return the other task that a file of a job belongs to, "" for its own.
 
-    >>> has_system_suffix("BASE.SYS"), has_system_suffix("job.mod")
-    (True, False)
+    >>> task_beside("TASKS/TASK2/PROGMOD/plc.mod"), task_beside("SYSMOD/user.sys")
+    ('TASK2', '')
     """
-    return _suffix(name) in SYSTEM_SUFFIXES
+    return name.split("/")[1] if name.startswith(OTHER_TASKS) else ""
+
+
+def is_named_as_system(name: str) -> bool:
+    """Return True if a module is a system module by its place or its suffix.
+
+    >>> [is_named_as_system(name) for name in ("SYSMOD/a.mod", "BASE.SYS", "job.mod")]
+    [True, True, False]
+    """
+    return name.startswith(SYSTEM_MODULES) or _suffix(name) in SYSTEM_SUFFIXES
+
+
+def is_from_elsewhere(name: str) -> bool:
+    """Return True if a file of a job was found in another folder of a backup."""
+    return name.startswith((SYSTEM_MODULES, OTHER_TASKS))

@@ -73,6 +73,7 @@ KNOWING = {
     # Weight shows by what yields to it.
     "calibration.diagnosis.weight": {"compliance"},
     "calibration.weight_direction": {"compliance"},
+    "calibration.doubt": {"compliance"},
     # The given model's zero of a joint holds the mean of what the model lacks.
     "calibration.diagnosis.refit": {"joint_offset"},
     "calibration.diagnosis.jumps": {"part_motion", "step"},

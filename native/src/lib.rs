@@ -80,6 +80,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(design::gram, module)?)?;
     module.add_function(wrap_pyfunction!(design::uncertainty, module)?)?;
     module.add_function(wrap_pyfunction!(evidence::by_groups, module)?)?;
+    module.add_function(wrap_pyfunction!(evidence::of_blocks, module)?)?;
     module.add_function(wrap_pyfunction!(evidence::scaled, module)?)?;
     module.add_function(wrap_pyfunction!(heap::give_back, module)?)?;
     module.add_function(wrap_pyfunction!(variance::variance, module)?)?;

@@ -155,7 +155,8 @@ def _files(root: Path, unit: Unit) -> Iterator[tuple[str, bytes]]:
     for place in unit.programs:
         yield Path(place).name, read_input(root / place)
     for place in unit.reads:
-        yield name_read(root / place), read_input(root / place)
+        name = name_read(Path(place), Path(unit.program))
+        yield name, read_input(root / place)
     if unit.variables is not None:
         name = variables_of(Path(unit.program).name)
         yield name, read_input(root / unit.variables)

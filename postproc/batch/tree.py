@@ -6,7 +6,7 @@ import os
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from postproc.batch.plan import BatchPlan, Unit
 from postproc.compensation.pages import (
@@ -25,6 +25,7 @@ from postproc.files import (
     data_list_of,
     find_shared,
     holds_targets,
+    is_beside,
     is_compiled,
     is_program,
     is_system_file,
@@ -84,7 +85,7 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
         sizes[place] = size
     found = [_sort(root, names, plan) for names in folders.values()]
     units = [unit for part in found for unit in part.units]
-    only_read = {place for unit in units for place in unit.reads}
+    only_read = {place for unit in units for place in _rewritten_nowhere(unit)}
     kept = [p for unit in units if unit.program in only_read for p in unit.own]
     units = [unit for unit in units if unit.program not in only_read]
     # The largest first: no worker is left alone with one at the end.
@@ -166,13 +167,21 @@ def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
     return part
 
 
+def _rewritten_nowhere(unit: Unit) -> list[str]:
+    """Return what a program reads and nobody rewrites: other tasks have programs."""
+    program = PurePosixPath(unit.program)
+    return [p for p in unit.reads if not is_beside(PurePosixPath(p), program)]
+
+
 def _shared(root: Path, program: str) -> tuple[str, ...]:
     """Return the places of what a program shares with others, and only reads."""
+    root = root.absolute()
     path = root / program
     found = find_shared(path, within=root)
     if is_program(program):
         found += language_of(program).reads(path)
-    return tuple(one.relative_to(root).as_posix() for one in found)
+    inside = (one for one in found if root in one.parents)
+    return tuple(one.relative_to(root).as_posix() for one in inside)
 
 
 def _by_base(

@@ -252,7 +252,9 @@ def _given(task: Task) -> Given:
     """Name the files of a task as its programs name each other."""
     unit, sources = task.unit, task.files
     pages = {_file_name(page): sources[page] for page in unit.pages}
-    reads = {name_read(PurePosixPath(one)): sources[one] for one in unit.reads}
+    program = PurePosixPath(unit.program)
+    named = {name_read(PurePosixPath(one), program): one for one in unit.reads}
+    reads = {name: sources[one] for name, one in named.items()}
     return Given(
         name=_file_name(unit.program),
         source=task.sources[0],
@@ -286,7 +288,7 @@ def _outputs(
 
     What did not change comes out as it went in.
     """
-    place_of = {_file_name(place): place for place in unit.files}
+    place_of = {_file_name(place): place for place in unit.programs}
     if unit.variables is not None:
         place_of[variables_of(_file_name(unit.program))] = unit.variables
     new = {place_of[name]: data for name, data in outcome.outputs.items()}

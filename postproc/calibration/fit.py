@@ -49,6 +49,7 @@ from postproc.calibration.weighing import ENOUGH
 from postproc.calibration.weight_direction import direction_warning, level_warning
 from postproc.exceptions import MeasurementError, ModelError
 from postproc.model.combination import Combination
+from postproc.model.doubt import Doubt
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
@@ -246,14 +247,16 @@ def fit_measurements(
     rows = _prepare(survey, cell, frame)
     if method != "full":
         return _dated(_published(rows, cell, frame, method, seed))
-    task = FitTask(rows.survey, cell.arm, effects, rows.tracker, rows.setup)
+    task = FitTask(
+        rows.survey, cell.arm, effects, rows.tracker, rows.setup, rows.mounted
+    )
     fitted = task.fit(progress=progress)
     found = Validated(fitted, None)
     if validate:
         progress("predict poses that are held out")
         found = validate_fit(task, fitted)
     progress("report")
-    return _dated(_conclude(rows, found, cell, frame))
+    return _dated(_conclude(rows, found, cell, frame, task.doubt(found.fit)))
 
 
 def _dated(found: Calibration) -> Calibration:
@@ -331,7 +334,11 @@ def _published(
 
 
 def _conclude(
-    rows: PreparedRows, found: Validated, cell: Cell, frame: Frame
+    rows: PreparedRows,
+    found: Validated,
+    cell: Cell,
+    frame: Frame,
+    doubt: Doubt | None,
 ) -> Calibration:
     """Make the model of a fit and its report.
 
@@ -341,7 +348,7 @@ def _conclude(
     fitted, survey, arm = found.fit, rows.survey, cell.arm
     direction = direction_warning(fitted)
     asked = "" if rows.mounted or found.error is None else "".join(direction)
-    model = model_of(fitted, survey, found.widening)
+    model = model_of(fitted, survey, found.widening, doubt)
     model = replace(model, registration=rows.placed, monuments=rows.monuments)
     widths = newer_widths((), model, arm, rows.reversals)
     model = replace(model, flank_widths=widths)

@@ -21,7 +21,9 @@ from postproc.calibration.regression import NEARLY, Fit, beside, fit_effects
 from postproc.calibration.sought import with_sought
 from postproc.calibration.tool_groups import find_groups
 from postproc.calibration.weighing import ENOUGH, SURE, keep_needed
+from postproc.model.combination import Combination
 from postproc.model.covariate import DRIVERS, JOINTS
+from postproc.model.doubt import Doubt
 from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
@@ -376,13 +378,19 @@ def _peak_of_others(fitted: Fit, before: Fit) -> float:
     return min(moved, default=0.0)
 
 
-def model_of(fitted: Fit, survey: Measurements, wide: float = 1.0) -> Model:
+def model_of(
+    fitted: Fit,
+    survey: Measurements,
+    wide: float = 1.0,
+    doubt: Doubt | None = None,
+) -> Model:
     """Keep what a fit found as a model.
 
     Args:
         fitted: The fit.
         survey: Its rows.
         wide: Factor on all standard deviations off the tracker, by held-out rows.
+        doubt: What may be there besides.
     """
     used = fitted.rows.weight > 0
     left = np.linalg.norm(fitted.residual[used], axis=1) / MM
@@ -391,7 +399,10 @@ def model_of(fitted: Fit, survey: Measurements, wide: float = 1.0) -> Model:
     own = np.where(np.outer(told, told), covariance, 0.0)  # no set-up in predictions
     arm, noise = fitted.batch.arm, expected_noise(fitted).scaled(wide)
     jacobian = fitted.design.jacobian
-    known = np.sqrt(fitted.design.variance(own) + noise.pose_variance(jacobian))
+    known = fitted.design.variance(own) + noise.pose_variance(jacobian)
+    if doubt is not None:
+        known = known + wide**2 * doubt.kept(told).variance(*_compensated(fitted))
+    known = np.sqrt(known)
     statistics = {
         "residual_mean_mm": float(left.mean()),
         "residual_max_mm": float(left.max()),
@@ -419,4 +430,12 @@ def model_of(fitted: Fit, survey: Measurements, wide: float = 1.0) -> Model:
         data_sha256=survey.sha256,
         statistics=statistics,
         weight=weight_of(arm),
+        doubt=None if doubt is None else doubt.scaled(wide**2),
     )
+
+
+def _compensated(fitted: Fit) -> tuple[Combination, Batch]:
+    """Return what predictions have of a fit, and the arm at its values."""
+    c = fitted.combination
+    own = tuple(e for e in c.effects if e.belongs_to() in COMPENSATED)
+    return Combination(own), c.at(fitted.batch, fitted.values)

@@ -22,10 +22,12 @@ from postproc.calibration.cross_validation import (
     summarise,
 )
 from postproc.calibration.diagnosis.search import with_effects
+from postproc.calibration.doubt import doubt_of
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
 from postproc.calibration.selection import Progress, fit_survey, model_of, silent
 from postproc.calibration.weighing import SURE, keep_needed, worth
+from postproc.model.doubt import Doubt
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.effect import Effect
@@ -79,6 +81,7 @@ class FitTask:
         effects: Names of effects; None: those that it gives evidence for.
         tracker: Tracker position in the base frame, (3,) [m], or None.
         setup: Names of effects of the set-up, fitted besides.
+        mounted: Whether the cell states the direction of weight.
     """
 
     survey: Measurements
@@ -86,6 +89,7 @@ class FitTask:
     effects: Sequence[str] | None
     tracker: Floats | None
     setup: tuple[str, ...] = ()
+    mounted: bool = True
 
     @property
     def rung(self) -> Rung:
@@ -108,12 +112,16 @@ class FitTask:
             chosen.free,
         )  # fmt: skip
 
+    def doubt(self, fitted: Fit) -> Doubt | None:
+        """Weigh what may be there besides, where it was left to the rows."""
+        return doubt_of(fitted, self.mounted) if self.effects is None else None
+
     def errors(self, rung: Rung, part: Ints, used: Bools) -> HeldOutRows:
         """Predict every part of the rows by fits of all others."""
 
         def fit(rows: Measurements) -> tuple[Fit, Model]:
             found = self.fit(rung, rows)
-            return found, model_of(found, rows)
+            return found, model_of(found, rows, doubt=self.doubt(found))
 
         return held_out(self.survey, self.arm, fit, part, used)
 

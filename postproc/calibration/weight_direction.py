@@ -52,7 +52,7 @@ def direction_warning(fitted: Fit) -> tuple[str, ...]:
     if laws != effects:
         gains = np.minimum(gains, _gains(fitted, effects))
     best = int(np.argmax(gains))
-    gain, (name, along) = float(gains[best]), _unit_directions()[best]
+    gain, (name, along) = float(gains[best]), unit_directions()[best]
     if gain < CLEARLY:
         return ()
     return (
@@ -72,7 +72,7 @@ def level_warning(placed: Registration, weight: Floats) -> tuple[str, ...]:
     """
     for name, T in zip(placed.stations, placed.transforms, strict=True):
         along = -T[:3, 2]
-        apart = _degrees(along, weight)
+        apart = degrees_between(along, weight)
         if apart > LEVEL:
             at = f" at {name}" if len(placed.stations) > 1 else ""
             return (
@@ -103,8 +103,8 @@ def _gains(fitted: Fit, others: tuple[Effect, ...]) -> list[float]:
     here = direction_evidence(base, others, stated)
     none = direction_evidence(base, others, None)
     gains = []
-    for _, along in _unit_directions():
-        apart = _degrees(along, stated)
+    for _, along in unit_directions():
+        apart = degrees_between(along, stated)
         if apart < SAME:
             gains.append(-np.inf)
             continue
@@ -152,7 +152,7 @@ def _stays(effect: Effect) -> bool:
     return effect.driven_by not in ("torque", "payload")
 
 
-def _unit_directions() -> list[tuple[str, Floats]]:
+def unit_directions() -> list[tuple[str, Floats]]:
     """List the directions with their names, as unit vectors."""
     vectors = {name: np.array(v, dtype=float) for name, v in DIRECTIONS.items()}
     return [(name, v / np.linalg.norm(v)) for name, v in vectors.items()]
@@ -167,6 +167,6 @@ def _listed(direction: Floats) -> str:
     return "[" + ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in direction) + "]"
 
 
-def _degrees(a: Floats, b: Floats) -> float:
+def degrees_between(a: Floats, b: Floats) -> float:
     """Return the angle between two unit vectors (3,) [deg]."""
     return float(np.degrees(np.arccos(np.clip(a @ b, -1.0, 1.0))))

@@ -237,8 +237,9 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
         found = Diagnostic(reading.sources[0].name, 1, Code.NOT_CLONED, text)
         return replace(reading, diagnostics=(*reading.diagnostics, found))
     return Reading(
-        again.texts, visits, notes, cloned, reading.sources, missed=reading.missed
-    )
+        again.texts, visits, notes, cloned, reading.sources, missed=reading.missed,
+        untouched=reading.untouched,
+    )  # fmt: skip
 
 
 def _stay(visits: Visits, rows: Sequence[int]) -> bool:
@@ -364,8 +365,9 @@ class _CloneWork:
             return
         text = f"{variable.name}: the moves of lines {lines} go to {name} now"
         self._note(file, declared, Code.CLONED, text)
-        separated = np.concatenate([self.stops[stop] for stop in group.stops])
-        self.names |= dict.fromkeys(separated.tolist(), name)
+        for row in np.concatenate([self.stops[stop] for stop in group.stops]).tolist():
+            _, bracket, index = visits.names[visits.name[row]].partition("[")
+            self.names[row] = f"{name}{bracket}{index}"
 
     def _note(self, file: int, line: int, code: Code, text: str) -> None:
         name = self.reading.sources[file].name

@@ -324,7 +324,7 @@ def _findings(
     advice = no_advice if in_time is None else in_time.advice
     return (
         *reading.diagnostics,
-        *followed_pages(visits),
+        *followed_pages(visits, reading.untouched),
         *missing_file(visits),
         *contradicted_base(visits, cell),
         *tool_in_metres(visits),

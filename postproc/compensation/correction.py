@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from postproc.arrays import Bools, Floats, Indices, Interned, among, give_back
 from postproc.compensation import windows as cuts
 from postproc.compensation.clones import give_own_points
-from postproc.compensation.decide import Proposal
+from postproc.compensation.decide import Proposal, with_what_moves_along
 from postproc.compensation.eligibility import overruled
 from postproc.compensation.frames import correct_taught
 from postproc.compensation.iterate import (
@@ -186,7 +186,7 @@ def correction_of(
     return Correction(
         edited=proposal.edited,
         edits=found.edits,
-        decisions=proposal.decisions,
+        decisions=with_what_moves_along(visits, planned, cell, proposal.decisions),
         corrected=moved,
         before=np.linalg.norm(before, axis=1),
         after=np.linalg.norm(after, axis=1),

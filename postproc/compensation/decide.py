@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, any_in_rows
+from postproc.arrays import Bools, Floats, Interned, Ints, any_in_rows
 from postproc.compensation.agreement import LEVER_MM, Agreement, agree
 from postproc.compensation.arc_angles import ASTRAY
 from postproc.compensation.command import (
@@ -280,6 +280,37 @@ def with_dependants(
         source = sources[np.argmax(np.linalg.norm(moves[sources], axis=1))]
         moves[v] = _carried(planned, v, int(source), moves)
     return moves
+
+
+ALONG = 1e-6  # [m]: what moves by less stays
+WITH_POINT = "it moves along with the point that it is computed from"
+WITH_BEGIN = "it moves along with the target that it begins at"
+
+
+def with_what_moves_along(
+    visits: Visits, planned: Planned, cell: Cell, found: Decisions
+) -> Decisions:
+    """Say of targets that are left where they move all the same.
+
+    Args:
+        visits: n arrivals.
+        planned: Their plan.
+        cell: The robot's surroundings.
+        found: What was decided for them.
+    """
+    own = (found.status == Status.SAFE)[:, None]
+    values, shift = found.corrected, np.where(own, found.correction, 0.0)
+    moves = np.nan_to_num(with_dependants(visits, planned, cell, values, shift))
+    along = ~own[:, 0] & (lengths(moves) > ALONG)
+    told = np.isin(visits.target, (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS))
+    rows = np.flatnonzero(along & ~told)
+    if len(rows) == 0:
+        return found
+    why, texts = np.array(found.why), Interned(found.reasons)
+    for v in rows.tolist():
+        how = WITH_POINT if visits.follows[v] >= 0 else WITH_BEGIN
+        why[v] = texts[f"{found.reasons[why[v]]}; {how}"]
+    return replace(found, why=why, reasons=tuple(texts))
 
 
 def _carried(planned: Planned, v: int, source: int, moves: Floats) -> Floats:

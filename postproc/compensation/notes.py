@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
@@ -11,10 +11,9 @@ from postproc.compensation.continuity import on_path
 from postproc.compensation.frames import taught_records
 from postproc.diagnostics import Code
 from postproc.files import (
-    has_system_suffix,
+    is_from_elsewhere,
     is_shared_list,
     is_submit,
-    is_system_module,
     is_variables,
     variables_of,
 )
@@ -72,24 +71,29 @@ def tool_in_metres(visits: Visits) -> list[Diagnostic]:
     ]
 
 
-def followed_pages(visits: Visits) -> list[Diagnostic]:
-    """List the files that are one job with the program."""
-    return [
-        Diagnostic(
-            visits.files[0], 1, Code.PAGE, f"{name} {_use(name, number, visits)}"
-        )
+def followed_pages(visits: Visits, untouched: Collection[str]) -> list[Diagnostic]:
+    """List the files that are one job with the program.
+
+    Args:
+        visits: The arrivals of the job.
+        untouched: Names of files that are never rewritten.
+    """
+    pages = [
+        (number, name)
         for number, name in enumerate(visits.files[1:], start=1)
-        if not (is_variables(name) or is_system_module(name))
+        if not (is_variables(name) or is_from_elsewhere(name))
     ]
+    uses = [f"{name} {_use(name, k, visits, untouched)}" for k, name in pages]
+    return [Diagnostic(visits.files[0], 1, Code.PAGE, use) for use in uses]
 
 
-def _use(name: str, number: int, visits: Visits) -> str:
+def _use(name: str, number: int, visits: Visits, untouched: Collection[str]) -> str:
     """Say what is done with a file of a job."""
     if is_shared_list(name) or is_submit(name):
         return "is read, and not rewritten: all programs share it"
     pinned = [bool(why) for why in visits.literals.pinned]
     own = np.array(pinned, dtype=bool)[visits.literals.file == number]
-    if has_system_suffix(name) or (len(own) and own.all()):
+    if name in untouched or (len(own) and own.all()):
         return "is read, and not rewritten: its numbers must stay"
     return "is followed, and rewritten, as a page of this program"
 

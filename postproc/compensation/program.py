@@ -46,6 +46,7 @@ class Reading:
             where there are none. Lines of visits are those before these edits.
         given: The files as they were before that; empty where nothing was cloned.
         missed: Lines of moves that are never reached, by file.
+        untouched: Names of files that are read, and never rewritten.
         begins: The first visit of every program.
         programs: What was parsed of the files, for who reads them again with other
             numbers.
@@ -62,6 +63,7 @@ class Reading:
     programs: tuple[Any, ...] = ()
     missed: Mapping[str, Ints] = field(default_factory=dict)
     aims: Floats = field(default_factory=lambda: np.empty((0, 6)))
+    untouched: frozenset[str] = frozenset()
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -183,6 +185,7 @@ def read_program(
         found.diagnostics,
         programs=found.programs,
         missed=found.missed,
+        untouched=found.untouched,
     )
 
 

@@ -236,7 +236,8 @@ class ProgramFiles:
         values = None if lsv is None else read_input(lsv)
         found = Pages() if path is None else find_pages(path)
         pages = {page.name: read_input(page) for page in found.paths}
-        pages |= {name_read(page): read_input(page) for page in found.reads}
+        here = Path() if path is None else path.absolute()
+        pages |= {name_read(page, here): read_input(page) for page in found.reads}
         return cls(
             name, source, values, pages, path, lsv, found.paths, found.reads,
             found.notes,

@@ -13,7 +13,7 @@ from postproc.arrays import Floats, Ints
 from postproc.language.archive import Archive
 from postproc.language.dialect import Dialect
 from postproc.language.rewrite import Skeleton
-from postproc.language.source import CloneError, Edit, Source
+from postproc.language.source import Edit, Source
 from postproc.language.visits import Diagnostic, Literals, Visits
 
 Record = tuple[float, ...] | None
@@ -85,6 +85,7 @@ class JobReading:
         diagnostics: What else was found.
         programs: What was parsed of the files, as `read` takes it for `known`.
         missed: Lines of moves that are never reached, by file.
+        untouched: Names of files that are read, and never rewritten.
     """
 
     texts: tuple[Skeleton, ...]
@@ -92,6 +93,7 @@ class JobReading:
     diagnostics: tuple[Diagnostic, ...]
     programs: tuple[Any, ...] = ()
     missed: Mapping[str, Ints] = field(default_factory=dict)
+    untouched: frozenset[str] = frozenset()
 
 
 class NamedPoint(Protocol):
@@ -144,31 +146,6 @@ class Cloner(ABC):
         Raises:
             CloneError: A value stands where it cannot be given twice.
         """
-
-
-@dataclass(frozen=True)
-class NoClones(Cloner):
-    """Of a language whose points are not cloned.
-
-    Attributes:
-        why: What the user is told.
-    """
-
-    why: str
-
-    def target(self, file: int, line: int, via: bool, name: str) -> NamedPoint:
-        """Refuse to clone what a move goes to."""
-        raise CloneError(self.why)
-
-    def declared(self, named: NamedPoint) -> int:
-        """Return no line."""
-        raise CloneError(self.why)
-
-    def clone(
-        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
-    ) -> tuple[str, list[tuple[int, Edit]]]:
-        """Refuse to clone."""
-        raise CloneError(self.why)
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,12 @@ from postproc.arrays import Bools, Floats, all_in_rows, any_in_rows, chunks, in_
 from postproc.exceptions import ModelError
 from postproc.files import write_all
 from postproc.model.combination import Combination
+from postproc.model.doubt import Doubt
 from postproc.model.effects import restore
 from postproc.model.kinematics import Batch
 from postproc.model.model_file import (
     FORMAT,
+    DoubtSection,
     Method,
     ModelFile,
     RegistrationSection,
@@ -147,6 +149,8 @@ class Model:
         weight: Direction in which weight pulled, unit vector in the base frame.
         provenance: When, for which robot and by what it was fitted, None where that is
             not known; no part of the id.
+        monuments: Fixed points that the survey read.
+        doubt: What may be there besides the effects; None where that is hardly any.
     """
 
     method: Method
@@ -169,6 +173,7 @@ class Model:
     weight: Direction = FLOOR
     monuments: tuple[Monument, ...] = ()
     provenance: Provenance | None = None
+    doubt: Doubt | None = None
 
     @cached_property
     def id(self) -> str:
@@ -368,7 +373,16 @@ class Model:
         if self.noise.pose_joint or self.noise.pose:
             beyond = beyond + self.noise.pose_variance(at.jacobian)
         beyond += moment_variance(effects, at, values) + unknown_variance(effects, at)
+        if self.doubt is not None:
+            beyond += self._doubt_among(effects).variance(effects, at)
         return side_variance(effects, at, values) + np.square(self.spread) + beyond
+
+    def _doubt_among(self, effects: Combination) -> Doubt:
+        """Return the doubt beside all effects, or beside those to be compensated."""
+        assert self.doubt is not None
+        if effects is self.effects:
+            return self.doubt
+        return self.doubt.kept(self.effects.where(*COMPENSATED))
 
     def without_clock(self, known: Collection[str]) -> Model:
         """Return it for rows of an unknown moment: what passes with time at its mean.
@@ -451,9 +465,7 @@ class Model:
             "arm": {"name": self.arm_name, "id": self.arm_id},
             "data_sha256": self.data_sha256,
             "rows": self.rows,
-            "effects": [
-                {"name": e.name, "settings": e.settings()} for e in self.effects.effects
-            ],
+            "effects": _listed_effects(self.effects),
             "parameters": [
                 {
                     "name": name,
@@ -488,6 +500,11 @@ class Model:
             ]
         if self.provenance is not None:
             data["provenance"] = asdict(self.provenance)
+        if self.doubt is not None:
+            data["doubt"] = {
+                "effects": _listed_effects(self.doubt.effects),
+                "covariance": packed(self.doubt.covariance),
+            }
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -571,10 +588,41 @@ def _model_of(path: Path, file: ModelFile) -> Model:
         provenance=None
         if (origin := file.provenance) is None
         else Provenance(**origin.model_dump()),
+        doubt=None if file.doubt is None else _doubt_of(path, file.doubt, count),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id
     return model
+
+
+def _doubt_of(path: Path, section: DoubtSection, count: int) -> Doubt:
+    """Read what may be there besides the effects of a model.
+
+    Args:
+        path: The file.
+        section: Its section.
+        count: Number of the model's own parameters.
+
+    Raises:
+        ModelError: It does not hold together.
+    """
+    cure = "Make the model again with postproc fit"
+    try:
+        effects = Combination(
+            tuple(restore(e.name, e.settings) for e in section.effects)
+        )
+        size = count + len(effects.parameters)
+    except (ValueError, TypeError) as exc:
+        raise ModelError(path, str(exc), cure, place="$.doubt.effects") from None
+    if len(section.covariance) != size * (size + 1) // 2:
+        problem = "covariance does not match the parameters"
+        raise ModelError(path, problem, cure, place="$.doubt.covariance")
+    return Doubt(effects, square_of(np.array(section.covariance), size))
+
+
+def _listed_effects(effects: Combination) -> list[dict[str, Any]]:
+    """Write effects as a file holds them."""
+    return [{"name": e.name, "settings": e.settings()} for e in effects.effects]
 
 
 def weight_of(arm: Arm) -> Direction:

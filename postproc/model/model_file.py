@@ -110,6 +110,13 @@ class MonumentSection(ModelSection):
     xyz_m: tuple[float, float, float]
 
 
+class DoubtSection(ModelSection):
+    """What may be there besides the effects, see `postproc.model.doubt.Doubt`."""
+
+    effects: tuple[EffectSection, ...]
+    covariance: tuple[float, ...]
+
+
 class RegistrationSection(ModelSection):
     """Where the survey's tracker stood: P_base = R P_tracker + t.
 
@@ -201,6 +208,7 @@ class ModelFile(ModelSection):
     weight: tuple[float, float, float] = FLOOR
     monuments: tuple[MonumentSection, ...] = ()
     provenance: ProvenanceSection | None = None
+    doubt: DoubtSection | None = None
 
 
 def content_id(data: dict[str, Any]) -> str:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from postproc.batch.archive import missing_in_cell
+from postproc.batch.plan import make_plan
+from postproc.batch.tree import scan
+from postproc.compensation.options import Options
 from postproc.language.rapid.backup import read_axes, read_backup
 from postproc.robot.cell import load_cell
+from tests.golden.rapid_cases import DATA
 from tests.language.rapid.test_backup import GIVEN, MOC, backup  # noqa: F401
 from tests.written import cli
 
@@ -120,3 +126,41 @@ def test_axes_that_the_cell_declares_are_not_asked_for(tree):
 )
 def test_axes_are_numbered_by_their_joints(text, axes):
     assert read_axes(text) == axes
+
+
+SHARED = next(line for line in DATA if "wobjdata w:" in line).replace("TASK ", "")
+OTHER = "MODULE Job\n{}\nPROC main()\n{}\nENDPROC\nENDMODULE\n"
+
+
+@pytest.mark.parametrize(
+    ("declared", "body", "code"),
+    [
+        ("", "Set do1;", 0),
+        (SHARED, "Set do1;", 0),
+        (SHARED, "w.oframe.trans.x:=n;", 1),
+        ("", "w:=wobj0;", 1),
+        (SHARED.replace("900", "901"), "Set do1;", 1),
+    ],
+)
+def test_a_batch_knows_what_other_tasks_may_change(
+    tree, monkeypatch, declared, body, code
+):
+    task = tree / "backup" / "RAPID" / "TASK1"
+    for path in (task / "PROGMOD" / "Job.mod", task / "SYSMOD" / "user.sys"):
+        path.write_text(path.read_text().replace("TASK PERS wobjdata", "PERS wobjdata"))
+    other = tree / "backup" / "RAPID" / "TASK2" / "PROGMOD" / "Job.mod"
+    other.parent.mkdir(parents=True)
+    other.write_text(OTHER.format(declared, body))
+    found = run(tree)
+    assert found.exit_code == code, found.output
+    out = tree / "out" / "RAPID"
+    before, after = (d / "PROGMOD" / "Job.mod" for d in (task, out / "TASK1"))
+    point = next(line for line in before.read_text().splitlines() if "p1:=" in line)
+    assert (point in after.read_text()) == bool(code)
+    lines = (out / "TASK2" / "PROGMOD" / "Job.mod").read_text().splitlines()
+    del lines[1]  # the stamp
+    assert lines == other.read_text().splitlines()
+    assert (after.with_name("Job.mod.postproc.json")).is_file()
+    plan = make_plan(None, tree / "cell.toml", tree / "model.json", Options())
+    monkeypatch.chdir(tree)
+    assert scan(Path("backup"), plan).units == scan(tree / "backup", plan).units

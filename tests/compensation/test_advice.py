@@ -21,7 +21,7 @@ def advice(job, **options):
 
 @pytest.mark.parametrize(
     ("job", "said"),
-    [("krl/job17", "(KRL has no --shared-points clone)"), ("rapid/job07", "(see --")],
+    [("krl/job17", "(see --shared-points clone)"), ("rapid/job07", "(see --")],
 )
 def test_moves_that_share_a_point_are_told_what_parts_them(job, said):
     found = advice(job)

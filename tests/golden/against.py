@@ -17,6 +17,7 @@ from postproc import _native
 from tests.golden.case import HERE, ROOT, Case, kept
 from tests.golden.record import Record, differences
 from tests.golden.running import run_all
+from tests.golden.translation import Translation
 
 BUILD = ROOT / "build" / "golden"
 
@@ -25,10 +26,13 @@ def against(
     commit: str, cases: Sequence[Case], workers: int, fresh: bool
 ) -> dict[str, list[str]]:
     """Tell what the package here writes otherwise than that of a commit, by case."""
-    base = records_of(commit, cases, workers, fresh)
+    words = Translation.read()
+    base = records_of(commit, [*map(words.case, cases)], workers, fresh)
     here = run_all(cases, ROOT, workers)
     found = {
-        case.name: differences(base[case.name], here[case.name], case.fitted)
+        case.name: differences(
+            words.base(base[case.name]), words.here(here[case.name]), case.fitted
+        )
         for case in cases
     }
     return {name: lines for name, lines in found.items() if lines}
@@ -72,6 +76,7 @@ def setup() -> str:
     found = hashlib.sha256(sys.version.encode())
     for path in sorted(HERE.glob("*.py")):
         found.update(path.read_bytes())
+    found.update(Translation.read().digest)
     for name, data in kept().items():
         found.update(name.encode() + data)
     for one in sorted(f"{d.name} {d.version}" for d in distributions()):

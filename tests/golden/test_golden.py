@@ -1,9 +1,10 @@
 """What the commands write is what they wrote when manifest.json was."""
 
-from tests.golden.case import ROOT
+from tests.golden.case import ROOT, Case
 from tests.golden.cases import all_cases
 from tests.golden.manifest import changed
 from tests.golden.record import differences, digest, digests_differ
+from tests.golden.translation import Translation
 
 
 def test_names_are_unique() -> None:
@@ -16,6 +17,33 @@ def test_a_changed_byte_is_seen() -> None:
     new = {"out/job.pdl": "MOVE LINEAR TO POS(1.251, 2.0, 3.0)"}
     assert differences(old, new, fitted=False)
     assert digests_differ(digest(old, False), digest(new, False))
+
+
+def test_a_rename_is_no_difference_and_a_changed_byte_is_one() -> None:
+    words = Translation(
+        arguments={"--new": "--old"},
+        keys={"why": "reason"},
+        words={"safe": "corrected", "side-not-sure": "direction-uncertain"},
+        messages={"see --old": "see --new"},
+        added={'"code": "[^"]*", ': ""},
+    )
+    old = {
+        "r.json": '{"why": "see --old", "status": "safe", "x": 1.0}',
+        "1 stdout": "safe        side-not-sure",
+        "job.pdl": "-- safe",
+    }
+    new = {
+        "r.json": '{"code": "a", "reason": "see --new", "status": "corrected", '
+        '"x": 1.0}',
+        "1 stdout": "corrected   direction-uncertain",
+        "job.pdl": "-- safe",
+    }
+    found = differences(words.base(old), words.here(new), False)
+    assert not found
+    other = words.here({**new, "job.pdl": "-- corrected"})
+    assert differences(words.base(old), other, False)
+    case = Case("c", ("compensate a --new b",))
+    assert words.case(case).commands == ("compensate a --old b",)
 
 
 def test_numbers_of_reports_are_compared_as_numbers() -> None:

@@ -61,6 +61,7 @@ from postproc.calibration.stops import AVERAGED, pool_readings
 from postproc.exceptions import ModelError
 from postproc.model.combination import Combination
 from postproc.model.covariate import JOINTS
+from postproc.model.doubt import Doubt
 from postproc.model.kinematics import Batch
 from postproc.model.model import WORST_STD, Model
 from postproc.model.statistics import ErrorStatistics
@@ -443,7 +444,19 @@ def _extended(
             ranges=model.ranges.joined(fitted.ranges, _unlike(found, diagnosis)),
             statistics=fitted.statistics | _worst(model, fitted),
         )
-    return replace(fitted, parent=model.id, history=(*model.history, record))
+    return replace(
+        fitted, parent=model.id, history=(*model.history, record),
+        doubt=_left_open(model, fitted),
+    )  # fmt: skip
+
+
+def _left_open(model: Model, extended: Model) -> Doubt | None:
+    """Keep what may be there besides a model, unless some of it is there by now."""
+    doubt, names = model.doubt, {e.name for e in extended.effects.effects}
+    old = {e.name for e in model.effects.effects}
+    if doubt is None or (names - old) & {e.name for e in doubt.effects.effects}:
+        return None
+    return doubt.among(model.effects.names, extended.effects.names)
 
 
 def _unlike(found: Search, diagnosis: Diagnosis) -> set[str]:

@@ -168,6 +168,7 @@ def only_arm(model: Model) -> Model:
         values=values,
         covariance=covariance,
         prior_std=model.prior_std[keep],
+        doubt=None if model.doubt is None else model.doubt.kept(keep),
     )
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
-from postproc.arrays import Floats
+from postproc._native import of_blocks
+from postproc.arrays import Floats, floats
 from postproc.calibration.diagnosis.library import (
     Projection,
     ReducedCandidates,
@@ -40,20 +41,14 @@ def log_evidence(blocks: ReducedCandidates, square: Floats, rows: int) -> Floats
         square: |z|^2 of every draw, (draws,).
         rows: Number of scalar rows N.
     """
-    gain, along2 = blocks.gain, blocks.along**2
-    largest = np.maximum(gain.max(axis=1, keepdims=True), 1e-300)
+    gain, share = blocks.gain, blocks.along**2 / square
+    largest = gain.max(axis=1)
     if gain.shape[1] == 1:
-        best = _of_one_column(along2[:, 0] / (largest * square), rows)
+        single = np.maximum(largest, 1e-300)[:, None]
+        best = _of_one_column(share[:, 0] / single, rows)
     else:
-        best = np.zeros(along2.shape[::2])
-        for signal in SIGNALS:
-            s2 = signal / largest
-            shrunk = 1.0 + s2 * gain
-            cost = 0.5 * np.log(shrunk).sum(axis=1)
-            taken = np.einsum("ck,ckd->cd", s2 / shrunk, along2)
-            left = np.maximum(1.0 - taken / square, 1e-12)
-            np.maximum(best, -0.5 * rows * np.log(left) - cost[:, None], out=best)
-    best[largest[:, 0] < NOTHING_LEFT] = 0.0
+        best = of_blocks(floats(gain), floats(share), SIGNALS, rows)
+    best[largest < NOTHING_LEFT] = 0.0
     return best
 
 

@@ -52,7 +52,6 @@ TERMS = Terms(
     angles="how the tool turns on the way is not sure: {}",
     arc="how the tool turns on this arc is not sure ({}): turn it in smaller steps",
     laws=("", "#VAR", "$CIRC_TYPE, $CIRC_MODE", "", "", "$ORI_TYPE = #JOINT"),
-    cloning="KRL has no --shared-points clone",
     border="axis {} ends within 0.02 deg of 0, where T is not sure: a wrong one turns "
     "it by 360 deg",
 )

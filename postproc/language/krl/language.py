@@ -16,11 +16,11 @@ from postproc.language.interface import (
     Cloner,
     JobReading,
     Language,
-    NoClones,
     Start,
 )
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
+from postproc.language.krl.clones import KrlCloner
 from postproc.language.krl.collect import visits_of
 from postproc.language.krl.dialect import KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
@@ -42,7 +42,6 @@ _ACCURACY = {
     "$deactivate_abs_accur": ("true",),
     "$suppress_abs_accur": ("true",),
 }
-_NOT_CLONED = "points of KRL are not cloned: give the move a point of its own"
 
 
 class Krl(Language):
@@ -89,8 +88,8 @@ class Krl(Language):
         return JobReading(texts, visits, tuple(sorted(set(found))), kept, missed)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
-        """Say that nothing is cloned."""
-        return NoClones(_NOT_CLONED)
+        """Parse the files of a job to clone points of its data lists."""
+        return KrlCloner.of(KrlTask([read_krl(source) for source in sources]))
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]

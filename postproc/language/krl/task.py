@@ -172,6 +172,12 @@ class KrlTask:
         place = self.place(name, here)
         return None if place is None else self._own[(*place, name)].get(index)
 
+    def declared(
+        self, place: tuple[str, str, str]
+    ) -> Mapping[tuple[int, ...], tuple[int, KrlDatum]]:
+        """Return data by their index: the file, the routine and the name of them."""
+        return self._own.get(place, {})
+
     def untold(self, name: str, here: Scope) -> str:
         """Say why a name stands for no known value."""
         if name in here.parameters:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from postproc.robot.pose import record_from_pose
 PROGRAMS, SYSTEM = "progmod", "sysmod"  # folders of a task
 SETTINGS = ("syspar", "moc.cfg")
 ARM_AXES = 6
+READ_BEFORE = 4096  # modules of which is known whether they can be read
 DEPTH = 4  # folders above a program in which the settings of its backup may lie
 _ENTRY = re.compile(r'-(\w+)\s+("[^"]*"|[^\s\\]+)')
 _PLACE = tuple(f"base_frame_pos_{axis}" for axis in "xyz")
@@ -59,9 +61,35 @@ def system_modules(program: Path) -> tuple[Path, ...]:
     Args:
         program: A module in ``PROGMOD``.
     """
-    if program.parent.name.lower() != PROGRAMS or not program.parent.parent.is_dir():
+    task = _task_of(program)
+    return () if task is None else _modules(_entry(task, SYSTEM))
+
+
+def modules_beside(program: Path) -> tuple[Path, ...]:
+    """Return the modules of all other tasks of the backup that a program stands in.
+
+    They run at the same time, and may change data that several tasks declare.
+
+    Args:
+        program: A module in ``PROGMOD``.
+    """
+    own = _task_of(program)
+    if own is None:
         return ()
-    folder = _entry(program.parent.parent, SYSTEM)
+    tasks = (p for p in sorted(own.parent.iterdir()) if p.is_dir() and p != own)
+    folders = (_entry(task, name) for task in tasks for name in (PROGRAMS, SYSTEM))
+    return tuple(module for folder in folders for module in _modules(folder))
+
+
+def _task_of(program: Path) -> Path | None:
+    """Return the folder of the task that a program belongs to, None for no backup."""
+    folder = program.absolute().parent
+    in_task = folder.name.lower() == PROGRAMS and folder.parent.is_dir()
+    return folder.parent if in_task else None
+
+
+def _modules(folder: Path | None) -> tuple[Path, ...]:
+    """Return the modules of a folder that can be read."""
     if folder is None or not folder.is_dir():
         return ()
     files = (p for p in sorted(folder.iterdir()) if is_module(p.name))
@@ -132,6 +160,13 @@ def _entry(folder: Path, name: str) -> Path | None:
 
 def _is_readable(path: Path) -> bool:
     """Return True if a module can be read: system modules may be encoded."""
+    at = path.stat()
+    return _is_text(path, at.st_mtime_ns, at.st_size)
+
+
+@lru_cache(maxsize=READ_BEFORE)
+def _is_text(path: Path, changed: int, size: int) -> bool:
+    """Read a module, as it is at a time, to see whether it can be read."""
     try:
         data = read_input(path)
         read_rapid(source_from_bytes(path.name, data))

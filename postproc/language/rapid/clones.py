@@ -10,7 +10,7 @@ from typing import cast
 from postproc.language.interface import Cloner, NamedPoint
 from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.program import Datum, MotionCall
+from postproc.language.rapid.program import Datum, MotionCall, RapidFile
 from postproc.language.rapid.task import TARGETS, RapidTask
 from postproc.language.source import (
     CloneError,
@@ -62,9 +62,14 @@ class RapidCloner(Cloner):
     taken: set[str] = field(default_factory=set)
 
     @classmethod
-    def of(cls, task: RapidTask) -> RapidCloner:
-        """Get ready to clone points of a task."""
-        texts = (file.text.source.data for file in task.files)
+    def of(cls, task: RapidTask, beside: Sequence[RapidFile] = ()) -> RapidCloner:
+        """Get ready to clone points of a task.
+
+        Args:
+            task: The task.
+            beside: Files of other tasks: data of one name may be shared with them.
+        """
+        texts = (file.text.source.data for file in (*task.files, *beside))
         words = {w.decode("latin-1").lower() for t in texts for w in _WORD.findall(t)}
         return cls(task, words)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeGuard
@@ -42,6 +42,7 @@ from postproc.language.rapid.modes import (
     given_modes,
 )
 from postproc.language.rapid.moves import Goals, pose_of
+from postproc.language.rapid.program import RapidFile
 from postproc.language.rapid.signatures import (
     MOTIONS,
     STILL_FUNCTIONS,
@@ -92,9 +93,17 @@ class RapidMachine(TaskMachine):
     )
 
     @classmethod
-    def of(cls, task: RapidTask, start: Start) -> RapidMachine:
-        """Get ready to follow a task."""
-        texts = [file.text for file in task.files]
+    def of(
+        cls, task: RapidTask, start: Start, beside: Sequence[RapidFile] = ()
+    ) -> RapidMachine:
+        """Get ready to follow a task.
+
+        Args:
+            task: The task.
+            start: What the cell says.
+            beside: Files of other tasks.
+        """
+        texts = [file.text for file in (*task.files, *beside)]
         return cls(texts, start, task=task, goals=Goals(task))
 
     def run(self) -> None:

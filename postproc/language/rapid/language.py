@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
-from postproc.files import MODULES, is_system_module
+from postproc.files import MODULES, task_beside
 from postproc.language.archive import Archive
 from postproc.language.grammars import line_parser
 from postproc.language.interface import (
@@ -21,14 +21,19 @@ from postproc.language.interface import (
     Start,
 )
 from postproc.language.outline import read_once
-from postproc.language.rapid.backup import mounted_arms, read_backup, system_modules
+from postproc.language.rapid.backup import (
+    modules_beside,
+    mounted_arms,
+    read_backup,
+    system_modules,
+)
 from postproc.language.rapid.clones import RapidCloner
 from postproc.language.rapid.collect import visits_of
 from postproc.language.rapid.dialect import RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.rapid.statements import RapidText
-from postproc.language.rapid.task import RapidTask
+from postproc.language.rapid.task import RapidTask, other_tasks
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import Source
 from postproc.language.visits import never_reached
@@ -59,30 +64,28 @@ class Rapid(Language):
         known: Sequence[RapidFile] = (),
     ) -> JobReading:
         """Read the modules of a task, the one with main first; see `Language.read`."""
-        files = [read_once(source, known, read_rapid) for source in sources]
-        if not files[0].routines:
-            problem, cure = "the file holds no routine", "Give a RAPID module"
-            raise ProgramError(sources[0].name, problem, cure)
-        task = RapidTask(files, start.taught)
-        machine = RapidMachine.of(task, start)
+        task, beside = _tasks(sources, start, known)
+        files = [*task.files, *beside]
+        machine = RapidMachine.of(task, start, beside)
         machine.run()
         visits = visits_of(machine)
-        moves = {k: [m.row for m in file.moves] for k, file in enumerate(files)}
+        moves = {k: [m.row for m in file.moves] for k, file in enumerate(task.files)}
         missed = machine.missed(moves)
-        missed = {k: v for k, v in missed.items() if not is_system_module(k)}
+        system = frozenset(f.text.source.name for f in task.files if f.is_system)
+        missed = {k: v for k, v in missed.items() if k not in system}
         told = never_reached(missed, "main", "module")
-        own = (d for file in files for d in file.diagnostics)
-        own = (d for d in own if not is_system_module(d.file))
+        own = (d for file in task.files for d in file.diagnostics)
+        own = (d for d in own if d.file not in system)
         found = [d for d in own if d.code not in _SAID_AGAIN]
         found += [*machine.diagnostics, *told]
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
         kept = tuple(f for f in files if f.text.source.name not in corrected)
         texts = tuple(skeleton_of(file.text) for file in files)
-        return JobReading(texts, visits, tuple(sorted(found)), kept, missed)
+        return JobReading(texts, visits, tuple(sorted(found)), kept, missed, system)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the modules of a task to clone points in them."""
-        return RapidCloner.of(RapidTask([read_rapid(source) for source in sources]))
+        return RapidCloner.of(*_tasks(sources, Start()))
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
@@ -102,8 +105,8 @@ class Rapid(Language):
         return _JOINTS.match(line) is not None
 
     def reads(self, program: Path) -> tuple[Path, ...]:
-        """Return the system modules of the task, in a backup."""
-        return system_modules(program)
+        """Return the system modules of the task, and the modules of others."""
+        return (*system_modules(program), *modules_beside(program))
 
     def read_archive(self, folder: Path) -> Archive | None:
         """Read ``MOC.cfg`` of a backup."""
@@ -116,6 +119,28 @@ class Rapid(Language):
     def prepare(self) -> None:
         """Load the parser of statements."""
         line_parser("rapid", "statement")
+
+
+def _tasks(
+    sources: Sequence[Source], start: Start, known: Sequence[RapidFile] = ()
+) -> tuple[RapidTask, list[RapidFile]]:
+    """Read the task of a program, and the files of the tasks beside it.
+
+    Raises:
+        ProgramError: A file of the task is none, or the first holds no routine.
+    """
+    own = [source for source in sources if not task_beside(source.name)]
+    files = [read_once(source, known, read_rapid) for source in own]
+    if not files[0].routines:
+        problem, cure = "the file holds no routine", "Give a RAPID module"
+        raise ProgramError(sources[0].name, problem, cure)
+    before = {file.text.source.name: file for file in known}
+    beside = []
+    for source in sources[len(own) :]:
+        file = before.get(source.name)
+        same = file is not None and file.text.source == source
+        beside.append(file if file is not None and same else read_rapid(source))
+    return RapidTask(files, start.taught, other_tasks(beside)), beside
 
 
 _DECLARED = re.compile(

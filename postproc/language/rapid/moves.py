@@ -271,7 +271,7 @@ class Goals:
             name=shown,
             aux=aux,
             why=why or ("" if file >= 0 else "it is computed from other data"),
-            pins=self._pinned(name, operand),
+            pins=self._pinned(name, scope),
         )
 
     def _own_places(
@@ -337,11 +337,13 @@ class Goals:
             return "is no data of the files at hand, or of several of them"
         if found[1].declared.value is None:
             return "has no value in the files at hand"
+        if self.task.is_changed_beside(*found):
+            return f"may be changed by another task at any time: {RUN_TIME}"
         if self.task.constant(name, scope) is None:
             return f"may be changed by the program: {RUN_TIME}"
         return f"has an element or value that is not known: {RUN_TIME}"
 
-    def _pinned(self, name: str, operand: said.Operand) -> str:
+    def _pinned(self, name: str, scope: Scope) -> str:
         """Say why a point must keep its numbers."""
         if not name:
             return ""
@@ -352,6 +354,8 @@ class Goals:
             )
         if "getdataval" in self.task.called:
             return f"GetDataVal may take {name} by a name in a string"
+        if self.task.is_used_beside(name, scope):
+            return f"{name} is data of another task too, which has its numbers as well"
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
         return ""

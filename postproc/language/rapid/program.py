@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.diagnostics import Code
-from postproc.files import has_system_suffix, is_system_module
+from postproc.files import is_named_as_system
 from postproc.language.flow import HeadedRows
 from postproc.language.outline import BlockWords, Outline
 from postproc.language.rapid.signatures import MOTIONS, Signature, known_instructions
@@ -102,8 +102,7 @@ class RapidFile:
         """
         heads = (scope.head for scope in self.modules)
         said = any(isinstance(h, ModuleHead) and _SYSTEM in h.attributes for h in heads)
-        name = self.text.source.name
-        return said or is_system_module(name) or has_system_suffix(name)
+        return said or is_named_as_system(self.text.source.name)
 
 
 def read_rapid(source: Source) -> RapidFile:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from postproc.files import task_beside
 from postproc.language.flow import HeadedRows
 from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
@@ -51,10 +53,13 @@ class RapidTask:
     Attributes:
         files: Its files, the one with the main routine first.
         taught: Lower-case names of data that were taught with the arm, by the cell.
+        others: Tasks that run at the same time.
     """
 
     files: Sequence[RapidFile]
     taught: Collection[str] = frozenset()
+    others: Sequence[RapidTask] = ()
+    _moved: dict[tuple[int, int], bool] = field(default_factory=dict)
     _local: dict[tuple[int, str, str], dict[str, Datum]] = field(default_factory=dict)
     _global: dict[str, list[tuple[int, Datum]]] = field(default_factory=dict)
 
@@ -130,7 +135,70 @@ class RapidTask:
         if name in self.loop_variables:  # it may hide the data
             return None
         changed = name in self.written or bool(BY_STRING & self.called)
-        return None if changed and found[1].declared.kind != "const" else found
+        changed = changed and found[1].declared.kind != "const"
+        return None if changed or self.is_changed_beside(*found) else found
+
+    # What other tasks do: global persistents of one name are the same data.
+
+    def is_changed_beside(self, file: int, datum: Datum) -> bool:
+        """Return True if another task may change data, or begin with other values."""
+        key = file, datum.row
+        if key not in self._moved:
+            self._moved[key] = _is_shared(datum)  # while it is worked out
+            own = self._first_value(file, datum)
+            self._moved[key] = _is_shared(datum) and any(
+                other.may_set(datum.declared.name, own) for other in self.others
+            )
+        return self._moved[key]
+
+    def is_used_beside(self, name: str, here: Scope) -> bool:
+        """Return True if another task has the data that a name means, too."""
+        found = self.datum(name, here)
+        if found is None or not _is_shared(found[1]):
+            return False
+        return any(name in other.persistents | other.strange for other in self.others)
+
+    def may_set(self, name: str, value: Nested | None) -> bool:
+        """Return True if a persistent may come to hold another value by this task."""
+        if name in self.changes:
+            return True
+        shared = (one for one in self._global.get(name, ()) if _is_shared(one[1]))
+        found = (self._first_value(*one) for one in shared)
+        return any(one is None or one != value for one in found)
+
+    @cached_property
+    def persistents(self) -> frozenset[str]:
+        """Names of data that tasks share with others that declare them too."""
+        data = (one for found in self._global.values() for _, one in found)
+        return frozenset(one.declared.name for one in data if _is_shared(one))
+
+    @cached_property
+    def strange(self) -> frozenset[str]:
+        """Names that it takes or changes and does not declare: shared modules do."""
+        return (self.written | self.read | self._odd_words) - self.declared
+
+    @cached_property
+    def changes(self) -> frozenset[str]:
+        """Names of data of several tasks that this one may change."""
+        by_name = self.persistents if BY_STRING & self.called else frozenset()
+        written = self.written | self._odd_words
+        return by_name | (written & (self.persistents | self.strange))
+
+    @cached_property
+    def _odd_words(self) -> frozenset[str]:
+        """Words of what is not understood: each may name what is set there."""
+        texts = [
+            file.text.text(row)
+            for file in self.files
+            for row in range(len(file.text))
+            if isinstance(file.text.statement(row), said.NotUnderstood)
+        ]
+        return frozenset(w for text in texts for w in _WORD.findall(text.lower()))
+
+    def _first_value(self, file: int, datum: Datum) -> Nested | None:
+        """Return what data hold at first, without where it is written."""
+        there = Scope(file, datum.module, datum.routine)
+        return _bare(self.record(datum.declared.value, datum.row, there))
 
     @cached_property
     def called(self) -> frozenset[str]:
@@ -314,6 +382,29 @@ class RapidTask:
 
 
 DEEPEST = 20  # names that stand for names
+_WORD = re.compile(r"[a-z_]\w*")
+
+
+def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
+    """Group the files of tasks that run beside a program, by the names of files."""
+    tasks: dict[str, list[RapidFile]] = {}
+    for file in files:
+        tasks.setdefault(task_beside(file.text.source.name), []).append(file)
+    return [RapidTask(own) for own in tasks.values()]
+
+
+def _is_shared(datum: Datum) -> bool:
+    """Return True if data are those of every task that declares them likewise."""
+    declared = datum.declared
+    return declared.kind == "pers" and not (declared.scope or datum.routine)
+
+
+def _bare(found: Nested | None) -> Nested | None:
+    """Return values without where they are written."""
+    if isinstance(found, tuple):
+        parts = [_bare(one) for one in found]
+        return tuple(one for one in parts if one is not None)
+    return WrittenNumber(found.value) if isinstance(found, WrittenNumber) else found
 
 
 def parameters_of(routine: HeadedRows) -> tuple[said.RoutineParameter, ...]:

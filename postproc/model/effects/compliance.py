@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from postproc.model.effects.effect import (
     alternatives,
     own_cells,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import Batch, Loads
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -155,14 +155,45 @@ class Compliance(WeightEffect, JointEffect):
 
     The torque is that of the nominal links and of the declared payload. Torque is
     linear in the links' first moments, so their deviations are columns too.
+
+    Attributes:
+        along: Direction in which weight pulls, base frame; None: as on this arm.
     """
 
     name: ClassVar[str] = "compliance"
+
+    along: tuple[float, float, float] | None = None
 
     @classmethod
     def cells(cls) -> Cells:
         """Name the cells of the table of causes that it is."""
         return own_cells("torque {j}", "linear")
+
+    @classmethod
+    def along_axes(cls, batch: Batch) -> tuple[Self, Self, Self]:
+        """Make the effect of weight along each axis of the base.
+
+        All have the same parameters: weight along any direction is a mix of them, its
+        components the weights. Moments of links are columns where no links are known.
+        """
+        load = np.zeros(6)
+        for axis in np.eye(3):
+            on = Batch(batch.arm.mounted(axis), batch.states).loads
+            unit = on.basis.reshape(len(batch), 6, 6, 4)[..., 1:]
+            load = np.maximum(load, loads(batch, on.total, unit))
+        known = batch.arm.file.links is not None
+        least = max(LOADED * float(load.max()), 1e-9)
+        joints = tuple(
+            j for j in (JOINTS if known else YIELDING) if load[j - 1] > least
+        )
+        made = cls.of_joints(batch, joints or YIELDING, load)
+        if known:
+            made = replace(made, moments=((),) * len(made.joints), payload=False)
+        along = (
+            replace(made, along=(1.0, 0.0, 0.0)),
+            replace(made, along=(0.0, 1.0, 0.0)),
+        )
+        return *along, replace(made, along=(0.0, 0.0, 1.0))
 
     @classmethod
     def on(cls, batch: Batch) -> Self:
@@ -184,23 +215,43 @@ class Compliance(WeightEffect, JointEffect):
         out = []
         scales = self.softness or (SCALE,) * len(self.joints)
         for j, links, scale in zip(self.joints, self.moments, scales, strict=True):
-            out.append(Parameter(f"k{j}", "rad/(N m)", scale, f"{j}", j, True))
+            k, group = f"k{j}{self._where}", f"{j}{self._where}"
+            out.append(Parameter(k, "rad/(N m)", scale, group, j, True))
             for link, spread in links:
                 out += [
-                    Parameter(f"k{j}_m{link}{a}", "rad kg/N", scale * spread, f"{j}", j)
+                    Parameter(f"{k}_m{link}{a}", "rad kg/N", scale * spread, group, j)
                     for a in AXES
                 ]
             if self.payload:
                 wide = scale * UNSURE_PAYLOAD
                 out += [
-                    Parameter(f"k{j}_com_{a}", "rad/N", wide, f"{j}", j) for a in AXES
+                    Parameter(f"{k}_com_{a}", "rad/N", wide, group, j) for a in AXES
                 ]
         return tuple(out)
 
+    def settings(self) -> dict[str, Any]:
+        """Leave the direction out where it is the arm's."""
+        own = super().settings()
+        return {k: v for k, v in own.items() if k != "along" or v is not None}
+
+    @property
+    def _where(self) -> str:
+        """Tell weight of another direction than the arm's in names."""
+        if self.along is None:
+            return ""
+        return "_along_" + "_".join(f"{v:g}" for v in self.along)
+
+    def _loads(self, batch: Batch) -> Loads:
+        """Take the torques of weight in its own direction."""
+        if self.along is None:
+            return batch.loads
+        return Loads(batch.arm.mounted(np.array(self.along)), batch.states)
+
     def basis(self, batch: Batch) -> Floats:
         """Evaluate torque [N m] and torque per unit of moment, (n, p)."""
-        torque = batch.loads.gravity + batch.loads.payload
-        unit = batch.loads.basis.reshape(len(batch), 6, 6, 4)
+        of = self._loads(batch)
+        torque = of.gravity + of.payload
+        unit = of.basis.reshape(len(batch), 6, 6, 4)
         mass = np.nan_to_num(batch.states.payload)[:, None]
         columns = []
         for j, links in zip(self.joints, self.moments, strict=True):

@@ -99,3 +99,14 @@ def test_a_batch_copies_system_modules(folder):
     cli("batch", folder / "in", folder / "out", *given, "-j", "1")
     assert (folder / "out" / "user.sys").read_text() == files["user.sys"]
     assert (folder / "out" / "job.mod").read_text() != files["job.mod"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_system_module_is_told_by_what_it_says_not_by_its_points(folder, name):
+    tool = next(line for line in DATA if "tooldata t:" in line)
+    files = parts(name, declared=tool, body=go("nowhere") + "\nodd 1;")
+    files["job.mod"] = module(go("p2")).decode().replace(tool + "\n", "")
+    found = compensated(folder, files)
+    assert found.exit_code == 0, found.stderr
+    assert f"{name} is read, and not rewritten" in found.stderr
+    assert f"{name}:" not in found.stderr
