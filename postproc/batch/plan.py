@@ -16,7 +16,14 @@ from postproc.compensation.options import Options
 from postproc.exceptions import CellError, PostprocError
 from postproc.model.model import Model, load_model
 from postproc.robot.arm_file import Strict, read_toml
-from postproc.robot.cell import ArmNumber, Cell, load_cell
+from postproc.robot.cell import (
+    MOTIONLESS,
+    ArmNumber,
+    Cell,
+    FrameSection,
+    LimitSection,
+    load_cell,
+)
 
 # Which cell and which model a program is compensated with.
 
@@ -34,19 +41,49 @@ class JobSetup:
         """Hash all that decides, beside the sources, what comes out.
 
         Contents count, places do not: a copy of the same cell file is the same cell.
+        It is made in the words that logs began with, so that they are resumed.
         """
         parts = {
             "version": __version__,
-            "cell": self.cell.file.model_dump(mode="json", exclude=NOT_DECIDING),
+            "cell": _in_first_words(self.cell.file.model_dump(mode="json")),
             "arm": self.cell.arm.file.model_dump(mode="json"),
             "model": self.model.id,
-            "options": self.options.told(),
+            "options": _options_in_first_words(self.options.told()),
         }
         text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-NOT_DECIDING = {"verify", "compensation", "measurements"}  # or told by the options
+NOT_DECIDING = ("verify", "compensation", "measurements", "serial_number")
+FIRST_WORDS = {
+    **{new: old for section in (LimitSection, FrameSection)
+       for old, new in section.RENAMED.items()},
+    MOTIONLESS: "still",
+    "edit_exported": "shared",
+    "assume_motion": "strict_calls",
+    "path_tolerance_mm": "path_mm",
+    "preload_backlash": "take_up",
+    "reapproach": "approach",
+}  # fmt: skip
+
+
+def _in_first_words(content: Any) -> Any:
+    """Return what decides of a cell in the words of version 0.1.0."""
+    if isinstance(content, dict):
+        return {
+            FIRST_WORDS.get(key, key): _in_first_words(value)
+            for key, value in content.items()
+            if key not in NOT_DECIDING
+        }
+    return FIRST_WORDS[MOTIONLESS] if content == MOTIONLESS else content
+
+
+def _options_in_first_words(told: Mapping[str, object]) -> dict[str, object]:
+    """Return options in the words of version 0.1.0, which knew mean and clone."""
+    found = {FIRST_WORDS.get(name, name): value for name, value in told.items()}
+    shared = found.pop("shared_points")
+    found["clone"] = shared == "clone"
+    return found | ({"shared_points": shared} if shared == "leave" else {})
 
 
 def open_setup(

@@ -147,10 +147,10 @@ class Model:
             joints goes from flank to flank, by reversals of the survey; UNTOLD where
             they do not tell, empty where none were measured.
         weight: Direction in which weight pulled, unit vector in the base frame.
-        monuments: Fixed points that the survey read.
-        doubt: What may be there besides the effects; None where that is hardly any.
         provenance: When, for which robot and by what it was fitted, None where that is
             not known; no part of the id.
+        monuments: Fixed points that the survey read.
+        doubt: What may be there besides the effects; None where that is hardly any.
     """
 
     method: Method
@@ -172,8 +172,8 @@ class Model:
     flank_widths: tuple[Width, ...] = ()
     weight: Direction = FLOOR
     monuments: tuple[Monument, ...] = ()
-    doubt: Doubt | None = None
     provenance: Provenance | None = None
+    doubt: Doubt | None = None
 
     @cached_property
     def id(self) -> str:
@@ -498,13 +498,13 @@ class Model:
             data["monuments"] = [
                 {"name": name, "xyz_m": xyz} for name, xyz in self.monuments
             ]
+        if self.provenance is not None:
+            data["provenance"] = asdict(self.provenance)
         if self.doubt is not None:
             data["doubt"] = {
                 "effects": _listed_effects(self.doubt.effects),
                 "covariance": packed(self.doubt.covariance),
             }
-        if self.provenance is not None:
-            data["provenance"] = asdict(self.provenance)
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -585,10 +585,10 @@ def _model_of(path: Path, file: ModelFile) -> Model:
         flank_widths=tuple(UNTOLD if w is None else w for w in file.flank_widths),
         weight=file.weight,
         monuments=tuple((m.name, m.xyz_m) for m in file.monuments),
-        doubt=None if file.doubt is None else _doubt_of(path, file.doubt, count),
         provenance=None
         if (origin := file.provenance) is None
         else Provenance(**origin.model_dump()),
+        doubt=None if file.doubt is None else _doubt_of(path, file.doubt, count),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id

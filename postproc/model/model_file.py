@@ -207,8 +207,8 @@ class ModelFile(ModelSection):
     flank_widths: Annotated[tuple[WidthSection | None, ...], Field(max_length=6)] = ()
     weight: tuple[float, float, float] = FLOOR
     monuments: tuple[MonumentSection, ...] = ()
-    doubt: DoubtSection | None = None
     provenance: ProvenanceSection | None = None
+    doubt: DoubtSection | None = None
 
 
 def content_id(data: dict[str, Any]) -> str:

@@ -18,8 +18,10 @@ from tests.conftest import SEED
 from tests.fuzz.case import records_of
 from tests.language.neutral_job import drawn, krl
 
-CLONE = Options(shared_points="clone")
-EXPORTED = replace(CLONE, edit_exported=True)
+CLONE, EXPORTED = (
+    Options(shared_points="clone"),
+    Options(shared_points="clone", edit_exported=True),
+)
 
 
 def run(files, cell, model, options=CLONE):
