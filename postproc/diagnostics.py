@@ -134,8 +134,8 @@ class Code(StrEnum):
         NOTE,
         "A routine that is in no file at hand is on the shipped list of routines that "
         "neither move the arm nor set frames.",
-        "Where it does, say so under [routines] of the cell; --strict-calls takes no "
-        "routine from the list.",
+        "Where it does, say so under [routines] of the cell; assume_motion of "
+        "[compensation] takes no routine from the list.",
     )
     MOTION_UNKNOWN = (
         "motion-unknown",
@@ -318,7 +318,7 @@ class Code(StrEnum):
         "cloned",
         NOTE,
         "Moves got a point of their own, since another move to the same point needs "
-        "another correction (--clone).",
+        "another correction (--shared-points clone).",
     )
     NOT_CLONED = (
         "not-cloned",
@@ -383,7 +383,7 @@ class Code(StrEnum):
         "no-variable-file",
         WARNING,
         "Targets have no value in the program, and its variable file is missing.",
-        "Put it beside the program, or give it with --lsv.",
+        "Put it beside the program, or give it with --variables.",
     )
     LSV_LINE = (
         "lsv-line",
@@ -489,7 +489,8 @@ class Code(StrEnum):
         "exported-variable",
         WARNING,
         "Other programs may read the variable of the target too.",
-        "Pass --shared where the others are compensated with it.",
+        "Set edit_exported in [compensation] of the cell where the others are compensated "
+        "with it.",
     )
     NUMBERS_USED_ELSEWHERE = (
         "numbers-used-elsewhere",
@@ -722,6 +723,12 @@ class Code(StrEnum):
         "Arrivals at one point need different corrections.",
         "Give each move a point of its own.",
     )
+    SHARED_POINT = (
+        "shared-point",
+        WARNING,
+        "Several moves go to one point, and the cell keeps such points as they are.",
+        'Set shared_points = "mean" or "clone" under [compensation].',
+    )
     DEPENDANT_WORSE = (
         "dependant-worse",
         WARNING,
@@ -791,7 +798,7 @@ class Code(StrEnum):
         "left-alone",
         ERROR,
         "Targets that could have been compensated keep their values.",
-        "Look at them, then pass --accept-left.",
+        "Look at them, then pass --allow-uncorrected.",
     )
 
 

@@ -46,7 +46,7 @@ for job in $jobs; do
     cp demo/$job.pdl demo/$job.pdl.postproc.json demo/upload
 done
 cp demo/spot.lsv demo/upload
-run postproc check demo/upload --cell $cell --model demo/model.json --accept-left \
+run postproc check demo/upload --cell $cell --model demo/model.json --allow-uncorrected \
     --second-opinion
 
 title "What the tool really misses by: programs as written, and compensated"
@@ -55,7 +55,7 @@ for job in $jobs; do
         program=programs/$job.pdl
         [ $state = written ] || program=demo/$job.pdl
         run postproc simulate "$program" --cell $cell --seed "$seed" \
-            --wanted programs/$job.pdl --path --json demo/$job.$state.json
+            --reference programs/$job.pdl --path --json demo/$job.$state.json
     done
 done
 

@@ -58,8 +58,8 @@ Written by `make intervals`, which is
 real arms, a UR10 (series A, B and D) and a UR5 (`grid` and `random`).
 
 A *reading* is what the tracker shows for one arrival at a pose. Its 95 % interval is
-1.96 times the standard deviation that `postproc predict --frame base` or `--frame
-tracker` writes (`reading_sx_mm` ..): uncertain parameters of all effects, those of the
+1.96 times the standard deviation that `postproc predict` writes where the frame of the
+measurements is stated (`reading_sx_mm` ..): uncertain parameters of all effects, of the
 set-up among them, the arm's repeatability, the tracker, and heavy tails. How heavy they
 are, a fit asks each of its rows, predicted without itself; no row that is counted below
 was seen by the fit that predicts it. *At least, at most* are the lowest and the highest

@@ -127,7 +127,9 @@ def scored(
 ) -> tuple[float, float]:
     """Let the arm run a program; mean along the shape and AT_p, second time round."""
     told = to / "true.json"
-    paths.done("simulate", run, *at, *arm, "--path", "--wanted", source, "--json", told)
+    paths.done(
+        "simulate", run, *at, *arm, "--path", "--reference", source, "--json", told
+    )
     own = json.loads(told.read_bytes())["path"]
     second = own[len(own) // 2 + 1 :] if len(own) > 2 else own
     return (

@@ -1,6 +1,6 @@
 """How well compensated programs keep to their paths, and how well that is predicted.
 
-    python docs/studies/paths.py [--seeds 41 45] [--gears sharp] [--unmeasured]
+    python docs/studies/paths.py [--seeds 41 45] [--backlash-model sharp] [--unmeasured]
 
 For each virtual arm: a survey of 300 poses from both sides and of reversals, a model, a
 job of 40 lines of 300 to 900 mm and 20 arcs with stops and random approaches at 50 mm/s
@@ -54,9 +54,19 @@ REVERSALS = 4  # of every joint
 PROGRAMS: dict[str, tuple[str, ...]] = {
     "job": (),
     "plain": (),
-    "points": ("--path-mm", "0.1", "--take-up"),
+    "points": (
+        "--path-tolerance",
+        "0.1",
+        "--set",
+        "compensation.preload_backlash=true",
+    ),
     "diagnosed": (),
-    "measured": ("--path-mm", "0.1", "--take-up"),
+    "measured": (
+        "--path-tolerance",
+        "0.1",
+        "--set",
+        "compensation.preload_backlash=true",
+    ),
 }
 DIAGNOSED = ("diagnosed", "measured")  # with the model that knows the track
 STATES = {
@@ -149,7 +159,7 @@ def follow(ran: Path, *arm: object) -> dict[str, Any]:
 
 def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
     """Print the figures of one arm."""
-    arm = ("--seed", seed, "--gears", gears)
+    arm = ("--seed", seed, "--backlash-model", gears)
     place = fit_a_survey(folder, *arm, reversals=REVERSALS)
     (folder / "job.pdl").write_text(job(seed, load_cell(place)))
     at = ("--cell", place)
@@ -167,8 +177,8 @@ def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
     paths: dict[str, PathScores] = {}
     for name in programs:
         run = simulate_file(
-            folder / f"{name}.pdl", place, seed, wanted=folder / "job.pdl", path=True,
-            gears=gears,
+            folder / f"{name}.pdl", place, seed,
+            reference=folder / "job.pdl", path=True, gears=gears,
         )  # fmt: skip
         assert run.paths is not None
         paths[name] = run.paths
@@ -235,7 +245,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs=2, default=(41, 45))
-    parser.add_argument("--gears", default="sharp")
+    parser.add_argument("--backlash-model", default="sharp")
     parser.add_argument("--unmeasured", action="store_true")
     given = parser.parse_args()
     first, last = given.seeds

@@ -88,7 +88,12 @@ def write_test(data: DataSet, split: Split, draw: int, place: Path) -> None:
 
 def fit_of(data: DataSet, place: Path) -> tuple[str, ...]:
     """Return what `postproc` is given to fit a folder."""
-    given = ("--cell", f"{place}/cell.toml", "--frame", data.about.frame)
+    given = (
+        "--cell",
+        f"{place}/cell.toml",
+        "--set",
+        f"measurements.frame={data.about.frame}",
+    )
     return ("fit", f"{place}/fit.csv", *given, "-o", f"{place}/model.json")
 
 
@@ -97,7 +102,7 @@ def predict_of(data: DataSet, split: Split, place: Path) -> tuple[str, ...]:
 
     In another set-up the registration is found from the tested rows themselves.
     """
-    frame = ("--frame", data.about.frame)
+    frame = ("--set", f"measurements.frame={data.about.frame}")
     how = frame if split.same else ("--refit", "registration")
     given = ("--cell", f"{place}/cell.toml", "--model", f"{place}/model.json")
     out = ("-o", f"{place}/predicted.csv")

@@ -29,7 +29,9 @@ def verdicts(folder: Path, seed: int, gears: str, count: int) -> tuple[str, ...]
     place.write_text(paths.CELL)
     at = ("--cell", place)
     paths.done("survey", *at, "--reversals", count, "-o", program)
-    paths.done("simulate", program, *at, "--seed", seed, "--gears", gears, "-o", rows)
+    paths.done(
+        "simulate", program, *at, "--seed", seed, "--backlash-model", gears, "-o", rows
+    )
     cell = load_cell(place)
     return verdicts_of_flanks(
         fit(rows, cell=cell, effects=BASE_EFFECTS).model, cell.arm

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from postproc.arrays import data_frame
-from postproc.batch.plan import make_plan
+from postproc.batch.plan import BatchPlan, make_plan
 from postproc.compensation.options import AS_USUAL
 from postproc.compensation.outcome import LEFT_ALONE, with_left
 from postproc.compensation.pages import program_arm, read_head
@@ -23,7 +23,7 @@ from postproc.compensation.record import (
     sidecar_path,
 )
 from postproc.diagnostics import Code
-from postproc.exceptions import ProgramError
+from postproc.exceptions import PostprocError, ProgramError
 from postproc.files import (
     KRL_DATA,
     KRL_PROGRAMS,
@@ -42,6 +42,7 @@ from postproc.files import (
 from postproc.language.stamp import read_stamp
 from postproc.language.visits import line_ranges
 from postproc.model.model import Model, load_model
+from postproc.robot.cell import load_cell
 
 if TYPE_CHECKING:
     from postproc.arrays import DataFrame
@@ -117,7 +118,8 @@ def check(
     model: Model | str | Path | None = None,
     plan: str | Path | None = None,
     source: str | Path | None = None,
-    strict_calls: bool = False,
+    cell: str | Path | None = None,
+    changes: Sequence[str] = (),
 ) -> Checked:
     """Check a tree of compensated programs before it is uploaded.
 
@@ -126,25 +128,34 @@ def check(
         model: The model that all programs should be made with, or its file.
         plan: Or the plan file that tells the model of each of them.
         source: The tree that it was made from.
-        strict_calls: Find programs with calls that the shipped list took as motionless.
+        cell: The cell of programs that no rule of the plan fits. Where assume_motion
+            of [compensation] holds, programs with calls of routines that were assumed
+            motionless are found.
+        changes: Keys of all cells for this run, as `load_cell` takes them.
 
     Raises:
         ProgramError: A folder or a file cannot be read.
         PostprocError: The plan or the model cannot be used.
     """
     folder = Path(folder)
-    current = _current_model(folder, model, plan)
-    return check_tree(
-        folder, current, None if source is None else Path(source), strict_calls
-    )
+    if changes and cell is None and plan is None:
+        raise PostprocError("--set: no cell is given. Give --cell or --plan")
+    made, cells = None, []
+    if plan is not None:
+        made = make_plan(Path(plan), None, None, AS_USUAL, changes)
+        cells += [setup.cell for setup in made.setups]
+    if cell is not None:
+        cells.append(load_cell(cell, changes=changes))
+    strict = any(one.compensation.assume_motion for one in cells)
+    current = _current_model(folder, model, made)
+    return check_tree(folder, current, None if source is None else Path(source), strict)
 
 
 def _current_model(
-    folder: Path, model: Model | str | Path | None, plan: str | Path | None
+    folder: Path, model: Model | str | Path | None, made: BatchPlan | None
 ) -> Current:
     """Tell which model a program of a tree should have been made with."""
-    if plan is not None:
-        made = make_plan(Path(plan), None, None, AS_USUAL)
+    if made is not None:
         ids = [setup.model.id for setup in made.setups]
 
         def current_of(place: str) -> str | None:
@@ -162,7 +173,7 @@ def check_tree(
     folder: Path,
     current: Current = lambda place: None,
     source: Path | None = None,
-    strict_calls: bool = False,
+    assume_motion: bool = False,
 ) -> Checked:
     """Check a tree of compensated programs, see `check`.
 
@@ -170,7 +181,7 @@ def check_tree(
         folder: The tree.
         current: Tells the model that a program should be made with, None: any.
         source: The tree that it was made from.
-        strict_calls: As `check` takes it.
+        assume_motion: Find calls of routines that were assumed motionless.
 
     Raises:
         ProgramError: A folder or a file cannot be read.
@@ -180,7 +191,7 @@ def check_tree(
             raise ProgramError(root, "is no folder", "Give a tree of programs")
     places = list(_places(folder))
     names = {place.lower(): place for place in places}
-    look = _Look(folder, source, current, names, strict_calls)
+    look = _Look(folder, source, current, names, assume_motion)
     findings = [f for place in places for f in look.at(place)]
     findings += _mixed(folder, [place for place in places if current(place) is None])
     if source is not None:
@@ -245,14 +256,14 @@ class _Look:
         source: The tree that it was made from, or None.
         current: Tells the model that a program should be made with.
         places: All files, by their paths in lower case.
-        strict_calls: No routine is still because the shipped list says so.
+        assume_motion: No routine is motionless because the shipped list says so.
     """
 
     root: Path
     source: Path | None
     current: Current
     places: Mapping[str, str]
-    strict_calls: bool = False
+    assume_motion: bool = False
 
     def at(self, place: str) -> Iterator[CheckFinding]:
         """Find what is wrong with a file."""
@@ -301,7 +312,7 @@ class _Look:
             yield CheckFinding(place, Code.NO_RECORD, str(exc))
             return
         yield from self._model(place, sidecar)
-        if self.strict_calls:
+        if self.assume_motion:
             yield from _assumed(place, sidecar)
         yield from self._content(place, data, sidecar)
         if values := self._existing(variables_of(place)):
@@ -369,7 +380,7 @@ def _left_alone(
     if rows:
         lines = line_ranges(sorted(line for _, line, _ in rows))
         text = f"{len(rows)} visits were left alone, lines {lines} of the source"
-        cure = "look at them, then pass --accept-left"
+        cure = "look at them, then pass --allow-uncorrected"
         yield CheckFinding(
             place, Code.LEFT_ALONE, f"{text}: {cure}; {_by_reason(rows, told)}"
         )
@@ -378,7 +389,7 @@ def _left_alone(
 def _assumed(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
     """Find routines that were assumed motionless because the shipped list says so."""
     for file, line, message in sidecar.assumed:
-        text = f"line {line} of {file}: {message}; compensate it with --strict-calls"
+        text = f"line {line} of {file}: {message}; compensate it with assume_motion"
         yield CheckFinding(place, Code.ROUTINE_ASSUMED_MOTIONLESS, text)
 
 

@@ -16,7 +16,14 @@ from postproc.compensation.options import Options
 from postproc.exceptions import CellError, PostprocError
 from postproc.model.model import Model, load_model
 from postproc.robot.arm_file import Strict, read_toml
-from postproc.robot.cell import ArmNumber, Cell, load_cell
+from postproc.robot.cell import (
+    MOTIONLESS,
+    ArmNumber,
+    Cell,
+    FrameSection,
+    LimitSection,
+    load_cell,
+)
 
 # Which cell and which model a program is compensated with.
 
@@ -34,43 +41,61 @@ class JobSetup:
         """Hash all that decides, beside the sources, what comes out.
 
         Contents count, places do not: a copy of the same cell file is the same cell.
+        It is made in the words that logs began with, so that they are resumed.
         """
-        cell = self.cell.file.model_dump(mode="json", exclude={"verify"})
         parts = {
             "version": __version__,
-            "cell": _named_before(cell),
+            "cell": _in_first_words(self.cell.file.model_dump(mode="json")),
             "arm": self.cell.arm.file.model_dump(mode="json"),
             "model": self.model.id,
-            "options": self.options.told(),
+            "options": _options_in_first_words(self.options.told()),
         }
         text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-_BEFORE = {
-    "conflict_mm": "agree_mm",
-    "correction_step_mm": "step_mm",
-    "reapproach_mm": "approach_mm",
-    "motionless": "still",
-    "taught_direction": "taught_lambda",
-}  # keys of cells as version 0.1.0 had them, whose runs are resumed
+NOT_DECIDING = ("verify", "compensation", "measurements", "serial_number")
+FIRST_WORDS = {
+    **{new: old for section in (LimitSection, FrameSection)
+       for old, new in section.RENAMED.items()},
+    MOTIONLESS: "still",
+    "edit_exported": "shared",
+    "assume_motion": "strict_calls",
+    "path_tolerance_mm": "path_mm",
+    "preload_backlash": "take_up",
+    "reapproach": "approach",
+}  # fmt: skip
 
 
-def _named_before(value: Any) -> Any:
-    """Return what a cell says with its keys as they were first named."""
-    if isinstance(value, dict):
-        return {_BEFORE.get(k, k): _named_before(own) for k, own in value.items()}
-    return [*map(_named_before, value)] if isinstance(value, list) else value
+def _in_first_words(content: Any) -> Any:
+    """Return what decides of a cell in the words of version 0.1.0."""
+    if isinstance(content, dict):
+        return {
+            FIRST_WORDS.get(key, key): _in_first_words(value)
+            for key, value in content.items()
+            if key not in NOT_DECIDING
+        }
+    return FIRST_WORDS[MOTIONLESS] if content == MOTIONLESS else content
 
 
-def open_setup(cell: Path, model: Path, options: Options) -> JobSetup:
+def _options_in_first_words(told: Mapping[str, object]) -> dict[str, object]:
+    """Return options in the words of version 0.1.0, which knew mean and clone."""
+    found = {FIRST_WORDS.get(name, name): value for name, value in told.items()}
+    shared = found.pop("shared_points")
+    found["clone"] = shared == "clone"
+    return found | ({"shared_points": shared} if shared == "leave" else {})
+
+
+def open_setup(
+    cell: Path, model: Path, options: Options, changes: Sequence[str] = ()
+) -> JobSetup:
     """Load a cell and a model, and refuse a pair that does not belong together.
 
     Raises:
         CellError: The cell cannot be used, or its controller compensates on its own.
         ModelError: The model cannot be used, or was made for another arm.
     """
-    loaded, fitted = load_cell(cell), load_model(model)
+    loaded, fitted = load_cell(cell, changes=changes), load_model(model)
     fitted.check_arm(loaded.arm, model)
     if loaded.file.robot.absolute_accuracy:
         raise CellError(
@@ -80,7 +105,8 @@ def open_setup(cell: Path, model: Path, options: Options) -> JobSetup:
             place="$.robot.absolute_accuracy",
         )
     # Only the name: messages must not depend on where a run was started.
-    return JobSetup(replace(loaded, path=Path(cell.name)), fitted, options)
+    named = replace(loaded, path=Path(cell.name))
+    return JobSetup(named, fitted, options.within(named))
 
 
 # The plan file: which programs of a tree belong to which arm.
@@ -149,7 +175,11 @@ def pattern_from_glob(glob: str) -> re.Pattern[str]:
 
 
 def make_plan(
-    plan: Path | None, cell: Path | None, model: Path | None, options: Options
+    plan: Path | None,
+    cell: Path | None,
+    model: Path | None,
+    options: Options,
+    changes: Sequence[str] = (),
 ) -> BatchPlan:
     """Load every cell and model that a run needs.
 
@@ -158,6 +188,7 @@ def make_plan(
         cell: Cell of the programs that no rule fits.
         model: Model of the programs that no rule fits.
         options: What the user asked for.
+        changes: Keys of all cells for this run, as `load_cell` takes them.
 
     Raises:
         PostprocError: Neither a plan nor both files are given, or one cannot be used.
@@ -169,7 +200,7 @@ def make_plan(
         raise PostprocError("Give --cell and --model, or --plan, or all three")
     if cell is not None and model is not None:
         rules.append(Rule("**", None, cell, model))
-    return _open_rules(rules, options)
+    return _open_rules(rules, options, changes)
 
 
 @dataclass(frozen=True)
@@ -195,14 +226,16 @@ def _read_rules(path: Path) -> list[Rule]:
     return [Rule(r.pattern, r.arm, here / r.cell, here / r.model) for r in file.rule]
 
 
-def _open_rules(rules: Sequence[Rule], options: Options) -> BatchPlan:
+def _open_rules(
+    rules: Sequence[Rule], options: Options, changes: Sequence[str]
+) -> BatchPlan:
     """Open each distinct pair of files once.
 
     Raises:
         PostprocError: A file cannot be used, or a cell is of another arm than its rule.
     """
     pairs = list(dict.fromkeys((rule.cell, rule.model) for rule in rules))
-    setups = tuple(open_setup(cell, model, options) for cell, model in pairs)
+    setups = tuple(open_setup(cell, model, options, changes) for cell, model in pairs)
     which = tuple(pairs.index((rule.cell, rule.model)) for rule in rules)
     for rule, index in zip(rules, which, strict=True):
         _check_number(rule, setups[index].cell)

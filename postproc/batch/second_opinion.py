@@ -125,8 +125,10 @@ def _judged(
         problem = f"it was made with model {record.model}, not with {setup.model.id}"
         raise PostprocError(problem)
     source, output = dict(_files(sources, unit)), dict(_files(folder, unit))
-    strict = Options(strict_calls=bool(record.options.get("strict_calls")))
-    cell = prepared(setup.cell, setup.model, strict)
+    names = ("assume_motion", "strict_calls")  # now, and in records of before 0.2
+    assumed = any(record.options.get(name) for name in names)
+    own = Options(assume_motion=assumed)
+    cell = prepared(setup.cell, setup.model, own)
     return second_opinion(source, output, cell, record, left)
 
 

@@ -20,7 +20,7 @@ from postproc.calibration.published import (
 )
 from postproc.calibration.reversals import split_reversals
 from postproc.calibration.stops import pool_readings
-from postproc.calibration.survey_files import read_measurements
+from postproc.calibration.survey_files import read_measurements, survey_frame
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.exceptions import PostprocError
 from postproc.model.noise import poses_of
@@ -43,7 +43,7 @@ class Held:
 
     def __post_init__(self) -> None:
         if self.files and self.blocks:
-            raise PostprocError("--test and --blocks: say one of them")
+            raise PostprocError("--test and --cv-blocks: say one of them")
 
     def pairs(
         self, survey: Measurements, cell: Cell, reading: TableFormat
@@ -67,7 +67,7 @@ class Held:
             return pairs, random_said(train, held, self.seed)
         if not 2 <= self.blocks <= len(survey) // 2:
             raise PostprocError(
-                f"--blocks {self.blocks}: {len(survey)} rows can be cut into 2 to "
+                f"--cv-blocks {self.blocks}: {len(survey)} rows can be cut into 2 to "
                 f"{len(survey) // 2} blocks"
             )
         cut = blocks_of(len(survey), self.blocks)
@@ -80,7 +80,7 @@ class Held:
 def compare_files(
     data: Sequence[Path],
     cell: Cell | str | Path,
-    frame: Frame,
+    frame: Frame | None,
     held: Held,
     reading: TableFormat = DETECT,
 ) -> Comparison:
@@ -92,6 +92,7 @@ def compare_files(
         PostprocError: A file cannot be used.
     """
     cell = as_cell(cell)
+    frame = survey_frame(cell, frame)
     survey = pool_readings(read_measurements(*data, cell=cell, reading=reading))
     survey, _ = split_reversals(survey, cell.arm)
     pairs, said = held.pairs(survey, cell, reading)

@@ -37,7 +37,11 @@ from postproc.calibration.reversals import (
 )
 from postproc.calibration.selection import Progress, model_of, silent
 from postproc.calibration.stops import pool_readings
-from postproc.calibration.survey_files import MeasurementFile, read_measurements
+from postproc.calibration.survey_files import (
+    MeasurementFile,
+    read_measurements,
+    survey_frame,
+)
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.calibration.validation import FitTask, Validated, validate_fit
@@ -55,6 +59,7 @@ from postproc.model.kinematics import Batch
 from postproc.model.model import Model, Monument
 from postproc.model.model_file import Method
 from postproc.model.noise import angle_step
+from postproc.model.provenance import Provenance
 from postproc.model.registration import Registration
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
@@ -127,11 +132,12 @@ class Calibration:
         Raises:
             PostprocError: It cannot be read, or has no positions.
         """
+        frame = "tracker" if self.frame == "tracker" else None
+        own = self.cell.measurements.model_copy(update={"frame": frame})
         found = predict(
             file,
-            self.cell,
+            replace(self.cell, measurements=own),
             self.model,
-            frame=self.frame if self.frame == "tracker" else None,
             name=name,
             reading=reading,
         )
@@ -167,7 +173,7 @@ def fit(
     cell: Cell | str | Path,
     method: Method = "full",
     effects: Sequence[str] | None = None,
-    frame: Frame = "base",
+    frame: Frame | None = None,
     program: str | Path | None = None,
     name: str = "measurements.csv",
     reading: TableFormat = DETECT,
@@ -185,7 +191,8 @@ def fit(
         effects: Names of the effects that "full" fits; None: geometry and backlash,
             and whatever else the survey gives evidence for.
         frame: Frame of the measured positions. In the tracker's, the tracker's place
-            and the probe points are fitted too.
+            and the probe points are fitted too. Default: as the cell says, else the
+            base frame.
         program: The survey program, for files that hold ids and positions only.
         name: File name of measurements that are given as bytes.
         reading: What the user knows of the files.
@@ -206,7 +213,7 @@ def fit(
         cell,
         method=method,
         effects=effects,
-        frame=frame,
+        frame=survey_frame(cell, frame),
         seed=seed,
         progress=progress,
     )
@@ -239,7 +246,7 @@ def fit_measurements(
     """
     rows = _prepare(survey, cell, frame)
     if method != "full":
-        return _published(rows, cell, frame, method, seed)
+        return _dated(_published(rows, cell, frame, method, seed))
     task = FitTask(
         rows.survey, cell.arm, effects, rows.tracker, rows.setup, rows.mounted
     )
@@ -249,7 +256,13 @@ def fit_measurements(
         progress("predict poses that are held out")
         found = validate_fit(task, fitted)
     progress("report")
-    return _conclude(rows, found, cell, frame, task.doubt(found.fit))
+    return _dated(_conclude(rows, found, cell, frame, task.doubt(found.fit)))
+
+
+def _dated(found: Calibration) -> Calibration:
+    """Return a calibration whose model tells where it comes from."""
+    model = replace(found.model, provenance=Provenance.today(found.cell))
+    return replace(found, model=model)
 
 
 @dataclass(frozen=True, eq=False)

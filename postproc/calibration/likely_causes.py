@@ -33,7 +33,9 @@ DRAWN, DRAWS, REFINED = 4, 80, 3
 MOST_PLACING = 200  # rows that place a tracker well enough to find a mistake
 LEAST_OFFSET = np.deg2rad(0.3)  # a smaller one is left to the fit
 NOTHING = Combination(())
-UNKNOWN = "Check units, joint order and signs, the tool and the frame (--frame)"
+UNKNOWN = (
+    "Check units, joint order and signs, the tool and the frame (measurements.frame)"
+)
 
 ErrorOf = Callable[[States], Floats]
 
@@ -188,12 +190,14 @@ def _guesses(states: States, position: Floats) -> Iterator[Guess]:
     """List mistakes that rows may have, most frequent first, each undone."""
     q = states.q
     yield Guess(
-        "The positions look like metres: write millimetres (of points: --unit m)",
+        "The positions look like metres: write millimetres (of points: "
+        "--set measurements.unit=m)",
         "look like metres",
         "The others are in millimetres: write all of them so", states, position * 1e3,
     )  # fmt: skip
     yield Guess(
-        "The positions look like inches: write millimetres (of points: --unit inch)",
+        "The positions look like inches: write millimetres (of points: "
+        "--set measurements.unit=inch)",
         "look like inches",
         "The others are in millimetres: write all of them so", states, position * 25.4,
     )  # fmt: skip
@@ -274,7 +278,10 @@ def cause_in_any_frame(survey: Measurements, arm: Arm) -> str:
         return typical_gap(found, arm, states, position)
 
     if left(states[some], position[some]) < CLOSE:
-        return "The positions look like the tracker's frame: use --frame tracker"
+        return (
+            "The positions look like the tracker's frame: use "
+            "--set measurements.frame=tracker"
+        )
     offsets = (
         _offset_guess(states, position, j, _offset_in_any_frame(survey[some], arm, j))
         for j in range(1, 5)  # the frame and the probe hold those of joints 1 and 6

@@ -14,9 +14,10 @@ import numpy as np
 from postproc.arrays import Floats, data_frame
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.plausibility import check_against
-from postproc.calibration.readings import MeasuredFrame, Readings, read_setup, rows_of
+from postproc.calibration.readings import Readings, read_setup, rows_of
 from postproc.calibration.report import FreeForms
 from postproc.calibration.residuals import beside_all
+from postproc.calibration.survey_files import MeasuredFrame, survey_frame
 from postproc.calibration.tables import DETECT, TableFormat, TextTable, read_foreign
 from postproc.files import named_text, spreadsheet_text
 from postproc.model.model import (
@@ -183,7 +184,7 @@ def predict(
         cell: The cell, or its file.
         model: The model, or its file.
         frame: Frame of the positions, where the readings of the set-up are to be
-            predicted, too.
+            predicted, too; default: as the cell says.
         refit: "registration": find the set-up from these rows.
         after: Take what passes with time as at the survey's end.
         name: File name of states that are given as bytes.
@@ -196,9 +197,11 @@ def predict(
     cell = as_cell(cell)
     model = as_model(model, cell.arm)
     model.check_arm(cell.arm)
-    asked = Readings(frame, refit, after)
-    table = read_foreign(named_text(states, name), reading)
+    table = read_foreign(named_text(states, name), reading.within(cell))
     measured = table.has(*POSITION)
+    if frame is None and measured and cell.measurements.frame is not None:
+        frame = survey_frame(cell, None)
+    asked = Readings(frame, refit, after)
     if not asked.asked:
         rows, read, placed = rows_of(table, cell, positions=False), None, ""
         if measured:

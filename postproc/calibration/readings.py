@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from postproc.calibration.registration import (
     predict_registered,
     station_of,
 )
-from postproc.calibration.survey_files import carrying_load
+from postproc.calibration.survey_files import MeasuredFrame, carrying_load
 from postproc.calibration.tables import TextTable
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.model.effects.effect import Effect
@@ -30,8 +29,6 @@ from postproc.model.variance import moment_variance
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from postproc.robot.state import States
-
-MeasuredFrame = Literal["base", "tracker"]
 
 LATER = 1e9  # [s], or rows: a moment after any survey
 MOVED = 0.01  # [m] rows that are further off were read from another station

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -16,8 +17,9 @@ from postproc.calibration.measurements import (
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.exceptions import PostprocError
 from postproc.files import named_text
-from postproc.robot.cell import Cell, as_cell
+from postproc.robot.cell import Cell, PointFrame, as_cell
 
+MeasuredFrame = Literal["base", "tracker"]
 MeasurementFile = str | Path | bytes | Measurements
 
 
@@ -47,11 +49,32 @@ def read_measurements(
     places = [named_text(f, name) for f in files if not isinstance(f, Measurements)]
     if not places or len(places) < len(files):
         raise PostprocError("measurements: give files, or one survey that was read")
+    reading = reading.within(cell)
     if program is not None:
         joined = [join_program(p, Path(program), cell, reading) for p in places]
         return concatenate(joined)
     parts = [read_survey_file(p, cell.arm, cell.nests, reading=reading) for p in places]
     return carrying_load(replace(concatenate(parts), mounting=cell.mounting), cell)
+
+
+def frame_of(cell: Cell, frame: PointFrame | None) -> PointFrame:
+    """Return the frame of positions: the one given, the cell's, or the arm's base."""
+    return frame or cell.measurements.frame or "base"
+
+
+def survey_frame(cell: Cell, frame: PointFrame | None) -> MeasuredFrame:
+    """Return the frame of a survey's positions, as `frame_of` does.
+
+    Raises:
+        PostprocError: It is the user frame, which a survey has no use for.
+    """
+    found = frame_of(cell, frame)
+    if found == "uframe":
+        raise PostprocError(
+            "measurements.frame = uframe: only `diagnose` reads points in the user "
+            "frame. Give base or tracker"
+        )
+    return found
 
 
 def carrying_load(rows: Measurements, cell: Cell) -> Measurements:

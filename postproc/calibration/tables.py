@@ -20,6 +20,7 @@ from postproc.arrays import Bools, Floats
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.files import NamedText
 from postproc.robot.arm import Arm
+from postproc.robot.cell import Cell
 from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.pose import MM
 
@@ -108,7 +109,7 @@ class TextTable:
                 f"has no header: its columns are 1 to {len(self.columns)}, column "
                 f"{', '.join(missing)} is missing",
                 "Write a header, or name the columns by number in a column map "
-                '(--columns) with lines as q1_deg = "8"',
+                '(measurements.columns) with lines as q1_deg = "8"',
                 line=int(self.line[0]),
             )
         if missing:
@@ -352,7 +353,8 @@ def _block(
                 path,
                 f"has {len(used)} cells, {what} {width}",
                 "Every row needs as many cells as the header. A decimal comma needs "
-                "another separator (--delimiter), a separator in a cell needs quotes",
+                "another separator (measurements.delimiter), a separator in a cell "
+                "needs quotes",
                 line=line,
             )
         cells[k, : len(used)] = used
@@ -833,30 +835,41 @@ NAMED = {"tab": "\t", "space": BLANKS, "comma": ",", "semicolon": ";"}
 
 @dataclass(frozen=True)
 class TableFormat:
-    """What a user knows of a file; None is detected.
+    """What a user knows of a file; None is as the cell says, else it is detected.
 
     Attributes:
         columns: A column-map file, see `postproc.calibration.tables`, or its content.
         delimiter: Between cells, itself or by name (tab, space, comma, semicolon).
         decimal: "." or ",".
         encoding: Name of a Python codec.
-        unit: Of coordinates in files that do not say it: mm, m or inch.
+        unit: Of coordinates in files that do not state it: mm, m or inch.
     """
 
     columns: Path | Format | None = None
     delimiter: str | None = None
     decimal: str | None = None
     encoding: str | None = None
-    unit: str = "mm"
+    unit: str | None = None
 
     def __post_init__(self) -> None:
         if self.decimal not in (None, ".", ","):
             raise PostprocError(f"decimal {self.decimal!r}: write . or ,")
-        if self.unit not in UNITS:
+        if self.unit not in (None, *UNITS):
             raise PostprocError(f"unit {self.unit!r}: write {', '.join(UNITS)}")
 
+    def within(self, cell: Cell) -> TableFormat:
+        """Return it with what [measurements] of the cell says of all that is None."""
+        own = cell.measurements
+        return TableFormat(
+            columns=self.columns or (Path(own.columns) if own.columns else None),
+            delimiter=self.delimiter or own.delimiter,
+            decimal=self.decimal or own.decimal,
+            encoding=self.encoding or own.encoding,
+            unit=self.unit or own.unit,
+        )
+
     @property
-    def given(self) -> dict[str, str]:
+    def given(self) -> dict[str, Any]:
         """Options of `read_table` that a user has given."""
         delimiter = self.delimiter and NAMED.get(self.delimiter, self.delimiter)
         options = {
@@ -869,7 +882,7 @@ class TableFormat:
     @property
     def mm_per_unit(self) -> float:
         """Millimetres per unit of coordinates."""
-        return UNITS[self.unit]
+        return UNITS[self.unit or "mm"]
 
 
 DETECT = TableFormat()

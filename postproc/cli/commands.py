@@ -10,6 +10,7 @@ from typer.models import CommandInfo
 
 from postproc import __version__
 from postproc.cli import arms, loop, models, plant, programs
+from postproc.cli.click_classes import Command
 from postproc.cli.common import app, epilog, guarded
 
 NAME = "__name__"  # a command is called like its function
@@ -26,6 +27,7 @@ for _group, _commands in (
     ("arm ", arms.arm.registered_commands),
 ):
     for _command in _commands:
+        _command.cls = Command
         _command.epilog = epilog(_group + _name_of(_command))
         if _command.callback is not None:
             _command.callback = guarded(_command.callback)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from enum import StrEnum
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, ParamSpec, TextIO, TypeVar
 
 import typer
 
+from postproc.cli.click_classes import Groups
 from postproc.exceptions import FileError, OutputError, PostprocError, printable
 from postproc.files import STREAM, disk_error, write_all
 
@@ -22,6 +24,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 app = typer.Typer(
+    cls=Groups,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -36,14 +39,35 @@ SeedOption = Annotated[int, typer.Option("--seed", help="Seed of every random dr
 JsonOption = Annotated[
     str | None, typer.Option("--json", help="Write JSON to a file, - for stdout.")
 ]
-LsvOption = Annotated[
-    Path | None, typer.Option("--lsv", help="Variable file, default PROGRAM.lsv.")
+VariablesOption = Annotated[
+    Path | None, typer.Option("--variables", help="Variable file, default PROGRAM.lsv.")
 ]
 HtmlOption = Annotated[
     Path | None, typer.Option("--html", help="Write a report (HTML) here.")
 ]
-CloneOption = Annotated[
-    bool, typer.Option("--clone", help="Clone variables whose arrivals disagree.")
+
+
+class SharedPoints(StrEnum):
+    """What is done with a point that several arrivals share."""
+
+    MEAN = "mean"
+    CLONE = "clone"
+    LEAVE = "leave"
+
+
+SharedPointsOption = Annotated[
+    SharedPoints | None,
+    typer.Option(
+        "--shared-points", help="What is done with a point that several moves go to."
+    ),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="SECTION.KEY=VALUE",
+        help="Set a key of [compensation] or [measurements] for this run.",
+    ),
 ]
 OrientationOption = Annotated[
     bool,
@@ -60,56 +84,40 @@ SecondOpinionOption = Annotated[
 EveryOption = Annotated[
     bool, typer.Option("--all", help="A line for every finding, also for equal ones.")
 ]
-StrictCallsOption = Annotated[
-    bool,
-    typer.Option(
-        "--strict-calls", help="Take no routine as still that the cell does not name."
-    ),
-]
 ProcessesOption = Annotated[
     int,
     typer.Option(
         "--jobs", "-j", min=0, help="Processes; 0: one for a core, 8 at the most."
     ),
 ]
-TimingOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--timing/--no-timing",
-        help="Run the program in time; default: if it has up to 5,000 targets.",
-    ),
-]
-PathOption = Annotated[
+PathToleranceOption = Annotated[
     float | None,
     typer.Option(
-        "--path-mm",
-        help="Insert points where a path is predicted to be left farther [mm], or "
-        "farther than half of it on more than 5 % of the way.",
-    ),
-]
-MaxInsertedOption = Annotated[
-    int, typer.Option("--max-inserted", min=0, help="The most points to insert.")
-]
-TakeUpOption = Annotated[
-    bool,
-    typer.Option(
-        "--take-up",
-        help="With --path-mm: stop once more where a move begins, to take up play, "
-        "where reversals (survey --reversals) or a measured path (diagnose --path) "
-        "confirm the flanks.",
-    ),
-]
-ApproachOption = Annotated[
-    bool,
-    typer.Option(
-        "--approach",
-        help="Approach targets anew, from a stop on the way already travelled, that "
-        "a joint reaches from a side that is not sure.",
+        "--path-tolerance",
+        metavar="MM",
+        help="Insert points where a path is predicted to be left by more.",
     ),
 ]
 TemperatureOption = Annotated[
     float | None, typer.Option("--temperature", help="Arm temperature [deg C].")
 ]
+
+
+def changes_of(
+    given: Sequence[str] | None,
+    orientation: bool = False,
+    shared_points: SharedPoints | None = None,
+    path_tolerance: float | None = None,
+) -> tuple[str, ...]:
+    """Return what a run changes of the cell, as `load_cell` takes it."""
+    found = list(given or ())
+    if orientation:
+        found.append("compensation.orientation=true")
+    if shared_points is not None:
+        found.append(f"compensation.shared_points={shared_points}")
+    if path_tolerance is not None:
+        found.append(f"compensation.path_tolerance_mm={path_tolerance!r}")
+    return tuple(found)
 
 
 def say(text: str) -> None:
@@ -243,8 +251,8 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc compensate job.pdl --cell cell.toml --model model.json"
         " -o out/job.pdl --html job.html",
         "cat job.pdl | postproc compensate - --cell cell.toml --model model.json > out",
-        "cat job.pdl | postproc compensate - --lsv job.lsv --lsv-out new.lsv"
-        " --cell cell.toml --model model.json > new.pdl",
+        "cat job.pdl | postproc compensate - --variables job.lsv"
+        " --variables-out new.lsv --cell cell.toml --model model.json > new.pdl",
     ),
     "diff": (
         "postproc diff job.pdl out/job.pdl | less -S",
@@ -261,12 +269,13 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "survey": ("postproc survey --cell cell.toml --poses 300 -o survey.pdl",),
     "simulate": (
         "postproc simulate survey.pdl --cell cell.toml -o measured.csv",
-        "postproc simulate out/job.pdl --cell cell.toml --wanted job.pdl",
+        "postproc simulate out/job.pdl --cell cell.toml --reference job.pdl",
         "postproc simulate out/job.pdl --cell cell.toml --track track.csv",
     ),
     "fit": (
         "postproc fit measured.csv --cell cell.toml -o model.json --html model.html",
-        "postproc fit measured.csv --cell cell.toml -o model.json --frame tracker",
+        "postproc fit measured.csv --cell cell.toml -o model.json"
+        " --set measurements.frame=tracker",
     ),
     "predict": (
         "postproc predict states.csv --cell cell.toml --model model.json -o errors.csv",

@@ -139,7 +139,7 @@ def _file_of(target: Path | None, part: Path) -> Path:
         OutputError: The program goes to standard output, a pipe or a device.
     """
     if target is None or is_stream(target):
-        how = "--lsv-out FILE, or " if is_variables(part.name) else ""
+        how = "--variables-out FILE, or " if is_variables(part.name) else ""
         raise OutputError(
             part,
             "changes too, and nothing says where it goes",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,8 +13,10 @@ from postproc.cli.common import (
     JsonOption,
     ModelOption,
     SeedOption,
+    SetOption,
     app,
     as_path,
+    changes_of,
     explained,
     say,
     write_text,
@@ -26,14 +27,6 @@ from postproc.files import check_places, schema
 if TYPE_CHECKING:
     from postproc.calibration.diagnosis.diagnose import Extension
     from postproc.calibration.diagnosis.measured_path import PathDiagnosis
-
-
-class PointFrame(StrEnum):
-    """The frame that points were measured in."""
-
-    BASE = "base"
-    UFRAME = "uframe"
-    TRACKER = "tracker"
 
 
 @app.command()
@@ -56,29 +49,29 @@ def diagnose(
         Path | None,
         typer.Option("--program", help="The program whose points were measured."),
     ] = None,
-    frame: Annotated[
-        PointFrame, typer.Option("--measured-frame", "--frame")
-    ] = PointFrame.BASE,
     path: Annotated[
         Path | None,
         typer.Option("--path", help="TRACK.csv: readings while --program ran."),
     ] = None,
     seed: SeedOption = 0,
+    changes: SetOption = None,
 ) -> None:
     """Find what the model lacks, trace it to an effect, and add that effect."""
     from postproc.calibration.diagnosis.diagnose import dumped, evidence_of
     from postproc.report.diagnosis import tell
     from postproc.report.measured_path import tell_path
     from postproc.report.terminal import stage_bar
+    from postproc.robot.cell import load_cell
 
     with explained():
         files = data or []
         inputs = [*files, cell, model, program, path]
         check_places([output, as_path(json), html, plot], inputs)
-        how = {"program": program, "frame": frame.value, "seed": seed}
+        how = {"program": program, "seed": seed}
+        loaded = load_cell(cell, changes=changes_of(changes))
         with stage_bar() as progress:
             on_the_way, found = _diagnosed(
-                files, path, cell=cell, model=model, progress=progress, **how
+                files, path, cell=loaded, model=model, progress=progress, **how
             )
             if not found.rejected:
                 found.save(output or extended_path(model))

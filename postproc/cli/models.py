@@ -15,9 +15,11 @@ from postproc.cli.common import (
     JsonOption,
     ModelOption,
     SeedOption,
+    SetOption,
     app,
     as_path,
     busy,
+    changes_of,
     explained,
     say,
     split_names,
@@ -45,29 +47,6 @@ class VirtualGears(StrEnum):
     ELASTIC = "elastic"
     GRAVITY = "gravity"
     INERTIA = "inertia"
-
-
-class MeasuredFrame(StrEnum):
-    """The frame that positions were measured in."""
-
-    BASE = "base"
-    TRACKER = "tracker"
-
-
-ColumnsOption = Annotated[
-    Path | None,
-    typer.Option("--columns", help="Column map (TOML) for files of other tools."),
-]
-DelimiterOption = Annotated[
-    str | None, typer.Option("--delimiter", help="Or tab, space, comma, semicolon.")
-]
-DecimalOption = Annotated[str | None, typer.Option("--decimal", help=". or ,")]
-EncodingOption = Annotated[
-    str | None, typer.Option("--encoding", help="utf-8, latin-1, utf-16, ..")
-]
-UnitOption = Annotated[
-    str, typer.Option("--unit", help="Of points without a unit: mm, m or inch.")
-]
 
 
 @app.command()
@@ -116,9 +95,9 @@ def simulate(
             help="Further effects, comma separated; any motion of a part by its text.",
         ),
     ] = None,
-    wanted: Annotated[
+    reference: Annotated[
         Path | None,
-        typer.Option("--wanted", help="Original program: print the true error."),
+        typer.Option("--reference", help="Original program: print the true error."),
     ] = None,
     path: Annotated[
         bool, typer.Option("--path", help="Score the paths between targets as well.")
@@ -131,19 +110,29 @@ def simulate(
         float, typer.Option("--rate", min=1.0, max=1000.0, help="Of the track [Hz].")
     ] = 100.0,
     gears: Annotated[
-        VirtualGears, typer.Option("--gears", help="What gears do in their gaps.")
+        VirtualGears,
+        typer.Option("--backlash-model", help="What gears do in gaps."),
     ] = VirtualGears.SHARP,
+    changes: SetOption = None,
     json: JsonOption = None,
 ) -> None:
     """Let the virtual arm run a program or a survey, and measure it."""
     from postproc.cli.simulate import simulate_file
+    from postproc.robot.cell import load_cell
 
     with explained():
-        check_places([output, track, as_path(json)], [program, cell, wanted])
+        check_places([output, track, as_path(json)], [program, cell, reference])
         with busy("run on the virtual arm"):
             often = rate if track is not None else 0.0
             found = simulate_file(
-                program, cell, seed, effects, wanted, path, often, gears.value
+                program,
+                load_cell(cell, changes=changes_of(changes)),
+                seed,
+                effects,
+                reference,
+                path,
+                often,
+                gears.value,
             )
         if output is not None:
             found.write(output)
@@ -164,41 +153,34 @@ def fit(
         str | None,
         typer.Option("--effects", help="Effects of the full method, comma separated."),
     ] = None,
-    frame: Annotated[MeasuredFrame, typer.Option("--frame")] = MeasuredFrame.BASE,
     seed: SeedOption = 0,
     program: Annotated[
         Path | None,
         typer.Option("--program", help="The survey program, for id, x, y, z files."),
     ] = None,
+    changes: SetOption = None,
     json: JsonOption = None,
     html: HtmlOption = None,
-    columns: ColumnsOption = None,
-    delimiter: DelimiterOption = None,
-    decimal: DecimalOption = None,
-    encoding: EncodingOption = None,
-    unit: UnitOption = "mm",
     everything: Annotated[
         bool, typer.Option("--all", help="List all parameters and rows.")
     ] = False,
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
     from postproc.calibration import fit as calibration
-    from postproc.calibration.tables import TableFormat
     from postproc.report.fit import fit_json, tell_fit_files, write_page
+    from postproc.robot.cell import load_cell
 
     names = None if effects is None else split_names(effects)
     with explained():
-        check_places([output, html, as_path(json)], [*data, cell, program, columns])
-        reading = TableFormat(columns, delimiter, decimal, encoding, unit)
+        check_places([output, html, as_path(json)], [*data, cell, program])
+        loaded = load_cell(cell, changes=changes_of(changes))
         with stages(log=True) as progress:
             found = calibration.fit(
                 *data,
-                cell=cell,
+                cell=loaded,
                 method=method.value,
                 effects=names,
-                frame=frame.value,
                 program=program,
-                reading=reading,
                 seed=seed,
                 progress=progress,
             )
@@ -220,12 +202,6 @@ def predict(
     cell: CellOption,
     model: ModelOption,
     output: Annotated[Path | None, typer.Option("-o", "--output")] = None,
-    frame: Annotated[
-        MeasuredFrame | None,
-        typer.Option(
-            "--frame", help="Of the positions: predict the set-up's readings too."
-        ),
-    ] = None,
     refit: Annotated[
         str | None,
         typer.Option("--refit", help="registration: find the set-up from these rows."),
@@ -234,28 +210,17 @@ def predict(
         bool,
         typer.Option("--after", help="Take drifts as they were at the survey's end."),
     ] = False,
-    columns: ColumnsOption = None,
-    delimiter: DelimiterOption = None,
-    decimal: DecimalOption = None,
-    encoding: EncodingOption = None,
+    changes: SetOption = None,
 ) -> None:
     """Add the predicted error of every row; with positions, also the residual."""
     from postproc.calibration import predict as prediction
-    from postproc.calibration.tables import TableFormat
+    from postproc.robot.cell import load_cell
 
     with explained():
-        check_places([output], [states, cell, model, columns])
-        reading = TableFormat(columns, delimiter, decimal, encoding)
+        check_places([output], [states, cell, model])
+        loaded = load_cell(cell, changes=changes_of(changes))
         with busy("predict"):
-            found = prediction.predict(
-                states,
-                cell,
-                model,
-                frame=None if frame is None else frame.value,
-                refit=refit,
-                after=after,
-                reading=reading,
-            )
+            found = prediction.predict(states, loaded, model, refit=refit, after=after)
         write_text("-" if output is None else str(output), found.to_csv())
         say(found.summary())
 
@@ -269,32 +234,28 @@ def compare(
     plot: Annotated[
         Path | None, typer.Option("--plot", help="Plot (.png or .svg).")
     ] = None,
-    frame: Annotated[MeasuredFrame, typer.Option("--frame")] = MeasuredFrame.BASE,
     test: Annotated[
         list[Path] | None,
         typer.Option("--test", help="Files to test on; default: a third of the rows."),
     ] = None,
     blocks: Annotated[
-        int, typer.Option("--blocks", min=0, help="Test on so many blocks in turn.")
+        int, typer.Option("--cv-blocks", min=0, help="Test on so many blocks in turn.")
     ] = 0,
     seed: SeedOption = 0,
-    columns: ColumnsOption = None,
-    delimiter: DelimiterOption = None,
-    decimal: DecimalOption = None,
-    encoding: EncodingOption = None,
+    changes: SetOption = None,
 ) -> None:
     """Fit every method to the same rows, and test it on the same others."""
     from postproc.calibration.comparison import Held, compare_files
-    from postproc.calibration.tables import TableFormat
     from postproc.report.fit import comparison_json, tell_comparison
+    from postproc.robot.cell import load_cell
 
     with explained():
         others = test or []
-        check_places([as_path(json), html, plot], [*data, *others, cell, columns])
-        reading = TableFormat(columns, delimiter, decimal, encoding)
+        check_places([as_path(json), html, plot], [*data, *others, cell])
+        loaded = load_cell(cell, changes=changes_of(changes))
         held = Held(others, blocks, seed)
         with busy("fit every method"):
-            found = compare_files(data, cell, frame.value, held, reading)
+            found = compare_files(data, loaded, None, held)
         if json:
             write_text(json, comparison_json(found))
         if html is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.common import (
-    CloneOption,
     HtmlOption,
     JsonOption,
     OrientationOption,
+    PathToleranceOption,
     SecondOpinionOption,
-    StrictCallsOption,
+    SetOption,
+    SharedPointsOption,
     TemperatureOption,
     app,
+    changes_of,
     explained,
     say,
     write_text,
@@ -67,13 +69,11 @@ def batch(
         Path | None, typer.Option("--log", help="Log; default: DST.batch.jsonl.")
     ] = None,
     html: HtmlOption = None,
-    clone: CloneOption = False,
     orientation: OrientationOption = False,
+    shared_points: SharedPointsOption = None,
+    path_tolerance: PathToleranceOption = None,
+    changes: SetOption = None,
     temperature: TemperatureOption = None,
-    strict_calls: StrictCallsOption = False,
-    timing: Annotated[
-        bool, typer.Option("--timing", help="Run every program in time.")
-    ] = False,
 ) -> None:
     """Compensate a tree of programs; what could not be compensated is not in DST."""
     with explained():
@@ -86,10 +86,8 @@ def batch(
         from postproc.compensation.options import Options
         from postproc.report.terminal import progress_bar
 
-        options = Options(
-            clone, False, temperature, orientation, strict_calls, timing=timing
-        )
-        made = make_plan(plan, cell, model, options)
+        asked = changes_of(changes, orientation, shared_points, path_tolerance)
+        made = make_plan(plan, cell, model, Options(temperature), asked)
         check_places([html], [cell, model, plan])
         for line in _archive_lines(source, made):
             say(line)
@@ -163,10 +161,11 @@ def check(
     source: Annotated[
         Path | None, typer.Option("--source", help="The tree it was made from.")
     ] = None,
-    accept_left: Annotated[
-        bool, typer.Option("--accept-left", help="Let targets left alone pass.")
+    allow_uncorrected: Annotated[
+        bool,
+        typer.Option("--allow-uncorrected", help="Let uncorrected targets pass."),
     ] = False,
-    strict_calls: StrictCallsOption = False,
+    changes: SetOption = None,
     json: JsonOption = None,
     cell: CellFile = None,
     second_opinion: SecondOpinionOption = None,
@@ -180,12 +179,13 @@ def check(
     from postproc.batch.check import check as look
 
     with explained():
+        asked = changes_of(changes)
         found = look(
-            folder, model=model, plan=plan, source=source, strict_calls=strict_calls
+            folder, model=model, plan=plan, source=source, cell=cell, changes=asked
         )
-        if accept_left:
+        if allow_uncorrected:
             found = found.accepting_left()
-        judged = _second_opinion(folder, (cell, model, plan), second_opinion)
+        judged = _second_opinion(folder, (cell, model, plan), second_opinion, asked)
         if json:
             write_text(json, found.to_json(None if judged is None else judged.told()))
         for finding in found.findings:
@@ -203,7 +203,7 @@ Places = tuple[Path | None, Path | None, Path | None]  # of cell, model, plan
 
 
 def _second_opinion(
-    folder: Path, places: Places, asked: bool | None
+    folder: Path, places: Places, asked: bool | None, changes: Sequence[str]
 ) -> TreeOpinion | None:
     """Judge a tree by other libraries; None where they or cells and models lack.
 
@@ -230,7 +230,7 @@ def _second_opinion(
     from postproc.batch.second_opinion import judge_tree
 
     own = (None, None) if cell is None and plan is not None else (cell, model)
-    made = make_plan(plan, *own, AS_USUAL)
+    made = make_plan(plan, *own, AS_USUAL, changes)
     judged = judge_tree(folder, made)
     return replace(judged, skipped=(*judged.skipped, *_without_rule(folder, made)))
 

@@ -10,30 +10,26 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.common import (
-    ApproachOption,
     CellOption,
-    CloneOption,
     EveryOption,
     HtmlOption,
     JsonOption,
-    LsvOption,
-    MaxInsertedOption,
     ModelOption,
     OrientationOption,
-    PathOption,
+    PathToleranceOption,
     ProcessesOption,
-    StrictCallsOption,
-    TakeUpOption,
+    SetOption,
+    SharedPointsOption,
     TemperatureOption,
-    TimingOption,
+    VariablesOption,
     app,
     as_path,
     busy,
+    changes_of,
     explained,
     say,
     write_text,
 )
-from postproc.compensation.options import MAX_INSERTED
 from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places, is_stream
 
@@ -86,10 +82,12 @@ def compensate(
             "-o", "--output", help="Default: PROGRAM.compensated.pdl beside it."
         ),
     ] = None,
-    lsv: LsvOption = None,
-    lsv_out: Annotated[
+    variables: VariablesOption = None,
+    variables_out: Annotated[
         Path | None,
-        typer.Option("--lsv-out", help="Where the variable file goes, changed or not."),
+        typer.Option(
+            "--variables-out", help="Where the variable file goes, changed or not."
+        ),
     ] = None,
     report: Annotated[
         Path | None,
@@ -99,19 +97,11 @@ def compensate(
     strict: Annotated[
         bool, typer.Option("--strict", help="Fail, and write nothing, if any is left.")
     ] = False,
-    clone: CloneOption = False,
-    shared: Annotated[
-        bool,
-        typer.Option("--shared", help="Edit variables that other programs may read."),
-    ] = False,
     orientation: OrientationOption = False,
+    shared_points: SharedPointsOption = None,
+    path_tolerance: PathToleranceOption = None,
+    changes: SetOption = None,
     temperature: TemperatureOption = None,
-    strict_calls: StrictCallsOption = False,
-    timing: TimingOption = None,
-    path_mm: PathOption = None,
-    max_inserted: MaxInsertedOption = MAX_INSERTED,
-    take_up: TakeUpOption = False,
-    approach: ApproachOption = False,
     processes: ProcessesOption = 0,
     every: EveryOption = False,
 ) -> None:
@@ -127,28 +117,18 @@ def compensate(
     from postproc.robot.cell import load_cell
 
     given = None if is_stream(program) else Path(program)
-    with explained(given, lsv):
-        options = Options(
-            clone,
-            shared,
-            temperature,
-            orientation,
-            strict_calls,
-            timing=timing,
-            path_mm=path_mm,
-            max_inserted=max_inserted,
-            take_up=take_up,
-            approach=approach,
-        )
-        options.check()
+    with explained(given, variables):
         if report == Path(STREAM) and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
-        check_places([output, report, html, lsv_out], [given, lsv, cell, model])
-        loaded = load_cell(cell)
+        outputs = [output, report, html, variables_out]
+        check_places(outputs, [given, variables, cell, model])
+        asked = changes_of(changes, orientation, shared_points, path_tolerance)
+        loaded = load_cell(cell, changes=asked)
+        options = Options(temperature, timing=loaded.compensation.timing)
         fitted = as_model(model, loaded.arm)
-        files = ProgramFiles.open(program, lsv)
-        if lsv_out is not None:
-            _check_values(lsv_out, files)
+        files = ProgramFiles.open(program, variables)
+        if variables_out is not None:
+            _check_values(variables_out, files)
         crowd = processes or min(parallel.available(), CROWD)
         with stages() as progress:
             outcome = run(
@@ -159,7 +139,7 @@ def compensate(
             _print_outcome(outcome, every)
             raise PostprocError(f"--strict: {_why_nothing(outcome)}")
         places = Destination(files, (cell, model))
-        written = places.write(outcome, output, report, html, lsv_out)
+        written = places.write(outcome, output, report, html, variables_out)
         _print_outcome(outcome, every)
         if report == Path(STREAM):
             write_text(STREAM, report_text(outcome))
@@ -188,10 +168,11 @@ def _check_values(place: Path, files: ProgramFiles) -> None:
         PostprocError: It is.
     """
     if place == Path(STREAM):
-        raise PostprocError("--lsv-out -: stdout holds the program. Name a file")
+        raise PostprocError("--variables-out -: stdout holds the program. Name a file")
     if files.variables is None:
         raise PostprocError(
-            "--lsv-out: the program has no variable file. Give it with --lsv"
+            "--variables-out: the program has no variable file. Give one with "
+            "--variables"
         )
 
 
@@ -260,13 +241,12 @@ def explain(
     model: Annotated[
         Path | None, typer.Option("--model", help="Model file (JSON).")
     ] = None,
-    lsv: LsvOption = None,
+    variables: VariablesOption = None,
     line: Annotated[
         int | None, typer.Option("--line", help="Only the visits of this line.")
     ] = None,
+    changes: SetOption = None,
     temperature: TemperatureOption = None,
-    strict_calls: StrictCallsOption = False,
-    timing: TimingOption = None,
     every: EveryOption = False,
     code: CodeOption = None,
     json: JsonOption = None,
@@ -280,17 +260,14 @@ def explain(
     from postproc.report.findings import listed
     from postproc.robot.cell import load_cell
 
-    with explained(program, lsv):
-        check_places([as_path(json)], [program, cell, model, lsv])
-        options = Options(
-            temperature=temperature,
-            strict_calls=strict_calls,
-            timing=timing,
-        )
+    with explained(program, variables):
+        check_places([as_path(json)], [program, cell, model, variables])
         with busy("plan"):
-            files = ProgramFiles.open(program, lsv)
+            files = ProgramFiles.open(program, variables)
+            loaded = load_cell(cell, changes=changes_of(changes))
+            options = Options(temperature, timing=loaded.compensation.timing)
             fitted = None if model is None else load_model(model)
-            found = tell(files, load_cell(cell), fitted, options=options)
+            found = tell(files, loaded, fitted, options=options)
         for text in listed(found.findings(line), every):
             say(text)
         if json:

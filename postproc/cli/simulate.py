@@ -19,7 +19,7 @@ from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.json import finite
 from postproc.robot.arm import load_arm
-from postproc.robot.cell import Cell, load_cell
+from postproc.robot.cell import Cell, as_cell
 from postproc.robot.pose import MM
 from postproc.simulation import (
     DEFAULT,
@@ -190,10 +190,10 @@ def check_arm(cell: Cell, path: Path) -> None:
 
 def simulate_file(
     program: Path,
-    cell_path: Path,
+    cell: Cell | Path,
     seed: int = 1,
     effects: str | None = None,
-    wanted: Path | None = None,
+    reference: Path | None = None,
     path: bool = False,
     rate: float = 0.0,
     gears: str = GearKind.SHARP.value,
@@ -202,10 +202,10 @@ def simulate_file(
 
     Args:
         program: A program (.pdl) or joint targets (.csv).
-        cell_path: The cell.
+        cell: The cell, or its file.
         seed: Which virtual arm.
         effects: Effects beyond geometry, tool and backlash, comma separated.
-        wanted: The program that says where the tool should have landed.
+        reference: The program that says where the tool should have landed.
         path: Score the paths between the targets as well.
         rate: Follow the tool with so many readings in a second [Hz]; 0: do not.
         gears: What the arm's gears do in their gaps.
@@ -213,8 +213,8 @@ def simulate_file(
     Raises:
         PostprocError: A file cannot be used, or an effect is not known.
     """
-    cell = load_cell(cell_path)
-    check_arm(cell, cell_path)
+    cell = as_cell(cell)
+    check_arm(cell, cell.path)
     setup = setup_of(cell)
     names: list[str | Planted] = [*DEFAULT, *parse_effects(effects or "")]
     if program.suffix.lower() == ".csv":
@@ -237,10 +237,10 @@ def simulate_file(
     )
     campaign = measure_program(arm, setup, visits)
     track = record_track(arm, setup, visits, rate) if rate else None
-    if wanted is None and not path:
+    if reference is None and not path:
         return Simulation(program.name, campaign, None, track=track)
-    original = visits if wanted is None else visits_of(wanted, cell)
-    own = own if wanted is not None else np.arange(len(visits))
+    original = visits if reference is None else visits_of(reference, cell)
+    own = own if reference is not None else np.arange(len(visits))
     landing = land(arm, setup, original, visits, own)
     error, left = true_error(landing, original), landing.left_out
     if not path:

@@ -75,13 +75,13 @@ def refuse_unknown_rotations(model: Model) -> None:
     Raises:
         ModelError: The survey does not show all rotations, or the method has none.
     """
-    cure = "Leave --orientation out, or fit a model with --method full from a survey "
+    cure = "Leave orientation out, or fit a model with --method full from a survey "
     if model.method != "full" or not len(model.covariance):
         problem = f"the method {model.method} says nothing of the tool's rotation"
-        raise ModelError("--orientation", problem, f"{cure}of three points")
+        raise ModelError("orientation", problem, f"{cure}of three points")
     if not model.ranges.see_all_rotations:
         raise ModelError(
-            "--orientation",
+            "orientation",
             "the model was surveyed at one point of the tool: it does not know how "
             "the tool is turned",
             f"{cure}of three points that span a plane ([survey] points_mm in the cell "

@@ -272,7 +272,7 @@ def correct(reading: Reading, setting: Setting) -> tuple[Reading, Correction]:
     """Plan a program, and correct it until its sides are those corrected for.
 
     Moves can only be given points of their own when all arrivals are at hand: with
-    --clone a program is one window, however long.
+    shared_points = "clone" a program is one window, however long.
 
     Args:
         reading: The program.
@@ -282,7 +282,7 @@ def correct(reading: Reading, setting: Setting) -> tuple[Reading, Correction]:
         The program, with clones where they were asked for, and what came of it.
     """
     clock = setting.clock
-    if not setting.options.clone:
+    if setting.options.shared_points != "clone":
         return reading, _in_windows(reading, setting)
     kept, proposal = _whole(reading, setting)
     with clock("clone"):

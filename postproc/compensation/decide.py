@@ -177,7 +177,7 @@ def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
         return empty
     held = taught(visits)
     reasons.mark(held, TAUGHT)
-    if not options.shared:
+    if not options.edit_exported:
         shared = has & visits.literals.shared[literal]
         reasons.mark(shared, EXPORTED)
     return np.asarray(empty | held)
@@ -225,14 +225,18 @@ HOLDS_NONE = Reason(Code.NO_TARGET, "this move holds no target")
 NOT_WRITTEN = Reason(Code.NUMBERS_NOT_OWN, "its numbers are not written in the program")
 TAUGHT = Reason(Code.TAUGHT_POINT, "a taught point already contains the arm's error")
 EXPORTED = Reason(
-    Code.EXPORTED_VARIABLE, "other programs may read this variable too (see --shared)"
+    Code.EXPORTED_VARIABLE,
+    "other programs may read this variable too (see edit_exported)",
 )
 OTHER_ARRIVAL = Reason(
     Code.DEPENDANT_WORSE, "another arrival at the same point cannot be corrected"
 )
+SEVERAL_MOVES = Reason(
+    Code.SHARED_POINT, "several moves go to this point (shared_points = leave)"
+)
 _ONE_MOVE = (
-    "one move makes them all, and --clone does not help: write it once for every way "
-    "to it, or for all frames that it is made with"
+    "one move makes them all, and --shared-points clone does not help: write it once "
+    "for every way to it, or for all frames that it is made with"
 )
 
 
@@ -727,7 +731,11 @@ class Round:
     ) -> dict[Reason, Bools]:
         """Find literals that must keep their values, see `must_stay`."""
         visits, cell = self.reading.visits, self.setting.cell
-        return must_stay(visits, agreement, change, self._trusted, cell, absorbing)
+        stay = must_stay(visits, agreement, change, self._trusted, cell, absorbing)
+        if self.setting.options.shared_points == "leave":
+            count = len(agreement.literal)
+            stay[SEVERAL_MOVES] = ~_by_one_move(visits, agreement.group, count)
+        return stay
 
     def _needed(self) -> tuple[Floats, Floats, Floats]:
         """Say what arrivals need, and what must agree.

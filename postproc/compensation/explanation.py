@@ -17,6 +17,7 @@ from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import (
     Planned,
     Reading,
+    assuming,
     plan_visits,
     read_program,
 )
@@ -205,6 +206,6 @@ def explain(
     if model is not None:
         fitted, told = as_model(model, cell.arm), replace(options, explained=True)
         return Explanation.of_outcome(compensate_files(given, cell, fitted, told))
-    cell = replace(cell, strict_calls=cell.strict_calls or options.strict_calls)
+    cell = assuming(cell, options)
     reading = read_program(given.by_name, cell)
     return Explanation.of_plan(reading, plan_visits(reading.visits, cell))

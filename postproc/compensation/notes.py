@@ -107,7 +107,7 @@ def missing_file(visits: Visits) -> list[Diagnostic]:
     lost = none[visits.reason]
     text = (
         f"{lost.sum()} targets have no value, and there is no {name}: put it beside "
-        "the program, or give it with --lsv"
+        "the program, or give it with --variables"
     )
     first = visits.line[np.flatnonzero(lost)[:1]].tolist()
     return [

@@ -5,85 +5,104 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from enum import Enum
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from postproc.exceptions import PostprocError
 
 if TYPE_CHECKING:  # the command line needs options only, and must start at once
     from postproc.arrays import Floats
     from postproc.model.model import Model
-    from postproc.robot.cell import Cell
+    from postproc.robot.cell import Cell, SharedPoints
 
 # What the user asked for.
 
-MAX_INSERTED = 1_000  # points on the ways of a program
+
+class AsInCell(Enum):
+    """The value of an option that is not given: the cell's."""
+
+    AS_IN_CELL = "as in the cell"
+
+
+AS_IN_CELL: Any = AsInCell.AS_IN_CELL
 
 
 @dataclass(frozen=True)
 class Options:
-    """What the user asked for.
+    """What the user asked for; what is not given is as [compensation] of the cell says.
 
     Attributes:
-        clone: Give moves whose arrivals at one variable disagree one each.
-        shared: Edit variables that other programs may read too.
-        orientation: Correct the orientation of targets as well as their position.
         temperature: Arm temperature [deg C]; default: the cell's.
-        strict_calls: Take no routine as motionless because the shipped list says so.
         explained: Keep what explains every target, of long programs too.
-        timing: Run the program in time, before and after; None: if it is no longer than
-            `IN_TIME`.
-        path_mm: Put points on the ways of moves that leave their paths farther [mm],
-            which runs the program in time; None: on none.
-        max_inserted: The most points.
-        take_up: Let the arm stop once more where a move begins, to take up play.
-        approach: Approach targets anew that a joint reaches from a side that is not
-            sure, which runs the program in time as well.
+        timing: Plan the program in time, before and after; None: if it is no longer
+            than `IN_TIME`. Where neither this nor the cell says so, it is not.
+        orientation, shared_points, edit_exported, assume_motion, max_inserted,
+            preload_backlash, reapproach, path_tolerance_mm: See `CompensationSection`.
     """
 
-    clone: bool = False
-    shared: bool = False
     temperature: float | None = None
-    orientation: bool = False
-    strict_calls: bool = False
     explained: bool = False
-    timing: bool | None = False
-    path_mm: float | None = None
-    max_inserted: int = MAX_INSERTED
-    take_up: bool = False
-    approach: bool = False
+    timing: bool | None = AS_IN_CELL
+    orientation: bool = AS_IN_CELL
+    shared_points: SharedPoints = AS_IN_CELL
+    edit_exported: bool = AS_IN_CELL
+    assume_motion: bool = AS_IN_CELL
+    max_inserted: int = AS_IN_CELL
+    preload_backlash: bool = AS_IN_CELL
+    reapproach: bool = AS_IN_CELL
+    path_tolerance_mm: float | None = AS_IN_CELL
 
-    def check(self) -> None:
+    def within(self, cell: Cell) -> Options:
+        """Return them with what the cell says of all that is not given.
+
+        Raises:
+            PostprocError: They do not go together.
+        """
+        given, own = vars(self), vars(cell.compensation)
+        unset = [name for name, value in given.items() if value is AS_IN_CELL]
+        found = replace(self, **{name: own[name] for name in unset})
+        if "timing" in unset and found.timing is None:
+            found = replace(found, timing=False)
+        found._check()
+        return found
+
+    def _check(self) -> None:
         """Refuse options that do not go together.
 
         Raises:
             PostprocError: They do not.
         """
-        if self.path_mm is None and self.take_up:
-            raise PostprocError("--take-up: give the tolerance of paths, --path-mm")
-        if self.path_mm is not None and not self.path_mm > 0:
-            raise PostprocError("--path-mm: give a distance of more than 0 mm")
-        if self.path_mm is not None and self.timing is False:
-            raise PostprocError("--path-mm runs the program in time: no --no-timing")
-        if self.approach and self.timing is False:
-            raise PostprocError("--approach runs the program in time: no --no-timing")
+        tolerance = self.path_tolerance_mm
+        if tolerance is not None and not tolerance > 0:
+            raise PostprocError("path_tolerance_mm: give a distance of more than 0 mm")
+        if tolerance is None and self.preload_backlash:
+            raise PostprocError(
+                "preload_backlash: no path tolerance is given. Give --path-tolerance"
+            )
 
     @property
     def inserts(self) -> bool:
         """Tell whether points may be put into a program."""
-        return self.path_mm is not None or self.approach
+        return self.path_tolerance_mm is not None or self.reapproach
+
+    def without_clones(self) -> Options:
+        """Return them for a program whose moves have points of their own already."""
+        shared = "mean" if self.shared_points == "clone" else self.shared_points
+        return replace(self, shared_points=shared)
 
     def told(self) -> dict[str, object]:
-        """Return them for a record: a strict reading of calls only if asked for."""
+        """Return them for a record: what is rarely asked for only if it is."""
         said = asdict(self)
         del said["explained"], said["timing"]  # they change no output
-        if not self.strict_calls:
-            del said["strict_calls"]
-        if self.path_mm is None:
-            del said["path_mm"], said["max_inserted"], said["take_up"]
-        if not self.approach:
-            del said["approach"]
+        if not self.assume_motion:
+            del said["assume_motion"]
+        if self.path_tolerance_mm is None:
+            for name in ("path_tolerance_mm", "max_inserted", "preload_backlash"):
+                del said[name]
+        if not self.reapproach:
+            del said["reapproach"]
         return said
 
     def times(self, visits: int) -> bool:
@@ -144,6 +163,10 @@ class Setting:
     options: Options
     clock: Clock
     processes: int = 1
+
+    def __post_init__(self) -> None:
+        """Take what is not given from the cell."""
+        object.__setattr__(self, "options", self.options.within(self.cell))
 
     def timed_by(self, clock: Clock) -> Setting:
         """Return the same with another clock."""

@@ -132,7 +132,7 @@ def start_of(cell: Cell) -> Start:
         routines=dict(cell.routines),
         motionless=cell.motionless,
         constant=cell.constant,
-        strict_calls=cell.strict_calls,
+        assume_motion=cell.compensation.assume_motion,
         payload_kg=cell.payload_mass,
         frame_tables=tables,
         aux=dict(cell.aux),
@@ -149,9 +149,15 @@ def with_measured_play(cell: Cell, model: Model) -> Cell:
 
 
 def prepared(cell: Cell, model: Model, options: Options) -> Cell:
-    """Let a cell know the model's play, and how strictly calls are taken."""
-    strict = cell.strict_calls or options.strict_calls
-    return with_measured_play(replace(cell, strict_calls=strict), model)
+    """Let a cell know the model's play, and whether routines are assumed to move."""
+    return with_measured_play(assuming(cell, options), model)
+
+
+def assuming(cell: Cell, options: Options) -> Cell:
+    """Let a cell know whether routines that it does not name are assumed to move."""
+    assume = options.within(cell).assume_motion
+    own = cell.compensation.model_copy(update={"assume_motion": assume})
+    return replace(cell, compensation=own)
 
 
 def read_program(

@@ -231,7 +231,7 @@ class ProgramFiles:
         name = name_of_text(program, name, source)
         if lsv is not None and not variables_of(name):
             problem = f"a {language_of(name).name} program has no variable file"
-            raise ProgramError(name, problem, "Leave --lsv out")
+            raise ProgramError(name, problem, "Leave --variables out")
         lsv = lsv or (None if path is None else find_variables(path))
         values = None if lsv is None else read_input(lsv)
         found = Pages() if path is None else find_pages(path)

@@ -89,7 +89,7 @@ def _corrected(
     readings: Sequence[Reading], setting: Setting
 ) -> list[tuple[Reading, Correction] | Exception]:
     """Correct the programs of a pass; one that fails leaves the others alone."""
-    if len(readings) > 1 and not setting.options.clone:
+    if len(readings) > 1 and setting.options.shared_points != "clone":
         found = _tried(correct_batch, readings, setting)
         if not isinstance(found, Exception):
             return list(zip(readings, found, strict=True))

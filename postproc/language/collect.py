@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_right
 from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -382,6 +383,8 @@ def _aux(found: Sequence[FoundVisit]) -> np.ndarray:
 # Where the numbers stand.
 
 _NO_LITERAL = -2  # follows numbers that are no literal
+MOST_NUMBERS = 17  # of a target
+TAUGHT_SHIFT = "a target that is computed from it is marked as taught"
 ANY_ELEMENT = "a move goes to an element of {} that only the run tells"
 BESIDE = (
     "the move in line {} of {} goes there too: how it is reached there is not followed"
@@ -415,6 +418,7 @@ def _literals(
                 rows.append(v)
             literal[k] = index[file, slots[0]]
     pinned = _pinned(found, rows, index, other)
+    _hold_for_taught(pinned, found, index, machine, comments)
     taught = _taught(found, literal, len(rows), machine, comments)
     literals = _places(rows, machine, pinned, taught, width)
     return literals, literal, _followed(found, index)
@@ -458,6 +462,25 @@ def _pinned(
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
     return pinned
+
+
+def _hold_for_taught(
+    pinned: list[str],
+    found: Sequence[FoundVisit],
+    index: Mapping[tuple[int, int], int],
+    machine: TaskMachine,
+    comments: Comments,
+) -> None:
+    """Hold the points of targets that are computed and marked as taught, in place."""
+    lines = [comments.taught(text.source) for text in machine.texts]
+    if not any(lines):
+        return
+    for v in found:
+        at, file = index.get(v.goal.point, -1), v.scope.file
+        if at < 0 or v.goal.slots[0] >= 0 or v.goal.is_rewritten_by_shift:
+            continue
+        if not lines[file].isdisjoint(machine.texts[file].lines(v.row)):
+            pinned[at] = pinned[at] or TAUGHT_SHIFT
 
 
 def _shifts(found: Sequence[FoundVisit]) -> dict[str, Any]:
@@ -550,19 +573,58 @@ def _taught(
         comments: How the language writes them.
     """
     lines = [comments.taught(text.source) for text in machine.texts]
-    starts = [text.source.line_starts for text in machine.texts]
+    if not (any(lines) or machine.start.taught):
+        return [False] * count
+    places = [{(v.goal.writes[0], v.goal.writes[1][0]), v.goal.point} for v in found]
+    written = {place for some in places for place in some if place[1] >= 0}
+    marked = _marked(written, machine, lines)
     out = [False] * count
-    for v, own in zip(found, literal.tolist(), strict=True):
-        if own < 0 or out[own]:
-            continue
-        file, slots = v.goal.writes
-        places = {(file, slots[0]), v.goal.point}
-        at = ((f, int(machine.texts[f].start[slot])) for f, slot in places if slot >= 0)
-        out[own] = _is_named(v.goal.name, machine.start.taught) or any(
-            int(np.searchsorted(starts[f], begin, side="right")) in lines[f]
-            for f, begin in at
-        )
+    for v, own, some in zip(found, literal.tolist(), places, strict=True):
+        if own >= 0 and not out[own]:
+            named = _is_named(v.goal.name, machine.start.taught)
+            out[own] = named or not marked.isdisjoint(some)
     return out
+
+
+def _marked(
+    places: Collection[tuple[int, int]],
+    machine: TaskMachine,
+    lines: Sequence[Collection[int]],
+) -> set[tuple[int, int]]:
+    """Find the targets that a comment marks as taught.
+
+    It speaks of those whose numbers stand on its line; where none do, of all in its
+    statement.
+
+    Args:
+        places: File and first number of targets.
+        machine: It has read the files.
+        lines: Lines of such comments, by file.
+    """
+    found = set[tuple[int, int]]()
+    for file, text in enumerate(machine.texts):
+        own = sorted(slot for at, slot in places if at == file) if lines[file] else []
+        rows = {slot: text.row_of(slot) for slot in own}
+        for line in lines[file]:
+            there = _on_line(own, rows, text, line)
+            near = (slot for slot in own if line in text.lines(rows[slot]))
+            found |= {(file, slot) for slot in there or near}
+    return found
+
+
+def _on_line(
+    own: Sequence[int], rows: Mapping[int, int], text: StatementText[Any], line: int
+) -> set[int]:
+    """Return the targets, by their first numbers, with numbers on a line."""
+    starts = text.source.line_starts
+    begin, end = (*starts[line - 1 : line + 1].tolist(), len(text.source.data))[:2]
+    first, last = np.searchsorted(text.start, [begin, end]).tolist()
+    found = set[int]()
+    for slot in range(first, last):
+        at = bisect_right(own, slot) - 1
+        if at >= 0 and slot - own[at] < MOST_NUMBERS:
+            found |= {own[at]} if text.row_of(slot) == rows[own[at]] else set()
+    return found
 
 
 def _is_named(name: str, names: Collection[str]) -> bool:

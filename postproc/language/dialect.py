@@ -32,7 +32,7 @@ class Terms:
         laws: Names of the `OrientationLaw` members, by their number.
         border: Why flags of a joint so near a border must not be trusted; its number is
             filled in.
-        cloning: Whether `--clone` writes a point of its own.
+        cloning: Whether `--shared-points clone` writes a point of its own.
     """
 
     tool: str
@@ -54,7 +54,7 @@ class Terms:
     arc: str
     laws: tuple[str, ...] = ()
     border: str = ""
-    cloning: str = "see --clone"
+    cloning: str = "see --shared-points clone"
 
 
 class Dialect(ABC):

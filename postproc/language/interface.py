@@ -31,7 +31,7 @@ class Start:
         constant: Patterns of exported variables, ``name`` or ``program.name``, that no
             other program changes.
         payload_kg: What the arm carries, NaN where that is not known.
-        strict_calls: The shipped list of such routines does not count.
+        assume_motion: The shipped list of such routines does not count.
         frame_tables: Outside routine to arguments (``"1,2"``) to the records of the
             frames (``tool``, ``base``, ``uframe``) that it sets.
         aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
@@ -45,7 +45,7 @@ class Start:
     uframe: Record = (0.0,) * 6
     routines: Mapping[str, str] = field(default_factory=dict)
     motionless: tuple[str, ...] = ()
-    strict_calls: bool = False
+    assume_motion: bool = False
     constant: tuple[str, ...] = ()
     payload_kg: float = math.nan
     frame_tables: Mapping[str, Mapping[str, Mapping[str, Record]]] = field(

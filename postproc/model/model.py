@@ -32,6 +32,7 @@ from postproc.model.model_file import (
     square_of,
 )
 from postproc.model.noise import Noise
+from postproc.model.provenance import Provenance
 from postproc.model.ranges import Ranges
 from postproc.model.registration import Registration
 from postproc.model.variance import (
@@ -146,6 +147,8 @@ class Model:
             joints goes from flank to flank, by reversals of the survey; UNTOLD where
             they do not tell, empty where none were measured.
         weight: Direction in which weight pulled, unit vector in the base frame.
+        provenance: When, for which robot and by what it was fitted, None where that is
+            not known; no part of the id.
         monuments: Fixed points that the survey read.
         doubt: What may be there besides the effects; None where that is hardly any.
     """
@@ -169,6 +172,7 @@ class Model:
     flank_widths: tuple[Width, ...] = ()
     weight: Direction = FLOOR
     monuments: tuple[Monument, ...] = ()
+    provenance: Provenance | None = None
     doubt: Doubt | None = None
 
     @cached_property
@@ -494,6 +498,8 @@ class Model:
             data["monuments"] = [
                 {"name": name, "xyz_m": xyz} for name, xyz in self.monuments
             ]
+        if self.provenance is not None:
+            data["provenance"] = asdict(self.provenance)
         if self.doubt is not None:
             data["doubt"] = {
                 "effects": _listed_effects(self.doubt.effects),
@@ -579,6 +585,9 @@ def _model_of(path: Path, file: ModelFile) -> Model:
         flank_widths=tuple(UNTOLD if w is None else w for w in file.flank_widths),
         weight=file.weight,
         monuments=tuple((m.name, m.xyz_m) for m in file.monuments),
+        provenance=None
+        if (origin := file.provenance) is None
+        else Provenance(**origin.model_dump()),
         doubt=None if file.doubt is None else _doubt_of(path, file.doubt, count),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.

@@ -23,7 +23,8 @@ from postproc.exceptions import ModelError
 from postproc.model.registration import Registration
 from postproc.robot.arm import FLOOR
 
-FORMAT = 1
+FORMAT = 2
+NOT_CONTENT = ("id", "provenance")  # what an id is not made from
 MAX_BYTES = 200_000_000
 
 Method = Literal["full", "eja-elm", "elm", "interpolation", "kinematic-elm", "kriging"]
@@ -171,13 +172,23 @@ class RegistrationSection(ModelSection):
         return Registration(T, probes, ids, tuple(s.name for s in stations))
 
 
+class ProvenanceSection(ModelSection):
+    """Where the model comes from: `postproc.model.provenance.Provenance`."""
+
+    date: str
+    arm: str
+    serial_number: str | None
+    instrument: str | None
+    software: str
+
+
 WidthSection = tuple[PositiveFloat, PositiveFloat]
 
 
 class ModelFile(ModelSection):
     """A whole model file."""
 
-    format: Literal[1]
+    format: Literal[1, 2]
     id: str
     parent: str | None
     method: Method
@@ -196,12 +207,17 @@ class ModelFile(ModelSection):
     flank_widths: Annotated[tuple[WidthSection | None, ...], Field(max_length=6)] = ()
     weight: tuple[float, float, float] = FLOOR
     monuments: tuple[MonumentSection, ...] = ()
+    provenance: ProvenanceSection | None = None
     doubt: DoubtSection | None = None
 
 
 def content_id(data: dict[str, Any]) -> str:
-    """Hash everything but the id."""
-    rest = {k: v for k, v in data.items() if k != "id"}
+    """Hash everything but the id and the provenance: equal data give equal ids.
+
+    Format 2 added the provenance alone: a model has the same id in both formats.
+    """
+    rest = {k: v for k, v in data.items() if k not in NOT_CONTENT}
+    rest |= {"format": 1} if rest.get("format") == FORMAT else {}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

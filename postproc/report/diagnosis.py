@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -176,14 +177,19 @@ def history_text(model_path: Path) -> str:
     model = load_model(model_path)
     if not model.history:
         row = (model.id, "fitted", _named(model), "", "", str(model.rows), "")
-        return table_text(HISTORY, folded(HISTORY, [row], ADDED))
+        return table_text(HISTORY, folded(HISTORY, [row], ADDED)) + _origin(model)
     first = str(model.history[0].get("parent", ""))
     made = [*(str(r.get("parent", "")) for r in model.history[1:]), model.id]
     steps = [
         _step(name, record) for name, record in zip(made, model.history, strict=True)
     ]
     rows = [(first, "given", "", "", "", "", ""), *steps]
-    return table_text(HISTORY, folded(HISTORY, rows, ADDED))
+    return table_text(HISTORY, folded(HISTORY, rows, ADDED)) + _origin(model)
+
+
+def _origin(model: Model) -> str:
+    """Write where a model comes from, nothing where its file does not tell."""
+    return "" if model.provenance is None else f"\n{model.id} {model.provenance}"
 
 
 def _step(name: str, record: Mapping[str, Any]) -> tuple[str, ...]:
@@ -210,5 +216,7 @@ def _added(entry: dict[str, object]) -> str:
 def history_json(model_path: Path) -> str:
     """Return the chain as JSON."""
     model = load_model(model_path)
-    told = {"id": model.id, "history": list(model.history)}
+    told: dict[str, object] = {"id": model.id, "history": list(model.history)}
+    if model.provenance is not None:
+        told["provenance"] = asdict(model.provenance)
     return json.dumps(schema("history") | told, indent=1)

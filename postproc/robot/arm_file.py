@@ -73,6 +73,20 @@ def parse_toml(
     except ValueError:
         problem = "holds an integer of more digits than any number needs"
         raise error(path, problem, "Write it shorter") from None
+    return validate(path, data, schema, error)
+
+
+def validate(
+    path: str | Path,
+    data: Mapping[str, object],
+    schema: type[Schema],
+    error: type[FileError],
+) -> Schema:
+    """Validate what a file, or a part of it, holds.
+
+    Raises:
+        FileError: Of the given type, naming the file and the first wrong place.
+    """
     try:
         return schema.model_validate(data)
     except pydantic.ValidationError as exc:
@@ -89,7 +103,7 @@ def _syntax(path: Path, message: str, error: type[FileError]) -> FileError:
 
 
 def _explain(
-    path: Path,
+    path: str | Path,
     exc: pydantic.ValidationError,
     schema: type[Strict],
     error: type[FileError],

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
@@ -11,6 +12,7 @@ import numpy as np
 from pydantic import (
     Field,
     NonNegativeFloat,
+    NonNegativeInt,
     PositiveFloat,
     PositiveInt,
     field_validator,
@@ -27,6 +29,7 @@ from postproc.robot.arm_file import (
     Triple,
     parse_toml,
     read_toml,
+    validate,
 )
 from postproc.robot.pose import MM, pose_from_record, rotation_from_zyz
 
@@ -100,6 +103,7 @@ class RobotSection(Strict):
         arm_number: Which arm of its controller it is.
         controller: Whose controller runs the programs, or several; default: as the arm
             file has it.
+        serial_number: Of the robot, kept with the models that are fitted for it.
         absolute_accuracy: Whether the controller compensates the arm itself.
         mounting: Where weight pulls in the arm's base frame: "floor" along -z,
             "ceiling" along +z, "wall" along +x, or a vector of any length. Without it
@@ -109,6 +113,7 @@ class RobotSection(Strict):
     arm: str
     arm_number: ArmNumber = 1
     controller: Controller | list[Controller] | None = None
+    serial_number: str | None = None
     absolute_accuracy: bool = False
     mounting: Literal["floor", "ceiling", "wall"] | Triple | None = None
 
@@ -226,6 +231,70 @@ class LimitSection(Strict):
     }
 
 
+SharedPoints = Literal["mean", "clone", "leave"]
+PointFrame = Literal["base", "uframe", "tracker"]
+MAX_INSERTED = 1_000  # points that are inserted into a program
+
+
+class CompensationSection(Strict):
+    """How the programs of this cell are compensated.
+
+    Attributes:
+        orientation: Correct the orientation of targets as well as their position.
+        shared_points: What is done with a point that several arrivals share: "mean"
+            gives it the mean of corrections that agree within limits.conflict_mm,
+            "clone" gives moves whose arrivals are in conflict points of their own,
+            "leave" corrects no point that several moves go to.
+        edit_exported: Edit variables that other programs may read.
+        assume_motion: Assume that a routine that the cell does not name moves the arm,
+            also where the shipped list has it as motionless.
+        max_inserted: The most points that are inserted into a program.
+        preload_backlash: Insert a stop where a move begins, which brings the gears to
+            the flank on which the move holds them.
+        reapproach: Insert a stop before each target whose approach direction is
+            uncertain.
+        path_tolerance_mm: Insert points where a path is predicted to be left by more;
+            default: insert none.
+        timing: Plan the program in time, before and after; default: `compensate` and
+            `explain` do if it is short. Where points are inserted it is planned so.
+    """
+
+    orientation: bool = False
+    shared_points: SharedPoints = "mean"
+    edit_exported: bool = False
+    assume_motion: bool = False
+    max_inserted: NonNegativeInt = MAX_INSERTED
+    preload_backlash: bool = False
+    reapproach: bool = False
+    path_tolerance_mm: PositiveFloat | None = None
+    timing: bool | None = None
+
+
+class MeasurementSection(Strict):
+    """How measurement files of this cell are written; what is not stated is detected.
+
+    Attributes:
+        columns: A column map (TOML), its place relative to the cell file.
+        delimiter: Between cells: itself, or tab, space, comma, semicolon.
+        decimal: "." or ",".
+        encoding: Name of a Python codec.
+        unit: Of coordinates in files that do not state it; default: mm.
+        frame: Frame of the measured positions; default: the arm's base frame.
+        instrument: What measured, kept with the models that are fitted.
+    """
+
+    columns: str | None = None
+    delimiter: str | None = None
+    decimal: Literal[".", ","] | None = None
+    encoding: str | None = None
+    unit: Literal["mm", "m", "inch"] | None = None
+    frame: PointFrame | None = None
+    instrument: str | None = None
+
+
+AS_USUAL, DETECTED = CompensationSection(), MeasurementSection()
+
+
 class FrameTableEntry(Strict):
     """The frames that one call of a frame routine sets."""
 
@@ -255,6 +324,8 @@ class CellFile(Strict):
     survey: SurveySection | None = None
     aux: dict[str, Literal["gun", "track", "positioner"]] = Field(default_factory=dict)
     limits: LimitSection = LimitSection()
+    compensation: CompensationSection = CompensationSection()
+    measurements: MeasurementSection = MeasurementSection()
     routines: dict[str, Effect | list[str]] = Field(default_factory=dict)
     frames: FramesSection = FramesSection()
     variables: VariablesSection = VariablesSection()
@@ -315,6 +386,8 @@ class Cell:
         mounting: Orientation of a 6D probe in the flange frame, (3, 3), or None.
         aux: Kind of every declared auxiliary axis.
         limits: Guards, in the units of their names.
+        compensation: How programs are compensated.
+        measurements: How measurement files are written; its column map is a whole path.
         routines: What outside routines do, by lower-case name.
         motionless: Lower-case patterns of outside routines, ``name`` or
             ``program.name``, that neither move the arm nor set frames.
@@ -326,7 +399,6 @@ class Cell:
             joint angles of their three points, (3, 6) [rad], or None.
         constant: Lower-case patterns of exported variables, ``name`` or
             ``program.name``, that no other program changes.
-        strict_calls: The shipped list of still routines does not count.
     """
 
     path: Path
@@ -352,7 +424,8 @@ class Cell:
     taught_frames: Mapping[tuple[float, ...], Floats | None]
     motionless: tuple[str, ...] = ()
     constant: tuple[str, ...] = ()
-    strict_calls: bool = False
+    compensation: CompensationSection = AS_USUAL
+    measurements: MeasurementSection = DETECTED
     taught_sides: Mapping[tuple[float, ...], Floats] = field(default_factory=dict)
     probe_names: tuple[str, ...] = ()
 
@@ -394,12 +467,20 @@ def as_cell(cell: Cell | str | Path) -> Cell:
     return cell if isinstance(cell, Cell) else load_cell(cell)
 
 
-def load_cell(file: str | Path | bytes, *, name: str = "cell.toml") -> Cell:
+def load_cell(
+    file: str | Path | bytes,
+    *,
+    name: str = "cell.toml",
+    changes: Sequence[str] = (),
+) -> Cell:
     """Read a cell file.
 
     Args:
         file: Its path, or its text as bytes.
         name: Of text, for messages; an arm file it names lies beside this path.
+        changes: Keys of [compensation] and [measurements] for this run, as
+            ``compensation.orientation=true``; the value ``none`` stands for the
+            default.
 
     Raises:
         CellError: The file cannot be read, or a key, unit or value is wrong; the
@@ -407,8 +488,60 @@ def load_cell(file: str | Path | bytes, *, name: str = "cell.toml") -> Cell:
         ArmError: The arm it names cannot be loaded.
     """
     if isinstance(file, bytes):
-        return _cell_of(Path(name), parse_toml(Path(name), file, CellFile, CellError))
-    return _cell_of(Path(file), read_toml(Path(file), CellFile, CellError))
+        path, read = Path(name), parse_toml(Path(name), file, CellFile, CellError)
+    else:
+        path, read = Path(file), read_toml(Path(file), CellFile, CellError)
+    for change in changes:
+        read = _changed(read, change)
+    return _cell_of(path, read)
+
+
+CHANGEABLE: Mapping[str, type[Strict]] = {
+    "compensation": CompensationSection,
+    "measurements": MeasurementSection,
+}
+
+
+def _changed(file: CellFile, change: str) -> CellFile:
+    """Return a cell file with one key changed for a run.
+
+    Raises:
+        CellError: There is no such key, or the value is wrong.
+    """
+    place, _, text = change.partition("=")
+    name, _, key = place.strip().partition(".")
+    if name not in CHANGEABLE or not key or not text.strip():
+        known = " or ".join(f"{section}.KEY=VALUE" for section in CHANGEABLE)
+        raise CellError(f"--set {change}", "sets nothing", f"Write {known}")
+    data = getattr(file, name).model_dump(exclude_unset=True)
+    data.pop(key, None)
+    value = _value(text.strip())
+    if value != "none":
+        whole = key == "columns" and isinstance(value, str)
+        data[key] = str(Path(str(value)).absolute()) if whole else value
+    elif key not in CHANGEABLE[name].model_fields:
+        data[key] = value
+    section = validate(f"--set {change}", data, CHANGEABLE[name], CellError)
+    return file.model_copy(update={name: section})
+
+
+def _value(text: str) -> object:
+    """Read a value as TOML has it; a bare word is a text.
+
+    >>> _value("0.1"), _value("true"), _value("clone"), _value('"a b"')
+    (0.1, True, 'clone', 'a b')
+    """
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        return text
+
+
+def _beside(folder: Path, section: MeasurementSection) -> MeasurementSection:
+    """Return what is stated of measurement files, with the whole path of its map."""
+    if section.columns is None:
+        return section
+    return section.model_copy(update={"columns": str(folder / section.columns)})
 
 
 def _cell_of(path: Path, file: CellFile) -> Cell:
@@ -434,6 +567,8 @@ def _cell_of(path: Path, file: CellFile) -> Cell:
         mounting=_mounting(file),
         aux=_aux(file, path),
         limits=file.limits,
+        compensation=file.compensation,
+        measurements=_beside(path.parent, file.measurements),
         routines={
             name.lower(): what
             for name, what in file.routines.items()

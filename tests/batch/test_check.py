@@ -90,7 +90,7 @@ def test_targets_left_alone_are_found_and_may_be_accepted(trees):
     assert found.exit_code == 1 and found.accepting_left().exit_code == 0
     command = ["check", str(target)]
     assert CliRunner().invoke(app, command).exit_code == 1
-    assert CliRunner().invoke(app, [*command, "--accept-left"]).exit_code == 0
+    assert CliRunner().invoke(app, [*command, "--allow-uncorrected"]).exit_code == 0
 
 
 @pytest.mark.parametrize("name", ["line000/job00000.pdl", "spot.lsv"])

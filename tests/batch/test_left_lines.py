@@ -54,7 +54,7 @@ def test_check_and_diff_name_every_line_that_was_left(desk, name, by):
     assert finding["code"] == "left-alone" and why in finding["message"]
     assert f"{len(lines)} visits were left alone, " in finding["message"]
     assert f"lines {lines[0]}-{lines[-1]} of" in finding["message"]
-    assert cli("check", out.parent, "--accept-left").exit_code == 0
+    assert cli("check", out.parent, "--allow-uncorrected").exit_code == 0
     told = json.loads(cli("diff", job, out, "--json", "-").stdout)
     assert [row["line"] for row in told["uncorrected"]] == lines
     assert all(row["status"] == "runtime" for row in told["uncorrected"])

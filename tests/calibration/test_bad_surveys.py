@@ -91,7 +91,10 @@ WRONG = {
         lambda s: {**s, "q3_deg": -s["q3_deg"]},
         r"Joint 3 looks like it has the other sign",
     ),
-    "frame": (tracker_frame, r"look like the tracker's frame: use --frame tracker"),
+    "frame": (
+        tracker_frame,
+        r"look like the tracker's frame: use --set measurements.frame=tracker",
+    ),
     "tools": (
         lambda s: without(s, *WITHOUT_TOOLS),
         r":3: the rows were measured with 3 tools \(first seen in rows 1, 2, 3\).*"
@@ -118,7 +121,7 @@ def test_a_survey_that_is_not_what_it_says_is_refused(desk, survey, fit, name):
 )
 def test_mixed_rows_in_the_tracker_s_frame(survey, fit, name, said):
     seen = tracker_frame(survey)
-    found = fit(WRONG[name][0](seen), "--frame", "tracker")
+    found = fit(WRONG[name][0](seen), "--set", "measurements.frame=tracker")
     assert found.exit_code == 2 and said in found.stderr, found.stderr
 
 
@@ -151,15 +154,29 @@ def test_options_say_how_a_file_is_to_be_read(desk, survey, fit):
         "map.toml", "[columns]\n" + "".join(f'{n} = "{c}"\n' for n, c in names.items())
     )
     renamed = {names[n]: v for n, v in survey.items()}
-    how = ("--columns", form, "--delimiter", "|", "--decimal", ",")
+    how = (
+        "--set",
+        f"measurements.columns={form}",
+        "--set",
+        "measurements.delimiter=|",
+        "--set",
+        "measurements.decimal=,",
+    )
     found = fit(renamed, *how, delimiter="|", decimal=",")
     assert found.exit_code == 0, found.stderr
     mapped = json.loads((desk.folder / "m.json").read_bytes())
     assert fit(survey).exit_code == 0
     plain = json.loads((desk.folder / "m.json").read_bytes())
     assert mapped["parameters"] == plain["parameters"]
-    found = fit(renamed, *how[:2], "--delimiter", ";", delimiter="|", decimal=",")
+    found = fit(
+        renamed,
+        *how[:2],
+        "--set",
+        "measurements.delimiter=;",
+        delimiter="|",
+        decimal=",",
+    )
     assert found.exit_code == 2
     assert re.search(r"s\.csv:1: column c0, .* is missing", found.stderr)
-    found = fit(survey, "--decimal", "x")
+    found = fit(survey, "--set", "measurements.decimal=x")
     assert found.exit_code == 2 and "write . or ," in found.stderr

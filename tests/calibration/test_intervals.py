@@ -142,10 +142,10 @@ def test_predict_reads_in_the_tracker_s_frame(tmp_path) -> None:
     model = tmp_path / "m.json"
     effects = ("--effects", "geometry,backlash_profile,backlash")
     fitted = cli("fit", tmp_path / "fit.csv", "--cell", setup, "-o", model,
-                 "--frame", "tracker", *effects)  # fmt: skip
+                 "--set", "measurements.frame=tracker", *effects)  # fmt: skip
     assert fitted.exit_code == 0, fitted.stderr
     ask = ("predict", tmp_path / "test.csv", "--cell", setup, "--model", model)
-    for how in (("--frame", "tracker"), ("--refit", "registration")):
+    for how in (("--set", "measurements.frame=tracker"), ("--refit", "registration")):
         told = cli(*ask, *how)
         assert told.exit_code == 0, told.stderr
         header = told.stdout.splitlines()[0].split(",")
@@ -163,15 +163,23 @@ def test_a_model_without_registration_finds_it_or_says_so(tmp_path) -> None:
     both = ("--cell", setup)
     cli("fit", tmp_path / "rows.csv", *both, "-o", model, "--effects", "geometry")
     ask = ("predict", tmp_path / "rows.csv", *both, "--model", model)
-    told = cli(*ask, "--frame", "tracker")
+    told = cli(*ask, "--set", "measurements.frame=tracker")
     assert told.exit_code == 0 and "registration refitted" in told.stderr
     lines = (tmp_path / "rows.csv").read_text().splitlines()
     bare = [",".join(line.split(",")[:-3]) for line in lines]
     (tmp_path / "bare.csv").write_text("\n".join(bare) + "\n")
-    told = cli("predict", tmp_path / "bare.csv", *ask[2:], "--frame", "tracker")
+    told = cli(
+        "predict",
+        tmp_path / "bare.csv",
+        *ask[2:],
+        "--set",
+        "measurements.frame=tracker",
+    )
     assert told.exit_code == 2 and "--refit registration" in told.stderr
     (tmp_path / "few.csv").write_text("\n".join(lines[:5]) + "\n")
-    told = cli("predict", tmp_path / "few.csv", *ask[2:], "--frame", "tracker")
+    told = cli(
+        "predict", tmp_path / "few.csv", *ask[2:], "--set", "measurements.frame=tracker"
+    )
     assert told.exit_code == 2 and "Measure 6 poses or more" in told.stderr
     told = cli(*ask, "--refit", "everything")
     assert told.exit_code == 2 and "write registration" in told.stderr

@@ -161,7 +161,7 @@ def test_another_frame_is_named() -> None:
     survey = measured(5)
     moved = replace(survey, position=survey.position + np.array([3.0, 1.0, 0.5]))
     for check in (checks("fit"), checks("model")):
-        with pytest.raises(MeasurementError, match="use --frame tracker"):
+        with pytest.raises(MeasurementError, match="frame=tracker"):
             check(moved)
 
 

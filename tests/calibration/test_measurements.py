@@ -220,6 +220,6 @@ def test_implausible_surveys_are_refused_with_the_reason(tmp_path: Path) -> None
         cells = row.split(",")
         x, y, z = map(float, cells[-3:])
         far.append(",".join([*cells[:-3], f"{-y + 3000}", f"{x}", f"{z - 500}"]))
-    refused("use --frame tracker", far)
+    refused("use --set measurements.frame=tracker", far)
     refused("determine", rows()[:5])
     refused("determine", [f"{k}," + rows()[0].split(",", 1)[1] for k in range(40)])

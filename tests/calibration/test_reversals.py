@@ -32,7 +32,7 @@ def surveyed(folder: Path, gears: str, seed: int = SEED) -> Path:
     """A survey with reversals of an arm whose gears are of one kind."""
     rows, written = folder / f"{gears}{seed}.csv", folder / "survey.pdl"
     done("survey", "--cell", CELL, "--poses", POSES, "--reversals", EACH, "-o", written)
-    done("simulate", written, "--cell", CELL, "--seed", seed, "--gears", gears,
+    done("simulate", written, "--cell", CELL, "--seed", seed, "--backlash-model", gears,
          "-o", rows)  # fmt: skip
     return rows
 

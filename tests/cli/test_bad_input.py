@@ -500,7 +500,7 @@ def test_toml_beyond_all_measure_is_refused_in_words(desk, text, said):
     plan = ["--plan", cell]
     found = cli("batch", desk.folder, desk.folder / "dst", *plan)
     refused(found, rf"odd\.toml: .*{said}")
-    columns = ["--cell", desk.cell, "--columns", cell]
+    columns = ["--cell", desk.cell, "--set", f"measurements.columns={cell}"]
     found = cli("compare", desk.put("d.csv", "id,q1_deg\n1,2\n"), *columns)
     refused(found, r"odd\.toml: ")
 

@@ -202,7 +202,9 @@ VALUED = program(FIRST, "MOVE LINEAR TO a", declared="a : XTNDPOS")
 def test_values_of_a_piped_program_go_where_they_are_told_to(desk):
     values = desk.put("job.lsv", LISTED + entry("a"))
     out = desk.folder / "out.lsv"
-    found = desk.compensate("-", "--lsv", values, "--lsv-out", out, stdin=VALUED)
+    found = desk.compensate(
+        "-", "--variables", values, "--variables-out", out, stdin=VALUED
+    )
     assert found.exit_code == 0
     assert found.stdout_bytes.startswith(b"-- postproc")
     assert out.read_bytes().startswith(b"-- postproc")
@@ -213,16 +215,18 @@ def test_values_of_a_piped_program_go_where_they_are_told_to(desk):
 
 def test_a_piped_program_writes_nothing_beside_its_sources(desk):
     values = desk.put("job.lsv", LISTED + entry("a"))
-    found = desk.compensate("-", "--lsv", values, stdin=VALUED)
+    found = desk.compensate("-", "--variables", values, stdin=VALUED)
     assert found.exit_code == 2 and found.stdout_bytes == b""
-    assert "job.lsv: changes too" in found.stderr and "--lsv-out" in found.stderr
+    assert "job.lsv: changes too" in found.stderr and "--variables-out" in found.stderr
     assert desk.names() == {"job.lsv"}
 
 
 def test_values_that_stay_come_out_of_the_filter_too(desk):
     values, out = desk.put("job.lsv", LISTED + entry("b")), desk.folder / "out.lsv"
     source = program(FIRST, POSE)
-    found = desk.compensate("-", "--lsv", values, "--lsv-out", out, stdin=source)
+    found = desk.compensate(
+        "-", "--variables", values, "--variables-out", out, stdin=source
+    )
     assert found.exit_code == 0
     assert out.read_bytes() == values.read_bytes()
     assert desk.names() == {"job.lsv", "out.lsv"}
@@ -233,7 +237,7 @@ def test_values_in_a_folder_of_their_own_have_a_record_of_their_own(desk):
     values = desk.put("job.lsv", LISTED + entry("a"))
     far = desk.folder / "far"
     far.mkdir()
-    found = desk.compensate(source, "--lsv-out", far / "v.lsv")
+    found = desk.compensate(source, "--variables-out", far / "v.lsv")
     assert found.exit_code == 0
     assert {p.name for p in far.iterdir()} == {"v.lsv", "v.lsv.postproc.json"}
     assert cli("restore", far / "v.lsv").exit_code == 0
@@ -242,7 +246,9 @@ def test_values_in_a_folder_of_their_own_have_a_record_of_their_own(desk):
 
 def test_a_place_for_values_needs_values(desk):
     for place, why in ((desk.folder / "out.lsv", "no variable file"), ("-", "stdout")):
-        found = desk.compensate("-", "--lsv-out", place, stdin=program(FIRST, POSE))
+        found = desk.compensate(
+            "-", "--variables-out", place, stdin=program(FIRST, POSE)
+        )
         assert found.exit_code == 2 and why in found.stderr
         assert desk.names() == set()
 
@@ -271,11 +277,11 @@ def test_clones_are_written_checked_compared_and_restored(desk):
     given = desk.put("job.pdl", source)
     (desk.folder / "new").mkdir()
     out = desk.folder / "new" / "job.pdl"
-    found = desk.compensate(given, "--clone", "-o", out)
+    found = desk.compensate(given, "--shared-points", "clone", "-o", out)
     assert found.exit_code == 0 and "job.pdl:3: cloned: p:" in found.stderr
     assert b"  p__2 : POSITION\r\n" in out.read_bytes()
     report = desk.folder / "r.json"
-    desk.compensate(given, "--clone", "-o", out, "--report", report)
+    desk.compensate(given, "--shared-points", "clone", "-o", out, "--report", report)
     row = json.loads(report.read_bytes())["targets"][3]
     assert row["name"] == "p__2" and row["status"] == "corrected"
     assert (row["line"], row["literal"]["line"]) == (9, 5)
@@ -283,7 +289,7 @@ def test_clones_are_written_checked_compared_and_restored(desk):
     assert checked.exit_code == 0, checked.stdout
     compared = cli("diff", given, out)
     assert compared.exit_code == 1 and "p__2" in compared.stdout
-    again = desk.compensate(out, "--clone")
+    again = desk.compensate(out, "--shared-points", "clone")
     assert again.exit_code == 2 and "compensated already" in again.stderr
     assert cli("restore", out).exit_code == 0
     assert out.read_bytes() == source
@@ -325,7 +331,7 @@ def test_survey_simulate_fit_predict(desk, tmp_path):
 
 def test_simulate_tells_the_true_error_as_json(desk):
     source = desk.put("job.pdl", program(FIRST, POSE))
-    found = cli("simulate", source, "--cell", desk.cell, "--wanted", source,
+    found = cli("simulate", source, "--cell", desk.cell, "--reference", source,
                 "--json", "-")  # fmt: skip
     error = json.loads(found.stdout)["true_error"]
     assert found.exit_code == 0 and error["n"] == 2 and error["mean_mm"] > 0.2

@@ -59,14 +59,19 @@ def test_files_of_their_own_are_tested(desk: Desk, files: dict[str, Path]) -> No
 
 def test_rows_of_a_tracker_are_registered_by_those_that_are_fitted(desk, files) -> None:
     found = told(
-        desk, files["tracker"], "--test", files["tracker test"], "--frame", "tracker"
+        desk,
+        files["tracker"],
+        "--test",
+        files["tracker test"],
+        "--set",
+        "measurements.frame=tracker",
     )
     mean = {row["method"]: row["mean_mm"] for row in found["rows"]}
     assert mean["full"] < 0.5 and mean["no compensation"] < 10
 
 
 def test_blocks_are_tested_in_turn(desk: Desk, files: dict[str, Path]) -> None:
-    found = told(desk, files["data"], "--blocks", 2)
+    found = told(desk, files["data"], "--cv-blocks", 2)
     assert {row["n"] for row in found["rows"]} == {ROWS}
     assert "2 blocks in their order" in found["split"]
 
@@ -74,9 +79,12 @@ def test_blocks_are_tested_in_turn(desk: Desk, files: dict[str, Path]) -> None:
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (("--blocks", 1), "can be cut into 2 to 40 blocks"),
-        (("--blocks", 41), "can be cut into 2 to 40 blocks"),
-        (("--blocks", 2, "--test", "data"), "--test and --blocks: say one of them"),
+        (("--cv-blocks", 1), "can be cut into 2 to 40 blocks"),
+        (("--cv-blocks", 41), "can be cut into 2 to 40 blocks"),
+        (
+            ("--cv-blocks", 2, "--test", "data"),
+            "--test and --cv-blocks: say one of them",
+        ),
         (("--test", "absent.csv"), "absent.csv"),
     ],
 )

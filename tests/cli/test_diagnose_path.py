@@ -101,7 +101,7 @@ def test_what_is_no_track_of_this_program_is_refused(tracked, tmp_path):
         (tracked / name).write_text("\n".join(lines) + "\n")
         found = diagnosed(tracked, name)
         assert found.exit_code == 2 and said in found.stderr.replace("\n", " "), name
-    found = diagnosed(tracked, "plain.csv", "--frame", "tracker")
+    found = diagnosed(tracked, "plain.csv", "--set", "measurements.frame=tracker")
     assert found.exit_code == 2 and "where the tracker stood" in found.stderr
 
 

@@ -90,17 +90,19 @@ def run(command, place, name):
             return place.compensate(given, "-o", to, *pair)
         case "compensate --orientation":
             return place.compensate(given, "-o", to, "--orientation")
-        case "compensate --clone":
+        case "compensate --shared-points clone":
             files = shared_point(place, name)
             shared, *_ = (place.put(part, data) for part, data in files.items())
-            return place.compensate(shared, "-o", to, "--clone")
-        case "compensate --path-mm":
-            return place.compensate(given, "-o", to, "--path-mm", "0.1")
-        case "compensate --approach":
-            return place.compensate(given, "-o", to, "--approach")
-        case "compensate --lsv":
+            return place.compensate(shared, "-o", to, "--shared-points", "clone")
+        case "compensate --path-tolerance":
+            return place.compensate(given, "-o", to, "--path-tolerance", "0.1")
+        case "compensate --set compensation.reapproach=true":
+            return place.compensate(
+                given, "-o", to, "--set", "compensation.reapproach=true"
+            )
+        case "compensate --variables":
             values = place.put("v.lsv", "--$$\r\n")
-            return place.compensate(given, "-o", to, "--lsv", values)
+            return place.compensate(given, "-o", to, "--variables", values)
         case "compensate without absolute_accuracy":
             place.cell.write_text(place.cell.read_text().replace(SAID, ""))
             return place.compensate(given, "-o", to)
@@ -130,7 +132,7 @@ def test_a_cell_of_the_table(place, command, language, said):
     if said == "yes":
         assert found.exit_code in (0, 1), found.output
     else:
-        left = command in ("compensate --clone", "compensate --path-mm")
+        left = command.endswith(("--shared-points clone", "--path-tolerance"))
         assert found.exit_code == (1 if left else 2)
         assert said in re.sub(r"\s+", " ", found.stderr)
 
@@ -227,7 +229,7 @@ def test_the_output_of_a_job_is_read_with_its_changed_data_list(place):
     assert changed.read_bytes() != job.with_suffix(".dat").read_bytes()
     means = []
     for run_ in (job, made):
-        given = ("--cell", place.cell, "--wanted", job, "--seed", 4, "--json", "-")
+        given = ("--cell", place.cell, "--reference", job, "--seed", 4, "--json", "-")
         found = cli("simulate", run_, *given, "-o", place.folder / "m.csv")
         means.append(json.loads(found.stdout)["true_error"]["mean_mm"])
     assert means[1] < 0.1 * means[0]

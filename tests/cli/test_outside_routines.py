@@ -34,18 +34,21 @@ def test_targets_are_left_until_the_cell_says_what_a_routine_does(desk, name):
     assert desk.compensate(job, "--cell", cell, "--model", desk.model).exit_code == 0
 
 
-def test_strict_calls_ignores_the_shipped_list(desk):
+STRICT = ("--set", "compensation.assume_motion=true")
+
+
+def test_assume_motion_ignores_the_shipped_list(desk):
     source = desk.folder / "src"
     source.mkdir()
     job = desk.put("src/job.pdl", calling("spot(1, 2)"))
     given = ("--cell", desk.cell, "--model", desk.model)
-    for strict, code in ((), 0), (("--strict-calls",), 1):
+    for strict, code in ((), 0), (STRICT, 1):
         alone = desk.folder / f"alone{code}.pdl"
         assert desk.compensate(job, "-o", alone, *strict).exit_code == code
         out = desk.folder / f"dst{code}"
         assert cli("batch", source, out, *given, "--jobs", 1, *strict).exit_code == code
         assert cli("check", out).exit_code == code
-        checked = cli("check", out, "--strict-calls", "--accept-left")
+        checked = cli("check", out, *STRICT, "--cell", desk.cell, "--allow-uncorrected")
         assert checked.exit_code == 1 - code  # made strictly, nothing was assumed
         assert ("routine-assumed-motionless" in checked.stderr) is not bool(code)
         told = cli("explain", job, *given, "--json", "-", *strict).stdout

@@ -103,12 +103,18 @@ def test_rows_without_a_clock_have_an_unknown_moment(tmp_path, clock) -> None:  
     c = Campaign(tmp_path, drift=2e-4)
     c.fit(c.write("s.csv", SURVEY, clock))
     bare, timed = c.write("bare.csv", AFTER), c.write("timed.csv", AFTER, clock)
-    mean, end = (c.predict(bare, "--frame", "base", *o) for o in ((), ("--after",)))
+    mean, end = (
+        c.predict(bare, "--set", "measurements.frame=base", *o)
+        for o in ((), ("--after",))
+    )
     assert f"no {clock} in the file: tracker_drift at the mean" in mean.stderr
     assert "--after takes the end" in mean.stderr and "--after" not in end.stderr
     assert 0.10 < left(mean) < 0.18  # half of the drift
     assert left(end) < 0.07
-    assert abs(left(c.predict(timed, "--frame", "base")) - left(end)) < 1e-3
+    assert (
+        abs(left(c.predict(timed, "--set", "measurements.frame=base")) - left(end))
+        < 1e-3
+    )
     held = float(re.search(r"hold ([\d.]+)%", mean.stderr)[1])
     assert held > 75.0  # all of them at the end of the drift
 
@@ -117,16 +123,20 @@ def test_the_survey_itself_has_its_moments(tmp_path) -> None:  # type: ignore[no
     c = Campaign(tmp_path, drift=2e-4)
     own = c.write("s.csv", SURVEY)
     c.fit(own)
-    found = c.predict(own, "--frame", "base")
+    found = c.predict(own, "--set", "measurements.frame=base")
     assert left(found) < 0.05 and "no order" not in found.stderr
 
 
 @pytest.mark.parametrize("pillars", [0, 1, 2, 3])
 def test_a_file_of_another_station_is_placed(tmp_path, pillars: int) -> None:  # type: ignore[no-untyped-def]
     c = Campaign(tmp_path)
-    c.fit(c.write("s.csv", SURVEY, "", AT, TURN, pillars), "--frame", "tracker")
+    c.fit(
+        c.write("s.csv", SURVEY, "", AT, TURN, pillars),
+        "--set",
+        "measurements.frame=tracker",
+    )
     later = c.write("later.csv", AFTER, "", AWAY, TURNED, pillars)
-    found = c.predict(later, "--frame", "tracker")
+    found = c.predict(later, "--set", "measurements.frame=tracker")
     assert left(found) < 0.1
     if pillars == 3:
         assert "registered by 3 fixed points" in found.stderr
@@ -139,16 +149,18 @@ def test_fixed_points_show_a_shift_of_the_base(tmp_path) -> None:  # type: ignor
     c = Campaign(tmp_path)
     c.fit(c.write("s.csv", SURVEY, "", None, None, 1))
     bare = c.write("bare.csv", AFTER, shift=5e-4)
-    assert left(c.predict(bare, "--frame", "base")) > 0.8
+    assert left(c.predict(bare, "--set", "measurements.frame=base")) > 0.8
     watched = c.write("watched.csv", AFTER, "", None, None, 1, shift=5e-4)
-    found = c.predict(watched, "--frame", "base")
+    found = c.predict(watched, "--set", "measurements.frame=base")
     assert left(found) < 0.06 and "registered by a fixed point of" in found.stderr
 
 
 def test_one_file_in_the_set_up_of_the_survey_says_both_errors(tmp_path) -> None:  # type: ignore[no-untyped-def]
     c = Campaign(tmp_path)
-    c.fit(c.write("s.csv", SURVEY, "", AT, TURN), "--frame", "tracker")
-    found = c.predict(c.write("l.csv", AFTER, "", AT, TURN), "--frame", "tracker")
+    c.fit(c.write("s.csv", SURVEY, "", AT, TURN), "--set", "measurements.frame=tracker")
+    found = c.predict(
+        c.write("l.csv", AFTER, "", AT, TURN), "--set", "measurements.frame=tracker"
+    )
     assert left(found) < 0.06
     assert "in the set-up of the model's survey" in found.stderr
     assert re.search(r"would leave 0\.0\d+ mm .*9 numbers of 180", found.stderr)
@@ -157,18 +169,20 @@ def test_one_file_in_the_set_up_of_the_survey_says_both_errors(tmp_path) -> None
 @pytest.mark.parametrize("rows", [1, 3, 5])
 def test_few_rows_of_another_station_are_refused(tmp_path, rows: int) -> None:  # type: ignore[no-untyped-def]
     c = Campaign(tmp_path)
-    c.fit(c.write("s.csv", SURVEY, "", AT, TURN), "--frame", "tracker")
+    c.fit(c.write("s.csv", SURVEY, "", AT, TURN), "--set", "measurements.frame=tracker")
     few = c.write("few.csv", slice(N, N + rows), "", AWAY, TURNED)
-    found = c.predict(few, "--frame", "tracker")
+    found = c.predict(few, "--set", "measurements.frame=tracker")
     assert found.exit_code == 2 and "Measure 6 poses or more" in found.stderr
     same = c.write("same.csv", slice(N, N + rows), "", AT, TURN)
-    assert left(c.predict(same, "--frame", "tracker")) < 0.1
+    assert left(c.predict(same, "--set", "measurements.frame=tracker")) < 0.1
 
 
-@pytest.mark.parametrize("options", [(), ("--frame", "base")])
+@pytest.mark.parametrize("options", [(), ("--set", "measurements.frame=base")])
 def test_rows_in_another_frame_are_refused(tmp_path, options) -> None:  # type: ignore[no-untyped-def]
     c = Campaign(tmp_path)
     c.fit(c.write("s.csv", SURVEY))
     found = c.predict(c.write("l.csv", AFTER, "", AT, TURN), *options)
-    assert found.exit_code == 2 and "use --frame tracker" in found.stderr
+    assert (
+        found.exit_code == 2 and "use --set measurements.frame=tracker" in found.stderr
+    )
     assert found.stdout == ""

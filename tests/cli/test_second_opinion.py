@@ -54,7 +54,12 @@ def nothing_installed(monkeypatch) -> None:
 
 def test_check_gives_it_where_cell_and_model_are_given(desk, tree, tmp_path):
     done = run(
-        "check", tree, "--accept-left", *given(desk), "--json", tmp_path / "told.json"
+        "check",
+        tree,
+        "--allow-uncorrected",
+        *given(desk),
+        "--json",
+        tmp_path / "told.json",
     )
     assert done.exit_code == 0, done.output
     assert "second opinion: agrees" in done.stderr
@@ -73,8 +78,10 @@ def test_a_wrong_direction_is_exit_1_and_named(desk, tree):
     flipped = targets["direction"][:k] + "-" + targets["direction"][k + 1 :]
     targets["direction"] = flipped
     record.write_text(json.dumps(told))
-    assert run("check", tree, "--accept-left", "--no-second-opinion").exit_code == 0
-    done = run("check", tree, "--accept-left", *given(desk))
+    assert (
+        run("check", tree, "--allow-uncorrected", "--no-second-opinion").exit_code == 0
+    )
+    done = run("check", tree, "--allow-uncorrected", *given(desk))
     assert done.exit_code == 1
     assert "1 differ" in done.stderr and f"axis {k % 6 + 1}" in done.stderr
     assert "second opinion: disagrees" in done.stderr
@@ -83,7 +90,7 @@ def test_a_wrong_direction_is_exit_1_and_named(desk, tree):
 def test_a_changed_program_is_judged_by_check_alone(desk, tree):
     text = (tree / "handling.pdl").read_bytes()
     (tree / "handling.pdl").write_bytes(text + b"-- more\r\n")
-    done = run("check", tree, "--accept-left", *given(desk))
+    done = run("check", tree, "--allow-uncorrected", *given(desk))
     assert done.exit_code == 1 and "handling.pdl: changed" in done.stderr
     assert "second opinion: agrees" in done.stderr
 
@@ -93,32 +100,34 @@ def test_another_model_is_no_ground_for_an_opinion(desk, tree, tmp_path):
     record = tree / "spot.pdl.postproc.json"
     told = json.loads(record.read_text())
     record.write_text(json.dumps(told | {"model": "another"}))
-    done = run("check", tree, "--accept-left", *given(desk))
+    done = run("check", tree, "--allow-uncorrected", *given(desk))
     assert f"was made with model another, not with {model['id']}" in done.stderr
 
 
 def test_without_a_cell_there_is_a_note(desk, tree):
-    done = run("check", tree, "--accept-left")
+    done = run("check", tree, "--allow-uncorrected")
     assert done.exit_code == 0
     assert done.stderr.count("no second opinion: it takes --cell and --model") == 1
-    asked = run("check", tree, "--accept-left", "--second-opinion")
+    asked = run("check", tree, "--allow-uncorrected", "--second-opinion")
     assert asked.exit_code == 2 and "--cell and --model" in asked.stderr
 
 
 def test_without_its_libraries_there_is_a_note(desk, tree, nothing_installed):
-    done = run("check", tree, "--accept-left", *given(desk))
+    done = run("check", tree, "--allow-uncorrected", *given(desk))
     assert done.exit_code == 0
     assert done.stderr.count("no second opinion: pin and toppra not installed") == 1
-    quiet = run("check", tree, "--accept-left", *given(desk), "--no-second-opinion")
+    quiet = run(
+        "check", tree, "--allow-uncorrected", *given(desk), "--no-second-opinion"
+    )
     assert quiet.exit_code == 0 and "opinion" not in quiet.stderr
-    asked = run("check", tree, "--accept-left", *given(desk), "--second-opinion")
+    asked = run("check", tree, "--allow-uncorrected", *given(desk), "--second-opinion")
     assert asked.exit_code == 2 and "pip install pin toppra" in asked.stderr
 
 
 def test_a_broken_library_is_none(desk, tree, monkeypatch):
     monkeypatch.setattr(extra, "find_spec", str)
     monkeypatch.setitem(sys.modules, "pinocchio", None)
-    done = run("check", tree, "--accept-left", *given(desk))
+    done = run("check", tree, "--allow-uncorrected", *given(desk))
     assert done.exit_code == 0 and "a library is broken" in done.stderr
     asked = run("check", tree, "--second-opinion", *given(desk))
     assert asked.exit_code == 2 and "pip install pin toppra" in asked.stderr

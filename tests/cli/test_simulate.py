@@ -54,7 +54,7 @@ def test_a_seed_is_an_arm(desk):
 def test_readings_are_the_landing_with_a_trackers_noise(desk, job_cell):
     source, out = desk.put("job.pdl", program(*[FIRST, POSE, NEXT] * 20)), None
     out = desk.folder / "m.csv"
-    found = simulate_file(source, desk.cell, SEED, wanted=source)
+    found = simulate_file(source, desk.cell, SEED, reference=source)
     found.write(out)
     from postproc.cli.simulate import visits_of
 
@@ -73,8 +73,8 @@ def test_a_compensated_program_misses_less(desk):
     desk.compensate(source, "-o", out)
     errors = [
         json.loads(
-            cli("simulate", p, "--cell", desk.cell, "--seed", SEED, "--wanted", source,
-                "--json", "-").stdout
+            cli("simulate", p, "--cell", desk.cell, "--seed", SEED,
+                "--reference", source, "--json", "-").stdout
         )["true_error"]
         for p in (source, out)
     ]  # fmt: skip
@@ -91,7 +91,7 @@ FLY = f"MOVEFLY {POSE.removeprefix('MOVE ')} ADVANCE"
 )
 def test_fly_points_that_the_run_does_not_go_on_from_are_told(desk, lines, left):
     source = desk.put("job.pdl", program(FIRST, *lines, NEXT))
-    given = "simulate", source, "--cell", desk.cell, "--wanted", source
+    given = "simulate", source, "--cell", desk.cell, "--reference", source
     told = json.loads(cli(*given, "--json", "-").stdout)
     assert told.get("left_out", 0) == left and told["true_error"]["n"] == 4 - left
     said = "1 fly points left out: it does not go on from them"
@@ -101,7 +101,7 @@ def test_fly_points_that_the_run_does_not_go_on_from_are_told(desk, lines, left)
 def test_another_program_cannot_be_the_wanted_one(desk):
     source, other = (desk.put(n, program(*lines)) for n, lines in (
         ("a.pdl", (FIRST, POSE)), ("b.pdl", (FIRST,))))  # fmt: skip
-    found = cli("simulate", source, "--cell", desk.cell, "--wanted", other)
+    found = cli("simulate", source, "--cell", desk.cell, "--reference", other)
     assert found.exit_code == 2 and "two versions of one program" in found.stderr
 
 
@@ -114,8 +114,8 @@ def test_unknown_effects_are_refused(desk, effects):
 
 def test_no_known_target_is_told_and_is_valid_json(desk):
     source = desk.put("job.pdl", program("MOVE LINEAR TO p"))
-    found = cli("simulate", source, "--cell", desk.cell, "--wanted", source, "--json",
-                "-")  # fmt: skip
+    found = cli("simulate", source, "--cell", desk.cell, "--reference", source,
+                "--json", "-")  # fmt: skip
     assert found.exit_code == 0
     assert json.loads(found.stdout)["true_error"]["mean_mm"] is None
 

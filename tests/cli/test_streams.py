@@ -76,6 +76,6 @@ def test_values_of_a_program_that_goes_through_a_pipe_need_a_place(desk, pipe):
     )
     found = desk.compensate(source, "-o", pipe)
     assert found.exit_code == 2
-    assert re.search(r"job\.lsv: changes too, .*--lsv-out FILE", found.stderr)
+    assert re.search(r"job\.lsv: changes too, .*--variables-out FILE", found.stderr)
     assert desk.names() == {"job.pdl", "job.lsv", "pipe"}
     assert values.read_bytes() == (LISTED + entry("a")).encode()

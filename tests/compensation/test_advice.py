@@ -7,7 +7,10 @@ import pytest
 from postproc.compensation.options import Options
 from tests.jobs.share import HERE, count
 
-OWN, NO_HELP = "give each move a point of its own", "--clone does not help"
+OWN, NO_HELP = (
+    "give each move a point of its own",
+    "--shared-points clone does not help",
+)
 
 
 def advice(job, **options):
@@ -17,7 +20,8 @@ def advice(job, **options):
 
 
 @pytest.mark.parametrize(
-    ("job", "said"), [("krl/job17", "(see --clone)"), ("rapid/job07", "(see --")]
+    ("job", "said"),
+    [("krl/job17", "(see --shared-points clone)"), ("rapid/job07", "(see --")],
 )
 def test_moves_that_share_a_point_are_told_what_parts_them(job, said):
     found = advice(job)
@@ -31,5 +35,5 @@ def test_one_move_that_makes_all_arrivals_is_not_sent_to_cloning():
 
 def test_cloning_does_not_part_what_one_move_makes():
     lost = {line for line, why in advice("rapid/job18").items() if NO_HELP in why}
-    left = count(HERE / "rapid/job18", options=Options(clone=True)).reasons
+    left = count(HERE / "rapid/job18", options=Options(shared_points="clone")).reasons
     assert lost and lost <= {line for (_, line), why in left.items() if why}

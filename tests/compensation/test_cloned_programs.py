@@ -58,7 +58,7 @@ def moved_targets(asked: Visits, done: Visits) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", range(PROGRAMS))
 def test_compensated_visits_land_where_they_should(seed, job_cell, job_model):
-    asked, done = compensated(seed, job_cell, job_model, Options(clone=True))
+    asked, done = compensated(seed, job_cell, job_model, Options(shared_points="clone"))
     landing = land(virtual_arm(SEED), setup_of(job_cell), asked, done)
     error = 1e3 * np.linalg.norm(landing.error, axis=1)
     assert error[moved_targets(asked, done)[landing.visit]].mean() < 0.03
@@ -66,7 +66,7 @@ def test_compensated_visits_land_where_they_should(seed, job_cell, job_model):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_clones_are_turned_as_written_too(seed, job_cell, job_model):
-    options = Options(clone=True, orientation=True)
+    options = Options(shared_points="clone", orientation=True)
     asked, done = compensated(seed, job_cell, job_model, options)
     moved = moved_targets(asked, done)[LOST:]
     before, after = (errors(job_cell, asked, ran) for ran in (asked, done))

@@ -39,7 +39,9 @@ def run(job_cell, job_model):
             job_model,
             name="job.pdl",
             variables=variables,
-            options=Options(clone=clone, shared=shared),
+            options=Options(
+                shared_points="clone" if clone else "mean", edit_exported=shared
+            ),
             **more,
         )
 

@@ -46,10 +46,12 @@ def test_what_is_written_is_the_same_with_and_without(bench_cell, bench_model, o
         assert both[0].in_time is not None and both[1].in_time is None
 
 
-def test_long_programs_are_run_in_time_on_demand():
-    usual = Options(timing=None)
+def test_long_programs_are_run_in_time_on_demand(bench_cell):
+    usual, timed, never = (
+        Options(timing=how).within(bench_cell) for how in (None, True, False)
+    )
     assert usual.times(IN_TIME) and not usual.times(IN_TIME + 1)
-    assert TIMED.times(10**6) and not Options(timing=False).times(1)
+    assert timed.times(10**6) and not never.times(1)
 
 
 def test_the_report_tells_times_and_paths(outcome):

@@ -265,7 +265,7 @@ def test_every_line_end_is_kept(shop):
 
 
 def test_points_that_are_cloned_leave_shifts_where_they_go(job_cell, job_model):
-    shop = Shop.of(job_cell, job_model, Options(clone=True))
+    shop = Shop.of(job_cell, job_model, Options(shared_points="clone"))
     lines = [offs("p1"), P1, P2, P1, offs("p1"), P3, offs("p1", 0, 0, 50), P1]
     found = landed(shop, lines)
     assert set(found.status[2:]) <= {"CORRECTED"}, found.whys

@@ -21,7 +21,11 @@ from tests.language.pdl2.whole_jobs import Job
 
 PROGRAMS = Path(__file__).parents[2] / "programs"
 SAMPLES = sorted(path.stem for path in PROGRAMS.glob("*.pdl"))
-WAYS = (Options(), Options(clone=True), Options(orientation=True, shared=True))
+WAYS = (
+    Options(),
+    Options(shared_points="clone"),
+    Options(orientation=True, edit_exported=True),
+)
 
 
 def assert_restored(files, cell, model, options=WAYS[0]):

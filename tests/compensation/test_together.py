@@ -84,7 +84,9 @@ def test_mixed_programs(mixed, job_model):
                 assert said(outcome) == meant[k], (size, mixed[k].name)
 
 
-@pytest.mark.parametrize("options", [Options(clone=True), Options(orientation=True)])
+@pytest.mark.parametrize(
+    "options", [Options(shared_points="clone"), Options(orientation=True)]
+)
 def test_other_options(mixed, options, job_model):
     cell = load_cell(ROOT / "programs" / "cell.toml")
     assert_as_alone(mixed[:10], cell, job_model, options)

@@ -56,7 +56,7 @@ def program(seed: int) -> tuple[Generated, Options]:
     cloned = seed % 8 < 4
     shares = 0.4 if cloned else 0.0
     made = reachable(seed, seed % 2 == 0, pages=seed % 4 < 2, shares=shares)
-    return made, Options(clone=cloned)
+    return made, Options(shared_points="clone" if cloned else "mean")
 
 
 def count_errors(

@@ -16,6 +16,13 @@ SETUP = "--cell cell.toml --model model.json"
 COMPENSATE = f"compensate job.pdl {SETUP} -o out/job.pdl"
 FITTED = ("default", "effects", "elm", "joint_map")  # models with named effects
 LEARNED = ("eja-elm", "interpolation", "kriging")  # models of other methods
+EXPORTED = "--set compensation.edit_exported=true"
+OPTIONS = {
+    "--orientation": "--orientation",
+    "--clone": "--shared-points clone",
+    "--strict": "--strict",
+    "--clone --shared": f"--shared-points clone {EXPORTED}",
+}  # by what their cases are called
 COMMANDS = (
     "compensate", "diff", "restore", "explain", "survey", "simulate", "fit", "predict",
     "compare", "diagnose", "history", "report", "batch", "check",
@@ -82,7 +89,7 @@ def studies() -> Iterator[Case]:
     varied = {**CELL, "survey.csv": "surveys/effects.csv"}
     for names in ("geometry,backlash,thermal,payload", "geometry,windup,lag,scale"):
         yield Case(f"fit/{names}", (f"{fit} --effects {names}",), varied, fitted=True)
-    tracker = f"{fit} --frame tracker --effects geometry,backlash"
+    tracker = f"{fit} --set measurements.frame=tracker --effects geometry,backlash"
     yield Case("fit/tracker", (tracker,), survey, fitted=True)
     for mode in ("lhs", "optimal", "d-optimal"):
         command = f"survey --cell cell.toml --poses 20 --mode {mode} --seed 3 -o s.pdl"
@@ -107,11 +114,13 @@ def trees() -> Iterator[Case]:
     batch = f"batch src dst {SETUP} --log log.jsonl"
     after = (
         "check dst --model model.json --source src --json check.json",
-        "check dst --accept-left",
+        "check dst --allow-uncorrected",
         f"{batch} --resume --jobs 1",
     )
     yield Case("batch/one", (f"{batch} --jobs 1 --html b.html", *after), tree)
-    yield Case("batch/two", (f"{batch} --jobs 2 --clone", *after[:2]), tree)
+    yield Case(
+        "batch/two", (f"{batch} --jobs 2 --shared-points clone", *after[:2]), tree
+    )
     plan = b'[[rule]]\npattern = "**/*.pdl"\ncell = "cell.toml"\nmodel = "model.json"\n'
     command = "batch src dst --plan plan.toml --log log.jsonl --jobs 1 --temperature 30"
     yield Case("batch/plan", (command,), tree, {"plan.toml": plan})
@@ -146,13 +155,13 @@ def effects() -> Iterator[Case]:
         command = f"{COMPENSATE} --report report.json"
         yield Case(f"models/{model}/spot", (command,), files, quick=quick)
         files = {**CELL, **job("handling"), "model.json": f"models/{model}.json"}
-        command = f"{COMPENSATE} --report report.json --temperature 22.4 --shared"
+        command = f"{COMPENSATE} --report report.json --temperature 22.4 {EXPORTED}"
         yield Case(f"models/{model}/handling", (command,), files)
     for name in ("drilling", "handling", "spot"):
-        for option in ("--orientation", "--clone", "--strict", "--clone --shared"):
+        for short, option in OPTIONS.items():
             files = {**PLANT, **job(name)}
-            yield Case(f"options/{name}{option}", (f"{COMPENSATE} {option}",), files)
-    values = "--lsv job.lsv --lsv-out out.lsv"
+            yield Case(f"options/{name}{short}", (f"{COMPENSATE} {option}",), files)
+    values = "--variables job.lsv --variables-out out.lsv"
     streams = f"compensate - {SETUP} {values} --report r.json < job.pdl"
     files = {**PLANT, **job("spot")}
     yield Case("stdin", (streams,), files, quick=True)
@@ -169,7 +178,7 @@ def made() -> Iterator[Case]:
         after = (
             f"diff {pdl} out/{pdl} --json diff.json",
             f"explain {pdl} {SETUP} --json explained.json",
-            f"simulate out/{pdl} --cell cell.toml --wanted {pdl} --json true.json",
+            f"simulate out/{pdl} --cell cell.toml --reference {pdl} --json true.json",
         )
         yield Case(f"made/{name}", (command, *after), files, quick=name == "drilling")
 
@@ -182,7 +191,7 @@ def small() -> Iterator[Case]:
             command = f"{COMPENSATE} --report report.json"
             after = (f"explain job.pdl {SETUP}", "diff job.pdl out/job.pdl")
             quick = group != "generated" or at % 4 == 0
-            clone = f"{COMPENSATE} --report report.json --clone"
+            clone = f"{COMPENSATE} --report report.json --shared-points clone"
             back = ("restore out/job.pdl -o back/job.pdl",)
             yield Case(f"{group}/{name}/all", (command, *after, *back), files)
             few = (clone if group == "shared" else command,)

@@ -327,7 +327,7 @@ def _landed(outcome: Outcome, cell: Cell) -> Misses:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the share of every language, and the reasons for the rest."""
     given = _arguments(arguments)
-    options = Options(clone=given.clone)
+    options = Options(shared_points="clone" if given.clone else "mean")
     for language in given.language or LANGUAGES:
         folders = sorted((HERE / language).glob("job*"))
         folders = [f for f in folders if not given.jobs or f.name[3:] in given.jobs]

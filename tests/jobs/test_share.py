@@ -12,7 +12,7 @@ from postproc.robot.cell import load_cell
 from tests.jobs.share import HERE, LANGUAGES, count, counted, landed, main, pasted
 
 JOBS = sorted(job for language in LANGUAGES for job in (HERE / language).glob("job*"))
-# Counted lines, and those that are corrected, of RAPID with --clone, at the least.
+# Counted lines, and those that are corrected, of RAPID with clones, at the least.
 FLOORS = {
     "rapid/job01": (15, 13),
     "rapid/job07": (15, 15),
@@ -23,6 +23,11 @@ FLOORS = {
     "krl/job34": (26, 24),
     "krl/job39": (42, 40),
 }
+
+
+def options_of(name: str) -> Options:
+    """Return what a job is compensated with: points of RAPID can be cloned."""
+    return Options(shared_points="clone" if name.startswith("rapid") else "mean")
 
 
 def test_the_jobs_are_frozen():
@@ -56,13 +61,13 @@ def test_every_job_runs():
 @pytest.mark.parametrize("name", FLOORS)
 def test_the_share_does_not_fall(name):
     lines, floor = FLOORS[name]
-    found = count(HERE / name, options=Options(clone=name.startswith("rapid")))
+    found = count(HERE / name, options=options_of(name))
     assert len(found.reasons) == lines and found.corrected >= floor
 
 
 @pytest.mark.parametrize("name", FLOORS)
 def test_the_arm_lands_where_the_job_says(name):
-    found = landed(HERE / name, Options(clone=name.startswith("rapid")))
+    found = landed(HERE / name, options_of(name))
     assert found.sure.max(initial=0.0) <= 0.05
     if len(found.before):
         both = np.concatenate([found.sure, found.other])
@@ -70,7 +75,7 @@ def test_the_arm_lands_where_the_job_says(name):
 
 
 def test_what_messages_ask_for_is_pasted(tmp_path):
-    job, clone = HERE / "rapid/job37", Options(clone=True)
+    job, clone = HERE / "rapid/job37", Options(shared_points="clone")
     cell = pasted(job, tmp_path / "cell.toml")
     assert load_cell(cell).aux == {1: "track"} != load_cell(job / "cell.toml").aux
     before, after = count(job, options=clone), count(job, cell, clone)

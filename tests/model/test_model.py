@@ -19,6 +19,7 @@ from postproc.model.effects import BASE_EFFECTS, BY_NAME, propose
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, load_model, weight_of
 from postproc.model.model_file import content_id
+from postproc.model.provenance import Provenance
 from postproc.robot.state import make_states
 from tests.calibration.simulator import (
     NJ,
@@ -87,6 +88,35 @@ def test_a_model_file_of_an_older_release_keeps_its_id(tmp_path: Path) -> None:
     path = tmp_path / "m.json"
     path.write_text(json.dumps(data))
     assert load_model(path).id == data["id"] != model().id
+
+
+HERE = Provenance("2026-11-27", "nj220-2.7", "A 17", "AT960", "postproc 0.2.0")
+
+
+def test_equal_data_give_equal_ids_whatever_they_come_from(tmp_path: Path) -> None:
+    path = tmp_path / "m.json"
+    known = replace(model(), provenance=HERE)
+    known.save(path)
+    assert json.loads(path.read_bytes())["format"] == 2
+    assert load_model(path).provenance == HERE
+    assert load_model(path).id == known.id == model().id
+    assert replace(known, rows=7).id != known.id
+    text = str(HERE)
+    assert "A 17" in text and "AT960" in text and "2026-11-27" in text
+
+
+def test_a_file_of_format_1_is_read_with_its_own_id(tmp_path: Path) -> None:
+    data = {**model().to_dict(), "format": 1}
+    data["id"] = content_id(data)
+    path = tmp_path / "m.json"
+    path.write_text(json.dumps(data))
+    old = load_model(path)
+    assert old.id == data["id"] and old.provenance is None
+    old.save(path)
+    assert load_model(path).id == old.id  # the same model in format 2
+    path.write_text(json.dumps({**data, "rows": 7}))
+    with pytest.raises(ModelError, match="changed since it was made"):
+        load_model(path)
 
 
 def test_a_model_file_is_written_whole_or_not_at_all(

@@ -25,7 +25,7 @@ COMMANDS = {
         "-o", "new.pdl", "--report", "-",
     ),
     "simulation": (
-        "simulate", "job.pdl", "--cell", "cell.toml", "--wanted", "job.pdl",
+        "simulate", "job.pdl", "--cell", "cell.toml", "--reference", "job.pdl",
         "--json", "-",
     ),
 }  # fmt: skip

@@ -72,7 +72,7 @@ def test_a_job_is_compensated_for_the_state_that_the_cell_declares(
     rows = compensate(campaign, payload, temperature)
     assert [row["status"] for row in rows] == ["corrected", "corrected"]
     found = cli("simulate", campaign / "out.pdl", "--cell", campaign / "now.toml",
-                "--wanted", campaign / "job.pdl", "--seed", 3, "--effects", EFFECTS,
+                "--reference", campaign / "job.pdl", "--seed", 3, "--effects", EFFECTS,
                 "--json", "-")  # fmt: skip
     error = json.loads(found.stdout)["true_error"]
     # Where the arm was before its first move is not known: its backlash stays.

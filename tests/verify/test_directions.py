@@ -112,13 +112,13 @@ def test_the_same_program_is_drawn_from_alike(models) -> None:
 
 
 def test_clones_are_judged_by_what_they_are_corrected_for(models) -> None:
-    opinion = shipped("handling.pdl", models, Options(clone=True)).opinion()
+    opinion = shipped("handling.pdl", models, Options(shared_points="clone")).opinion()
     assert opinion.agrees, opinion.told()
     assert row(opinion, "output: approach directions").compared > 400
 
 
 def test_points_on_ways_are_visits_of_the_output_alone(models) -> None:
-    options = Options(path_mm=0.05, max_inserted=50)
+    options = Options(path_tolerance_mm=0.05, max_inserted=50)
     job = shipped("drilling.pdl", models, options)
     opinion = job.opinion()
     assert opinion.agrees, opinion.told()

@@ -37,7 +37,7 @@ def desk(tmp_path_factory, bench_model) -> Path:
 def test_a_program_without_a_rule_is_named(desk, tmp_path, asked, code) -> None:
     told = tmp_path / "told.json"
     done = run(
-        "check", desk / "made", "--accept-left", "--plan", desk / "plan.toml",
+        "check", desk / "made", "--allow-uncorrected", "--plan", desk / "plan.toml",
         "--json", told, *asked,
     )  # fmt: skip
     assert done.exit_code == code, done.stderr
@@ -49,7 +49,7 @@ def test_a_program_without_a_rule_is_named(desk, tmp_path, asked, code) -> None:
 def test_a_cell_for_the_rest_gives_an_opinion_on_all(desk) -> None:
     rest = "--cell", desk / "cell.toml", "--model", desk / "model.json"
     done = run(
-        "check", desk / "made", "--accept-left", "--plan", desk / "plan.toml",
+        "check", desk / "made", "--allow-uncorrected", "--plan", desk / "plan.toml",
         *rest, "--second-opinion",
     )  # fmt: skip
     assert done.exit_code == 0, done.stderr

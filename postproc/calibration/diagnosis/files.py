@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -19,17 +18,20 @@ from postproc.calibration.plausibility import (
     check_stops,
 )
 from postproc.calibration.registration import register, station_of
-from postproc.calibration.survey_files import MeasurementFile, read_measurements
+from postproc.calibration.survey_files import (
+    MeasurementFile,
+    frame_of,
+    read_measurements,
+)
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.model.effects.placement import Placement
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, as_model
+from postproc.model.provenance import Provenance
 from postproc.model.registration import Registration
-from postproc.robot.cell import Cell, as_cell
+from postproc.robot.cell import Cell, PointFrame, as_cell
 from postproc.robot.pose import MM, inverse
 from postproc.threads import in_one_thread
-
-PointFrame = Literal["base", "uframe", "tracker"]
 
 REGISTERED = (Placement.name,)  # what is fitted besides where the tracker is found
 
@@ -40,7 +42,7 @@ def diagnose(
     cell: Cell | str | Path,
     model: Model | str | Path,
     program: str | Path | None = None,
-    frame: PointFrame = "base",
+    frame: PointFrame | None = None,
     name: str = "measurements.csv",
     reading: TableFormat = DETECT,
     seed: int = 0,
@@ -56,7 +58,7 @@ def diagnose(
         model: The model that may lack something, or its file.
         program: The program whose points were measured, compensated or not.
         frame: What positions are given in: the arm's base frame, the cell's user
-            frame, or the tracker's.
+            frame, or the tracker's; default: as the cell says, else the base frame.
         name: File name of measurements that are given as bytes.
         reading: What the user knows of the files.
         seed: Of the bootstrap, the folds and the poses proposed.
@@ -66,7 +68,7 @@ def diagnose(
         PostprocError: A file cannot be used, or the model cannot be extended.
     """
     cell = as_cell(cell)
-    model = as_model(model, cell.arm)
+    model, frame = as_model(model, cell.arm), frame_of(cell, frame)
     survey = read_measurements(
         *files, cell=cell, program=program, name=name, reading=reading
     )
@@ -89,7 +91,9 @@ def diagnose(
     seen_fixed = (*found.diagnosis.fixed_points, *notes)
     return replace(
         found,
-        model=replace(found.model, registration=placed),
+        model=replace(
+            found.model, registration=placed, provenance=Provenance.today(cell)
+        ),
         diagnosis=replace(found.diagnosis, fixed_points=seen_fixed),
     )
 

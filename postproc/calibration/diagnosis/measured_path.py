@@ -12,11 +12,17 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.diagnosis.diagnose import Extension, extend_model
-from postproc.calibration.diagnosis.files import REGISTERED, PointFrame
+from postproc.calibration.diagnosis.files import REGISTERED
 from postproc.calibration.diagnosis.search import Progress
 from postproc.calibration.diagnosis.trace import silent
 from postproc.calibration.measurements import POSITION, Measurements
-from postproc.calibration.tables import read_table
+from postproc.calibration.survey_files import frame_of
+from postproc.calibration.tables import (
+    DETECT,
+    TableFormat,
+    read_foreign,
+    read_table,
+)
 from postproc.compensation.paths.accuracy import PredictedWays, predicted_ways
 from postproc.compensation.paths.flanks import JointInMotion, in_motion, measured_steps
 from postproc.compensation.paths.measured import Aligned, OnTheWay, Track, align
@@ -27,9 +33,10 @@ from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.language.visits import Visits
 from postproc.model.model import READING, Model, as_model
+from postproc.model.provenance import Provenance
 from postproc.model.statistics import ErrorStatistics
 from postproc.motion.cycle import ProgramCycle, run
-from postproc.robot.cell import Cell, as_cell
+from postproc.robot.cell import Cell, PointFrame, as_cell
 from postproc.robot.pose import MM, inverse, lengths
 from postproc.robot.state import States, make_states
 
@@ -109,7 +116,7 @@ def diagnose_path(
     cell: Cell | str | Path,
     model: Model | str | Path,
     program: str | Path | None,
-    frame: PointFrame = "base",
+    frame: PointFrame | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> PathDiagnosis:
@@ -120,7 +127,7 @@ def diagnose_path(
         cell: The cell, or its file.
         model: The model that may lack something, or its file.
         program: The program that ran.
-        frame: What positions are given in.
+        frame: What positions are given in; default: as `diagnose` has it.
         seed: Of the bootstrap.
         progress: Told what is being done.
 
@@ -130,7 +137,7 @@ def diagnose_path(
     if program is None:
         raise PostprocError("--path: name the program that ran with --program")
     cell = as_cell(cell)
-    model = as_model(model, cell.arm)
+    model, frame = as_model(model, cell.arm), frame_of(cell, frame)
     return _diagnosed(track, cell, model, Path(program), frame, seed, progress)
 
 
@@ -144,7 +151,7 @@ def _diagnosed(
     progress: Progress,
 ) -> PathDiagnosis:
     """Diagnose a track of a program in a cell."""
-    read, digest = read_track(track)
+    read, digest = read_track(track, DETECT.within(cell))
     read = replace(read, position=_in_base(read.position, frame, cell, model))
     visits = read_program(read_files(program), cell).visits
     own = with_measured_play(cell, model)
@@ -167,6 +174,8 @@ def _diagnosed(
         progress=progress,
     )  # fmt: skip
     extension = _with_verdicts(_as_surveyed(extension, model), joints)
+    named = replace(extension.model, provenance=Provenance.today(cell))
+    extension = replace(extension, model=named)
     size = ErrorStatistics.of_sizes(lengths(found.on_the_way.off))
     moves = np.unique(_move(found.on_the_way.sample, ways))
     stops = len(found.ended), found.missed
@@ -185,13 +194,18 @@ def _lag(
     return servo_lag(ways, nominal, found.on_the_way, visits.fly & ~visits.via)
 
 
-def read_track(path: Path) -> tuple[Track, str]:
+def read_track(path: Path, reading: TableFormat = DETECT) -> tuple[Track, str]:
     """Read a tracker's track; return its hash besides.
+
+    Args:
+        path: The file.
+        reading: What the user knows of it.
 
     Raises:
         MeasurementError: Columns are missing, or the times are none.
     """
-    table = read_table(path)
+    mapped = reading.columns is not None
+    table = read_foreign(path, reading) if mapped else read_table(path, **reading.given)
     table.require(*COLUMNS)
     time = table.numbers("time_s")
     cure = "Give readings of one run, in order, with their times in seconds"

@@ -245,7 +245,8 @@ class SetAnew:
         return (
             f"since the given model the base has moved by {base:.3f} mm and turned by "
             f"{turn:.3f} mrad, the tool by {tool:.3f} mm: this is compensated. If the "
-            "tracker was set up anew instead, give its readings with --frame tracker"
+            "tracker was set up anew instead, give its readings with "
+            "--set measurements.frame=tracker"
         )
 
     def to_dict(self) -> dict[str, list[float]]:

@@ -61,13 +61,13 @@ def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
         return draft
     language = language_of(reading.sources[0].name)
     splitter = language.splitter(reading.sources)
-    if splitter is None and setting.options.approach:
+    if splitter is None and setting.options.reapproach:
         raise PostprocError(
-            f"--approach: targets are not approached anew in {language.name} programs. "
+            f"reapproach: targets are not approached anew in {language.name} programs. "
             "Leave it out: direction-uncertain says how to approach them"
         )
     work = PathWork(draft, first, setting, write, splitter)
-    if splitter is not None and setting.options.approach:
+    if splitter is not None and setting.options.reapproach:
         approach_anew(work, splitter)
     find_split(work)
     if work.open or work.approaches:
@@ -239,7 +239,7 @@ def _told(work: PathWork, told: InTime) -> Insertions:
     """Say what was put on ways, and why moves that are left too far got nothing."""
     why = "its pieces would be too short, or the path no better"
     if work.crowded:
-        why = "no more points may be put on ways (--max-inserted)"
+        why = "no more points may be put on ways (max_inserted)"
     too_far = set(work.paths.visit[work.too_far].tolist()) - work.points.keys()
     otherwise = {}
     if work.latest is not work.source:

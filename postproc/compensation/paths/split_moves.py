@@ -32,7 +32,7 @@ def find_split(work: PathWork) -> None:
         work.open[v] = pieces[v]
         if v not in far:
             work.beside.add(v)
-        if work.setting.options.take_up and _can_stop(work, v):
+        if work.setting.options.preload_backlash and _can_stop(work, v):
             _may_stop(work, v, take_up(work.first.after, work.setting, visits, v))
 
 

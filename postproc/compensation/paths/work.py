@@ -123,7 +123,7 @@ class PathWork:
     @property
     def tolerance(self) -> float:
         """The largest deviation that is asked for [m]."""
-        asked = self.setting.options.path_mm
+        asked = self.setting.options.path_tolerance_mm
         return np.inf if asked is None else asked * MM
 
     @property
@@ -175,7 +175,7 @@ class PathWork:
                 self.source.reading, self.points, stops, self.splitter, cell,
                 self.chords, self.approaches, self._meant(),
             )  # fmt: skip
-        options = replace(self.setting.options, clone=False)
+        options = self.setting.options.without_clones()
         reading, kept = correct(reading, replace(self.setting, options=options))
         output, again = self.write(reading, kept, self.setting)
         n = len(reading.visits)

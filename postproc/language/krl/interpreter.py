@@ -283,7 +283,7 @@ class KrlMachine(TaskMachine):
 
     def _is_overruled(self, name: str) -> bool:
         """Return True if the cell says what a routine of a package does."""
-        return self.start.strict_calls or name in self.start.routines
+        return self.start.assume_motion or name in self.start.routines
 
     def _assume(
         self, context: CallContext, row: int, name: str, here: Arrived

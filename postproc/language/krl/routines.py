@@ -11,7 +11,7 @@ AHEAD = "ahead"
 ASSUMED = (
     "is not in the available files: it is on the list of routines known neither to "
     "move the arm nor to set frames (docs/routines.md). If it does, say so under "
-    "[routines] in the cell file, or pass --strict-calls"
+    "[routines] in the cell file, or set assume_motion"
 )
 
 

@@ -235,7 +235,7 @@ def opaque_call(
                  "is not in the files at hand: it is "
                  "on the list of routines known neither to move the arm nor to set "
                  "frames (docs/routines.md); if it does, say so under [routines] "
-                 "in the cell file, or pass --strict-calls")  # fmt: skip
+                 "in the cell file, or set assume_motion")  # fmt: skip
         case RoutineEffect.UNKNOWN:
             report_unknown_routine(here.world, here.place.program, here.row, name)
             forget_surroundings(here, f"{name}, which is not in the files at hand, may "

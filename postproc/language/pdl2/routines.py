@@ -79,7 +79,7 @@ def effect_of(world: World, program: Program, name: str) -> RoutineEffect:
         return RoutineEffect.TRACKS
     if name in _BUILT_IN:
         return RoutineEffect.STILL
-    known = not start.strict_calls and name in known_still()
+    known = not start.assume_motion and name in known_still()
     return RoutineEffect.KNOWN if known else RoutineEffect.UNKNOWN
 
 

@@ -86,7 +86,7 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
          "-o", folder / "out.pdl", "--report", folder / "report.json")  # fmt: skip
     for name in ("job", "out"):
         done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
-             "--wanted", folder / "job.pdl", "--path",
+             "--reference", folder / "job.pdl", "--path",
              "--json", folder / f"{name}.json")  # fmt: skip
     return folder
 

@@ -42,6 +42,7 @@ from tests.compensation.test_approach import job as approaches
 from tests.written import cli
 
 TOLERANCE = 0.1  # [mm]
+STOPS, AGAIN = "compensation.preload_backlash=true", "compensation.reapproach=true"
 SPEED = 50.0  # [mm/s] in the job
 SHORTEST_MS = 50.0  # [limits] segment_ms, as it is unless set
 INSERTED = b"postproc: inserted"
@@ -64,12 +65,12 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done("simulate", survey, "--cell", CELL, "--seed", SEED, "-o", measured)
     done("fit", measured, "--cell", CELL, "-o", folder / "model.json")
     known(folder, "confirmed")
-    asked = ("--path-mm", TOLERANCE)
+    asked = ("--path-tolerance", TOLERANCE)
     for name, more in (("plain", ()), ("points", asked),
-                       ("stops", (*asked, "--take-up"))):  # fmt: skip
+                       ("stops", (*asked, "--set", STOPS))):  # fmt: skip
         compensated(folder, "job.pdl", name, *more)
         done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
-             "--wanted", folder / "job.pdl", "--path",
+             "--reference", folder / "job.pdl", "--path",
              "--json", folder / f"{name}.true.json")  # fmt: skip
     return folder
 
@@ -156,14 +157,14 @@ def test_points_that_did_better_are_put_back(
         best.note(bending(work))
 
     monkeypatch.setattr(correction, "_bend", worse)
-    found = compensated(shop, "job.pdl", "put_back", "--path-mm", TOLERANCE)
+    found = compensated(shop, "job.pdl", "put_back", "--path-tolerance", TOLERANCE)
     for old, new in zip(lines_of(told(shop, "points")), lines_of(found), strict=True):
         assert new["points"] == old["points"]
 
 
 def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
     known(shop, "refuted")
-    asked = ("--path-mm", TOLERANCE)
+    asked = ("--path-tolerance", TOLERANCE)
     paths = lines_of(compensated(shop, "job.pdl", "known", *asked, model="refuted"))
     why = [p["insertion_skipped"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
     assert sum("which in motion is refuted" in (text or "") for text in why) > 5
@@ -177,7 +178,7 @@ def test_flanks_that_a_measured_path_confirms_are_no_reason_for_doubt(
     monkeypatch.setattr(judging, "WORSE", -0.04 * MM)
     doubted = []
     for name in ("model", "confirmed"):
-        asked = ("--path-mm", TOLERANCE)
+        asked = ("--path-tolerance", TOLERANCE)
         found = compensated(shop, "job.pdl", "doubted", *asked, model=name)["path"]
         why = [
             "if a flank is not" in (path["insertion_skipped"] or "") for path in found
@@ -194,7 +195,7 @@ def test_a_joint_that_is_not_sure_in_motion_matters_where_its_step_does(
     known(shop, "not sure")
     monkeypatch.setattr(split_moves, "SMALL", small_mm * MM)
     monkeypatch.setattr(judging, "HARM", small_mm * MM)
-    asked, name = ("--path-mm", TOLERANCE), f"small{small_mm}"
+    asked, name = ("--path-tolerance", TOLERANCE), f"small{small_mm}"
     paths = lines_of(compensated(shop, "job.pdl", name, *asked, model="not sure"))
     hindered = [
         "which in motion is not sure" in (p["insertion_skipped"] or "") for p in paths
@@ -218,13 +219,13 @@ def test_points_are_kept_beside_a_start_that_nothing_mends(shop: Path) -> None:
 def test_points_do_no_harm_where_no_measured_path_says_how_flanks_change(
     shop: Path, gears: str
 ) -> None:
-    asked = ("--path-mm", TOLERANCE)
+    asked = ("--path-tolerance", TOLERANCE)
     cautious = compensated(shop, "job.pdl", "cautious", *asked, model="model")
     assert any(path["inserted"] for path in cautious["path"])
     scores = []
     for name in ("cautious", "plain"):
         run = simulate_file(shop / f"{name}.pdl", CELL, SEED, path=True, gears=gears,
-                            wanted=shop / "job.pdl")  # fmt: skip
+                            reference=shop / "job.pdl")  # fmt: skip
         assert run.paths is not None
         scores.append(run.paths)
     new, old = scores
@@ -251,7 +252,9 @@ def test_a_link_ahead_of_its_drive_at_stops_is_not_sure_in_motion(shop: Path) ->
     assert ahead(braked, arm).sum() > 3
     braked.save(shop / "braked.json")
     paths = lines_of(
-        compensated(shop, "job.pdl", "slowed", "--path-mm", TOLERANCE, model="braked")
+        compensated(
+            shop, "job.pdl", "slowed", "--path-tolerance", TOLERANCE, model="braked"
+        )
     )
     why = [p["insertion_skipped"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
     assert sum("which in motion is not sure" in (text or "") for text in why) > 5
@@ -262,7 +265,7 @@ def test_pieces_are_as_short_as_the_cell_says(shop: Path) -> None:
     (shop / "short.toml").write_text(text)
     done("compensate", shop / "job.pdl", "--cell", shop / "short.toml", "--model",
          shop / "confirmed.json", "-o", shop / "short.pdl", "--report",
-         shop / "short.json", "--path-mm", TOLERANCE)  # fmt: skip
+         shop / "short.json", "--path-tolerance", TOLERANCE)  # fmt: skip
     pieces = [
         step
         for path in lines_of(told(shop, "short"))
@@ -274,9 +277,11 @@ def test_pieces_are_as_short_as_the_cell_says(shop: Path) -> None:
 def test_play_is_taken_up_only_where_a_measured_path_confirms_flanks(
     shop: Path,
 ) -> None:
-    asked = ("--path-mm", TOLERANCE)
+    asked = ("--path-tolerance", TOLERANCE)
     compensated(shop, "job.pdl", "cautious", *asked, model="model")
-    report = compensated(shop, "job.pdl", "asked", *asked, "--take-up", model="model")
+    report = compensated(
+        shop, "job.pdl", "asked", *asked, "--set", STOPS, model="model"
+    )
     assert (shop / "asked.pdl").read_bytes() == (shop / "cautious.pdl").read_bytes()
     (found,) = [
         d for d in report["diagnostics"] if d["code"] == "backlash-preload-skipped"
@@ -298,7 +303,7 @@ def with_reversals(
     if in_motion:
         model = load_model(shop / f"{in_motion}.json")
     replace(model, flank_widths=(width,) * 6).save(shop / "known.json")
-    asked = ("--path-mm", TOLERANCE, "--take-up")
+    asked = ("--path-tolerance", TOLERANCE, "--set", STOPS)
     report = compensated(shop, "job.pdl", "reversed", *asked, model="known")
     said = {d["code"]: d["message"] for d in report["diagnostics"]}
     return lines_of(report), said
@@ -311,7 +316,7 @@ def test_reversals_that_say_sharp_gaps_let_play_be_taken_up(shop: Path) -> None:
     stops = [p for p in paths if p["points"] and p["points"][0]["at_mm"] < 1.0]
     assert len(stops) > LINES / 2
     run = simulate_file(shop / "reversed.pdl", CELL, SEED, path=True,
-                        wanted=shop / "job.pdl")  # fmt: skip
+                        reference=shop / "job.pdl")  # fmt: skip
     true = {m["visit"]: m["max_mm"] for m in json.loads(run.to_json())["path"]}
     plain = real(shop, "plain")
     mean = np.mean([true[path["visit"]] for path in paths])
@@ -377,7 +382,7 @@ def test_both_halves_of_an_arc_are_open_where_one_is(
     works: list[PathWork] = []
     monkeypatch.setattr(correction, "judge", works.append)
     monkeypatch.setattr(PathWork, "to_split", property(one_half_of_every_arc))
-    compensated(shop, "job.pdl", "halves", "--path-mm", TOLERANCE)
+    compensated(shop, "job.pdl", "halves", "--path-tolerance", TOLERANCE)
     (work,) = works
     via = np.flatnonzero(work.source.reading.visits.via)
     assert len(via) > 1 and {*via, *(via + 1)} == set(work.open)
@@ -413,7 +418,7 @@ def test_where_the_error_changes_fast_points_beside_it_are_taken_back(
     (shop / "strict.toml").write_text(strict)
     done("compensate", shop / "job.pdl", "--cell", shop / "strict.toml", "--model",
          shop / "confirmed.json", "-o", shop / "strict.pdl", "--report",
-         shop / "strict.json", "--path-mm", TOLERANCE)  # fmt: skip
+         shop / "strict.json", "--path-tolerance", TOLERANCE)  # fmt: skip
     (work,) = works
     assert len(work.shut) > 2
     assert all(not gone & {*work.points.get(v, ())} for v, gone in work.shut.items())
@@ -467,13 +472,14 @@ def test_diff_tells_points_apart(shop: Path) -> None:
 
 
 def test_a_budget_holds(shop: Path) -> None:
-    report = compensated(shop, "job.pdl", "few", "--path-mm", TOLERANCE,
-                         "--max-inserted", 2, "--html", shop / "few.html")  # fmt: skip
+    report = compensated(shop, "job.pdl", "few", "--path-tolerance", TOLERANCE,
+                         "--set", "compensation.max_inserted=2",
+                         "--html", shop / "few.html")  # fmt: skip
     assert (shop / "few.html").stat().st_size > 10_000
     assert sum(path["inserted"] for path in report["path"]) <= 2
     assert any("max-inserted" in d["message"] for d in report["diagnostics"])
-    none = compensated(shop, "job.pdl", "none", "--path-mm", TOLERANCE,
-                       "--max-inserted", 0)  # fmt: skip
+    none = compensated(shop, "job.pdl", "none", "--path-tolerance", TOLERANCE,
+                       "--set", "compensation.max_inserted=0")  # fmt: skip
     assert sum(path["inserted"] for path in none["path"]) == 0
     same = [(shop / f"{n}.pdl").read_bytes() for n in ("plain", "none")]
     assert same[0] == same[1]
@@ -485,7 +491,7 @@ def test_where_events_may_count_segments_nothing_is_split(shop: Path) -> None:
     lines = timed().split("\r\n")
     text = "\r\n".join([*lines[:2], *handler, *lines[2:]])
     (shop / "events.pdl").write_bytes(text.encode())
-    report = compensated(shop, "events.pdl", "event", "--path-mm", TOLERANCE)
+    report = compensated(shop, "events.pdl", "event", "--path-tolerance", TOLERANCE)
     assert sum(path["inserted"] for path in report["path"]) == 0
     assert any("events along a move" in d["message"] for d in report["diagnostics"])
 
@@ -501,10 +507,19 @@ def holes(speed: str = "  $LIN_SPD := 0.05\n") -> bytes:
 @pytest.fixture(scope="module")
 def drilled(shop: Path) -> Path:
     (shop / "holes.pdl").write_bytes(holes())
-    for name, more in (("once", ()), ("anew", ("--approach",))):
+    for name, more in (
+        ("once", ()),
+        (
+            "anew",
+            (
+                "--set",
+                AGAIN,
+            ),
+        ),
+    ):
         compensated(shop, "holes.pdl", name, *more)
         done("simulate", shop / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
-             "--wanted", shop / "holes.pdl", "--path",
+             "--reference", shop / "holes.pdl", "--path",
              "--json", shop / f"{name}.true.json")  # fmt: skip
     return shop
 
@@ -569,17 +584,17 @@ def test_nothing_is_approached_anew_where_a_process_may_run(
 ) -> None:
     text = holes().replace(b"  MOVE LINEAR", f"  {between}\n  MOVE LINEAR".encode())
     (shop / "process.pdl").write_bytes(text)
-    report = compensated(shop, "process.pdl", "processed", "--approach")
+    report = compensated(shop, "process.pdl", "processed", "--set", AGAIN)
     assert sum(path["inserted"] for path in report["path"]) == 0
 
 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--approach", "--no-timing"), "--no-timing"),
-        (("--path-mm", 0.0), "more than 0"),
-        (("--path-mm", 0.1, "--no-timing"), "--no-timing"),
-        (("--take-up",), "--path-mm"),
+        (("--path-tolerance", 0.0), "greater than 0"),
+        (("--set", STOPS), "--path-tolerance"),
+        (("--path-mm", 0.1), "--path-mm is called --path-tolerance"),
+        (("--take-up",), f"--take-up is called --set {STOPS}"),
     ],
 )
 def test_options_that_do_not_fit(
@@ -597,7 +612,13 @@ def test_check_tells_a_point_that_was_touched(
 ) -> None:
     for name in ("points.pdl", "points.pdl.postproc.json"):
         (tmp_path / name).write_bytes((shop / name).read_bytes())
-    given = ("check", tmp_path, "--model", shop / "confirmed.json", "--accept-left")
+    given = (
+        "check",
+        tmp_path,
+        "--model",
+        shop / "confirmed.json",
+        "--allow-uncorrected",
+    )
     assert cli(*given).exit_code == 0
     place = tmp_path / "points.pdl"
     lines = place.read_bytes().split(b"\r\n")
@@ -640,8 +661,12 @@ def short() -> bytes:
 @pytest.fixture(scope="module")
 def turned(shop: Path) -> Path:
     (shop / "short.pdl").write_bytes(short())
-    asked = ("--path-mm", TOLERANCE, "--take-up")
-    for name, more in (("alone", ()), ("put", asked), ("both", (*asked, "--approach"))):
+    asked = ("--path-tolerance", TOLERANCE, "--set", STOPS)
+    for name, more in (
+        ("alone", ()),
+        ("put", asked),
+        ("both", (*asked, "--set", AGAIN)),
+    ):
         compensated(shop, "short.pdl", f"short.{name}", *more)
     return shop
 
@@ -669,7 +694,7 @@ def test_no_stop_lies_beyond_the_target(turned: Path) -> None:
 
 
 def test_targets_are_approached_anew_only_where_no_path_is_worse(drilled: Path) -> None:
-    asked = ("--path-mm", TOLERANCE, "--take-up", "--approach")
+    asked = ("--path-tolerance", TOLERANCE, "--set", STOPS, "--set", AGAIN)
     report = compensated(drilled, "holes.pdl", "holes.both", *asked)
     usual = {p["visit"]: p["max_mm"]["after"] for p in told(drilled, "once")["path"]}
     assert any(d["code"] == "reapproach-inserted" for d in report["diagnostics"])

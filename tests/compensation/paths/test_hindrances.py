@@ -30,7 +30,7 @@ def test_taught_ends_and_weaving_moves_stay_in_one_piece(desk, line, why):
     text = "\n".join(["PROGRAM job", "VAR n : INTEGER", "BEGIN", *lines, "END job", ""])
     job.write_text(text)
     given = ("--cell", desk.cell, "--model", desk.model, "-o", out)
-    found = cli("compensate", job, *given, "--path-mm", "0.01")
+    found = cli("compensate", job, *given, "--path-tolerance", "0.01")
     words = [word for word in WORDS if word in found.stderr]
     assert words == ([why] if why else [])
     written = out.read_text().splitlines()

@@ -101,7 +101,7 @@ def compensated(
     """Compensate a program with its pages."""
     main, *others = files
     pages = {name: files[name] for name in others}
-    options = Options(shared=shared)
+    options = Options(edit_exported=shared)
     return compensate(files[main], cell, model, name=main, pages=pages, options=options)
 
 

@@ -18,7 +18,10 @@ from tests.conftest import SEED
 from tests.fuzz.case import records_of
 from tests.language.neutral_job import drawn, krl
 
-CLONE, EXPORTED = Options(clone=True), Options(clone=True, shared=True)
+CLONE, EXPORTED = (
+    Options(shared_points="clone"),
+    Options(shared_points="clone", edit_exported=True),
+)
 
 
 def run(files, cell, model, options=CLONE):

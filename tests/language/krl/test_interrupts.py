@@ -130,7 +130,7 @@ def test_routines_of_packages_are_still(name):
     notes = [d for d in found.diagnostics if d.code == Code.ROUTINE_ASSUMED_MOTIONLESS]
     assert len(notes) == (package_routines()[name] != "ahead")
     strict = job(
-        "LIN XP1", f"{name}(1, XP2)", "LIN XP1", start=Start(strict_calls=True)
+        "LIN XP1", f"{name}(1, XP2)", "LIN XP1", start=Start(assume_motion=True)
     )
     assert origins(strict)[1] == [ELSEWHERE] and "motion-unknown" in codes(strict)
     moves = Start(routines={name: "moves"})

@@ -103,7 +103,13 @@ def test_the_rows_of_diff_name_the_nodes(made):
 def test_shared_parts_are_edited_where_that_is_wanted(made, desk):
     source, out, _ = made
     assert b"X: 220.00 " in (out / "job.lsv").read_bytes()
-    desk.compensate(source, "-o", desk.folder / "other.pdl", "--shared")
+    desk.compensate(
+        source,
+        "-o",
+        desk.folder / "other.pdl",
+        "--set",
+        "compensation.edit_exported=true",
+    )
     assert b"X: 220.00 " not in (desk.folder / "other.lsv").read_bytes()
 
 
@@ -113,7 +119,7 @@ def test_a_node_is_not_cloned(desk):
     moves = [line for start in far for line in (start, "MOVE JOINT TO pth.NODE[1]")]
     source = desk.put("job.pdl", program(FIRST, *moves, declared=DECLARED))
     desk.put("job.lsv", VALUES)
-    found = desk.compensate(source, "--clone")
+    found = desk.compensate(source, "--shared-points", "clone")
     assert found.exit_code == 1
     text = "elements of arrays, records and paths are not cloned"
     assert f"not-cloned: {text}" in found.stderr
@@ -127,7 +133,7 @@ def test_a_point_that_holds_a_node_is_not_cloned(desk):
     declared = f"p : POSITION\r\n  {DECLARED}"
     source = desk.put("job.pdl", program(FIRST, *moves, declared=declared))
     desk.put("job.lsv", VALUES)
-    found = desk.compensate(source, "--clone")
+    found = desk.compensate(source, "--shared-points", "clone")
     assert "not-cloned: p holds a copy of pth.NODE[1].$MAIN_POS" in found.stderr
 
 

@@ -113,9 +113,12 @@ def test_the_shipped_list_counts_unless_calls_are_strict() -> None:
     body = [FIRST, "spot(1)", THEN]
     assert reasons(followed(*body)) == ["", ""]
     assert codes(followed(*body)) == ["routine-assumed-motionless"]
-    strict = followed(*body, strict_calls=True)
+    strict = followed(*body, assume_motion=True)
     assert reasons(strict)[1] and codes(strict) == ["unknown-routine"]
-    assert reasons(followed(*body, strict_calls=True, motionless=("spot",))) == ["", ""]
+    assert reasons(followed(*body, assume_motion=True, motionless=("spot",))) == [
+        "",
+        "",
+    ]
 
 
 def test_the_shipped_list_names_no_routine_that_sets_frames_or_moves() -> None:
@@ -134,7 +137,7 @@ def test_the_page_lists_the_shipped_list() -> None:
 
 def test_built_in_routines_are_known() -> None:
     body = ["n := prog_state('x')", "err_post(1, 'x')", "bit_set(n, 1)", "n := abs(n)"]
-    found = followed(FIRST, *body, THEN, strict_calls=True)
+    found = followed(FIRST, *body, THEN, assume_motion=True)
     assert reasons(found) == ["", ""] and codes(found) == []
 
 

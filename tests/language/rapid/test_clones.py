@@ -20,7 +20,7 @@ from tests.conftest import SEED
 from tests.fuzz.case import records_of
 from tests.language.neutral_job import drawn, rapid
 
-CLONE = Options(clone=True)
+CLONE = Options(shared_points="clone")
 
 
 def shared(cell, seed):

@@ -75,7 +75,7 @@ def test_a_module_beside_the_program_is_rewritten(folder):
 
 def test_a_point_of_a_system_module_is_cloned_beside_its_moves(folder):
     files = parts("user.sys", go("p1"))
-    assert compensated(folder, files, "--clone").exit_code == 0
+    assert compensated(folder, files, "--shared-points", "clone").exit_code == 0
     assert "p1__2" in (folder / "out" / "job.mod").read_text()
     assert not (folder / "out" / "user.sys").exists()
 

@@ -17,7 +17,8 @@ REASONS = (
     NO_REASON,
     Reason(
         Code.ARRIVALS_DIFFER,
-        "its arrivals differ by more than conflict_mm = 0.02 (see --clone)",
+        "its arrivals differ by more than conflict_mm = 0.02 "
+        "(see --shared-points clone)",
     ),
     Reason(Code.NUMBERS_NOT_OWN, "its numbers are not written in the program"),
     Reason(Code.SINGULAR_WRIST, "joint 5 is within 3 deg of the wrist singularity"),

@@ -1,0 +1,72 @@
+"""How commands are listed, and what options of earlier versions are called now."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from typer.core import TyperCommand, TyperGroup
+
+GROUPS = {
+    "Calibrate": ("survey", "fit", "diagnose", "history", "compare", "predict"),
+    "Compensate": ("compensate", "explain", "batch"),
+    "Check": ("diff", "check", "restore", "report"),
+    "Set up and try": ("arm", "simulate"),
+}
+KEYS = {
+    "--take-up": "compensation.preload_backlash=true",
+    "--approach": "compensation.reapproach=true",
+    "--max-inserted": "compensation.max_inserted=N",
+    "--strict-calls": "compensation.assume_motion=true",
+    "--shared": "compensation.edit_exported=true",
+    "--timing": "compensation.timing=true",
+    "--no-timing": "compensation.timing=false",
+    "--measured-frame": "measurements.frame=FRAME",
+    "--frame": "measurements.frame=FRAME",
+    "--columns": "measurements.columns=FILE",
+    "--delimiter": "measurements.delimiter=SIGN",
+    "--decimal": "measurements.decimal=SIGN",
+    "--encoding": "measurements.encoding=NAME",
+    "--unit": "measurements.unit=UNIT",
+}
+OLD_OPTIONS = {
+    **{old: f"--set {key}" for old, key in KEYS.items()},
+    "--clone": "--shared-points clone",
+    "--path-mm": "--path-tolerance",
+    "--accept-left": "--allow-uncorrected",
+    "--wanted": "--reference",
+    "--lsv": "--variables",
+    "--lsv-out": "--variables-out",
+    "--gears": "--backlash-model",
+    "--blocks": "--cv-blocks",
+}
+
+
+class Command(TyperCommand):
+    """A command that names the new word where an old one is given."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse arguments; end with 2 where one is an option of an earlier version."""
+        known = {word for param in self.params for word in param.opts}
+        for arg in args:
+            word = arg.partition("=")[0]
+            if word in OLD_OPTIONS and word not in known:
+                ctx.fail(f"{word} is called {OLD_OPTIONS[word]}")
+        return super().parse_args(ctx, args)
+
+
+class Groups(TyperGroup):
+    """The commands in the order of the work, with no line cut."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands, a section a step of the work."""
+        for title, names in GROUPS.items():
+            found = [(name, self.commands.get(name)) for name in names]
+            rows = [(name, _first(one)) for name, one in found if one is not None]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+
+def _first(command: Any) -> str:
+    """Return the first line of a command's help."""
+    return str(command.help or "").strip().partition("\n")[0]
