@@ -489,8 +489,8 @@ class Code(StrEnum):
         "exported-variable",
         WARNING,
         "Other programs may read the variable of the target too.",
-        "Set edit_exported in [compensation] of the cell where the others are compensated "
-        "with it.",
+        "Set edit_exported in [compensation] of the cell where the others are "
+        "compensated with it.",
     )
     NUMBERS_USED_ELSEWHERE = (
         "numbers-used-elsewhere",
