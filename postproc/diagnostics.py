@@ -1,7 +1,8 @@
-"""The registry of findings: each has a code, a severity, a meaning and a cure."""
+"""The registry of findings and reasons: code, severity, meaning and cure of each."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Self
 
@@ -18,7 +19,7 @@ NOTE, WARNING, ERROR = Severity.NOTE, Severity.WARNING, Severity.ERROR
 
 
 class Code(StrEnum):
-    """What was found in a program, or in a tree of compensated programs.
+    """What was found in a program or a tree of programs, or why a target stays.
 
     Attributes:
         severity: What it asks for.
@@ -128,8 +129,8 @@ class Code(StrEnum):
 
     # Where the arm is.
 
-    ASSUMED_STILL = (
-        "assumed-still",
+    ROUTINE_ASSUMED_MOTIONLESS = (
+        "routine-assumed-motionless",
         NOTE,
         "A routine that is in no file at hand is on the shipped list of routines that "
         "neither move the arm nor set frames.",
@@ -210,16 +211,16 @@ class Code(StrEnum):
         "A move names no trajectory, and $MOVE_TYPE is not set: it is taken as JOINT.",
         "Name the trajectory, or set $MOVE_TYPE.",
     )
-    SIDE_NOT_SURE = (
-        "side-not-sure",
+    DIRECTION_UNCERTAIN = (
+        "direction-uncertain",
         WARNING,
         "A joint reaches a corrected target from a side that is not sure, soon after "
         "it turned or from a place that is not known. Up to half of its backlash may "
         "remain; the stated standard error holds it.",
         "Start the approach farther away, or from the side that the joint moves to.",
     )
-    SIDE_IN_TIME = (
-        "side-in-time",
+    DIRECTION_DISAGREES = (
+        "direction-disagrees",
         WARNING,
         "In the trajectory in time a joint arrives from the other side than along the "
         "path; the correction is that of the path.",
@@ -261,8 +262,8 @@ class Code(StrEnum):
         NOTE,
         "No time law was found for a run: its times and speeds are estimates.",
     )
-    SLOWED_DOWN = (
-        "slowed-down",
+    SPEED_NOT_REACHED = (
+        "speed-not-reached",
         WARNING,
         "The joints cannot follow the programmed speed; the controller slows down or "
         "stops, near a singularity as a rule.",
@@ -280,20 +281,20 @@ class Code(StrEnum):
         NOTE,
         "Points were put on the ways of moves, so that these keep their paths.",
     )
-    NOT_TAKEN_UP = (
-        "not-taken-up",
+    BACKLASH_PRELOAD_SKIPPED = (
+        "backlash-preload-skipped",
         NOTE,
         "Play is not taken up before moves: no measurement confirms how joints change "
         "their flanks there.",
         "Measure it: survey --reversals, or diagnose --path.",
     )
-    APPROACHED_ANEW = (
-        "approached-anew",
+    REAPPROACH_INSERTED = (
+        "reapproach-inserted",
         NOTE,
         "Targets are approached once more, from a stop on the way already travelled.",
     )
-    PATH_LEFT = (
-        "path-left",
+    PATH_TOLERANCE_EXCEEDED = (
+        "path-tolerance-exceeded",
         WARNING,
         "A move is predicted to leave its path by more than was asked for.",
         "Program a lower speed, or approach the path from the side it moves to.",
@@ -301,14 +302,14 @@ class Code(StrEnum):
 
     # What the corrected program does.
 
-    SLOWER = (
-        "slower",
+    CYCLE_TIME_INCREASED = (
+        "cycle-time-increased",
         WARNING,
         "The compensated program takes more than 3 % longer than the original.",
         "Look at the corrections of its fastest moves.",
     )
-    BEYOND_LIMIT = (
-        "beyond-limit",
+    JOINT_LIMIT_EXCEEDED = (
+        "joint-limit-exceeded",
         ERROR,
         "A joint comes beyond a limit that the original program keeps.",
         "Move the target away from the limit.",
@@ -348,8 +349,8 @@ class Code(StrEnum):
         "A tool is shorter than two millimetres: is it written in metres?",
         "Write millimetres.",
     )
-    BASE_CONTRADICTS = (
-        "base-contradicts",
+    BASE_FRAME_MISMATCH = (
+        "base-frame-mismatch",
         WARNING,
         "Joint angles and Cartesian targets of the program place the base elsewhere "
         "than the cell.",
@@ -361,8 +362,8 @@ class Code(StrEnum):
         "The archive places the arm otherwise than the cell.",
         "Paste the lines of the message into [base] of the cell.",
     )
-    LISTING_DIGITS = (
-        "listing-digits",
+    LSV_PRECISION = (
+        "lsv-precision",
         NOTE,
         "The controller lists values with two decimals: to list corrected values and "
         "to load them again costs what the message says.",
@@ -389,8 +390,8 @@ class Code(StrEnum):
         NOTE,
         "A line of the variable file is not understood; it is kept.",
     )
-    LSV_TWICE = (
-        "lsv-twice",
+    LSV_DUPLICATE = (
+        "lsv-duplicate",
         WARNING,
         "A variable has two entries: which one the controller takes is not known.",
         "Delete one.",
@@ -431,6 +432,309 @@ class Code(StrEnum):
         WARNING,
         "The program uses no variable of the file.",
         "Is it the file of another program?",
+    )
+
+    # Why a target keeps its values: what the program tells of it.
+
+    NO_TARGET = (
+        "no-target",
+        NOTE,
+        "The move goes where no numbers of its own say: home, a step, a part of an "
+        "axis position.",
+    )
+    TAUGHT_POINT = (
+        "taught-point",
+        NOTE,
+        "The point was taught with the robot: it contains the arm's error already.",
+    )
+    NO_VALUE = (
+        "no-value",
+        WARNING,
+        "The target, or a frame of it, has no value in the program or its variable "
+        "file.",
+        "Give the variable file, or teach the point.",
+    )
+    RUNTIME_VALUE = (
+        "runtime-value",
+        WARNING,
+        "The target, or a number of it, is known only while the program runs.",
+        "Write the numbers in the program.",
+    )
+    UNREADABLE_NUMBER = (
+        "unreadable-number",
+        WARNING,
+        "A number of the target cannot be read, or makes no position.",
+        "Correct the number.",
+    )
+    PARTIAL_TARGET = (
+        "partial-target",
+        WARNING,
+        "The target names some of its numbers only; the others stay what they are.",
+        "Write all of its numbers.",
+    )
+    COMPUTED_TARGET = (
+        "computed-target",
+        WARNING,
+        "The program computes the target, so that no numbers can be written for it.",
+        "Write the target as a position of its own, or correct the point it is "
+        "computed from.",
+    )
+    NUMBERS_NOT_OWN = (
+        "numbers-not-own",
+        WARNING,
+        "The numbers of the target are not written in one place that is its own.",
+        "Write the numbers of the target one by one, in the move or in a variable.",
+    )
+    EXPORTED_VARIABLE = (
+        "exported-variable",
+        WARNING,
+        "Other programs may read the variable of the target too.",
+        "Set edit_exported in [compensation] of the cell where the others are "
+        "compensated with it.",
+    )
+    NUMBERS_USED_ELSEWHERE = (
+        "numbers-used-elsewhere",
+        WARNING,
+        "The program uses the numbers of the target for something else as well, which "
+        "a correction would change.",
+        "Give the move a point of its own.",
+    )
+    FRAME_UNKNOWN = (
+        "frame-unknown",
+        WARNING,
+        "Tool, base or user frame of the move is not known.",
+        "Write the frame in the program, or in the cell file.",
+    )
+    TAUGHT_FRAME = (
+        "taught-frame",
+        WARNING,
+        "A frame of the target was taught with the arm and contains its error.",
+        "Give the joint angles of its points in the cell file, or measure the frame.",
+    )
+    REMOTE_TOOL = (
+        "remote-tool",
+        WARNING,
+        "The tool stands still and the arm holds the part.",
+        "Such targets are not compensated; look at them by hand.",
+    )
+    EXTERNAL_AXES = (
+        "external-axes",
+        WARNING,
+        "A track, a positioner or an axis that the cell does not declare moves the arm "
+        "or the part.",
+        "Declare the axis under [aux] of the cell.",
+    )
+    TRAJECTORY_UNKNOWN = (
+        "trajectory-unknown",
+        WARNING,
+        "How the arm moves to the target is not known, or not followed.",
+        "Name the trajectory in the move.",
+    )
+    ENDS_ELSEWHERE = (
+        "ends-elsewhere",
+        WARNING,
+        "The move may end before its target, or beside it: a search, a trigger, a "
+        "condition, a spline.",
+        "Such targets are not compensated; look at them by hand.",
+    )
+    SENSOR_GUIDED = (
+        "sensor-guided",
+        WARNING,
+        "A sensor may lead the arm off the path of the program.",
+        "Switch the sensor off before targets that have to be exact.",
+    )
+    CONVEYOR = (
+        "conveyor",
+        WARNING,
+        "The work object moves, on a conveyor or with a mechanical unit.",
+        "Such targets are not compensated; look at them by hand.",
+    )
+    COORDINATED_ARMS = (
+        "coordinated-arms",
+        WARNING,
+        "The arm moves together with another one.",
+        "Such targets are not compensated; look at them by hand.",
+    )
+    SOFT_AXIS = (
+        "soft-axis",
+        WARNING,
+        "An axis is soft and gives way.",
+        "End that before targets that have to be exact.",
+    )
+    AXIS_OFFSET = (
+        "axis-offset",
+        WARNING,
+        "External axes are offset by the program.",
+        "End the offset before targets that have to be exact.",
+    )
+    SETTING_UNTRACKED = (
+        "setting-untracked",
+        WARNING,
+        "The program sets something that moves the arm off its targets and that is not "
+        "followed.",
+        "Take the setting back before targets that have to be exact.",
+    )
+    LOAD_UNKNOWN = (
+        "load-unknown",
+        WARNING,
+        "What the arm carries is not known, and how far it sags depends on it.",
+        "Write the load as constants in the program.",
+    )
+    BESIDE_PROGRAM = (
+        "beside-program",
+        WARNING,
+        "A program that runs beside this one, an interrupt or a trap may change what "
+        "holds at the move, or move the arm.",
+        "Let it set a signal, and act in the program.",
+    )
+
+    # Why a target keeps its values: what the plan finds.
+
+    OUT_OF_REACH = (
+        "out-of-reach",
+        WARNING,
+        "The arm cannot reach the target as it is written.",
+        "Check the target and its frames.",
+    )
+    TARGET_BEYOND_LIMIT = (
+        "target-beyond-limit",
+        WARNING,
+        "A joint is beyond its limit at the target as it is written, or on the way.",
+        "Check the target and its turns.",
+    )
+    CONFIGURATION_UNKNOWN = (
+        "configuration-unknown",
+        WARNING,
+        "On which branch, or with which turns, the arm reaches the target is not "
+        "known.",
+        "Write configuration flags, or a joint target before it.",
+    )
+    CONFIGURATION_CONTRADICTED = (
+        "configuration-contradicted",
+        WARNING,
+        "The path arrives otherwise than the configuration flags say: the controller "
+        "stops there, or may.",
+        "Write the flags that the path arrives with.",
+    )
+    CONFIGURATION_BORDER = (
+        "configuration-border",
+        WARNING,
+        "Corrected, an axis would stand so near a border of the configuration flags "
+        "that they could become wrong.",
+        "Move the target a little, or go there by joint angles.",
+    )
+    SINGULAR_WRIST = (
+        "singular-wrist",
+        WARNING,
+        "The wrist is near its singularity, where corrections turn axes far.",
+        "Turn the tool, or lower wrist_deg in the cell.",
+    )
+    SINGULAR_PATH = (
+        "singular-path",
+        WARNING,
+        "The path to the target leaves the reach or passes through a singularity.",
+        "Lead the path round it, add a point, or use a joint move.",
+    )
+    ARC_UNDETERMINED = (
+        "arc-undetermined",
+        WARNING,
+        "The points of the arc make no circle that is certain, or where the arc ends "
+        "is not known.",
+        "Move the point on the way of the arc, or use lines.",
+    )
+    ORIENTATION_LAW = (
+        "orientation-law",
+        WARNING,
+        "How the tool turns on the way is not planned, so that joints may arrive from "
+        "another side.",
+        "Use the usual orientation of the language, or points that are nearer.",
+    )
+    UNKNOWN_POSITION_BEFORE = (
+        "unknown-position-before",
+        WARNING,
+        "The move comes from a place that is not certain: a target out of reach, or "
+        "with doubtful configuration flags.",
+        "Correct the move before, or put a joint target between.",
+    )
+
+    # Why a target keeps its values: what the correction would do.
+
+    OUTSIDE_SURVEY = (
+        "outside-survey",
+        WARNING,
+        "The target lies outside of what the survey covers, or the model is too "
+        "uncertain there.",
+        "Survey the range of the program.",
+    )
+    CORRECTION_UNREACHABLE = (
+        "correction-unreachable",
+        WARNING,
+        "Corrected, the target would be out of reach on its branch, or the search for "
+        "the correction does not come to an end.",
+        "Move the target away from the border of the reach.",
+    )
+    CORRECTION_BEYOND_LIMIT = (
+        "correction-beyond-limit",
+        WARNING,
+        "Corrected, a joint would be beyond its limit.",
+        "Move the target away from the limit.",
+    )
+    CORRECTION_TOO_LARGE = (
+        "correction-too-large",
+        WARNING,
+        "The correction is larger than correction_mm or correction_deg of the cell.",
+        "Check tool, base and model, then raise the limit.",
+    )
+    ARM_SWINGS = (
+        "arm-swings",
+        WARNING,
+        "Corrected, a joint, the elbow or the wrist would move farther than the cell's "
+        "limits, at the target or on the way.",
+        "Look at the target: near a singularity, turn the tool.",
+    )
+    DIRECTION_CHANGES = (
+        "direction-changes",
+        WARNING,
+        "With the correction a joint would arrive from its other side.",
+        "Start the approach farther away.",
+    )
+    CORRECTION_STEP = (
+        "correction-step",
+        WARNING,
+        "The correction changes too fast along the path.",
+        "Stop between the points, or raise step_mm of the cell.",
+    )
+    PATH_BENT = (
+        "path-bent",
+        WARNING,
+        "A neighbour on the path, or on the same arc or curve, cannot be corrected: "
+        "correcting this point alone would bend the path.",
+        "Look at the neighbour.",
+    )
+    ARC_DISTORTED = (
+        "arc-distorted",
+        WARNING,
+        "Corrected, the points of the arc would make quite another circle.",
+        "Move the point on the way to its middle, or divide the arc.",
+    )
+    ARRIVALS_DIFFER = (
+        "arrivals-differ",
+        WARNING,
+        "Arrivals at one point need different corrections.",
+        "Give each move a point of its own.",
+    )
+    SHARED_POINT = (
+        "shared-point",
+        WARNING,
+        "Several moves go to one point, and the cell keeps such points as they are.",
+        'Set shared_points = "mean" or "clone" under [compensation].',
+    )
+    DEPENDANT_WORSE = (
+        "dependant-worse",
+        WARNING,
+        "A correction would take a target that is computed from this one farther off, "
+        "or another arrival at the point cannot be corrected.",
+        "Give the moves points of their own.",
     )
 
     # Trees of compensated programs (check).
@@ -496,3 +800,51 @@ class Code(StrEnum):
         "Targets that could have been compensated keep their values.",
         "Look at them, then pass --allow-uncorrected.",
     )
+
+
+@dataclass(frozen=True, order=True, slots=True)
+class Reason:
+    """Why a target keeps its values; `NO_REASON`, which is false, where it need not.
+
+    Programs decide by the code, and by what it is about: the text is for people.
+
+    Attributes:
+        code: What kind of reason it is, None for no reason, and in records of version
+            0.1.0, which had no codes.
+        text: What was found, and what the user can do.
+        about: Which of several things of one kind it is about, "" where there is one.
+
+    >>> reason = NO_REASON or Reason(Code.TAUGHT_POINT, "it was taught")
+    >>> bool(NO_REASON), str(reason)
+    (False, 'it was taught')
+    """
+
+    code: Code | None
+    text: str
+    about: str = ""
+
+    def __bool__(self) -> bool:
+        """Return True if there is a reason."""
+        return self.code is not None
+
+    def __str__(self) -> str:
+        """Return the text."""
+        return self.text
+
+    @property
+    def name(self) -> str:
+        """Return the code as JSON has it, "" for none."""
+        return "" if self.code is None else str(self.code)
+
+    @classmethod
+    def named(cls, name: str, text: str) -> Self:
+        """Take a reason from JSON; a code of another version is none."""
+        known = {str(code): code for code in Code}
+        return cls(known.get(name), text)
+
+    def within(self, text: str) -> Reason:
+        """Return the reason in a longer text, in which {} stands for it."""
+        return replace(self, text=text.format(self.text))
+
+
+NO_REASON = Reason(None, "")

@@ -135,7 +135,9 @@ def solved_and_written(cell: Cell, model: Model) -> tuple[np.ndarray, np.ndarray
     at = planned_states(planned.plan, cell, cell.temperature)
     at = at.with_(direction=done.decisions.side)
     exact = solve_visits(model, cell, planned, at)
-    rows = (done.decisions.status == Status.SAFE) & (done.visits.target == Meaning.POSE)
+    rows = (done.decisions.status == Status.CORRECTED) & (
+        done.visits.target == Meaning.POSE
+    )
     shift = done.decisions.corrected - new_numbers(
         reading.visits, cell.arm, planned.plan, exact, planned.plan.aside
     )

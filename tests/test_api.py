@@ -143,9 +143,9 @@ def test_compensates_bytes(job_folder):
     assert isinstance(outcome, postproc.Outcome)
     assert outcome.exit_code == 0
     assert outcome.outputs["program.pdl"].startswith(b"-- postproc ")
-    assert outcome.decisions.count(Status.SAFE) == 3
+    assert outcome.decisions.count(Status.CORRECTED) == 3
     table = outcome.to_frame()
-    assert table["status"].tolist().count("safe") == 3
+    assert table["status"].tolist().count("corrected") == 3
     assert set(table["line"]) == set(outcome.visits.line)
     assert str(outcome).startswith("program.pdl: ")
 
@@ -181,7 +181,7 @@ def test_explains_compares_and_checks(job_folder, tmp_path):
     told = postproc.explain(str(path), cell, model)
     planned = postproc.explain(path, cell)
     assert told.to_frame()["line"].tolist() == planned.to_frame()["line"].tolist()
-    assert "why" in planned.to_frame()
+    assert "reason" in planned.to_frame()
     outcome = postproc.compensate(path, cell, model)
     assert told.outcome is not None
     assert np.array_equal(
@@ -191,7 +191,7 @@ def test_explains_compares_and_checks(job_folder, tmp_path):
     found = postproc.diff(path, str(new))
     beside = postproc.diff(path.read_bytes(), new.read_bytes(), name="job.pdl")
     assert [r.line for r in found.rows] == [r.line for r in beside.rows]
-    assert set(found.to_frame()["status"]) == {"safe"}
+    assert set(found.to_frame()["status"]) == {"corrected"}
     assert "lines with other numbers" in str(found)
     checked = postproc.check(tmp_path / "out", model=model, source=source)
     assert checked.exit_code == 0, str(checked)

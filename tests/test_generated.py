@@ -72,7 +72,7 @@ def test_what_is_seen_at_one_value_from_one_side_is_compensated(found):
     # Points drawn at random often make arcs that no correction should touch, and
     # now and then moves that no arm can make.
     arcs = sum(n for text, n in found.once.items() if ARCS.search(text))
-    lost = sum(n for text, n in found.once.items() if STRANDED in text)
+    lost = sum(n for text, n in found.once.items() if STRANDED.text in text)
     assert compensated > 0.9 * (found.once.total() - arcs - lost) > 100
     assert arcs < 0.1 * found.once.total() and lost < 0.05 * found.once.total()
     assert found.once[DONE] > 100

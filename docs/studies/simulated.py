@@ -103,7 +103,7 @@ def _one_point(seeds: int) -> list[str]:
         f"{np.sqrt(np.mean(stated)) / MM:.3f} mm, real rms error "
         f"{np.sqrt(np.mean(real)) / MM:.3f} mm, 95 % intervals hold "
         f"{100 * np.mean(inside):.1f} % (standard error of that figure "
-        f"{100 * np.std(inside) / np.sqrt(seeds):.1f}); every such visit is guarded",
+        f"{100 * np.std(inside) / np.sqrt(seeds):.1f}); every such visit is rejected",
     ]
 
 

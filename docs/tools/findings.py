@@ -19,6 +19,9 @@ names a file and a line, and has a code: `job.pdl:12: unknown-routine: ..`. JSON
 carry the code; `postproc explain --code CODE` prints what stands here. What is found at
 many lines is one line with the first of them; `--all` lists each.
 
+The reason for which a target keeps its values has a code of the same registry. JSON
+outputs carry that code (`code`) beside the text.
+
 | severity | what it asks for |
 |---|---|
 | note | nothing: it tells what was done, or taken for granted |

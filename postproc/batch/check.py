@@ -373,9 +373,9 @@ def _left_alone(
     place: str, targets: Mapping[str, Any], left: tuple[LeftLine, ...]
 ) -> Iterator[CheckFinding]:
     """Find targets that could have been compensated and kept their value."""
-    told = with_left(targets, left) if left else targets
+    told = with_left(targets, left)
     codes = "".join(str(int(status)) for status in LEFT_ALONE)
-    columns = (str(told.get("status", "")), told.get("line", ()), told.get("why", ()))
+    columns = (told["status"], told["line"], told["reason"])
     rows = [row for row in zip(*columns, strict=False) if row[0] in codes]
     if rows:
         lines = line_ranges(sorted(line for _, line, _ in rows))
@@ -390,7 +390,7 @@ def _assumed(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
     """Find routines that were assumed motionless because the shipped list says so."""
     for file, line, message in sidecar.assumed:
         text = f"line {line} of {file}: {message}; compensate it with assume_motion"
-        yield CheckFinding(place, Code.ASSUMED_STILL, text)
+        yield CheckFinding(place, Code.ROUTINE_ASSUMED_MOTIONLESS, text)
 
 
 def _by_reason(rows: list[tuple[str, int, int]], told: Mapping[str, Any]) -> str:

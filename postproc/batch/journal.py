@@ -22,8 +22,8 @@ class JournalEntry:
 
     Attributes:
         place: The main program, or the file, below the source tree.
-        status: ``done``, ``left`` (not all targets), ``failed``, ``copied``,
-            ``removed`` or ``known`` (written by an earlier run).
+        status: ``done``, ``uncorrected`` (not all targets are corrected), ``failed``,
+            ``copied``, ``removed`` or ``known`` (written by an earlier run).
         exit_code: 0, 1 or 2.
         digest: Hash of all that decided it.
         outputs: SHA-256 of what was written, by path below the target tree.
@@ -48,6 +48,11 @@ class JournalEntry:
 
 
 _OWN = ("file", "status", "exit", "digest", "outputs")
+_BEFORE = {
+    "safe": "corrected",
+    "left": "uncorrected",
+    "left_alone": "uncorrected_lines",
+}  # words of version 0.1.0
 
 
 def entry_from(data: Mapping[str, Any]) -> JournalEntry:
@@ -57,10 +62,10 @@ def entry_from(data: Mapping[str, Any]) -> JournalEntry:
         KeyError, TypeError, ValueError, AttributeError: It is no such line.
     """
     outputs = {str(k): str(v) for k, v in data.get("outputs", {}).items()}
-    facts = {k: v for k, v in data.items() if k not in _OWN}
+    facts = {_BEFORE.get(k, k): v for k, v in data.items() if k not in _OWN}
     return JournalEntry(
         str(data["file"]),
-        str(data["status"]),
+        _BEFORE.get(data["status"], str(data["status"])),
         int(data["exit"]),
         str(data.get("digest", "")),
         outputs,
@@ -128,7 +133,7 @@ LISTED = 20  # programs that are listed on the terminal; the log lists all
 
 ROWS = {
     "done": "compensated",
-    "left": "compensated, targets left alone",
+    "uncorrected": "compensated, targets not corrected",
     "failed": "not compensated, absent",
     "copied": "copied",
 }
@@ -171,12 +176,12 @@ class Summary:
         count.files += 1
         count.skipped += entry.skipped
         count.visits += entry.facts.get("visits", 0)
-        count.left += entry.facts.get("left", 0)
+        count.left += entry.facts.get("uncorrected", 0)
         self.worst = max(self.worst, entry.exit_code)
         if entry.status == "failed":
             self.problems.append((entry.place, entry.facts.get("error", "")))
-        if entry.status == "left":
-            self.left.append((entry.place, entry.facts.get("left", 0)))
+        if entry.status == "uncorrected":
+            self.left.append((entry.place, entry.facts.get("uncorrected", 0)))
 
     @property
     def files(self) -> int:

@@ -260,7 +260,7 @@ def file_hash(path: str | Path) -> str:
 
 # A tree of programs in, the same tree compensated out.
 
-STATUS = ("done", "left", "failed")  # by exit code
+STATUS = ("done", "uncorrected", "failed")  # by exit code
 
 Told = Callable[[int, int], None]  # how many files are done, of how many
 Gather = Callable[[BatchPlan], WorkerPool]

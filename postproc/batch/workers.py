@@ -26,7 +26,7 @@ import numpy as np
 
 from postproc import __version__
 from postproc.batch.plan import JobSetup, Result, Task, Unit, failed
-from postproc.compensation.outcome import Outcome
+from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.parallel import end_with_parent
 from postproc.compensation.record import SUFFIX
 from postproc.compensation.together import Given, compensate_batch
@@ -312,9 +312,9 @@ def facts_of(outcome: Outcome) -> dict[str, Any]:
         "version": __version__,
         "model": outcome.model,
         "visits": len(statuses),
-        "safe": int((statuses == 0).sum()),
-        "left": len(left),
-        "left_alone": left[:LISTED],
+        "corrected": outcome.decisions.count(Status.CORRECTED),
+        "uncorrected": len(left),
+        "uncorrected_lines": left[:LISTED],
         "findings": [*map(str, outcome.diagnostics[:LISTED])],
         "largest_mm": _largest(outcome),
         "before_mm": _figures(asdict(outcome.before)),

@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.eligibility import Reasons
+from postproc.diagnostics import Code, Reason
 from postproc.language.visits import Meaning, Visits
 from postproc.motion.path import circles
 from postproc.robot.pose import lengths, rotation_from_vector, rotation_vector
@@ -19,21 +20,25 @@ WHOLE = np.deg2rad(300.0)  # from here on the end lies nearer to the start than 
 # centre does: what their corrections differ by would bend the arc by twice as much
 BEHIND = np.deg2rad(1.0)  # that the end lies behind the point on the way
 TURNED = np.deg2rad(0.5)  # between start and third point: it may count at either end
-NO_START = (
+NO_START = Reason(
+    Code.ARC_UNDETERMINED,
     "its arc ends at an angle, and begins where no single point with this tool is "
-    "known: write its end point, without the angle"
+    "known: write its end point, without the angle",
 )
-NO_END = (
+NO_END = Reason(
+    Code.ARC_UNDETERMINED,
     "its arc ends before the point on its way, nearly where it begins, or backwards: "
-    "divide it, without the angle"
+    "divide it, without the angle",
 )
-TILTED = (
+TILTED = Reason(
+    Code.ARC_UNDETERMINED,
     "its arc ends at an angle, and the tool turns on it: how it stands there depends "
-    "on the controller; divide the arc, without the angle"
+    "on the controller; divide the arc, without the angle",
 )
-ASTRAY = (
+ASTRAY = Reason(
+    Code.ARC_DISTORTED,
     "its arc ends at an angle: corrected to end where it should, it would pass this "
-    "point farther off than it does now; divide it, without the angle"
+    "point farther off than it does now; divide it, without the angle",
 )
 
 

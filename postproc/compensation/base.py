@@ -95,7 +95,7 @@ def contradicted_base(visits: Visits, cell: Cell) -> list[Diagnostic]:
                 "[base] the frame that the program was made with"
             )
             file, line = visits.files[visits.file[first]], int(visits.line[first])
-            return [Diagnostic(file, line, Code.BASE_CONTRADICTS, text)]
+            return [Diagnostic(file, line, Code.BASE_FRAME_MISMATCH, text)]
     return []
 
 

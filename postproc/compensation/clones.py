@@ -259,8 +259,8 @@ def _stops(visits: Visits) -> dict[MoveSlot, Ints]:
 def _disputed(work: _CloneWork) -> list[frozenset[int]]:
     """List the literals that arrivals disagree on, with all that share their moves."""
     visits = work.reading.visits
-    unsafe = work.proposal.decisions.status == Status.UNSAFE
-    disputed = set(visits.literal[unsafe & (visits.literal >= 0)].tolist())
+    conflict = work.proposal.decisions.status == Status.CONFLICT
+    disputed = set(visits.literal[conflict & (visits.literal >= 0)].tolist())
     found = (visits.literal[rows] for rows in work.stops.values())
     sets = [frozenset(literal[literal >= 0].tolist()) for literal in found]
     together = connected(s for s in sets if len(s) > 1)

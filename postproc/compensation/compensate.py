@@ -309,7 +309,7 @@ def _record(reading: Reading, draft: Draft, setting: Setting) -> Sidecar:
         assumed=tuple(
             (x.file, x.line, x.message)
             for x in reading.diagnostics
-            if x.code == Code.ASSUMED_STILL
+            if x.code == Code.ROUTINE_ASSUMED_MOTIONLESS
         ),
         left=left_elsewhere(visits, d, files, reading.missed, reading.diagnostics),
     )

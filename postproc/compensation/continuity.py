@@ -9,6 +9,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.arc_angles import ArcAngles
 from postproc.compensation.eligibility import Reasons
+from postproc.diagnostics import Code, Reason
 from postproc.language.visits import Visits
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM, lengths
@@ -17,14 +18,18 @@ from postproc.robot.trajectory import Motion
 LEAST_STEP = 0.1 * MM  # [m] a step that is never too large
 PER = 100.0 * MM  # [m] of path that `correction_step_mm` is for
 TURNED = 0.5  # change of a side by which a joint has turned
-ARC = "its arc is left as a whole: its other point cannot be corrected"
-ANGLED = (
-    "its arc ends at an angle, and is left with its start as a whole: another of its "
-    "points cannot be corrected"
+ARC = Reason(
+    Code.PATH_BENT, "its arc is left as a whole: its other point cannot be corrected"
 )
-CURVE = (
+ANGLED = Reason(
+    Code.PATH_BENT,
+    "its arc ends at an angle, and is left with its start as a whole: another of its "
+    "points cannot be corrected",
+)
+CURVE = Reason(
+    Code.PATH_BENT,
     "its curve is corrected whole, with the point before it, or not at all: another "
-    "point of it cannot be corrected"
+    "point of it cannot be corrected",
 )
 STEP = (
     "the correction steps by more than correction_step_mm = {:g} for 100 mm of the path"
@@ -153,13 +158,13 @@ class _Wholes:
     """Points that are all corrected, or none: arcs, and curves through many points.
 
     Attributes:
-        texts: What is said of those that are left for another's sake.
-        text: Which text a whole has, (w,).
+        reasons: Why those are left that could be corrected, for another's sake.
+        reason: Which of them a whole has, (w,).
         whole, visit: The points of all, (p,) each.
     """
 
-    texts: tuple[str, ...]
-    text: Ints
+    reasons: tuple[Reason, ...]
+    reason: Ints
     whole: Ints
     visit: Ints
 
@@ -186,20 +191,20 @@ class _Wholes:
         found, whole = np.unique(whole, return_inverse=True)
         return cls((ARC, ANGLED, CURVE), found // max(n, 1), whole, visit)
 
-    def broken(self, moves: Bools) -> dict[str, Bools]:
-        """Say which points must stay since others of their whole do, (n,) by text.
+    def broken(self, moves: Bools) -> dict[Reason, Bools]:
+        """Say which points must stay since others of their whole do, (n,) by reason.
 
         Args:
             moves: Which points move, (n,).
         """
-        stays = np.zeros(len(self.text), dtype=bool)
+        stays = np.zeros(len(self.reason), dtype=bool)
         stays[self.whole[~moves[self.visit]]] = True
         out = {}
-        for kind, text in enumerate(self.texts):
+        for kind, reason in enumerate(self.reasons):
             rows = np.zeros(len(moves), dtype=bool)
-            rows[self.visit[(stays & (self.text == kind))[self.whole]]] = True
+            rows[self.visit[(stays & (self.reason == kind))[self.whole]]] = True
             if rows.any():
-                out[text] = rows
+                out[reason] = rows
         return out
 
 
@@ -218,14 +223,14 @@ def keep_whole(
     """
     steps = path.steps & reasons.none
     steps[path.before[steps]] = True
-    reasons.mark(steps, STEP.format(step_mm))
+    reasons.mark(steps, Reason(Code.CORRECTION_STEP, STEP.format(step_mm)))
     wholes, along = _Wholes.of(visits), visits.follows >= 0
     while True:
         moves = reasons.none | along
-        for text, rows in wholes.broken(moves).items():
-            reasons.mark(rows, text)
+        for reason, rows in wholes.broken(moves).items():
+            reasons.mark(rows, reason)
         free = reasons.none
         lonely = path.bent(~free & ~given, free)
         if not lonely.any():
             return
-        reasons.mark(lonely, BENT.format(step_mm))
+        reasons.mark(lonely, Reason(Code.PATH_BENT, BENT.format(step_mm)))

@@ -52,6 +52,7 @@ from postproc.compensation.rounds import (
     same_rows,
 )
 from postproc.compensation.windows import Window, cut_points, seams, windows
+from postproc.diagnostics import NO_REASON
 from postproc.language.source import Replacements
 from postproc.language.visits import Visits
 from postproc.model.model import Model
@@ -221,15 +222,15 @@ def joined(parts: list[Correction]) -> Correction:
 
 def _one_after_another(parts: Sequence[dict[str, Any]]) -> Decisions:
     """Join decisions, and their reasons; the parts are emptied."""
-    codes = Interned([""])
+    numbers = Interned([NO_REASON])
     for part in parts:
         why, reasons = part["why"], part.pop("reasons")
         new = np.zeros(len(reasons), dtype=np.int32)
         for k in np.unique(why).tolist():
-            new[k] = codes[reasons[k]]
+            new[k] = numbers[reasons[k]]
         part["why"] = new[why]
     columns = {name: _column(name, parts) for name in list(parts[0])}
-    return Decisions(reasons=tuple(codes), **columns)
+    return Decisions(reasons=tuple(numbers), **columns)
 
 
 def _column(name: str, parts: Sequence[dict[str, Any]]) -> NDArray[Any]:

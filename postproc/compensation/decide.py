@@ -29,7 +29,8 @@ from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.program import Planned, Reading
 from postproc.compensation.shifts import absorb, own_shifts, shifted_values
 from postproc.compensation.targets import moved_targets
-from postproc.language.visits import NO_TARGET, Meaning, Visits
+from postproc.diagnostics import Code, Reason
+from postproc.language.visits import Meaning, Visits
 from postproc.motion.departure import Departure
 from postproc.motion.replan import IS_STEP
 from postproc.motion.targets import TargetKind
@@ -127,7 +128,7 @@ def must_stay(
     trusted: Bools,
     cell: Cell,
     absorbing: Bools,
-) -> dict[str, Bools]:
+) -> dict[Reason, Bools]:
     """Find literals that must keep their values for what else depends on them.
 
     Args are those of `worsened`.
@@ -138,11 +139,12 @@ def must_stay(
     limit = cell.limits.conflict_mm
     hurt = worsened(visits, agreement, change, trusted, limit, absorbing)
     cloning = visits.dialect.terms.cloning
-    found = {f"{why}: give the move a point of its own ({cloning})": rows
+    found = {Reason(Code.NUMBERS_USED_ELSEWHERE,
+                    f"{why}: give the move a point of its own ({cloning})"): rows
              for why, pins in visits.literals.pins.items()
              if (rows := np.isin(agreement.literal, pins)).any()}  # fmt: skip
     text = f"a target computed from it would land farther off ({cloning})"
-    return found | {text: hurt}
+    return found | {Reason(Code.DEPENDANT_WORSE, text): hurt}
 
 
 def mark_display(visits: Visits, planned: Planned, reasons: Reasons) -> Bools:
@@ -150,13 +152,13 @@ def mark_display(visits: Visits, planned: Planned, reasons: Reasons) -> Bools:
     holds = ~without_target(visits)
     display = holds & ((visits.reason > 0) | (visits.literal < 0))
     reasons.adopt(visits.reason, visits.reasons)
-    reasons.mark(display, "its numbers are not written in the program")
+    reasons.mark(display, NOT_WRITTEN)
     return display
 
 
 def without_target(visits: Visits) -> Bools:
     """Tell which moves go where no target of theirs says, (n,): $HOME, RELATIVE, .."""
-    none = np.array([text.startswith(NO_TARGET) for text in visits.reasons])
+    none = np.array([one.code is Code.NO_TARGET for one in visits.reasons])
     named = np.isin(
         visits.target,
         (Meaning.POSE, Meaning.JOINTS, Meaning.NEAR, Meaning.PARTIAL_POSE,
@@ -174,7 +176,7 @@ def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
     if len(visits.literals) == 0:
         return empty
     held = taught(visits)
-    reasons.mark(held, "a taught point already contains the arm's error")
+    reasons.mark(held, TAUGHT)
     if not options.edit_exported:
         shared = has & visits.literals.shared[literal]
         reasons.mark(shared, EXPORTED)
@@ -184,7 +186,7 @@ def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
 def mark_disagreement(
     visits: Visits,
     agreement: Agreement,
-    stay: Mapping[str, Bools],
+    stay: Mapping[Reason, Bools],
     cell: Cell,
     reasons: Reasons,
 ) -> tuple[Bools, Bools]:
@@ -202,24 +204,36 @@ def mark_disagreement(
     if len(together) == 0:
         return together, np.zeros(len(visits), dtype=bool)
     at = np.where(has, agreement.group, 0)
-    unsafe = reasons.none & has & ~together[at]
-    differ = unsafe & agreement.usable[at] & apart[at]
-    reasons.mark(differ & own_shifts(visits), SHIFTED_APART.format(limit))
+    conflict = reasons.none & has & ~together[at]
+    differ = conflict & agreement.usable[at] & apart[at]
+    code = Code.ARRIVALS_DIFFER
+    apart_by = Reason(code, SHIFTED_APART.format(limit))
+    reasons.mark(differ & own_shifts(visits), apart_by)
     text = f"its arrivals differ by more than conflict_mm = {limit:g}: "
     alone = has & _by_one_move(visits, agreement.group, len(together))[at]
-    reasons.mark(differ & alone, f"{text}{_ONE_MOVE}")
+    reasons.mark(differ & alone, Reason(code, f"{text}{_ONE_MOVE}"))
     cloning = visits.dialect.terms.cloning
     text += f"give each move a point of its own ({cloning})"
-    reasons.mark(differ, text)
+    reasons.mark(differ, Reason(code, text))
     for why, literals in stay.items():
-        reasons.mark(unsafe & literals[at], why)
-    reasons.mark(unsafe, "another arrival at the same point cannot be corrected")
-    return together, unsafe
+        reasons.mark(conflict & literals[at], why)
+    reasons.mark(conflict, OTHER_ARRIVAL)
+    return together, conflict
 
 
-EXPORTED = "other programs may read this variable too (see edit_exported)"
-HOLDS_NONE = "this move holds no target"
-SEVERAL_MOVES = "several moves go to this point (shared_points = leave)"
+HOLDS_NONE = Reason(Code.NO_TARGET, "this move holds no target")
+NOT_WRITTEN = Reason(Code.NUMBERS_NOT_OWN, "its numbers are not written in the program")
+TAUGHT = Reason(Code.TAUGHT_POINT, "a taught point already contains the arm's error")
+EXPORTED = Reason(
+    Code.EXPORTED_VARIABLE,
+    "other programs may read this variable too (see edit_exported)",
+)
+OTHER_ARRIVAL = Reason(
+    Code.DEPENDANT_WORSE, "another arrival at the same point cannot be corrected"
+)
+SEVERAL_MOVES = Reason(
+    Code.SHARED_POINT, "several moves go to this point (shared_points = leave)"
+)
 _ONE_MOVE = (
     "one move makes them all, and --shared-points clone does not help: write it once "
     "for every way to it, or for all frames that it is made with"
@@ -298,7 +312,7 @@ def with_what_moves_along(
         cell: The robot's surroundings.
         found: What was decided for them.
     """
-    own = (found.status == Status.SAFE)[:, None]
+    own = (found.status == Status.CORRECTED)[:, None]
     values, shift = found.corrected, np.where(own, found.correction, 0.0)
     moves = np.nan_to_num(with_dependants(visits, planned, cell, values, shift))
     along = ~own[:, 0] & (lengths(moves) > ALONG)
@@ -306,11 +320,11 @@ def with_what_moves_along(
     rows = np.flatnonzero(along & ~told)
     if len(rows) == 0:
         return found
-    why, texts = np.array(found.why), Interned(found.reasons)
+    why, reasons = np.array(found.why), Interned(found.reasons)
     for v in rows.tolist():
         how = WITH_POINT if visits.follows[v] >= 0 else WITH_BEGIN
-        why[v] = texts[f"{found.reasons[why[v]]}; {how}"]
-    return replace(found, why=why, reasons=tuple(texts))
+        why[v] = reasons[found.reasons[why[v]].within(f"{{}}; {how}")]
+    return replace(found, why=why, reasons=tuple(reasons))
 
 
 def _carried(planned: Planned, v: int, source: int, moves: Floats) -> Floats:
@@ -368,6 +382,16 @@ def _steps(planned: Planned) -> Iterator[tuple[int, Ints]]:
 
 SOLVED = 1e-6  # [m] model against wanted pose
 ROUNDING = 1e-9  # [rad] and [m]
+UNSOLVED = Reason(
+    Code.CORRECTION_UNREACHABLE, "the corrected pose is out of reach on its branch"
+)
+BEYOND = Reason(
+    Code.CORRECTION_BEYOND_LIMIT, "the corrected pose is beyond a joint limit"
+)
+FLIPPED = Reason(Code.ARM_SWINGS, "the correction would flip the wrist")
+NOT_CONVERGED = Reason(
+    Code.CORRECTION_UNREACHABLE, "the correction did not converge to 1 um"
+)
 
 
 def guard_solutions(
@@ -386,15 +410,15 @@ def guard_solutions(
     with np.errstate(invalid="ignore"):
         unsolved = has_unknown(solved)
         lost = np.asarray(unsolved & ~has_unknown(q))
-        reasons.mark(lost, "the corrected pose is out of reach on its branch")
+        reasons.mark(lost, UNSOLVED)
         over = ~arm.within_limits(solved) & ~unsolved
-        reasons.mark(over, "the corrected pose is beyond a joint limit")
+        reasons.mark(over, BEYOND)
         wrist = np.abs(q[:, 4]) < np.deg2rad(limits.wrist_deg)
         wrist |= np.abs(solved[:, 4]) < np.deg2rad(limits.wrist_deg)
         text = f"within {limits.wrist_deg:g} deg of the wrist singularity"
-        reasons.mark(wrist, text)
+        reasons.mark(wrist, Reason(Code.SINGULAR_WRIST, text))
         flipped = np.sign(q[:, 4]) != np.sign(solved[:, 4])
-        reasons.mark(flipped & ~lost, "the correction would flip the wrist")
+        reasons.mark(flipped & ~lost, FLIPPED)
 
 
 def guard_size(
@@ -411,8 +435,9 @@ def guard_size(
     with np.errstate(invalid="ignore"):
         size = lengths(correction) / MM
         text = f"the correction exceeds correction_mm = {limits.correction_mm:g}"
-        reasons.mark(size > limits.correction_mm, text)
-        reasons.mark(~(residual <= SOLVED), "the correction did not converge to 1 um")
+        too_large = Reason(Code.CORRECTION_TOO_LARGE, text)
+        reasons.mark(size > limits.correction_mm, too_large)
+        reasons.mark(~(residual <= SOLVED), NOT_CONVERGED)
 
 
 def guard_motion(reasons: Reasons, limits: LimitSection, moved: Departure) -> None:
@@ -424,7 +449,7 @@ def guard_motion(reasons: Reasons, limits: LimitSection, moved: Departure) -> No
         moved: What the corrections do there, n visits.
     """
     for text, far in swings(limits, moved).items():
-        reasons.mark(far, f"corrected, {text}")
+        reasons.mark(far, Reason(Code.ARM_SWINGS, f"corrected, {text}"))
 
 
 def swings(limits: LimitSection, moved: Departure) -> dict[str, Bools]:
@@ -455,7 +480,8 @@ def guard_turn(reasons: Reasons, limits: LimitSection, turn: Floats) -> None:
     with np.errstate(invalid="ignore"):
         angle = np.rad2deg(lengths(turn))
         text = f"the correction exceeds correction_deg = {limits.correction_deg:g}"
-        reasons.mark(angle > limits.correction_deg, text)
+        too_large = Reason(Code.CORRECTION_TOO_LARGE, text)
+        reasons.mark(angle > limits.correction_deg, too_large)
 
 
 # Which targets move, where to, and why the others do not.
@@ -463,10 +489,13 @@ def guard_turn(reasons: Reasons, limits: LimitSection, turn: Floats) -> None:
 FLAG_MM = 1e6  # [mm] that a flag counts for where arrivals must agree
 NONE = np.empty((0, 3))
 KNOWN = 0.5  # part of its play that a joint must have left behind to be on a side
-HELD = "its direction of arrival would change with the correction"
-SWUNG = (
+HELD = Reason(
+    Code.DIRECTION_CHANGES, "its direction of arrival would change with the correction"
+)
+SWUNG = Reason(
+    Code.ARM_SWINGS,
     "corrected, the way to it or on from it would swing a joint, the elbow or the "
-    "wrist centre by more than the cell's limits, or pass a singularity otherwise"
+    "wrist centre by more than the cell's limits, or pass a singularity otherwise",
 )
 
 
@@ -474,9 +503,10 @@ SHIFTED_APART = (
     "its arrivals need numbers of its shift that differ by more than conflict_mm = "
     "{:g}: give each a move of its own"
 )
-NOT_ABSORBED = (
+NOT_ABSORBED = Reason(
+    Code.ARRIVALS_DIFFER,
     "the numbers of its shift cannot make up for how all of its points are corrected: "
-    "give each a move of its own"
+    "give each a move of its own",
 )
 
 
@@ -492,7 +522,7 @@ class Settled:
     """
 
     agreement: Agreement
-    stay: dict[str, Bools]
+    stay: dict[Reason, Bools]
     change: Floats
 
     def together(self, agree_mm: float) -> Bools:
@@ -608,14 +638,14 @@ class Round:
         usable = reasons.none
         settled = self._settled(usable)
         agreement, stay = settled.agreement, settled.stay
-        chosen, unsafe = mark_disagreement(
+        chosen, conflict = mark_disagreement(
             visits, agreement, stay, self.setting.cell, reasons
         )
-        status = np.where(reasons.none, Status.SAFE, Status.GUARDED)
-        status[unsafe] = Status.UNSAFE
-        status[display] = Status.DISPLAY
+        status = np.where(reasons.none, Status.CORRECTED, Status.REJECTED)
+        status[conflict] = Status.CONFLICT
+        status[display] = Status.RUNTIME
         status[unchanged] = Status.UNCHANGED
-        corrected = status == Status.SAFE
+        corrected = status == Status.CORRECTED
         values = np.array(visits.values)
         values[corrected] = agreement.values[agreement.group[corrected]]
         move_dependants(visits, agreement, chosen, values)
@@ -635,9 +665,9 @@ class Round:
         """Mark the visits whose corrections are not trusted."""
         solved, limits, q = self.solved, self.setting.cell.limits, self.planned.plan.q
         visits, given = self.reading.visits, ~reasons.none
-        reasons.adopt(self.planned.reasons.index, self.planned.reasons.texts)
+        reasons.adopt(self.planned.reasons.index, self.planned.reasons.all)
         for text, outside in solved.outside.items():
-            reasons.mark(outside, text)
+            reasons.mark(outside, Reason(Code.OUTSIDE_SURVEY, text))
         guard_solutions(reasons, self.setting.cell.arm, limits, q, solved.q)
         guard_motion(reasons, limits, self.departure)
         guard_turn(reasons, limits, solved.turn)
@@ -659,7 +689,8 @@ class Round:
             return
         rows = visits.config_given & (visits.target == Meaning.POSE)
         for axis, found in enumerate(near.T, start=1):
-            reasons.mark(rows & found, visits.dialect.terms.border.format(axis))
+            text = visits.dialect.terms.border.format(axis)
+            reasons.mark(rows & found, Reason(Code.CONFIGURATION_BORDER, text))
 
     @property
     def _trusted(self) -> Bools:
@@ -697,7 +728,7 @@ class Round:
 
     def _must_stay(
         self, agreement: Agreement, change: Floats, absorbing: Bools
-    ) -> dict[str, Bools]:
+    ) -> dict[Reason, Bools]:
         """Find literals that must keep their values, see `must_stay`."""
         visits, cell = self.reading.visits, self.setting.cell
         stay = must_stay(visits, agreement, change, self._trusted, cell, absorbing)
@@ -730,7 +761,7 @@ class Round:
 
     def _decisions(self, status: Ints, reasons: Reasons, values: Floats) -> Decisions:
         """Say what was decided for every visit, but for standard errors."""
-        side, moves = self.solved.direction, (status == Status.SAFE)[:, None]
+        side, moves = self.solved.direction, (status == Status.CORRECTED)[:, None]
         turn = (
             np.where(moves, self.solved.turn, 0.0)
             if self.setting.options.orientation
@@ -739,7 +770,7 @@ class Round:
         return Decisions(
             status=status.astype(np.int8),
             why=reasons.index,
-            reasons=reasons.texts,
+            reasons=reasons.all,
             q=self.planned.plan.q,
             direction=(side >= KNOWN).astype(np.int8) - (side <= -KNOWN),
             side=side,

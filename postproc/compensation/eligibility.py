@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Interned, Ints
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.dialect import Terms
 from postproc.language.visits import OrientationLaw, Switch, Visits
 from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
@@ -24,46 +25,48 @@ class Reasons:
     """The first reason given for each of n visits.
 
     >>> reasons = Reasons(3)
-    >>> reasons.mark(np.array([True, False, False]), "out of reach")
-    >>> reasons.mark(np.array([True, True, False]), "joint limit")
-    >>> [reasons.texts[k] for k in reasons.index]
-    ['out of reach', 'joint limit', '']
+    >>> far = Reason(Code.OUT_OF_REACH, "out of reach")
+    >>> wrist = Reason(Code.SINGULAR_WRIST, "at the wrist singularity")
+    >>> reasons.mark(np.array([True, False, False]), far)
+    >>> reasons.mark(np.array([True, True, False]), wrist)
+    >>> [str(reasons[k]) for k in range(3)]
+    ['out of reach', 'at the wrist singularity', '']
     """
 
     def __init__(self, n: int) -> None:
         """Start with no reason for n visits."""
         self.index: Ints = np.zeros(n, dtype=np.int64)
-        self._codes = Interned([""])
+        self._found = Interned([NO_REASON])
 
     @property
-    def texts(self) -> tuple[str, ...]:
-        """Return the texts; index 0 is "" (no reason)."""
-        return tuple(self._codes)
+    def all(self) -> tuple[Reason, ...]:
+        """Return the reasons; index 0 is `NO_REASON`."""
+        return tuple(self._found)
 
     @property
     def none(self) -> Bools:
         """Tell which visits have no reason yet, (n,)."""
         return np.asarray(self.index == 0)
 
-    def mark(self, rows: Bools, text: str) -> None:
+    def mark(self, rows: Bools, reason: Reason) -> None:
         """Give visits a reason, unless they have one already.
 
         Args:
             rows: Which visits, (n,).
-            text: The reason.
+            reason: The reason.
         """
         if rows.any() and (rows := rows & self.none).any():
-            self.index[rows] = self._codes[text]
+            self.index[rows] = self._found[reason]
 
-    def adopt(self, index: Ints, texts: tuple[str, ...]) -> None:
-        """Take over reasons found elsewhere, (n,) indices into texts."""
-        for code in np.flatnonzero(np.bincount(index)).tolist():
-            if texts[code]:
-                self.mark(index == code, texts[code])
+    def adopt(self, index: Ints, reasons: tuple[Reason, ...]) -> None:
+        """Take over reasons found elsewhere, (n,) indices into them."""
+        for number in np.flatnonzero(np.bincount(index)).tolist():
+            if reasons[number]:
+                self.mark(index == number, reasons[number])
 
-    def __getitem__(self, visit: int) -> str:
+    def __getitem__(self, visit: int) -> Reason:
         """Return the reason of one visit."""
-        return self.texts[int(self.index[visit])]
+        return self.all[int(self.index[visit])]
 
 
 # How far configuration flags count.
@@ -80,8 +83,14 @@ SAID = {
     Switch.OFF: "FALSE",
     Switch.UNKNOWN: "not known",
 }
-AFTER = "it comes from a move whose branch or turn is not sure"
-STRANDED = "it comes from a target that the arm cannot reach as it is written"
+AFTER = Reason(
+    Code.UNKNOWN_POSITION_BEFORE,
+    "it comes from a move whose branch or turn is not sure",
+)
+STRANDED = Reason(
+    Code.UNKNOWN_POSITION_BEFORE,
+    "it comes from a target that the arm cannot reach as it is written",
+)
 
 
 @dataclass(frozen=True)
@@ -178,8 +187,9 @@ def _mark_stops(visits: Visits, path: Overruled, reasons: Reasons) -> None:
         (path.turn, terms.turn_stops, terms.turn_may_stop, TURN),
     ):
         care = visits.care[:, column]
-        reasons.mark(rows & (care == Switch.ON), stops)
-        reasons.mark(rows & (care == Switch.UNKNOWN), may_stop)
+        for switch, text in ((Switch.ON, stops), (Switch.UNKNOWN, may_stop)):
+            reason = Reason(Code.CONFIGURATION_CONTRADICTED, text)
+            reasons.mark(rows & (care == switch), reason)
 
 
 def _mark_misses(
@@ -193,7 +203,7 @@ def _mark_misses(
     off, terms = np.zeros(len(visits), dtype=bool), visits.dialect.terms
     off[rows] = missed & ~np.isnan(plan.q[rows, 0])
     off &= visits.care[:, CNFG] != Switch.OFF
-    reasons.mark(off, terms.branch_stops)
+    reasons.mark(off, Reason(Code.CONFIGURATION_CONTRADICTED, terms.branch_stops))
 
 
 def _mark_either_way(
@@ -210,14 +220,15 @@ def _mark_either_way(
         branch &= _from_other_branch(visits, targets, plan, arm, branch)
     if turn.any():
         turn &= _other_turn(visits, targets, plan, arm)
-    terms = visits.dialect.terms
-    reasons.mark(wrist & (branch | turn), terms.wrist)
+    terms, code = visits.dialect.terms, Code.CONFIGURATION_UNKNOWN
+    reasons.mark(wrist & (branch | turn), Reason(code, terms.wrist))
     for value in Switch:
         rows = branch & (visits.care[:, CNFG] == value)
-        reasons.mark(rows, terms.branch.format(SAID[value]))
+        reasons.mark(rows, Reason(code, terms.branch.format(SAID[value])))
     for pair in np.unique(visits.care[turn][:, [TURN, MULTI]], axis=0):
         rows = turn & (visits.care[:, [TURN, MULTI]] == pair).all(axis=1)
-        reasons.mark(rows, terms.nearest.format(*(SAID[Switch(v)] for v in pair)))
+        text = terms.nearest.format(*(SAID[Switch(v)] for v in pair))
+        reasons.mark(rows, Reason(code, text))
     return np.asarray(branch | turn)
 
 
@@ -323,7 +334,8 @@ def mark_orientation_interpolation(
     """
     kind, cartesian = visits.orientation_law, targets.move != Motion.JOINT
     law, terms = OrientationLaw, visits.dialect.terms
-    reasons.mark(cartesian & (kind == law.UNKNOWN), terms.law_unknown)
+    unknown = Reason(Code.ORIENTATION_LAW, terms.law_unknown)
+    reasons.mark(cartesian & (kind == law.UNKNOWN), unknown)
     arc = targets.move == Motion.CIRCULAR
     reasons.mark(arc & targets.wrist_joint, _said(terms, terms.arc, law.WRIST_JOINTS))
     for rows, text, said in (
@@ -337,9 +349,10 @@ def mark_orientation_interpolation(
             reasons.mark(off, _said(terms, text, said))
 
 
-def _said(terms: Terms, text: str, law: OrientationLaw) -> str:
-    """Name a law in a message, where the language has a name for it."""
-    return text.format(terms.laws[law] if law < len(terms.laws) else law.name)
+def _said(terms: Terms, text: str, law: OrientationLaw) -> Reason:
+    """Name a law in a reason, where the language has a name for it."""
+    name = terms.laws[law] if law < len(terms.laws) else law.name
+    return Reason(Code.ORIENTATION_LAW, text.format(name))
 
 
 def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bools:
@@ -384,14 +397,19 @@ def _sine(R: Floats, kind: Ints) -> Floats:
 # another circle than the program says, or along none.
 
 CURE = "move VIA, or use LINEAR"
-LINE = f"the three points of the arc that begins here lie on one line: {CURE}"
-TOO_NEAR = (
-    f"two of the three points of an arc are nearer than {NEAR / MM:g} mm, so that its "
-    f"circle is not sure: {CURE}"
+LINE = Reason(
+    Code.ARC_UNDETERMINED,
+    f"the three points of the arc that begins here lie on one line: {CURE}",
 )
-STRAYS = (
+TOO_NEAR = Reason(
+    Code.ARC_UNDETERMINED,
+    f"two of the three points of an arc are nearer than {NEAR / MM:g} mm, so that its "
+    f"circle is not sure: {CURE}",
+)
+STRAYS = Reason(
+    Code.ARC_DISTORTED,
     "corrected, the three points of an arc would make quite another circle: move VIA "
-    "to its middle, or divide it"
+    "to its middle, or divide it",
 )
 
 
@@ -405,8 +423,8 @@ def mark_arcs(targets: Targets, plan: Plan, reasons: Reasons) -> None:
     """
     arcs = arcs_of(targets, plan.tcp, plan.aside)
     near = arcs.too_near
-    for rows, text in ((near, TOO_NEAR), (arcs.on_a_line & ~near, LINE)):
-        reasons.mark(_among(arcs.visit[rows], len(targets)), text)
+    for rows, reason in ((near, TOO_NEAR), (arcs.on_a_line & ~near, LINE)):
+        reasons.mark(_among(arcs.visit[rows], len(targets)), reason)
 
 
 def strayed(targets: Targets, plan: Plan, shift: Floats, step: float) -> Bools:

@@ -22,6 +22,7 @@ from postproc.compensation.program import (
     read_program,
 )
 from postproc.compensation.program_files import NO_PAGES, ProgramFiles, program_files
+from postproc.diagnostics import Reason
 from postproc.exceptions import ProgramError
 from postproc.language.visits import (
     ELSEWHERE,
@@ -40,7 +41,17 @@ if TYPE_CHECKING:
 
 # Columns of an outcome that an explanation has, too.
 KEPT = frozenset(
-    ("status", "why", "dx_mm", "dy_mm", "dz_mm", "std_x_mm", "std_y_mm", "std_z_mm")
+    (
+        "status",
+        "code",
+        "reason",
+        "dx_mm",
+        "dy_mm",
+        "dz_mm",
+        "std_x_mm",
+        "std_y_mm",
+        "std_z_mm",
+    )
 )
 
 
@@ -54,7 +65,7 @@ class Explanation:
         direction: Side every joint arrives from, (n, 6): +1, -1, or 0 where not known;
             with a model that for which the visit is corrected.
         travel: Of every joint since its last reversal, (n, 6) [rad].
-        why: Why a visit cannot be compensated, (n,); without a model.
+        reasons: Why a visit cannot be compensated, (n,); without a model.
         outcome: The compensation, or None without a model.
         diagnostics: What was found in the program.
     """
@@ -63,7 +74,7 @@ class Explanation:
     q: Floats
     direction: Signs
     travel: Floats
-    why: Sequence[str]
+    reasons: Sequence[Reason]
     outcome: Outcome | None
     diagnostics: tuple[Diagnostic, ...] = ()
 
@@ -71,10 +82,10 @@ class Explanation:
     def of_plan(cls, reading: Reading, planned: Planned) -> Self:
         """Explain a plan."""
         visits, told = reading.visits, told_once(reading.diagnostics)
-        plan, reasons = planned.plan, planned.reasons
-        why = [reasons[i] for i in range(len(visits))]
+        plan, every = planned.plan, planned.reasons.all
+        reasons = [every[k] for k in planned.reasons.index.tolist()]
         direction = plan.direction.astype(np.int8)
-        return cls(visits, plan.q, direction, plan.travel, why, None, told)
+        return cls(visits, plan.q, direction, plan.travel, reasons, None, told)
 
     @classmethod
     def of_outcome(cls, outcome: Outcome) -> Self:
@@ -103,8 +114,8 @@ class Explanation:
 
         Columns: line, target, from (the lines it is reached from), the commanded
         joint angles (``q1_deg`` ..) and the sides they arrive from (``lambda1`` ..);
-        then status, why and correction as `Outcome.to_frame` has them, or, without a
-        model, why a visit cannot be compensated.
+        then status, code, reason and correction as `Outcome.to_frame` has them, or,
+        without a model, why a visit cannot be compensated.
         """
         v, rows = self.visits, range(len(self.visits))
         columns: dict[str, object] = {
@@ -115,7 +126,9 @@ class Explanation:
             **columns_of([f"lambda{k}" for k in range(1, 7)], self.direction),
         }
         if self.outcome is None:
-            return data_frame(columns | {"why": list(self.why)})
+            codes = [reason.name for reason in self.reasons]
+            texts = [reason.text for reason in self.reasons]
+            return data_frame(columns | {"code": codes, "reason": texts})
         told = self.outcome.to_frame()
         return data_frame(columns | {name: told[name] for name in told if name in KEPT})
 

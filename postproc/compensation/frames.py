@@ -12,6 +12,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.compensation.program import Planned
+from postproc.diagnostics import Code, Reason
 from postproc.exceptions import CellError
 from postproc.language.visits import Meaning, Visits
 from postproc.model.model import Model
@@ -21,11 +22,15 @@ from postproc.robot.state import make_states
 
 SAME = 1e-9  # [m] and in rotation matrices: the frame of the cell
 APART_MM, APART_DEG = 1.0, 0.1  # a frame of three points may differ by rounding only
-_NO_POINTS = (
+_NO_POINTS = Reason(
+    Code.TAUGHT_FRAME,
     "its user frame was taught with the arm and contains its error: give taught_deg in "
-    "the cell file (the joint angles of its three points), or measure the frame"
+    "the cell file (the joint angles of its three points), or measure the frame",
 )
-_OUTSIDE = "the points of its taught user frame lie outside of what was surveyed"
+_OUTSIDE = Reason(
+    Code.TAUGHT_FRAME,
+    "the points of its taught user frame lie outside of what was surveyed",
+)
 _OTHER = "its {} was taught with the arm and contains its error: measure it"
 
 
@@ -51,7 +56,8 @@ def correct_taught(
     shift, variance = np.array(planned.shift), np.array(planned.shift_variance)
     for frame in taught:
         for column, name in ((visits.tool, "tool"), (visits.base, "base")):
-            planned.reasons.mark(column == frame, _OTHER.format(name))
+            other = Reason(Code.TAUGHT_FRAME, _OTHER.format(name))
+            planned.reasons.mark(column == frame, other)
         rows = poses & (visits.uframe == frame)
         record = listed.get(frame, ())
         joints = cell.taught_frames.get(record)

@@ -27,7 +27,7 @@ from postproc.robot.pose import MM
 
 MOST_SLOWER = 0.03  # of the cycle time
 FEW = 5  # lines that a finding names
-_LIMITS = [CODE[text] for text in (*LIMITS, *PATH_LIMITS)]
+_LIMITS = [CODE[one] for one in (*LIMITS, *PATH_LIMITS)]
 
 
 @dataclass(frozen=True)
@@ -126,11 +126,11 @@ class InTime:
                 f"the compensated program takes {self.after.seconds:.1f} s instead of "
                 f"{self.before.seconds:.1f} s"
             )
-            yield Diagnostic(visits.files[0], 1, Code.SLOWER, text)
+            yield Diagnostic(visits.files[0], 1, Code.CYCLE_TIME_INCREASED, text)
         for v in self._beyond.tolist():
             text = "a joint comes beyond its limit, which the original program keeps"
             file = visits.files[visits.file[v]]
-            yield Diagnostic(file, int(visits.line[v]), Code.BEYOND_LIMIT, text)
+            yield Diagnostic(file, int(visits.line[v]), Code.JOINT_LIMIT_EXCEEDED, text)
         yield from self._slowed(visits)
         if self.inserted is not None:
             yield from self._points(visits, self.inserted)
@@ -141,11 +141,13 @@ class InTime:
         said = (
             (Code.PATH_POINTS, told.points, f"{told.count} points are put on the ways "
              f"of {len(told.points)} moves; {verified(self.in_motion)}"),
-            (Code.NOT_TAKEN_UP, told.unconfirmed, "play is not taken up before "
+            (Code.BACKLASH_PRELOAD_SKIPPED, told.unconfirmed,
+             "play is not taken up before "
              f"{len(told.unconfirmed)} moves: neither reversals (survey --reversals) "
              "nor a measured path (diagnose --path) confirm how joints change their "
              "flanks there"),
-            (Code.APPROACHED_ANEW, told.approaches, f"{len(told.approaches)} targets "
+            (Code.REAPPROACH_INSERTED, told.approaches,
+             f"{len(told.approaches)} targets "
              "are approached anew, from a stop on the way already travelled"),
         )  # fmt: skip
         for code, moves, text in said:
@@ -159,7 +161,7 @@ class InTime:
             why = told.left.get(v, "more points on its way do not help")
             text = f"the move is predicted to leave its path by {far:.3f} mm: {why}"
             place = visits.files[visits.file[v]], int(visits.line[v])
-            yield Diagnostic(*place, Code.PATH_LEFT, text)
+            yield Diagnostic(*place, Code.PATH_TOLERANCE_EXCEEDED, text)
 
     def _other_sides(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where joints arrive otherwise in time than along the path."""
@@ -171,7 +173,7 @@ class InTime:
                 "that of the path"
             )
             file = visits.files[visits.file[v]]
-            yield Diagnostic(file, int(visits.line[v]), Code.SIDE_IN_TIME, text)
+            yield Diagnostic(file, int(visits.line[v]), Code.DIRECTION_DISAGREES, text)
 
     def _slowed(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where the joints cannot follow the programmed speed."""
@@ -191,7 +193,7 @@ class InTime:
             f"(lines {', '.join(map(str, [*lines][:FEW]))}{more})"
         )
         place = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
-        yield Diagnostic(*place, Code.SLOWED_DOWN, text)
+        yield Diagnostic(*place, Code.SPEED_NOT_REACHED, text)
 
 
 def _round_off(corners: RoundOff) -> str:

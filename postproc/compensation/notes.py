@@ -18,7 +18,7 @@ from postproc.files import (
     variables_of,
 )
 from postproc.language.languages import language_of
-from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
+from postproc.language.visits import Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
@@ -101,9 +101,10 @@ def _use(name: str, number: int, visits: Visits, untouched: Collection[str]) -> 
 def missing_file(visits: Visits) -> list[Diagnostic]:
     """Tell that a program came without the variable file that holds its targets."""
     name = variables_of(visits.files[0])
-    if any(map(is_variables, visits.files)):
+    if not name or any(map(is_variables, visits.files)):
         return []
-    lost = np.array([text.endswith(NO_VALUE) for text in visits.reasons])[visits.reason]
+    none = np.array([one.code is Code.NO_VALUE for one in visits.reasons])
+    lost = none[visits.reason]
     text = (
         f"{lost.sum()} targets have no value, and there is no {name}: put it beside "
         "the program, or give it with --variables"
@@ -207,7 +208,7 @@ def listing_cost(
         Diagnostic(
             visits.files[visits.literals.file[visits.literal[v]]],
             int(visits.literals.line[visits.literal[v]]),
-            Code.LISTING_DIGITS,
+            Code.LSV_PRECISION,
             f"a listing by the controller has 2 decimals (0.01 mm, 0.01 deg): to list "
             f"these values and load them again costs {'; '.join(found)}",
         )
@@ -264,7 +265,7 @@ def unsure_frames(
             "these directions as taught_direction in the cell file"
         )
         where = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
-        found.append(Diagnostic(*where, Code.SIDE_NOT_SURE, text))
+        found.append(Diagnostic(*where, Code.DIRECTION_UNCERTAIN, text))
     return found
 
 
@@ -305,7 +306,10 @@ def unsure_sides(
         )
         return [
             Diagnostic(
-                visits.files[0], int(visits.line[rows[0]]), Code.SIDE_NOT_SURE, text
+                visits.files[0],
+                int(visits.line[rows[0]]),
+                Code.DIRECTION_UNCERTAIN,
+                text,
             )
         ]
     told = advice(rows)
@@ -313,7 +317,7 @@ def unsure_sides(
         Diagnostic(
             visits.files[visits.file[i]],
             int(visits.line[i]),
-            Code.SIDE_NOT_SURE,
+            Code.DIRECTION_UNCERTAIN,
             f"{_how(side[i])}, from a side that is not sure "
             f"(+-{size[i]:.3f} mm): {told.get(i, cure)}",
         )

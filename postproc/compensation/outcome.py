@@ -19,7 +19,7 @@ from postproc.compensation.record import (
     read_without_edits,
     sidecar_path,
 )
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.exceptions import ProgramError
 from postproc.files import (
     Content,
@@ -52,10 +52,10 @@ SHARED = 40_000  # visits up to which reports tell the shares of the effects
 class Status(IntEnum):
     """How a visit came out."""
 
-    SAFE = 0  # corrected; every arrival at the literal agrees
-    UNSAFE = 1  # arrivals at one literal disagree: left alone
-    DISPLAY = 2  # the value is known only at run time
-    GUARDED = 3  # the correction is not trusted: left alone
+    CORRECTED = 0  # corrected; every arrival at the literal agrees
+    CONFLICT = 1  # arrivals at one literal disagree: left alone
+    RUNTIME = 2  # the value is known only at run time
+    REJECTED = 3  # the correction is not trusted: left alone
     UNCHANGED = 4  # nothing to correct, or not to be corrected
 
 
@@ -66,7 +66,7 @@ class Decisions:
     Attributes:
         status: `Status`, (n,).
         why: Index into `reasons`, (n,).
-        reasons: Texts; reasons[0] is "".
+        reasons: Why visits keep their values; reasons[0] is `NO_REASON`.
         q: Commanded joint angles of the original program, (n, 6) [rad].
         direction: Arrival direction, (n, 6): +1, -1, or 0 where not known.
         side: Where every joint lies in its play, (n, 6) from -1 to 1.
@@ -79,7 +79,7 @@ class Decisions:
 
     status: Signs
     why: Indices
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     q: Floats
     direction: Signs
     side: Floats
@@ -193,9 +193,9 @@ class Outcome:
     def to_frame(self) -> DataFrame:
         """Return a data frame, one row a visit, in the order of the program.
 
-        Columns: file, line, target, status, why, then the correction of the TCP in the
-        base frame (``dx_mm`` ..), its standard error (``std_x_mm`` ..) and the
-        commanded joint angles before correction (``q1_deg`` ..).
+        Columns: file, line, target, status, code, reason, then the correction of the
+        TCP in the base frame (``dx_mm`` ..), its standard error (``std_x_mm`` ..) and
+        the commanded joint angles before correction (``q1_deg`` ..).
         """
         v, d = self.visits, self.decisions
         return data_frame(
@@ -204,7 +204,8 @@ class Outcome:
                 "line": v.line,
                 "target": [v.names[k] for k in v.name.tolist()],
                 "status": [Status(k).name.lower() for k in d.status.tolist()],
-                "why": [d.reasons[k] for k in d.why.tolist()],
+                "code": [d.reasons[k].name for k in d.why.tolist()],
+                "reason": [d.reasons[k].text for k in d.why.tolist()],
                 **columns_of(("dx_mm", "dy_mm", "dz_mm"), d.correction / MM),
                 **columns_of(("std_x_mm", "std_y_mm", "std_z_mm"), d.std_error / MM),
                 **columns_of([f"q{k}_deg" for k in range(1, 7)], np.rad2deg(d.q)),
@@ -232,7 +233,7 @@ class Outcome:
         Also where the compensated program does not run as the original does, or a
         second opinion disagrees.
         """
-        left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
+        left = (Status.CONFLICT, Status.RUNTIME, Status.REJECTED)
         missed = any(d.code in NOT_FOLLOWED for d in self.diagnostics)
         missed |= self.in_time is not None and self.in_time.falls_short
         missed |= self.opinion is not None and not self.opinion.agrees
@@ -255,7 +256,7 @@ class Outcome:
 
     def left_rows(self) -> list[int]:
         """Return the visits that kept their value although they hold a target."""
-        left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
+        left = (Status.CONFLICT, Status.RUNTIME, Status.REJECTED)
         rows: list[int] = np.flatnonzero(np.isin(self.decisions.status, left)).tolist()
         return rows
 
@@ -290,8 +291,14 @@ def largest_motion(departure: Floats) -> dict[str, float]:
 DIGIT = "0123456789"  # status of a visit
 SIGNS = "-0+"  # direction of a joint: -1, 0, 1
 BOTH = 2  # arrivals at one line from both sides of a joint
-URGENCY = (Status.UNSAFE, Status.GUARDED, Status.DISPLAY, Status.SAFE, Status.UNCHANGED)
-LEFT_ALONE = (Status.UNSAFE, Status.GUARDED, Status.DISPLAY)
+URGENCY = (
+    Status.CONFLICT,
+    Status.REJECTED,
+    Status.RUNTIME,
+    Status.CORRECTED,
+    Status.UNCHANGED,
+)
+LEFT_ALONE = (Status.CONFLICT, Status.REJECTED, Status.RUNTIME)
 DIGITS = 4  # of a correction [mm]
 
 
@@ -303,7 +310,7 @@ class LineOutcomes:
         line: 1-based lines of the source, ascending, (k,).
         status: The most urgent `Status` of a line's visits, (k,).
         why: Index into `reasons`, of that visit, (k,).
-        reasons: Texts.
+        reasons: Why they keep their values; without codes in records of version 0.1.0.
         direction: In which every joint arrives, (k, 6): -1, 1, 0 where not known,
             `BOTH` where the visits differ.
         correction_mm: Largest correction of the TCP, (k,).
@@ -315,7 +322,7 @@ class LineOutcomes:
     line: Ints
     status: Ints
     why: Ints
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     direction: Signs
     correction_mm: Floats
     counts: Mapping[str, int]
@@ -340,7 +347,7 @@ class LineOutcomes:
         status = _places(told["status"], DIGIT).astype(np.int64)
         sides = (_places(told["direction"], SIGNS) - 1).reshape(len(line), 6)
         size = np.array(told["correction_mm"], dtype=np.float64)
-        why = np.array(told["why"], dtype=np.int64)
+        why = np.array(_told_why(told), dtype=np.int64)
         rank = np.argsort(URGENCY)[status]
         order = np.lexsort((rank, line))
         first = np.flatnonzero(np.diff(line[order], prepend=-1))
@@ -353,7 +360,7 @@ class LineOutcomes:
             line=line[lead],
             status=status[lead],
             why=why[lead],
-            reasons=tuple(map(str, told["reasons"])),
+            reasons=_told_reasons(told),
             direction=np.where(least == most, least, BOTH),
             correction_mm=np.maximum.reduceat(size[order], first)
             if len(line)
@@ -361,6 +368,19 @@ class LineOutcomes:
             counts={s.name.lower(): int((status == s).sum()) for s in Status},
             mixed=_mixed(status[order], first),
         )
+
+
+def _told_why(told: Mapping[str, Any]) -> Sequence[int]:
+    """Take the index of the reason of every visit; `why` in records of 0.1.0."""
+    found: Sequence[int] = told.get("reason", told.get("why", ()))
+    return found
+
+
+def _told_reasons(told: Mapping[str, Any]) -> tuple[Reason, ...]:
+    """Take the reasons of a record; those of version 0.1.0 are texts without codes."""
+    texts = [str(text) for text in told["reasons"]]
+    codes = [str(code) for code in told.get("codes", [""] * len(texts))]
+    return tuple(map(Reason.named, codes, texts))
 
 
 def _mixed(status: Ints, first: Ints) -> dict[int, dict[str, int]]:
@@ -429,8 +449,9 @@ def tell_arrivals(
             "status": _letters(d.status[rows], DIGIT),
             "direction": _letters(d.direction[rows] + 1, SIGNS),
             "correction_mm": np.round(np.nan_to_num(size[rows]), DIGITS),
-            "why": np.argsort(order)[why],
-            "reasons": [d.reasons[k] for k in codes[order].tolist()],
+            "reason": np.argsort(order)[why],
+            "codes": [d.reasons[k].name for k in codes[order].tolist()],
+            "reasons": [d.reasons[k].text for k in codes[order].tolist()],
         }
     return told
 
@@ -468,7 +489,7 @@ def corrected_directions(visits: Visits, record: Sidecar) -> Floats | None:
         if not np.array_equal(np.asarray(told.get("line", ())), line[rows]):
             return None
         sides = _places(str(told["direction"]), SIGNS) - 1.0
-        corrected = _places(str(told["status"]), DIGIT) == Status.SAFE
+        corrected = _places(str(told["status"]), DIGIT) == Status.CORRECTED
         out[rows[corrected]] = sides.reshape(len(rows), 6)[corrected]
     return out
 
@@ -501,27 +522,36 @@ def left_elsewhere(
         for i in np.flatnonzero(rows & ~told).tolist()
     ]
     for name, lines in missed.items():
-        found += [(name, line, Code.NEVER_REACHED) for line in lines.tolist()]
+        found += [(name, line, _of_finding(Code.NEVER_REACHED)) for line in lines]
     found += [
-        (x.file, x.line, x.code) for x in diagnostics if x.code == Code.MOTION_UNKNOWN
+        (x.file, x.line, _of_finding(x.code))
+        for x in diagnostics
+        if x.code == Code.MOTION_UNKNOWN
     ]
-    return tuple(found)
+    return tuple((file, int(line), why) for file, line, why in found)
+
+
+def _of_finding(code: Code) -> Reason:
+    """Return the reason that a finding of the same code explains."""
+    return Reason(code, str(code))
 
 
 def with_left(told: Mapping[str, Any], left: Sequence[LeftLine]) -> dict[str, Any]:
     """Add lines that were left to what `tell_arrivals` says of their file."""
     whys = list(dict.fromkeys(why for _, _, why in left))
     known = list(told.get("reasons", ()))
+    codes = list(told.get("codes", [""] * len(known)))
     return {
         "line": [*told.get("line", ()), *(line for _, line, _ in left)],
-        "status": str(told.get("status", "")) + str(int(Status.DISPLAY)) * len(left),
+        "status": str(told.get("status", "")) + str(int(Status.RUNTIME)) * len(left),
         "direction": str(told.get("direction", "")) + SIGNS[1] * 6 * len(left),
         "correction_mm": [*told.get("correction_mm", ()), *[0.0] * len(left)],
-        "why": [
-            *told.get("why", ()),
+        "reason": [
+            *_told_why(told),
             *(len(known) + whys.index(why) for _, _, why in left),
         ],
-        "reasons": [*known, *whys],
+        "codes": [*codes, *(why.name for why in whys)],
+        "reasons": [*known, *(why.text for why in whys)],
     }
 
 

@@ -10,11 +10,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from postproc.arrays import Cells, shortest, text_of, whole
+from postproc.diagnostics import Reason
 from postproc.exceptions import ProgramError
 from postproc.files import LARGEST, check_places, read_input, write_all
 from postproc.language.source import Replacements, Source, apply, as_bytes
@@ -22,6 +23,7 @@ from postproc.language.stamp import read_stamp
 
 # The record beside an output that gives the source back, byte for byte.
 
+T = TypeVar("T")
 SUFFIX = ".postproc.json"
 EDITS, TARGETS = b'"edits": [', b'], "targets": {'
 CURE = "Restore needs the record that was written beside the program"
@@ -130,11 +132,11 @@ def _rows(edits: Replacements) -> bytes:
     return text_of(len(edits), [start, end, text, Cells(b"], ")])[:-2]
 
 
-LeftLine = tuple[str, int, str]
+LeftLine = tuple[str, int, Reason]
 """A file, a line of its source, and why what stands there was left as it is."""
 
-
-_LISTS = ("left", "assumed")  # keys of a record that are there where they hold any
+AssumedLine = tuple[str, int, str]
+"""A file, a line of its source, and what was assumed there."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,7 @@ class Sidecar:
     files: Mapping[str, FileRecord]
     options: Mapping[str, Any] = field(default_factory=dict)
     left: tuple[LeftLine, ...] = ()
-    assumed: tuple[LeftLine, ...] = ()
+    assumed: tuple[AssumedLine, ...] = ()
 
     def left_in(self, name: str) -> tuple[LeftLine, ...]:
         """Return what was left in a file, beside what its own record tells."""
@@ -166,7 +168,9 @@ class Sidecar:
     def to_json(self) -> Iterator[bytes]:
         """Write the record as JSON text, piece by piece."""
         head: dict[str, Any] = {"postproc": self.version, "model": self.model}
-        head |= {key: told for key in _LISTS if (told := getattr(self, key))}
+        left = [(file, line, why.text, why.name) for file, line, why in self.left]
+        head |= {"uncorrected": left} if left else {}
+        head |= {"assumed": self.assumed} if self.assumed else {}
         head["options"] = dict(self.options)
         yield (json.dumps(head)[:-1] + ', "files": {').encode()
         for number, (name, record) in enumerate(self.files.items()):
@@ -184,10 +188,10 @@ class Sidecar:
         main = next(iter(self.files), None)
         rest = not files or main in names
 
-        def own(lines: tuple[LeftLine, ...]) -> tuple[LeftLine, ...]:
+        def own(lines: Sequence[tuple[str, int, T]]) -> tuple[tuple[str, int, T], ...]:
             return tuple(
-                (names.get(file, file), line, why)
-                for file, line, why in lines
+                (names.get(file, file), line, told)
+                for file, line, told in lines
                 if file in names or (rest and file not in self.files)
             )
 
@@ -237,16 +241,22 @@ def _record(path: Path, text: bytes) -> Sidecar:
         if not all(map(_is_name, files)):
             raise ValueError("a name that no file has")
         version, model = str(data["postproc"]), str(data["model"])
-        lists = {
-            key: tuple((str(f), int(n), str(why)) for f, n, why in data.get(key, ()))
-            for key in _LISTS
-        }
-        return Sidecar(version, model, files, data.get("options", {}), **lists)
+        left = tuple(map(_left_line, data.get("uncorrected", data.get("left", ()))))
+        assumed = tuple(
+            (str(f), int(n), str(text)) for f, n, text in data.get("assumed", ())
+        )
+        return Sidecar(version, model, files, data.get("options", {}), left, assumed)
     except (
         *(ValueError, KeyError, TypeError, AttributeError),
         *(RecursionError, OverflowError),
     ):
         raise ProgramError(path, "is not a record of postproc", CURE) from None
+
+
+def _left_line(told: Sequence[Any]) -> LeftLine:
+    """Take a line that was left; version 0.1.0 gave its text without a code."""
+    file, line, text, *code = told
+    return str(file), int(line), Reason.named(str(code[0]) if code else "", str(text))
 
 
 def _is_name(name: str) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Indices, Ints
+from postproc.diagnostics import Reason
 from postproc.robot.direction import NO_SIDES, Sides
 from postproc.robot.play import Clamps
 
@@ -53,7 +54,7 @@ class Glimpse:
     Attributes:
         values: Numbers, (k, 6).
         status, why: What was decided, (k,); `why` is an index into `reasons`.
-        reasons: Texts.
+        reasons: See `Decisions`.
         correction: (k, 3) [m].
         aim: Sides that are corrected for, (k, 6).
         bent, left: As in `Iterate`: (k, 3) [m]; held, swung, settled, (k, 3).
@@ -67,7 +68,7 @@ class Glimpse:
     values: Floats
     status: Indices
     why: Ints
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     correction: Floats
     aim: Floats
     bent: Floats
@@ -90,8 +91,8 @@ class Glimpse:
         return Glimpse(reasons=self.reasons, **arrays)
 
     @property
-    def told(self) -> list[str]:
-        """Return the reasons in words."""
+    def told(self) -> list[Reason]:
+        """Return the reason of every visit."""
         return [self.reasons[k] for k in self.why.tolist()]
 
     @property

@@ -82,7 +82,7 @@ def _claim(label: str, visits: Visits, cell: Cell) -> Claim:
 
 def _within_limits(reason: Ints) -> Ints:
     """Say where joints stay within their limits, -1 where they do not, 0: unknown."""
-    beyond = np.isin(reason, [CODE[text] for text in (*LIMITS, *PATH_LIMITS)])
+    beyond = np.isin(reason, [CODE[one] for one in (*LIMITS, *PATH_LIMITS)])
     return np.where(beyond, -1, np.where(reason == 0, 1, 0))
 
 

@@ -12,14 +12,19 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.agreement import LEVER_MM, Agreement, agree
+from postproc.diagnostics import Code, Reason
 from postproc.language.shifts import ANGLES, NUMBERS, Shifts
 from postproc.language.visits import Visits
 
-TURNS = (
+TURNS = Reason(
+    Code.ARRIVALS_DIFFER,
     "it would be turned otherwise than it must, as its shift keeps the orientation of "
-    "the point"
+    "the point",
 )
-FLAGS = "it would need other configuration flags than the point that it is shifted from"
+FLAGS = Reason(
+    Code.ARRIVALS_DIFFER,
+    "it would need other configuration flags than the point that it is shifted from",
+)
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,7 @@ class Absorbed:
 
     change: Floats
     agreement: Agreement
-    stay: dict[str, Bools]
+    stay: dict[Reason, Bools]
 
 
 def own_shifts(visits: Visits) -> Bools:

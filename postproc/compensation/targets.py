@@ -9,7 +9,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.arc_angles import ArcAngles, place_ends
 from postproc.compensation.eligibility import Reasons
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.language.visits import (
     Blend,
     Diagnostic,
@@ -230,9 +230,10 @@ def _targets(
     )
 
 
-UNNAMED = (
+UNNAMED = Reason(
+    Code.CONFIGURATION_UNKNOWN,
     "which branch its flags name is known for arms with a closed form alone: go there "
-    "by joint angles, or on a line"
+    "by joint angles, or on a line",
 )
 
 
@@ -408,24 +409,25 @@ def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
             continue
         outside |= given
         if use is None:
-            reasons.mark(
-                given,
+            text = (
                 f"auxiliary axis {axis} is not declared in the cell: add [aux] "
-                f'{axis} = "gun", "track" or "positioner"',
+                f'{axis} = "gun", "track" or "positioner"'
             )
         else:
-            reasons.mark(given & (visits.aux[:, column] == STAYS), _STAYS.format(axis))
-            reasons.mark(given, f"auxiliary axis {axis} is a {use}: not modelled")
+            stays = Reason(Code.EXTERNAL_AXES, _STAYS.format(axis))
+            reasons.mark(given & (visits.aux[:, column] == STAYS), stays)
+            text = f"auxiliary axis {axis} is a {use}: not modelled"
+        reasons.mark(given, Reason(Code.EXTERNAL_AXES, text))
     return outside
 
 
 def _explain(visits: Visits, values: Floats, poses: Bools, reasons: Reasons) -> None:
     """Say why visits are not compensated."""
     terms = visits.dialect.terms
-    reasons.mark(visits.tool_remote, terms.tool_remote)
+    reasons.mark(visits.tool_remote, Reason(Code.REMOTE_TOOL, terms.tool_remote))
     reasons.mark(
         np.isnan(values).any(axis=1) & (poses | np.isin(visits.target, JOINTS)),
-        "a value is not known",
+        Reason(Code.RUNTIME_VALUE, "a value is not known"),
     )
     unknown = is_unknown(few_frames(visits))
     for name, which, who in (
@@ -433,7 +435,5 @@ def _explain(visits: Visits, values: Floats, poses: Bools, reasons: Reasons) -> 
         (terms.base, visits.base, poses),
         (terms.uframe, visits.uframe, poses),
     ):
-        reasons.mark(
-            unknown[which] & who,
-            f"{name} is not known at this move: add it to the cell file",
-        )
+        text = f"{name} is not known at this move: add it to the cell file"
+        reasons.mark(unknown[which] & who, Reason(Code.FRAME_UNKNOWN, text))

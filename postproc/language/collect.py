@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_right
 from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from postproc.arrays import Floats, Interned, Ints, slim
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.dialect import Dialect
 from postproc.language.machine import Scope, TaskMachine
 from postproc.language.marks import MEASURE, Comments
@@ -29,8 +31,11 @@ from postproc.language.visits import (
 from postproc.robot.pose import pose_from_record
 from postproc.robot.trajectory import Motion
 
-TOO_COMPLEX = "the program is too complex to be followed"
-ONLY_SHIFTED = "it is shifted from a point that no move goes to: what to correct?"
+TOO_COMPLEX = Reason(Code.TOO_COMPLEX, "the program is too complex to be followed")
+ONLY_SHIFTED = Reason(
+    Code.NUMBERS_NOT_OWN,
+    "it is shifted from a point that no move goes to: what to correct?",
+)
 _NO_FRAME = -1
 NO_LOAD: tuple[float, ...] = (math.nan,) * 4  # one object: NaN differs from itself
 Pose = tuple[float, ...]
@@ -85,7 +90,7 @@ class FoundGoal:
         follows: Likewise of the point that it is shifted from.
         name: Of the point, "" where it is written in the move.
         aux: External axes, NaN where there is none.
-        why: Why it cannot be compensated, "" where it can.
+        why: Why it cannot be compensated.
         pins: Why the numbers must stay, "" where they need not.
         shared: Other programs may read it too.
         shift: How it is shifted from a point, None where it is not, or not known.
@@ -98,7 +103,7 @@ class FoundGoal:
     follows: tuple[int, ...] = (-1,)
     name: str = ""
     aux: tuple[float, ...] = (math.nan,) * 6
-    why: str = ""
+    why: Reason = NO_REASON
     pins: str = ""
     shared: bool = False
     shift: FoundShift | None = None
@@ -125,7 +130,7 @@ class FoundGoal:
         return self.file, max(self.slots[0], self.follows[0])
 
 
-def not_reached(goal: FoundGoal, why: str) -> FoundGoal:
+def not_reached(goal: FoundGoal, why: Reason) -> FoundGoal:
     """Return the goal of a move that need not reach it: its numbers stay.
 
     Args:
@@ -135,7 +140,8 @@ def not_reached(goal: FoundGoal, why: str) -> FoundGoal:
     numbers = (max(goal.slots[0], goal.follows[0]),)
     return FoundGoal(
         Meaning.UNKNOWN, tuple(math.nan for _ in goal.values), goal.file,
-        follows=numbers, name=goal.name, aux=goal.aux, why=why, pins=goal.pins or why,
+        follows=numbers, name=goal.name, aux=goal.aux, why=why,
+        pins=goal.pins or why.text,
     )  # fmt: skip
 
 
@@ -149,7 +155,7 @@ class FoundVisit:
         goal: Where it goes.
         modes: What holds there.
         origins: Where it may come from.
-        why: Why it cannot be compensated, "" where it can.
+        why: Why it cannot be compensated.
         arc_angle: As in `Visits` [rad].
         block: Tells the curves apart that visits are points of, None for none.
         curved: As in `Visits`.
@@ -162,7 +168,7 @@ class FoundVisit:
     goal: FoundGoal
     modes: Any
     origins: frozenset[int] = frozenset()
-    why: str = ""
+    why: Reason = NO_REASON
     arc_angle: float = math.nan
     block: Hashable = None
     curved: bool = False
@@ -176,7 +182,7 @@ class Conditions:
         tool, base, uframe: Frames.
         taught: Tool and user frame were taught with the arm, and contain its error.
         remote: The tool stands still, and the arm holds the part.
-        reasons: Why it cannot be compensated; empty texts do not count.
+        reasons: Why it cannot be compensated; `NO_REASON` does not count.
         flags: Whether its configuration flags are checked.
         flagged: It has such flags.
         law: How the tool turns on the way.
@@ -196,7 +202,7 @@ class Conditions:
     uframe: Pose
     taught: tuple[bool, bool]
     remote: bool
-    reasons: Sequence[str]
+    reasons: Sequence[Reason]
     flags: Switch
     flagged: bool
     law: OrientationLaw
@@ -215,7 +221,7 @@ class _Tables:
     """What columns point into."""
 
     frames: Interned[tuple[Pose, bool]]
-    reasons: Interned[str]
+    reasons: Interned[Reason]
     names: Interned[str]
 
     def frames_of(self, frames: Sequence[tuple[Pose, bool]]) -> Ints:
@@ -243,7 +249,7 @@ def visits_of(
     found = [machine.visits[k] for k in order]
     held = [conditions(v) for v in found]
     texts, n = machine.texts, len(found)
-    tables = _Tables(Interned(), Interned([""]), Interned([""]))
+    tables = _Tables(Interned(), Interned([NO_REASON]), Interned([""]))
     loads = Interned[tuple[float, ...]]([NO_LOAD])
     other = [*_goals_beside(machine, moves)]
     literals, literal, follows = _literals(
@@ -304,11 +310,11 @@ def _measured(
     return ["" if v.via else ids.get((v.scope.file, v.row), "") for v in found]
 
 
-def _reason(held: Conditions, exhausted: bool) -> str:
-    """Say why a visit cannot be compensated, "" where it can."""
+def _reason(held: Conditions, exhausted: bool) -> Reason:
+    """Say why a visit cannot be compensated."""
     if exhausted:
         return TOO_COMPLEX
-    return next((why for why in held.reasons if why), "")
+    return next((why for why in held.reasons if why), NO_REASON)
 
 
 def _moves(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> dict[str, Any]:
@@ -377,6 +383,8 @@ def _aux(found: Sequence[FoundVisit]) -> np.ndarray:
 # Where the numbers stand.
 
 _NO_LITERAL = -2  # follows numbers that are no literal
+MOST_NUMBERS = 17  # of a target
+TAUGHT_SHIFT = "a target that is computed from it is marked as taught"
 ANY_ELEMENT = "a move goes to an element of {} that only the run tells"
 BESIDE = (
     "the move in line {} of {} goes there too: how it is reached there is not followed"
@@ -410,6 +418,7 @@ def _literals(
                 rows.append(v)
             literal[k] = index[file, slots[0]]
     pinned = _pinned(found, rows, index, other)
+    _hold_for_taught(pinned, found, index, machine, comments)
     taught = _taught(found, literal, len(rows), machine, comments)
     literals = _places(rows, machine, pinned, taught, width)
     return literals, literal, _followed(found, index)
@@ -453,6 +462,25 @@ def _pinned(
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
     return pinned
+
+
+def _hold_for_taught(
+    pinned: list[str],
+    found: Sequence[FoundVisit],
+    index: Mapping[tuple[int, int], int],
+    machine: TaskMachine,
+    comments: Comments,
+) -> None:
+    """Hold the points of targets that are computed and marked as taught, in place."""
+    lines = [comments.taught(text.source) for text in machine.texts]
+    if not any(lines):
+        return
+    for v in found:
+        at, file = index.get(v.goal.point, -1), v.scope.file
+        if at < 0 or v.goal.slots[0] >= 0 or v.goal.is_rewritten_by_shift:
+            continue
+        if not lines[file].isdisjoint(machine.texts[file].lines(v.row)):
+            pinned[at] = pinned[at] or TAUGHT_SHIFT
 
 
 def _shifts(found: Sequence[FoundVisit]) -> dict[str, Any]:
@@ -545,19 +573,58 @@ def _taught(
         comments: How the language writes them.
     """
     lines = [comments.taught(text.source) for text in machine.texts]
-    starts = [text.source.line_starts for text in machine.texts]
+    if not (any(lines) or machine.start.taught):
+        return [False] * count
+    places = [{(v.goal.writes[0], v.goal.writes[1][0]), v.goal.point} for v in found]
+    written = {place for some in places for place in some if place[1] >= 0}
+    marked = _marked(written, machine, lines)
     out = [False] * count
-    for v, own in zip(found, literal.tolist(), strict=True):
-        if own < 0 or out[own]:
-            continue
-        file, slots = v.goal.writes
-        places = {(file, slots[0]), v.goal.point}
-        at = ((f, int(machine.texts[f].start[slot])) for f, slot in places if slot >= 0)
-        out[own] = _is_named(v.goal.name, machine.start.taught) or any(
-            int(np.searchsorted(starts[f], begin, side="right")) in lines[f]
-            for f, begin in at
-        )
+    for v, own, some in zip(found, literal.tolist(), places, strict=True):
+        if own >= 0 and not out[own]:
+            named = _is_named(v.goal.name, machine.start.taught)
+            out[own] = named or not marked.isdisjoint(some)
     return out
+
+
+def _marked(
+    places: Collection[tuple[int, int]],
+    machine: TaskMachine,
+    lines: Sequence[Collection[int]],
+) -> set[tuple[int, int]]:
+    """Find the targets that a comment marks as taught.
+
+    It speaks of those whose numbers stand on its line; where none do, of all in its
+    statement.
+
+    Args:
+        places: File and first number of targets.
+        machine: It has read the files.
+        lines: Lines of such comments, by file.
+    """
+    found = set[tuple[int, int]]()
+    for file, text in enumerate(machine.texts):
+        own = sorted(slot for at, slot in places if at == file) if lines[file] else []
+        rows = {slot: text.row_of(slot) for slot in own}
+        for line in lines[file]:
+            there = _on_line(own, rows, text, line)
+            near = (slot for slot in own if line in text.lines(rows[slot]))
+            found |= {(file, slot) for slot in there or near}
+    return found
+
+
+def _on_line(
+    own: Sequence[int], rows: Mapping[int, int], text: StatementText[Any], line: int
+) -> set[int]:
+    """Return the targets, by their first numbers, with numbers on a line."""
+    starts = text.source.line_starts
+    begin, end = (*starts[line - 1 : line + 1].tolist(), len(text.source.data))[:2]
+    first, last = np.searchsorted(text.start, [begin, end]).tolist()
+    found = set[int]()
+    for slot in range(first, last):
+        at = bisect_right(own, slot) - 1
+        if at >= 0 and slot - own[at] < MOST_NUMBERS:
+            found |= {own[at]} if text.row_of(slot) == rows[own[at]] else set()
+    return found
 
 
 def _is_named(name: str, names: Collection[str]) -> bool:

@@ -56,6 +56,15 @@ class StatementText(Generic[T]):
         """Return the 1-based line that a statement begins on."""
         return self.source.line_of(int(self.begin[row]))
 
+    def lines(self, row: int) -> range:
+        """Return the 1-based lines that a statement stands on."""
+        begin, end = self.span(row)
+        return range(self.line(row), self.source.line_of(max(end - 1, begin)) + 1)
+
+    def row_of(self, slot: int) -> int:
+        """Return the statement that a number stands in."""
+        return int(np.searchsorted(self.first, slot, side="right")) - 1
+
     def span(self, row: int) -> Span:
         """Return the bytes of a statement."""
         return Span(int(self.begin[row]), int(self.end[row]))

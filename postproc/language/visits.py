@@ -16,13 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Indices, Ints, chunks, narrow, read_only
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.language.dialect import Dialect
 from postproc.language.shifts import ANGLES, Shift, Shifts
 
 START = -1  # predecessor: wherever the arm stands when the program starts
-NO_VALUE = "it has no value in the program or its variable file"  # ends a reason
-NO_TARGET = "the move holds no target of its own"  # begins such a visit's reason
 ELSEWHERE = -2  # predecessor: a place that the program text does not tell
 
 
@@ -248,7 +246,7 @@ class Visits:
         curved: The way to it is a part of a curve whose shape is the controller's own,
             (n,).
         reason: Index into `reasons`, (n,); 0 means that the visit may be compensated.
-        reasons: Why a visit is display only; reasons[0] is "".
+        reasons: Why a visit keeps its numbers; reasons[0] is `NO_REASON`.
         pred_start: Offsets into `pred`, (n + 1,).
         pred: Predecessor visits; START or ELSEWHERE where it is no visit.
         measure_id: Ids of ``MEASURE <id>`` comments, n strings or "" where none.
@@ -301,7 +299,7 @@ class Visits:
     block: Ints
     curved: Bools
     reason: Ints
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     pred_start: Indices
     pred: Indices
     measure_id: tuple[str, ...]

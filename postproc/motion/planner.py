@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, read_only
+from postproc.diagnostics import Reason
 from postproc.motion.arrival_times import ArrivalTimes, no_time
 from postproc.motion.blending import blend
 from postproc.motion.curves import arrivals_on_curves
@@ -37,7 +38,7 @@ class Plan:
         time: Time since the first move along the first predecessors, (n,) [s].
         slot: Branch 4 W + 2 S + E, (n,), -1 where it was not looked up.
         reason: Index into `reasons`, (n,); 0 where the arrival may be compensated.
-        reasons: Why not; reasons[0] is "".
+        reasons: Why not; reasons[0] is `NO_REASON`.
         overruled: Continuity took another branch or turn than the string says, (n,).
         untimed: Time and speed are estimates: no time law was found, (n,).
         pull: How rounded fly points move with their neighbours.
@@ -56,7 +57,7 @@ class Plan:
     time: Floats
     slot: Ints
     reason: Ints
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     overruled: Bools
     untimed: Bools
     pull: BlendCoupling

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, read_only, slim, taken
+from postproc.diagnostics import NO_REASON, Code, Reason
 
 
 class Fly(IntEnum):
@@ -200,34 +201,62 @@ def make_targets(
 
 # Why a planned move must not be compensated.
 
-REACHED = ""
-NO_TARGET = "where this move goes is not known"
-OUT_OF_REACH = "out of reach: check the target, $TOOL, $UFRAME and $BASE"
-NO_BRANCH = "no solution for the configuration string: check its flags"
-NO_START = (
+REACHED = NO_REASON
+NO_TARGET = Reason(Code.RUNTIME_VALUE, "where this move goes is not known")
+OUT_OF_REACH = Reason(
+    Code.OUT_OF_REACH, "out of reach: check the target, $TOOL, $UFRAME and $BASE"
+)
+NO_BRANCH = Reason(
+    Code.CONFIGURATION_UNKNOWN,
+    "no solution for the configuration string: check its flags",
+)
+NO_START = Reason(
+    Code.CONFIGURATION_UNKNOWN,
     "the branch is not known: no configuration string and an unknown start; write one, "
-    "or a joint target before it"
+    "or a joint target before it",
 )
-PATH_REACH = "the path to it leaves the reach: add a point between, or use JOINT"
-PATH_JUMP = "the path to it passes through a singularity: lead it round, or use JOINT"
-NO_CIRCLE = (
+PATH_REACH = Reason(
+    Code.SINGULAR_PATH,
+    "the path to it leaves the reach: add a point between, or use JOINT",
+)
+PATH_JUMP = Reason(
+    Code.SINGULAR_PATH,
+    "the path to it passes through a singularity: lead it round, or use JOINT",
+)
+NO_CIRCLE = Reason(
+    Code.ARC_UNDETERMINED,
     "the three points of the arc lie on one line, or two of them are one: move VIA, "
-    "or use LINEAR"
+    "or use LINEAR",
 )
-ARC_END = "where the arc through it ends is not known"
-AMBIGUOUS = "its predecessors lead to different joint angles"
-OTHER_BRANCH = "the path to it arrives on another branch or turn than its joint angles"
+ARC_END = Reason(Code.ARC_UNDETERMINED, "where the arc through it ends is not known")
+AMBIGUOUS = Reason(
+    Code.CONFIGURATION_UNKNOWN, "its predecessors lead to different joint angles"
+)
+OTHER_BRANCH = Reason(
+    Code.CONFIGURATION_UNKNOWN,
+    "the path to it arrives on another branch or turn than its joint angles",
+)
 LIMITS = tuple(
-    f"axis {j} beyond its limit: check the target and its turns" for j in range(1, 7)
+    Reason(
+        Code.TARGET_BEYOND_LIMIT,
+        f"axis {j} beyond its limit: check the target and its turns",
+    )
+    for j in range(1, 7)
 )
-PATH_LIMITS = tuple(f"axis {j} beyond its limit on the way to it" for j in range(1, 7))
-WRIST = "at the wrist singularity: turn the tool, or lower wrist_deg in the cell"
+PATH_LIMITS = tuple(
+    Reason(Code.TARGET_BEYOND_LIMIT, f"axis {j} beyond its limit on the way to it")
+    for j in range(1, 7)
+)
+WRIST = Reason(
+    Code.SINGULAR_WRIST,
+    "at the wrist singularity: turn the tool, or lower wrist_deg in the cell",
+)
 
 REASONS = (
     REACHED, NO_TARGET, OUT_OF_REACH, NO_BRANCH, NO_START, PATH_REACH, PATH_JUMP,
     NO_CIRCLE, ARC_END, AMBIGUOUS, OTHER_BRANCH, *LIMITS, *PATH_LIMITS, WRIST,
 )  # fmt: skip
-CODE = {reason: code for code, reason in enumerate(REASONS)}
+CODE = {reason: number for number, reason in enumerate(REASONS)}
 
 # Where the controller stops with an error: where the arm stands then nobody knows.
 _STRANDS = (

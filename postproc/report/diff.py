@@ -54,7 +54,7 @@ class DiffRow(NamedTuple):
         change_mm: Length of the change of the first three of six numbers or more, for
             a position; None for joint angles and text.
         text: The line's two texts where more than numbers differ, else "".
-        status, why: What came of the line's target, "" where no record tells.
+        status, code, reason: What came of the line's target, "" where no record tells.
         direction: In which every joint arrives, see `compensation.outcome`; or ().
         correction_mm: How far the TCP is moved there, or None.
         visits: Visits of the line by status where they have several, the most urgent
@@ -69,7 +69,8 @@ class DiffRow(NamedTuple):
     change_mm: float | None
     text: str = ""
     status: str = ""
-    why: str = ""
+    code: str = ""
+    reason: str = ""
     direction: tuple[int, ...] = ()
     correction_mm: float | None = None
     visits: dict[str, int] = {}  # noqa: RUF012
@@ -150,7 +151,8 @@ class DiffRows(Sequence[DiffRow]):
             return row
         return row._replace(
             status=STATUSES[told.status[at]],
-            why=told.reasons[told.why[at]],
+            code=told.reasons[told.why[at]].name,
+            reason=told.reasons[told.why[at]].text,
             direction=tuple(told.direction[at].tolist()),
             correction_mm=float(told.correction_mm[at]),
             visits=dict(told.mixed.get(at, {})),
@@ -528,12 +530,12 @@ class Difference:
         """Return a data frame, one row a line that differs or was left alone.
 
         Columns: file, line, target, the numbers on the line in the first and the
-        second program (original, compensated), change_mm, text, status, why and
-        correction_mm, as `DiffRow` has them.
+        second program (original, compensated), change_mm, text, status, code, reason
+        and correction_mm, as `DiffRow` has them.
         """
         names = (
             "file", "line", "target", "original", "compensated", "change_mm", "text",
-            "status", "why", "correction_mm",
+            "status", "code", "reason", "correction_mm",
         )  # fmt: skip
         rows = (*self.rows, *self.left)
         return data_frame({name: [getattr(r, name) for r in rows] for name in names})

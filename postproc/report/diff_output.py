@@ -54,7 +54,7 @@ def single_rows(rows: DiffRows) -> Ints:
     many |= rows.has_change & ~np.isfinite(rows.change_mm)
     if rows.told is not None and len(rows.told.line):
         many |= ~np.isfinite(rows.told.correction_mm)[rows.entry]
-        unclear = ~np.array([why.isprintable() for why in rows.told.reasons])
+        unclear = ~np.array([why.text.isprintable() for why in rows.told.reasons])
         many |= unclear[rows.told.why[rows.entry]]
         many |= np.isin(rows.entry, [*rows.told.mixed])
     return np.flatnonzero(many)
@@ -82,7 +82,7 @@ def difference_pieces(found: Difference) -> Iterator[str]:
         "counts": dict(found.counts),
     }
     yield json.dumps(head, indent=1)[: -len("\n}")]
-    for key, parts in (("rows", found.differing), ("left", found.untouched)):
+    for key, parts in (("rows", found.differing), ("uncorrected", found.untouched)):
         yield f',\n "{key}": ['
         comma = len(",")
         for block in blocks_of(parts):
@@ -123,14 +123,16 @@ def _object(row: DiffRow) -> bytes:
 def _told(rows: DiffRows, some: slice) -> dict[str, Cells]:
     """Write what a record says of some rows."""
     told = rows.told
-    none = {"status": b'""', "why": b'""', "direction": b"[]", "correction_mm": b"null"}
+    none = {key: b'""' for key in ("status", "code", "reason")}
+    none |= {"direction": b"[]", "correction_mm": b"null"}
     if told is None or not len(told.line):
         return {key: Cells(text) for key, text in none.items()}
     entry = rows.entry[some]
     signs = named(SIGN_NUMBERS, told.direction[entry] + 1, str)
     columns = {
         "status": named(STATUSES, told.status[entry], json.dumps),
-        "why": named(told.reasons, told.why[entry], json.dumps),
+        "code": named([r.name for r in told.reasons], told.why[entry], json.dumps),
+        "reason": named([r.text for r in told.reasons], told.why[entry], json.dumps),
         "direction": signs.within(*LIST),
         "correction_mm": shortest(told.correction_mm[entry]),
     }
@@ -225,7 +227,7 @@ class _Writer:
         entry = rows.entry[some]
         signs = named(SIGN_ARROWS, told.direction[entry] + 1, str)
         what = told.status[entry] * len(told.reasons) + told.why[entry]
-        said = [_said(s, why) for s in STATUSES for why in told.reasons]
+        said = [_said(s, why.text) for s in STATUSES for why in told.reasons]
         both = signs, named(said, what, self._painted)
         return [cells.unless(entry < 0, b"") for cells in both]
 
@@ -239,7 +241,7 @@ class _Writer:
         length = "" if size is None else f"{size:.3f}"
         place = [row.file, str(row.line or ""), row.target]
         cells = [*place, old, "->" if new else "", new, length]
-        told = [arrows(row.direction), _said(row.status, row.why, row.visits)]
+        told = [arrows(row.direction), _said(row.status, row.reason, row.visits)]
         return [*cells, *told] if self.told else cells
 
 

@@ -17,7 +17,7 @@ from postproc.report.json import target_rows
 from postproc.report.terminal import Column, arrows, print_table, status_colour
 from postproc.robot.pose import MM
 
-STATUS = "status, why"
+STATUS = "status, reason"
 FEW = 3  # places of origin that a row names
 COLUMNS = (
     Column("line"),
@@ -66,7 +66,8 @@ def _plan_row(found: Explanation, i: int) -> dict[str, object]:
         "name": v.names[v.name[i]] or None,
         "q_deg": _known_deg(found.q[i]),
         "lambda": [int(s) for s in found.direction[i]],
-        "why": found.why[i],
+        "code": found.reasons[i].name,
+        "reason": found.reasons[i].text,
     }
 
 
@@ -126,12 +127,12 @@ def _cells(found: Explanation, i: int) -> list[str]:
     angles = " ".join(_told(q, 8, 3) for q in np.rad2deg(found.q[i]))
     cells = [found.line_of(i), name, _few(found.reached_from(i)), angles, sides]
     if found.outcome is None:
-        return [*cells, found.why[i]]
+        return [*cells, found.reasons[i].text]
     d = found.outcome.decisions
     moved = " ".join(_told(c, 7, 3) for c in d.correction[i] / MM)
     sure = " ".join(_told(s, 5, 3) for s in d.std_error[i] / MM)
     status = Status(d.status[i]).name.lower()
-    why = d.reasons[d.why[i]]
+    why = d.reasons[d.why[i]].text
     said = f"{status}: {why}" if why else status
     return [*cells, moved, sure, *_timed(found, i), said]
 

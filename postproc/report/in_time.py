@@ -103,7 +103,7 @@ def _path(paths: PathAccuracy, k: int, visits: Visits) -> dict[str, object]:
         "max_mm": of(lambda told: float(told.across[told.largest[k]])),
         "at_mm": of(lambda told: float(paths.way[told.largest[k]])),
         "along_mm": of(lambda told: float(np.abs(told.along[samples]).max())),
-        "unsure_mm": of(lambda told: float(told.unsure[samples].max())),
+        "uncertainty_mm": of(lambda told: float(told.unsure[samples].max())),
         "joint": {key: int(told.joint[k]) for key, told in pair.items()},
     }
 
@@ -143,11 +143,11 @@ def _points(
         "points": [
             {"at_mm": round(share * length / MM, 3)} | more for share, more in shares
         ],
-        "not_split": inserted.left.get(visit),
+        "insertion_skipped": inserted.left.get(visit),
     }
     for key, far in (
         ("without_mm", inserted.without),
-        ("otherwise_mm", inserted.otherwise),
+        ("worst_case_mm", inserted.otherwise),
     ):
         told[key] = round(far[visit] / MM, 5) if visit in far else None
     return told

@@ -103,7 +103,8 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
         "lambda": [named(SIGNS, d.direction[rows].astype(np.int64) + 1, str).listed()],
         "side": [_rounded(d.side[rows], 3)],
         "status": [named([s.name.lower() for s in Status], d.status[rows], json.dumps)],
-        "why": [named(d.reasons, d.why[rows], json.dumps)],
+        "code": [named([r.name for r in d.reasons], d.why[rows], json.dumps)],
+        "reason": [named([r.text for r in d.reasons], d.why[rows], json.dumps)],
         "original": [_as_written(v, v.values, rows)],
         "corrected": [_as_written(v, d.corrected, rows)],
         "position_mm": [position],
@@ -152,7 +153,10 @@ def _free(arrivals: ArrivalStates, rows: Ints) -> dict[str, list[Cells]]:
     if not arrivals.free_forms:
         return {}
     error, std = np.moveaxis(arrivals.free(rows) / MM, 1, 0)
-    return {"free_mm": [_rounded(error, 5)], "free_std_mm": [_rounded(std, 5)]}
+    return {
+        "nonparametric_mm": [_rounded(error, 5)],
+        "nonparametric_std_mm": [_rounded(std, 5)],
+    }
 
 
 def _literals(outcome: Outcome, rows: Ints) -> list[Cells]:

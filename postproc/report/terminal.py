@@ -41,7 +41,7 @@ MEASURED = 1000  # rows that the widths of the columns are taken from
 GAP = "  "
 CODES = {"bold": "1", "faint": "2", "red": "31", "yellow": "33", "magenta": "35"}
 ARROWS = {1: "↑", -1: "↓", 0: "·", 2: "↕"}  # 2: arrivals from both sides
-STATUS_COLOURS = {"unsafe": "red", "guarded": "yellow", "display": "magenta"}
+STATUS_COLOURS = {"conflict": "red", "rejected": "yellow", "runtime": "magenta"}
 
 Colours = Mapping[str, Callable[[str], str]]
 

@@ -82,7 +82,7 @@ def test_targets_left_alone_are_found_and_may_be_accepted(trees):
     path = target / ("spot.pdl" + SUFFIX)
     record = json.loads(path.read_text())
     told = record["files"]["spot.lsv"]["targets"]
-    told["status"] = str(int(Status.GUARDED)) * len(told["line"])
+    told["status"] = str(int(Status.REJECTED)) * len(told["line"])
     path.write_text(json.dumps(record))
     found = check(target)
     assert codes(found) == {("spot.lsv", "left-alone")}

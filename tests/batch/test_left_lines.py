@@ -56,8 +56,8 @@ def test_check_and_diff_name_every_line_that_was_left(desk, name, by):
     assert f"lines {lines[0]}-{lines[-1]} of" in finding["message"]
     assert cli("check", out.parent, "--allow-uncorrected").exit_code == 0
     told = json.loads(cli("diff", job, out, "--json", "-").stdout)
-    assert [row["line"] for row in told["left"]] == lines
-    assert all(row["status"] == "display" for row in told["left"])
+    assert [row["line"] for row in told["uncorrected"]] == lines
+    assert all(row["status"] == "runtime" for row in told["uncorrected"])
     assert "left as they were" in cli("diff", job, out).stdout
 
 
@@ -73,7 +73,7 @@ def test_targets_in_a_program_of_which_only_the_values_change_are_found(desk):
     assert "ext, which is not in the files at hand" in finding["message"]
     count = re.search(r"(\d+) visits", finding["message"])
     left = desk.report(job)["targets"]
-    assert count and int(count[1]) == sum(t["status"] != "safe" for t in left)
+    assert count and int(count[1]) == sum(t["status"] != "corrected" for t in left)
 
 
 def test_a_message_names_all_lines_that_are_never_reached(desk):

@@ -194,7 +194,7 @@ def test_a_diagnosis_says_whose_the_warm_up_is(places: np.ndarray | None) -> Non
     assert named == (set() if places is None else {"thermal"})
     stood = " fixed points: the tracker did not move"
     assert (stood in tell(found.diagnosis)) == (places is not None)
-    assert bool(found.diagnosis.to_dict()["fixed_points"]) == (places is not None)
+    assert bool(found.diagnosis.to_dict()["monuments"]) == (places is not None)
 
 
 def test_readings_that_cover_a_part_of_the_survey_leave_it_in_doubt() -> None:

@@ -92,7 +92,7 @@ def test_a_target_that_must_not_move_keeps_its_value_and_is_listed(desk, line, s
     out = desk.folder / "out.pdl"
     found = desk.compensate(desk.put("job.pdl", program(FIRST, line, POSE)), "-o", out)
     assert found.exit_code == 1
-    assert re.search(rf"job\.pdl:6: guarded: .*({said})", found.stderr), found.stderr
+    assert re.search(rf"job\.pdl:6: rejected: .*({said})", found.stderr), found.stderr
     assert line.encode() in out.read_bytes()
 
 
@@ -103,9 +103,9 @@ def test_a_target_so_near_its_limit_that_the_correction_passes_it(desk, job_cell
     report = desk.report(desk.put("job.pdl", program(FIRST, *lines)))
     for row in report["targets"][1:]:
         assert abs(row["corrected"][4]) <= top
-        if row["status"] != "safe":
+        if row["status"] != "corrected":
             assert row["corrected"] == row["original"]
-            assert "axis 5" in row["why"] or "survey" in row["why"]
+            assert "axis 5" in row["reason"] or "survey" in row["reason"]
 
 
 def test_an_unknown_frame_at_a_move_is_named_with_the_cure(desk):
@@ -120,10 +120,10 @@ def test_an_unknown_frame_at_a_move_is_named_with_the_cure(desk):
     found = desk.compensate(desk.put("job.pdl", program(*lines, NEXT)))
     assert found.exit_code == 1
     assert re.search(
-        r"job\.pdl:7: (display|guarded): \$UFRAME is not known", found.stderr
+        r"job\.pdl:7: (runtime|rejected): \$UFRAME is not known", found.stderr
     )
     assert "[frames.routines.vision]" in found.stderr
-    assert not re.search(r"job\.pdl:11: (display|guarded)", found.stderr)
+    assert not re.search(r"job\.pdl:11: (runtime|rejected)", found.stderr)
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def test_a_model_for_one_point_is_not_used_for_another_tool(desk, job_folder):
                 "--model", model)  # fmt: skip
     assert found.exit_code == 1
     assert (
-        len(re.findall(r"job\.pdl:\d: guarded: tool not surveyed", found.stderr)) == 2
+        len(re.findall(r"job\.pdl:\d: rejected: tool not surveyed", found.stderr)) == 2
     )
 
 
@@ -362,41 +362,45 @@ BOTH = LISTED + entry("a") + entry("b", 130.0)
 @pytest.mark.parametrize(
     ("values", "status", "said"),
     [
-        (None, ["display"] * 2, r"job\.pdl:6: no-variable-file: .*no job\.lsv: put"),
+        (None, ["runtime"] * 2, r"job\.pdl:6: no-variable-file: .*no job\.lsv: put"),
         (
             LISTED + entry("y") + entry("z"),
-            ["display"] * 2,
+            ["runtime"] * 2,
             "of another program",
         ),
-        (BOTH[:-70], ["safe", "display"], r"job\.lsv:5: lsv-incomplete: b has . of 6"),
+        (
+            BOTH[:-70],
+            ["corrected", "runtime"],
+            r"job\.lsv:5: lsv-incomplete: b has . of 6",
+        ),
         (
             BOTH + entry("A", 110.0),
-            ["display", "safe"],
+            ["runtime", "corrected"],
             "job.lsv:8: .*A has two ",
         ),
         (
             LISTED + entry("a", arm=2) + entry("b"),
-            ["display", "safe"],
+            ["runtime", "corrected"],
             "a point of arm 2",
         ),
         (
             BOTH.replace("130.00", "*******"),
-            ["safe", "display"],
+            ["corrected", "runtime"],
             "b is not init",
         ),
         (
             BOTH.replace("1: 90", "1: 90 2: 5", 1),
-            ["display", "safe"],
+            ["runtime", "corrected"],
             r"axis 2 .*\[aux",
         ),
-        (LISTED + entry("c") + BOTH, ["safe"] * 2, "job.lsv:1: .*never used: c"),
+        (LISTED + entry("c") + BOTH, ["corrected"] * 2, "job.lsv:1: .*never used: c"),
     ],
     ids=["missing", "other", "cut", "twice", "arm", "uninitialised", "aux", "unused"],
 )
 def test_a_variable_file_that_does_not_fit(listed, values, status, said):
     found, statuses = listed(values)
     assert statuses == status
-    assert found.exit_code == (0 if set(status) == {"safe"} else 1)
+    assert found.exit_code == (0 if set(status) == {"corrected"} else 1)
     assert re.search(said, found.stderr), found.stderr
 
 
@@ -431,8 +435,10 @@ def test_an_arc_through_three_points_on_a_line(desk):
     )
     report = desk.report(desk.put("job.pdl", program(FIRST, *arcs)))
     status = [row["status"] for row in report["targets"]]
-    assert status == ["safe"] + 5 * ["guarded"]  # where the last begins is not known
-    assert all("on one line" in row["why"] for row in report["targets"][1:4])
+    assert status == ["corrected"] + 5 * [
+        "rejected"
+    ]  # where the last begins is not known
+    assert all("on one line" in row["reason"] for row in report["targets"][1:4])
 
 
 def test_a_fly_run_through_the_wrist_singularity(desk):
@@ -442,8 +448,8 @@ def test_a_fly_run_through_the_wrist_singularity(desk):
     ]
     report = desk.report(desk.put("job.pdl", program(FIRST, *flown, POSE)))
     rows = report["targets"]
-    assert [r["status"] for r in rows[1:4]] == ["safe", "guarded", "safe"]
-    assert "wrist" in rows[2]["why"] and rows[2]["corrected"] == rows[2]["original"]
+    assert [r["status"] for r in rows[1:4]] == ["corrected", "rejected", "corrected"]
+    assert "wrist" in rows[2]["reason"] and rows[2]["corrected"] == rows[2]["original"]
 
 
 @pytest.mark.parametrize("distance", ["-1.0", "0.0", "5.0"])
@@ -451,7 +457,7 @@ def test_fly_distances_are_legal_whatever_their_sign(desk, distance):
     flown = [f"MOVEFLY LINEAR TO {pos(100 + 20 * k, 200)} ADVANCE" for k in range(6)]
     setting = ("$FLY_TYPE := FLY_CART", f"$FLY_DIST := {distance}")
     report = desk.report(desk.put("job.pdl", program(FIRST, *setting, *flown, POSE)))
-    assert {row["status"] for row in report["targets"]} == {"safe"}
+    assert {row["status"] for row in report["targets"]} == {"corrected"}
 
 
 def test_a_straight_line_to_the_joints_where_the_arm_already_is(desk):

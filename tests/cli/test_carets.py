@@ -91,7 +91,7 @@ def test_targets_left_alone_are_shown_with_their_numbers(desk):
     source = desk.put("job.pdl", program(FIRST, FAR, POSE, "MOVE LINEAR TO r"))
     told = desk.compensate(source, "-o", desk.folder / "out.pdl").stderr
     lines = told.splitlines()
-    at = next(k for k, line in enumerate(lines) if "6: guarded" in line)
+    at = next(k for k, line in enumerate(lines) if "6: rejected" in line)
     assert pointed("\n".join(lines[at + 1 : at + 3])).startswith("9000.0, 0.0")
     assert "8 |   MOVE LINEAR TO r" in told
 

@@ -97,7 +97,7 @@ def test_a_target_left_alone_is_exit_1_and_listed(desk):
     source = desk.put("job.pdl", program(FIRST, UNREACHED, POSE))
     found = desk.compensate(source, "-o", desk.folder / "out.pdl")
     assert found.exit_code == 1
-    assert re.search(r"job\.pdl:6: guarded: out of reach: check", found.stderr)
+    assert re.search(r"job\.pdl:6: rejected: out of reach: check", found.stderr)
     assert UNREACHED.encode() in (desk.folder / "out.pdl").read_bytes()
 
 
@@ -134,7 +134,7 @@ def test_report_has_one_row_a_visit_in_program_order(desk):
     assert rows[1]["name"].lower() == "p" and rows[0]["name"] is None
     assert rows[4]["status"] == "unchanged" and rows[4]["literal"] is None
     assert {r["status"] for r in rows} <= {
-        "safe", "unsafe", "display", "guarded", "unchanged",
+        "corrected", "conflict", "runtime", "rejected", "unchanged",
     }  # fmt: skip
     for row in rows:
         assert len(row["q_deg"]) == len(row["lambda"]) == 6
@@ -283,7 +283,7 @@ def test_clones_are_written_checked_compared_and_restored(desk):
     report = desk.folder / "r.json"
     desk.compensate(given, "--shared-points", "clone", "-o", out, "--report", report)
     row = json.loads(report.read_bytes())["targets"][3]
-    assert row["name"] == "p__2" and row["status"] == "safe"
+    assert row["name"] == "p__2" and row["status"] == "corrected"
     assert (row["line"], row["literal"]["line"]) == (9, 5)
     checked = cli("check", desk.folder / "new")
     assert checked.exit_code == 0, checked.stdout
@@ -301,7 +301,7 @@ def test_temperature_outside_the_survey_is_guarded(desk):
         desk.folder / "o.pdl",
     )  # fmt: skip
     assert found.exit_code == 1
-    assert re.search(r"job\.pdl:5: guarded: .*temperature", found.stderr)
+    assert re.search(r"job\.pdl:5: rejected: .*temperature", found.stderr)
 
 
 def test_survey_simulate_fit_predict(desk, tmp_path):

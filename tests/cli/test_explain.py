@@ -65,11 +65,11 @@ def test_the_table(desk):
     cell = ("--cell", desk.cell)
     plain = cli("explain", source, *cell)
     assert plain.exit_code == 0
-    assert "q [deg]" in plain.stdout and "safe" not in plain.stdout
+    assert "q [deg]" in plain.stdout and "corrected" not in plain.stdout
     full = cli("explain", source, *cell, "--model", desk.model, "--line", 6)
     assert "correction x, y, z [mm]" in full.stdout
     assert full.stdout.splitlines()[1].split()[:4] == ["6", "inline", "line", "5"]
-    assert full.stdout.splitlines()[1].endswith("safe")
+    assert full.stdout.splitlines()[1].endswith("corrected")
 
 
 def test_the_shares_of_a_line(desk):
@@ -105,8 +105,8 @@ def test_free_forms_are_told_below_the_error(desk, free_model):
     lines = cli("explain", source, *given).stdout.splitlines()
     (row,) = visits(cli("explain", source, *given, "--json", "-"))
     for line, name, key in (
-        (lines[-2], "of it free forms", "free_mm"),
-        (lines[-1], "+- free forms", "free_std_mm"),
+        (lines[-2], "of it free forms", "nonparametric_mm"),
+        (lines[-1], "+- free forms", "nonparametric_std_mm"),
     ):
         told, size, *vector = line.rsplit(None, 4)
         assert told == name

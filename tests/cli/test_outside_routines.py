@@ -28,7 +28,7 @@ def test_targets_are_left_until_the_cell_says_what_a_routine_does(desk, name):
     job = desk.put("job.pdl", calling(CALLS[name]))
     found = desk.compensate(job)
     assert found.exit_code == 1
-    assert "5 visits (2 safe, 3 display)" in found.stderr
+    assert "5 visits (2 corrected, 3 runtime)" in found.stderr
     (line,) = re.findall(rf'{name} = "motionless"', found.stderr)
     cell = desk.put("cell.toml", f"{desk.cell.read_text()}\n[routines]\n{line}\n")
     assert desk.compensate(job, "--cell", cell, "--model", desk.model).exit_code == 0
@@ -50,7 +50,7 @@ def test_assume_motion_ignores_the_shipped_list(desk):
         assert cli("check", out).exit_code == code
         checked = cli("check", out, *STRICT, "--cell", desk.cell, "--allow-uncorrected")
         assert checked.exit_code == 1 - code  # made strictly, nothing was assumed
-        assert ("assumed-still" in checked.stderr) is not bool(code)
+        assert ("routine-assumed-motionless" in checked.stderr) is not bool(code)
         told = cli("explain", job, *given, "--json", "-", *strict).stdout
         assert ("spot, which is not in the files at hand" in told) is bool(code)
         planned = cli("explain", job, *given[:2], "--json", "-", *strict)

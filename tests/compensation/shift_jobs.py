@@ -201,7 +201,7 @@ class Landed:
     def whys(self) -> str:
         """All reasons."""
         d = self.done.decisions
-        return " / ".join(d.reasons[k] for k in d.why.tolist())
+        return " / ".join(d.reasons[k].text for k in d.why.tolist())
 
 
 def landed(

@@ -46,7 +46,7 @@ def advice(bench_cell, bench_model):
         found = compensate(job(back), bench_cell, bench_model, options=TIMED)
         told = {}
         for d in found.diagnostics:
-            if d.code == "side-not-sure" and (hole := (d.line - 4) // 2) >= 0:
+            if d.code == "direction-uncertain" and (hole := (d.line - 4) // 2) >= 0:
                 moved = re.search(
                     r"begin the approach (\d+) mm farther back", d.message
                 )
@@ -67,10 +67,10 @@ def test_who_approaches_as_advised_is_sure_of_all_sides(advice) -> None:
 def test_a_first_move_is_told_what_to_do_before_it(bench_cell, bench_model) -> None:
     source = job({}).replace(f"{START}\n".encode(), b"")
     found = compensate(source, bench_cell, bench_model, options=TIMED)
-    told = [d.message for d in found.diagnostics if d.code == "side-not-sure"]
+    told = [d.message for d in found.diagnostics if d.code == "direction-uncertain"]
     assert any("before it, move every axis by" in text for text in told)
     plain = compensate(source, bench_cell, bench_model)
-    texts = [d.message for d in plain.diagnostics if d.code == "side-not-sure"]
+    texts = [d.message for d in plain.diagnostics if d.code == "direction-uncertain"]
     assert all("start the approach farther away" in text for text in texts)
 
 

@@ -86,7 +86,7 @@ def test_arcs_end_where_they_should(cell, truth, model):
     source = job(*lines)
     done, (wanted, made) = plans(source, cell, model)
     decided = done.decisions
-    assert (decided.status[2:11] == Status.SAFE).all()
+    assert (decided.status[2:11] == Status.CORRECTED).all()
     assert decided.reasons[decided.why[12]] == ASTRAY  # so long an arc bends too much
     tool = np.tile(cell.tool.pose[:3, 3], (len(made.q), 1))
     really = truth.tcp(made.q, made.direction, tool)
@@ -131,7 +131,7 @@ def test_what_is_not_sure_is_left(cell, model, change, why):
     done, _ = plans(source, cell, model)
     decided = done.decisions
     assert decided.reasons[decided.why[-1]] == why
-    assert not (decided.status[-2:] == Status.SAFE).any()
+    assert not (decided.status[-2:] == Status.CORRECTED).any()
 
 
 def test_a_tool_that_turns_is_left(cell, model):
@@ -147,7 +147,7 @@ def test_the_start_stays_with_an_arc_that_is_left(cell, model):
     lines = drawn(np.random.default_rng(19), 200.0, 150.0)
     lines[1] += " ; TAUGHT"
     decided = plans(job(*lines), cell, model)[0].decisions
-    assert not (decided.status[2:] == Status.SAFE).any()
+    assert not (decided.status[2:] == Status.CORRECTED).any()
     assert decided.reasons[decided.why[2]] == ANGLED
 
 

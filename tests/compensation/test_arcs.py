@@ -32,7 +32,7 @@ def run(job_cell, job_model):
     def status(source: bytes) -> list[str]:
         done = compensate(source, job_cell, job_model, name="job.pdl")
         d = done.decisions
-        return ["" if d.status[k] == Status.SAFE else d.reasons[d.why[k]]
+        return ["" if d.status[k] == Status.CORRECTED else d.reasons[d.why[k]].text
                 for k in range(5)]  # fmt: skip
 
     return status
@@ -54,7 +54,7 @@ def test_an_arc_whose_points_lie_well_is_corrected(run):
 )
 def test_all_three_points_are_left_alone(run, via, end, reason):
     found = run(program(point(*via), point(*end)))
-    assert found[0] == "" and found[4] in ("", STRANDED)
+    assert found[0] == "" and found[4] in ("", STRANDED.text)
     assert reason in found[1] and "three points of" in found[1]
     assert all("three points of" in why for why in found[2:4])
     assert "VIA" in found[1]
@@ -87,9 +87,9 @@ START_BY = [
 
 def whys(done) -> list[str]:
     d = done.decisions
-    why = [d.reasons[k] for k in d.why]
+    why = [d.reasons[k].text for k in d.why]
     return [
-        "" if status == Status.SAFE else text
+        "" if status == Status.CORRECTED else text
         for status, text in zip(d.status, why, strict=True)
     ]
 

@@ -151,7 +151,7 @@ def test_the_arm_lands_at_the_ends(bench_cell, bench_model, seed):
     )
     landing = land(virtual_arm(SEED, tool=setup.tool), setup, given, made)
     rows = landing.visit
-    ends = (v.motion == Motion.CIRCULAR) & ~v.via & (d.status == Status.SAFE)
+    ends = (v.motion == Motion.CIRCULAR) & ~v.via & (d.status == Status.CORRECTED)
     sure = ends & (d.direction != 0).all(axis=1)
     miss = 1e3 * np.linalg.norm(landing.error, axis=1)
     assert ends.sum() >= 6
@@ -166,4 +166,4 @@ def test_an_arc_on_which_the_tool_turns_farther_is_left(bench_cell, bench_model)
     )
     found = compensate(source, bench_cell, bench_model, name="job.mod")
     ends = found.visits.motion == Motion.CIRCULAR
-    assert ends.sum() > 3 and (found.decisions.status[ends] != Status.SAFE).all()
+    assert ends.sum() > 3 and (found.decisions.status[ends] != Status.CORRECTED).all()

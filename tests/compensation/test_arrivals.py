@@ -28,7 +28,7 @@ def outcome(job_cell, job_model):
 
 def test_shares_sum_to_what_is_corrected(outcome, job_cell, job_model):
     arrivals = outcome.arrivals
-    rows = np.flatnonzero(outcome.decisions.status == Status.SAFE)
+    rows = np.flatnonzero(outcome.decisions.status == Status.CORRECTED)
     assert len(rows) == 2
     whole = arrivals.shares(rows).sum(axis=1)
     error = job_model.error(job_cell.arm, arrivals.states(rows))
@@ -65,13 +65,13 @@ def test_what_free_forms_predict_is_told_beside_its_error(job_cell, free_model):
     part = free_model.free_part(job_cell.arm, outcome.arrivals.states(rows[:2]))
     for i in (0, 1):
         wanted = np.array([part.error[i], part.std[i]]) / MM
-        given = [told[i]["free_mm"], told[i]["free_std_mm"]]
+        given = [told[i]["nonparametric_mm"], told[i]["nonparametric_std_mm"]]
         np.testing.assert_allclose(given, wanted, atol=1e-5)
         shares = told[i]["share_mm"]
-        size = np.linalg.norm(told[i]["free_mm"])
+        size = np.linalg.norm(told[i]["nonparametric_mm"])
         assert abs(shares["joint_map"] - shares["elm"]) <= size + 1e-4
         assert size <= shares["joint_map"] + shares["elm"] + 1e-4
-    assert told[2]["free_mm"] == told[2]["free_std_mm"] == [None] * 3
+    assert told[2]["nonparametric_mm"] == told[2]["nonparametric_std_mm"] == [None] * 3
 
 
 def test_without_free_forms_nothing_is_told_of_them(outcome):

@@ -55,7 +55,7 @@ def findings(source, cell):
 def test_a_program_made_without_the_base_of_the_cell_is_told(job_cell, degrees, z, n):
     cell = standing(job_cell, turned(degrees, z))
     (found,) = findings(made(cell, np.eye(4), n), cell)
-    assert (found.code, found.line) == ("base-contradicts", 5)
+    assert (found.code, found.line) == ("base-frame-mismatch", 5)
     assert "identity" in found.message and f"{n} Cartesian" in found.message
     assert findings(made(cell, cell.base.pose, n), cell) == []
 
@@ -81,7 +81,7 @@ def test_approaches_from_far_away_tell_nothing(job_cell):
 def test_it_is_told_with_what_came_of_the_program(job_cell, job_model):
     cell = standing(job_cell, turned(90))
     outcome = compensate(made(cell, np.eye(4)), cell, job_model, name="job.pdl")
-    assert "base-contradicts" in {d.code for d in outcome.diagnostics}
+    assert "base-frame-mismatch" in {d.code for d in outcome.diagnostics}
 
 
 def test_shipped_and_made_programs_do_not_contradict_their_cell(bench_cell):

@@ -63,7 +63,7 @@ def given_back(outcome) -> dict[str, bytes]:
 
 
 def all_safe(outcome) -> bool:
-    return set(outcome.decisions.status.tolist()) == {int(Status.SAFE)}
+    return set(outcome.decisions.status.tolist()) == {int(Status.CORRECTED)}
 
 
 def masked(data: bytes) -> list[str]:
@@ -76,7 +76,7 @@ def test_moves_that_disagree_get_points_of_their_own(run, job_cell):
     source = text_of(SET + " -- where", *BOTH)
     plain, outcome = run(source, clone=False), run(source)
     assert [Status(s).name for s in plain.decisions.status] == [
-        "SAFE", "UNSAFE", "SAFE", "UNSAFE",
+        "CORRECTED", "CONFLICT", "CORRECTED", "CONFLICT",
     ]  # fmt: skip
     assert all_safe(outcome) and outcome.exit_code == 0
     assert masked(outcome.outputs["job.pdl"])[2:7] == [
@@ -184,7 +184,7 @@ def test_each_value_is_given_to_the_clone(run):
     loop = (SET, "FOR i := 1 TO 2 DO", *body, "ENDFOR")
     outcome = run(text_of(*loop, declared="i : INTEGER\r\n  p : POSITION"))
     visits, status = outcome.visits, outcome.decisions.status
-    named = [visits.names[k] for k in visits.name[status == Status.SAFE]]
+    named = [visits.names[k] for k in visits.name[status == Status.CORRECTED]]
     assert named.count("p") == named.count("p__2") == 2
     assert outcome.outputs["job.pdl"].count(b"p__2 := POS") == 2
 

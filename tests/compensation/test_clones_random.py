@@ -17,6 +17,7 @@ from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
 from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.program import Reading, read_program
+from postproc.diagnostics import NO_REASON
 from tests.language.pdl2.executed import Generated
 from tests.language.pdl2.generator import Generator
 from tests.language.pdl2.interpreter import Interpreter
@@ -48,9 +49,9 @@ def all_disagree(reading: Reading, seed: int) -> Proposal:
     visits, rng = reading.visits, np.random.default_rng(seed)
     usable = (visits.reason == 0) & (visits.literal >= 0)
     nothing = np.zeros((len(visits), 6))
-    status = np.where(usable, Status.UNSAFE, Status.DISPLAY)
+    status = np.where(usable, Status.CONFLICT, Status.RUNTIME)
     why = np.zeros(len(visits), dtype=np.int64)
-    decisions = Decisions(status, why, ("",), nothing, nothing, nothing, nothing,
+    decisions = Decisions(status, why, (NO_REASON,), nothing, nothing, nothing, nothing,
                           nothing[:, :3], nothing[:, :3])  # fmt: skip
     change = rng.integers(0, 3, (len(visits), 3)).astype(float)
     places = (visits.file.tolist(), visits.line.tolist(), visits.literal.tolist())

@@ -45,7 +45,7 @@ def statuses(outcome):
 
 def whys(outcome):
     d = outcome.decisions
-    return [d.reasons[k] for k in d.why]
+    return [d.reasons[k].text for k in d.why]
 
 
 JOINTS = "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 50.0, 30.0}"
@@ -60,7 +60,7 @@ LOW = "MOVE JOINT TO {-12.0, -8.0, -140.0, -40.0, 20.0, -60.0}"
 
 def test_corrects_joint_and_pose_targets(run):
     outcome = run(JOINTS, POSE, BACK)
-    assert statuses(outcome) == ["SAFE"] * 3
+    assert statuses(outcome) == ["CORRECTED"] * 3
     assert outcome.exit_code == 0
     assert outcome.before.mean_mm > 0.5
     assert outcome.after.max_mm < 0.004  # digits of the joint target
@@ -142,7 +142,7 @@ def test_refuses_a_model_of_another_arm(job_cell, job_model):
 )
 def test_guarded_targets_keep_their_value(run, line, said):
     outcome = run(JOINTS, line)
-    assert statuses(outcome)[1] == "GUARDED"
+    assert statuses(outcome)[1] == "REJECTED"
     assert re.search(said, whys(outcome)[1])
     assert outcome.exit_code == 1
     assert line.encode() in outcome.outputs["job.pdl"]
@@ -150,7 +150,7 @@ def test_guarded_targets_keep_their_value(run, line, said):
 
 def test_unknown_frame_is_not_compensated(run):
     outcome = run(JOINTS, "$UFRAME := frame_from_vision()", POSE, NEXT)
-    assert statuses(outcome) == ["SAFE", "DISPLAY", "DISPLAY"]
+    assert statuses(outcome) == ["CORRECTED", "RUNTIME", "RUNTIME"]
     assert "$UFRAME" in whys(outcome)[1]
 
 
@@ -161,17 +161,17 @@ UNREAD = ("FROBNICATE p WITH 3", "SPLINE TO POS(1, 2, 3, 0, 0, 0, '') 3",
 @pytest.mark.parametrize("line", UNREAD)
 def test_targets_after_what_is_not_understood_are_left(run, line):
     outcome = run(JOINTS, line, POSE, NEXT)
-    assert statuses(outcome) == ["SAFE", "DISPLAY", "DISPLAY"]
+    assert statuses(outcome) == ["CORRECTED", "RUNTIME", "RUNTIME"]
     assert "not understood" in whys(outcome)[1]
     assert outcome.exit_code == 1
     alone = run(JOINTS, POSE, NEXT, line)  # it may hold a target itself
-    assert statuses(alone) == ["SAFE"] * 3 and alone.exit_code == 1
+    assert statuses(alone) == ["CORRECTED"] * 3 and alone.exit_code == 1
 
 
 @pytest.mark.parametrize("line", ["WAIT FOR $DIN[1] ?? 3", "PULSE ?? 3", "n := 3 3"])
 def test_what_cannot_move_the_arm_leaves_targets_alone(run, line):
     outcome = run(JOINTS, line, POSE, NEXT)
-    assert statuses(outcome) == ["SAFE"] * 3 and outcome.exit_code == 0
+    assert statuses(outcome) == ["CORRECTED"] * 3 and outcome.exit_code == 0
 
 
 DISTURBED = {
@@ -190,30 +190,30 @@ DISTURBED = {
 @pytest.mark.parametrize("line", DISTURBED)
 def test_targets_are_left_where_the_arm_does_not_go_as_written(run, line):
     outcome = run(JOINTS, line, POSE, *filter(None, [DISTURBED[line]]), NEXT)
-    assert statuses(outcome)[:2] == ["SAFE", "DISPLAY"]
-    assert (statuses(outcome)[2] == "SAFE") is bool(DISTURBED[line])
+    assert statuses(outcome)[:2] == ["CORRECTED", "RUNTIME"]
+    assert (statuses(outcome)[2] == "CORRECTED") is bool(DISTURBED[line])
     assert outcome.exit_code == 1
 
 
-@pytest.mark.parametrize(("mass", "status"), [(0.2, "SAFE"), (200.0, "GUARDED")])
+@pytest.mark.parametrize(("mass", "status"), [(0.2, "CORRECTED"), (200.0, "REJECTED")])
 def test_a_stated_load_counts_and_is_guarded_by_what_it_leaves_unsure(
     run, mass, status
 ):
     outcome = run(JOINTS, f"$TOOL_MASS := {mass}", POSE)
-    assert statuses(outcome) == ["SAFE", status]
-    assert any("payload_mm" in why for why in whys(outcome)) is (status == "GUARDED")
+    assert statuses(outcome) == ["CORRECTED", status]
+    assert any("payload_mm" in why for why in whys(outcome)) is (status == "REJECTED")
 
 
 def test_settings_that_disturb_nothing(run):
     lines = ("$SENSOR_ENBL := FALSE", "$SENSOR_ENBL[2] := FALSE", "$CONV_ENBL := OFF",
              "SENSOR_TRK(FALSE)", "$ARM_DATA[2].SENSOR_ENBL := TRUE",
              "$ARM_DATA[2].CAL_SYS[1] := 3.0")  # fmt: skip
-    assert statuses(run(JOINTS, *lines, POSE)) == ["SAFE"] * 2
+    assert statuses(run(JOINTS, *lines, POSE)) == ["CORRECTED"] * 2
 
 
 def test_a_tool_far_from_the_survey_is_guarded(run):
     outcome = run("$TOOL := POS(0.0, 0.0, 1900.0, 0.0, 0.0, 0.0, '')", JOINTS)
-    assert statuses(outcome) == ["GUARDED"]
+    assert statuses(outcome) == ["REJECTED"]
     assert "tool" in whys(outcome)[0]
 
 
@@ -223,7 +223,7 @@ def test_a_variable_reached_from_two_sides_is_left_alone(run):
         HIGH, "MOVE JOINT TO p", LOW, "MOVE JOINT TO p",
     )  # fmt: skip
     outcome = run(*lines)
-    assert statuses(outcome) == ["SAFE", "UNSAFE", "SAFE", "UNSAFE"]
+    assert statuses(outcome) == ["CORRECTED", "CONFLICT", "CORRECTED", "CONFLICT"]
     assert "conflict_mm" in whys(outcome)[1]
     assert lines[0].encode() in outcome.outputs["job.pdl"]
 
@@ -235,13 +235,13 @@ def test_a_variable_reached_alike_is_corrected_once(run):
     )  # fmt: skip
     outcome = run(*lines)
     # the very first move arrives from an unknown side only at the first literal
-    assert statuses(outcome)[1] == statuses(outcome)[3] == "SAFE"
+    assert statuses(outcome)[1] == statuses(outcome)[3] == "CORRECTED"
     assert lines[0].encode() not in outcome.outputs["job.pdl"]
 
 
 def test_moves_without_a_target_do_not_count(run):
     outcome = run(JOINTS, "MOVE TO $HOME", "MOVE RELATIVE VEC(0, 0, 20) IN TOOL")
-    assert statuses(outcome) == ["SAFE", "UNCHANGED", "UNCHANGED"]
+    assert statuses(outcome) == ["CORRECTED", "UNCHANGED", "UNCHANGED"]
     assert outcome.exit_code == 0
 
 
@@ -259,8 +259,8 @@ def test_report_has_the_agreed_keys(run):
     assert set(report) >= {"program", "model", "targets", "predicted", "diagnostics"}
     row = report["targets"][1]
     assert set(row) >= {
-        "line", "literal", "name", "move", "q_deg", "lambda", "status", "why",
-        "original", "corrected", "correction_mm", "std_error_mm",
+        "line", "literal", "name", "move", "q_deg", "lambda", "side", "status", "code",
+        "reason", "original", "corrected", "correction_mm", "std_error_mm",
     }  # fmt: skip
     assert row["move"] == "LINEAR" and row["literal"] == {"file": "job.pdl", "line": 7}
     assert row["original"][:3] == [100.0, 200.0, 150.0]

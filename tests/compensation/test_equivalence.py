@@ -9,8 +9,11 @@ import pytest
 
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.program import read_program
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.visits import Visits
 from postproc.robot.cell import Cell
+
+MOVES = Reason(Code.NO_TARGET, "it moves")
 
 POINT = "POS(100, 200, 150, 0, 175, 0, '')"
 SHARED = f"""PROGRAM job
@@ -65,7 +68,7 @@ def test_nothing_else_may_differ(both: tuple[Visits, Visits], column: str) -> No
     assert told == f"the output has another {column}"
     texts = replace(after, configs=("", "x"), config=np.array([1, 0, 0]))
     assert "config" in equivalent(before, texts, NONE, before.values, {2: "q"})
-    display = replace(after, reason=np.array([0, 1, 0]), reasons=("", "it moves"))
+    display = replace(after, reason=np.array([0, 1, 0]), reasons=(NO_REASON, MOVES))
     assert "reason" in equivalent(before, display, NONE, before.values, {2: "q"})
     values = after.values + np.array([0.0, 0.0, 1e-9, 0.0, 0.0, 0.0])
     moved = replace(after, values=values)

@@ -81,7 +81,7 @@ def test_targets_in_a_taught_frame_land_on_the_part(tmp_path, taught, job_model)
     part = with_uframe(tmp_path, "part", section(TRUE))
     source = program(*SWEEP, FIRST, *lines())
     outcome, error = errors(source, known, part, job_model)
-    assert set(outcome.decisions.status.tolist()) == {int(Status.SAFE)}
+    assert set(outcome.decisions.status.tolist()) == {int(Status.CORRECTED)}
     _, misled = errors(source, naive, part, job_model)
     assert misled.mean() > 0.8
     assert error.mean() < 0.25 * misled.mean()
@@ -147,14 +147,14 @@ def test_joint_targets_do_not_depend_on_the_frame(tmp_path, taught, job_model):
     cell = with_uframe(tmp_path, "blind", section(record, 'source = "taught"'))
     outcome = compensate(program(FIRST, POSE), cell, job_model, name="job.pdl")
     d = outcome.decisions
-    assert [Status(s) for s in d.status] == [Status.SAFE, Status.GUARDED]
-    assert "give taught_deg" in d.reasons[d.why[1]]
+    assert [Status(s) for s in d.status] == [Status.CORRECTED, Status.REJECTED]
+    assert "give taught_deg" in d.reasons[d.why[1]].text
 
 
 def test_a_frame_marked_in_the_program_is_not_trusted(job_cell, job_model):
     lines = ("$UFRAME := POS(1600, -300, 900, 0, 0, 0, '') -- TAUGHT", FIRST, POSE)
     outcome = compensate(program(*lines), job_cell, job_model, name="job.pdl")
-    assert outcome.decisions.status.tolist() == [Status.SAFE, Status.GUARDED]
+    assert outcome.decisions.status.tolist() == [Status.CORRECTED, Status.REJECTED]
 
 
 def test_a_taught_tool_is_not_trusted(tmp_path, job_model):
@@ -162,7 +162,7 @@ def test_a_taught_tool_is_not_trusted(tmp_path, job_model):
     tool = "[tool]\n"
     path.write_text(CELL.replace(tool, f'{tool}source = "taught"\n'))
     outcome = compensate(program(FIRST, POSE), load_cell(path), job_model)
-    assert outcome.decisions.status.tolist() == [Status.GUARDED] * 2
+    assert outcome.decisions.status.tolist() == [Status.REJECTED] * 2
 
 
 def test_points_of_another_frame_are_refused(tmp_path, taught, job_model):

@@ -18,7 +18,7 @@ HOME = np.deg2rad([5.0, 10.0, -95.0, 20.0, 50.0, 30.0])
 def solutions(command, corrected):
     reasons = Reasons(1)
     guard_solutions(reasons, ARM, LIMITS, command[None], corrected[None])
-    return reasons[0]
+    return reasons[0].text
 
 
 def moved(joint, angle):
@@ -54,7 +54,7 @@ def sizes(correction_mm, residual):
     correction = np.zeros((len(correction_mm), 3))
     correction[:, 0] = np.array(correction_mm) * 1e-3
     guard_size(reasons, LIMITS, correction, np.array(residual))
-    return [reasons[i] for i in range(len(correction))]
+    return [reasons[i].text for i in range(len(correction))]
 
 
 def test_the_cap_on_a_correction():

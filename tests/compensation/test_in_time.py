@@ -100,8 +100,9 @@ def told_of(outcome, before, after) -> InTime:
 @pytest.mark.parametrize(
     ("before", "after", "code"),
     [
-        ("same", "same", ""), ("same", "slow", "slower"), ("slow", "same", ""),
-        ("same", "beyond", "beyond-limit"), ("beyond", "beyond", ""),
+        ("same", "same", ""), ("same", "slow", "cycle-time-increased"),
+        ("slow", "same", ""),
+        ("same", "beyond", "joint-limit-exceeded"), ("beyond", "beyond", ""),
     ],
 )  # fmt: skip
 def test_a_program_that_runs_worse_ends_with_1(outcome, pair, before, after, code):
@@ -114,7 +115,7 @@ def test_a_program_that_runs_worse_ends_with_1(outcome, pair, before, after, cod
 def test_joints_that_cannot_follow_are_told(bench_cell, bench_model):
     source = JOB.replace(b"$LIN_SPD := 0.2", b"$LIN_SPD := 20")
     found = compensate(source, bench_cell, bench_model, options=TIMED)
-    (finding,) = [d for d in found.diagnostics if d.code == "slowed-down"]
+    (finding,) = [d for d in found.diagnostics if d.code == "speed-not-reached"]
     assert finding.line == 7 and "of the programmed speed" in finding.message
     slowed = json.loads(report_text(found))["timing"]["slowed"]
     assert [row["line"] for row in slowed] == [7] and 0 < slowed[0]["share"] < 0.5

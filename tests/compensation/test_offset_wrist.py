@@ -72,7 +72,7 @@ def test_targets_land_where_they_should(cell, truth, model):
     source = job(cell)
     done = compensate(source, cell, model, name="job.pdl")
     decided = done.decisions
-    safe = decided.status == Status.SAFE
+    safe = decided.status == Status.CORRECTED
     assert safe.mean() > 0.9
     ready = prepared(cell, model, AS_USUAL)
     wanted, made = (
@@ -100,7 +100,7 @@ def test_a_line_through_a_singularity_is_left(cell, model):
              f"MOVE LINEAR TO POS({poses[1]}, '')"]  # fmt: skip
     text = "\n".join(["PROGRAM job", "BEGIN", *lines, "END job"]).encode()
     done = compensate(text, cell, model, name="job.pdl")
-    assert done.decisions.status[1] != Status.SAFE
+    assert done.decisions.status[1] != Status.CORRECTED
 
 
 def test_flags_name_no_branch_of_such_an_arm(cell, model):
@@ -115,6 +115,6 @@ def test_flags_name_no_branch_of_such_an_arm(cell, model):
     ]
     text = "\n".join(["PROGRAM job", "BEGIN", home, *lines, "END job"]).encode()
     decided = compensate(text, cell, model, name="job.pdl").decisions
-    assert decided.status[1] != Status.SAFE
+    assert decided.status[1] != Status.CORRECTED
     assert decided.reasons[decided.why[1]] == UNNAMED
-    assert (decided.status[[0, 2]] == Status.SAFE).all()
+    assert (decided.status[[0, 2]] == Status.CORRECTED).all()

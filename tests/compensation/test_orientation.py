@@ -71,7 +71,7 @@ def test_orientations_land_too_and_positions_no_worse(job_cell, job_model, files
             files["job.pdl"], job_cell, job_model, name="job.pdl",
             variables=files.get("job.lsv"), options=options,
         )  # fmt: skip
-        assert (done.decisions.status == Status.SAFE).all(), done.left_alone()
+        assert (done.decisions.status == Status.CORRECTED).all(), done.left_alone()
         executed = read_program({**files, **done.outputs}, job_cell).visits
         found[options] = errors(job_cell, asked, executed)
     place, full = found[Options()], found[FULL]
@@ -130,7 +130,7 @@ def test_a_correction_that_turns_too_far_is_guarded(job_cell, job_model):
     limits = job_cell.limits.model_copy(update={"correction_deg": 0.001})
     cell = replace(job_cell, limits=limits)
     done = compensate(inline()["job.pdl"], cell, job_model, options=FULL)
-    assert (done.decisions.status == Status.GUARDED).all()
+    assert (done.decisions.status == Status.REJECTED).all()
     assert "correction_deg = 0.001" in done.left_alone()[0]
 
 

@@ -25,7 +25,7 @@ def left(cell: Cell, kind: str, *moves: str) -> list[bool]:
     text = "\n".join(["PROGRAM job", "BEGIN", *lines, "END job"])
     visits = read_program({"job.pdl": text.encode()}, cell).visits
     reasons = plan_visits(visits, cell).reasons
-    return ["$ORNT_TYPE" in reasons[i] for i in range(1, len(visits))]
+    return ["$ORNT_TYPE" in reasons[i].text for i in range(1, len(visits))]
 
 
 def line(y: float, a: float, e: float, r: float, word: str = "LINEAR") -> str:

@@ -52,7 +52,7 @@ def test_a_program_of_another_arm_is_refused(run, attributes, arm):
 
 def test_a_program_of_the_arm_of_the_cell_is_corrected(run):
     outcome = run(OURS, LAST, attributes="PROG_ARM = 2", arm=2)
-    assert outcome.exit_code == 0 and statuses(outcome) == ["SAFE"] * 2
+    assert outcome.exit_code == 0 and statuses(outcome) == ["CORRECTED"] * 2
     assert run(OURS, LAST, arm=2).exit_code == 0
 
 
@@ -114,18 +114,18 @@ def test_a_point_of_another_arm_in_the_variable_file(run):
 def test_moves_without_an_arm_after_the_default_arm_is_another(run, set_, attributes):
     given = OURS, set_, f"MOVE JOINT TO {NEXT}", LAST
     outcome = run(*given, attributes=attributes)
-    assert statuses(outcome) == ["SAFE", "DISPLAY", "DISPLAY"]
+    assert statuses(outcome) == ["CORRECTED", "RUNTIME", "RUNTIME"]
     assert outcome.exit_code == 1
     assert all("_ARM" in line for line in outcome.left_alone())
     back = run(*given, "$DFT_ARM := 1", "$PROG_ARM := 1", OURS, LAST)
-    assert statuses(back)[-1] == "SAFE"
+    assert statuses(back)[-1] == "CORRECTED"
 
 
 def test_a_tool_that_is_set_for_another_arm_is_not_ours(run):
     tool = "$TOOL := POS(10, 20, 300, 0, 0, 0, '')"
     pose = f"MOVE LINEAR TO {POINT}"
     outcome = run(OURS, "$DFT_ARM := 2", tool, "$DFT_ARM := 1", pose)
-    assert statuses(outcome) == ["SAFE", "DISPLAY"]
+    assert statuses(outcome) == ["CORRECTED", "RUNTIME"]
 
 
 def test_moves_that_name_another_arm_are_listed(run):
@@ -139,7 +139,7 @@ def test_moves_that_name_another_arm_are_listed(run):
     found = [d for d in outcome.diagnostics if d.code == "other-arm"]
     assert [d.line for d in found] == [6, 8]
     assert all("arm 2" in d.message and "arm_number" in d.message for d in found)
-    assert statuses(outcome) == ["SAFE"] * 3 and outcome.exit_code == 1
+    assert statuses(outcome) == ["CORRECTED"] * 3 and outcome.exit_code == 1
     assert lines_of(outcome)[5] == f"MOVE ARM[2] JOINT TO {NEXT}"
     assert lines_of(outcome)[7].endswith(f"SYNCMOVE ARM[2] LINEAR TO {POINT}")
 

@@ -21,8 +21,8 @@ def test_every_line_comes_back():
     assert np.array_equal(found.direction, decisions.direction)
     size = np.linalg.norm(decisions.correction, axis=1) * 1e3
     assert found.correction_mm == pytest.approx(size, abs=1e-4)
-    assert [found.reasons[k] for k in found.why] == [
-        decisions.reasons[k] for k in decisions.why
+    assert [found.reasons[k].text for k in found.why] == [
+        decisions.reasons[k].text for k in decisions.why
     ]
     assert sum(found.counts.values()) == 60
 
@@ -38,7 +38,7 @@ def test_visits_of_one_line_are_told_together():
     }
     found = LineOutcomes.read(told)
     assert found.line.tolist() == [3, 7]
-    assert found.status.tolist() == [Status.GUARDED, Status.SAFE]
+    assert found.status.tolist() == [Status.REJECTED, Status.CORRECTED]
     assert found.direction[1].tolist() == [1, BOTH, BOTH, BOTH, BOTH, 1]
     assert found.correction_mm.tolist() == [0.0, 0.7]
     assert found.find([7, 4, 3]).tolist() == [1, -1, 0]
@@ -53,7 +53,7 @@ def test_the_most_urgent_status_of_a_line_counts():
         assert found.status.tolist() == [wanted]
         assert found.why.tolist() == [status.index(str(wanted))]
         assert sum(found.mixed[0].values()) == 3
-    assert found.mixed == {0: {"safe": 1, "unchanged": 2}}
+    assert found.mixed == {0: {"corrected": 1, "unchanged": 2}}
 
 
 def test_lines_whose_visits_have_several_statuses_are_counted():
@@ -67,7 +67,7 @@ def test_lines_whose_visits_have_several_statuses_are_counted():
     }
     found = LineOutcomes.read(told)
     assert found.line.tolist() == [3, 7, 9]
-    assert found.mixed == {2: {"guarded": 1, "unchanged": 1}}
+    assert found.mixed == {2: {"rejected": 1, "unchanged": 1}}
 
 
 def test_numbers_in_a_file_that_is_not_written_belong_to_their_move():

@@ -55,7 +55,7 @@ def places(k: int, seed: int) -> np.ndarray:
 
 
 def reasons(decided) -> list[str]:
-    return [decided.reasons[k] for k in decided.why.tolist()]
+    return [decided.reasons[k].text for k in decided.why.tolist()]
 
 
 def test_the_arm_stands_where_the_commanded_place_leads(cell, truth, model):
@@ -72,8 +72,8 @@ def test_the_arm_stands_where_the_commanded_place_leads(cell, truth, model):
     done, (before, after) = plans(job(*lines), cell, model)
     decided = done.decisions
     status = decided.status[2:].reshape(n, 4)
-    assert (status[:, [0, 2]] == Status.SAFE).all()
-    assert (status[:, [1, 3]] == Status.DISPLAY).all()
+    assert (status[:, [0, 2]] == Status.CORRECTED).all()
+    assert (status[:, [1, 3]] == Status.RUNTIME).all()
     assert {*np.array(reasons(decided))[2:][status.ravel() == 2]} == {PARTIAL}
     assert (after.reason == 0).all()
     old, new = (p.tcp[2:, :3, 3].reshape(n, 4, 3) for p in (before, after))
@@ -120,7 +120,7 @@ def test_what_is_not_sure_loses_the_place(cell, model, between, partial):
     lines = f"LIN {frame(a)}", between, partial, f"LIN {frame(b)}"
     done, (before, _) = plans(job(*lines), cell, model)
     assert np.isnan(before.q[-2:]).all()
-    assert (done.decisions.status[-2:] != Status.SAFE).all()
+    assert (done.decisions.status[-2:] != Status.CORRECTED).all()
 
 
 @pytest.mark.parametrize("partial", ["LIN {Z 1000}", "PTP {A1 10}"])

@@ -18,6 +18,9 @@ from postproc.compensation.rounds import (
     fits,
     same_looks,
 )
+from postproc.diagnostics import NO_REASON, Code, Reason
+
+FAR = Reason(Code.OUT_OF_REACH, "far")
 
 READ_BACK, AIM, BEND = Step.READ_BACK, Step.AIM, Step.BEND
 
@@ -74,7 +77,7 @@ def glimpse(n: int, off: float = 0.0) -> Glimpse:
     rows, one = np.arange(6.0 * n).reshape(n, 6) + off, np.arange(n)
     flags = np.zeros((n, 3), dtype=bool)
     return Glimpse(
-        values=rows, status=one, why=one % 2, reasons=("", "far"), aim=rows,
+        values=rows, status=one, why=one % 2, reasons=(NO_REASON, FAR), aim=rows,
         correction=rows[:, :3], bent=rows[:, :3], left=flags, q=rows * np.nan,
         passed=rows, aside=rows[:, :3], slot=one, side=rows, lo=rows, hi=rows,
     )  # fmt: skip

@@ -82,7 +82,7 @@ def test_a_whole_curve_lands_where_it_should(cell, truth, model):
     lines = [line for _ in range(6) for line in block(rng)]
     done, (wanted, made) = plans(job(*lines), cell, model)
     decided = done.decisions
-    curves = (decided.status[2:] == Status.SAFE).reshape(6, 11)
+    curves = (decided.status[2:] == Status.CORRECTED).reshape(6, 11)
     assert np.isin(curves.sum(axis=1), (0, 11)).all()
     assert curves.all(axis=1).sum() >= 4
     tool = np.tile(cell.tool.pose[:3, 3], (10, 1))
@@ -111,6 +111,6 @@ def test_a_point_that_is_left_leaves_its_curve_and_its_start(cell, model, point)
     lines[point + (point > 0)] += " ; TAUGHT"
     done, _ = plans(job(*lines), cell, model)
     decided = done.decisions
-    assert not (decided.status[2:] == Status.SAFE).any()
+    assert not (decided.status[2:] == Status.CORRECTED).any()
     other = 3 if point == 0 else 2
     assert decided.reasons[decided.why[other]] == CURVE

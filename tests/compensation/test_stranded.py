@@ -50,7 +50,7 @@ def test_the_next_target_is_left_and_no_side_is_known_behind(cell, pos):
     away = f"MOVE LINEAR TO {pos(THERE, x=9.0)}"
     behind = f"MOVE JOINT TO {pos(NEAR)}", f"MOVE LINEAR TO {pos(FAR)}"
     found = planned(cell, away, *behind)
-    assert found.reasons[1].startswith("out of reach")
+    assert found.reasons[1].text.startswith("out of reach")
     assert stranded(found) == [False, False, True, False]
     assert not found.plan.direction[2].any()  # but all of them are where it gets there
     assert planned(cell, *behind).plan.direction[1].all()
@@ -74,7 +74,7 @@ def test_behind_an_axis_that_leaves_its_range_on_the_way(cell, pos):
     upper = np.rad2deg(cell.arm.upper[0])
     far = f"MOVE JOINT TO {{{upper + 5:.1f}, 0, -90, 0, 45, 0}}"
     found = planned(cell, far, START)
-    assert found.reasons[1].startswith("axis 1 beyond its limit")
+    assert found.reasons[1].text.startswith("axis 1 beyond its limit")
     assert stranded(found) == [False, False, True]
 
 

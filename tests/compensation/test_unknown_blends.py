@@ -56,7 +56,7 @@ def test_the_arm_lands_there_whatever_the_controller_does(
         )
         before, after = land(body, setup, given), land(body, setup, given, made)
         rows = after.visit
-        points = (d.status[rows] == Status.SAFE) & ~v.via[rows] & (rows > 0)
+        points = (d.status[rows] == Status.CORRECTED) & ~v.via[rows] & (rows > 0)
         points &= v.zone_rule[rows] == ZoneRule.UNKNOWN
         sure = points & (d.direction[rows] != 0).all(axis=1)
         was, is_ = (1e3 * np.linalg.norm(x.error, axis=1) for x in (before, after))

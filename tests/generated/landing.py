@@ -68,9 +68,9 @@ def count_errors(
         if ran[k].values == step.values:
             continue
         mine, pair = sorted(rows[k]), (run.before[k], run.now[k])
-        if not mine or (d.status[mine] != Status.SAFE).any():
+        if not mine or (d.status[mine] != Status.CORRECTED).any():
             found.error_mm[ALONG].append(pair)
-            why = {d.reasons[d.why[row]] for row in mine}
+            why = {d.reasons[d.why[row]].text for row in mine}
             if not all(COMPUTED.search(one) for one in why):
                 text = "is listed as not known, but went to new numbers"
                 found.wrong.append((seed, step.line, f"{text}: {' / '.join(why)}"))

@@ -58,9 +58,13 @@ def count_once(
     for line, steps in seen_once(asked, sides).items():
         mine = sorted(set().union(*(rows[k] for k in steps)))
         moved = all(ran[k].values != asked[k].values for k in steps)
-        safe = bool(mine) and bool((d.status[mine] == Status.SAFE).all())
+        safe = bool(mine) and bool((d.status[mine] == Status.CORRECTED).all())
         assert moved or not safe, f"seed {seed}, line {line}"
-        why = {d.reasons[d.why[row]] for row in mine if d.status[row] != Status.SAFE}
+        why = {
+            d.reasons[d.why[row]].text
+            for row in mine
+            if d.status[row] != Status.CORRECTED
+        }
         text = DONE if safe else " / ".join(sorted(why)) or "no visit"
         text = text if moved == safe else f"{DONE} for some of its moves: {text}"
         lost = bool((np.abs(d.side[mine]) < SURE).any())

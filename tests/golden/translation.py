@@ -82,16 +82,19 @@ class Translation:
         out = {}
         for what, text in record.items():
             if not _is_program(what):
-                for pattern, stands in self.added.items():
-                    text = re.sub(pattern, stands, text)
-                text = _even(what, text)
+                text = _even(what, self._without(text))
             out[what] = text
         return out
+
+    def _without(self, text: str) -> str:
+        for pattern, stands in self.added.items():
+            text = re.sub(pattern, stands, text)
+        return text
 
     def _translated(self, what: str, text: str) -> str:
         for old, new in self.keys.items():
             text = text.replace(f'"{old}":', f'"{new}":')
-        text = _replaced(text, self.messages)
+        text = _replaced(self._without(text), self.messages)
         if self.words:
             some = "|".join(map(re.escape, self.words))
             pattern = rf"(?<![\w-])(?:{some})(?![\w-])"

@@ -258,14 +258,14 @@ def reasons_of(unit: Unit, outcome: Outcome) -> dict[Place, str]:
     places = {file.rpartition("/")[2]: file for file in unit.files}
     v, d = outcome.visits, outcome.decisions
     found: dict[Place, str] = {}
-    written = set(v.literal[(d.status == Status.SAFE) & (v.literal >= 0)].tolist())
+    written = set(v.literal[(d.status == Status.CORRECTED) & (v.literal >= 0)].tolist())
     for finding in outcome.diagnostics:
         if finding.code in NOT_FOLLOWED and finding.file in places:
             found[places[finding.file], finding.line] = finding.message
     for k in range(len(v)):
         place = places.get(v.files[v.file[k]], ""), int(v.line[k])
-        safe = d.status[k] == Status.SAFE or v.follows[k] in written
-        reason = "" if safe else d.reasons[d.why[k]] or Status(d.status[k]).name
+        safe = d.status[k] == Status.CORRECTED or v.follows[k] in written
+        reason = "" if safe else d.reasons[d.why[k]].text or Status(d.status[k]).name
         found[place] = found.get(place) or reason
     return found
 
@@ -312,7 +312,7 @@ def _landed(outcome: Outcome, cell: Cell) -> Misses:
     )
     before, after = land(arm, setup, given), land(arm, setup, given, made)
     v, d, rows = outcome.visits, outcome.decisions, after.visit
-    stops = (d.status == Status.SAFE) & ~v.fly & ~v.via
+    stops = (d.status == Status.CORRECTED) & ~v.fly & ~v.via
     stops[:1] = False  # how the gears lie at first is not known
     sure = stops & (d.direction != 0).all(axis=1)
     was, miss = (1e3 * np.linalg.norm(x.error, axis=1) for x in (before, after))
@@ -382,7 +382,7 @@ def _print_share(language: str, found: list[JobCount]) -> None:
     seconds = sum(job.seconds for job in found)
     share = 100.0 * done / max(total, 1)
     print(f"{language}: {done} of {total} motion lines ({share:.1f} %) are corrected")
-    elsewhere = total - reasons[HOLDS_NONE]
+    elsewhere = total - reasons[HOLDS_NONE.text]
     share = 100.0 * done / max(elsewhere, 1)
     print(f"  {done} of the {elsewhere} ({share:.1f} %) that go to no home position")
     print(f"  in {seconds:.1f} s")

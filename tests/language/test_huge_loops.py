@@ -50,6 +50,6 @@ def test_numbers_that_overflow_are_not_known():
     for line in (far, go("Offs(p1,1E300*1E300,0,0)"), go("many{1E999}")):
         text = module(line, go("p2"), declared="VAR num a{2}:=[1,2];")
         visits = Rapid().read([Source("job.mod", text)], Start()).visits
-        assert visits.reasons[visits.reason[1]] and not visits.reason[2]
+        assert visits.reasons[visits.reason[1]].text and not visits.reason[2]
     found = job("LIN {X 1E999,Y 0,Z 0,A 0,B 0,C 0}", "LIN XS[1E999]", "LIN XP1")
     assert [bool(why) for why in reasons(found)] == [True, True, False]

@@ -116,7 +116,7 @@ def test_confdata_is_that_of_the_rounded_numbers(bench_cell, bench_model):
         made = read_program({"job.mod": output}, bench_cell).visits
         run = run_program(virtual_arm(SEED, tool=setup.tool), setup, made)
         rows = run.visit
-        stops = (found.decisions.status[rows] == Status.SAFE) & (
+        stops = (found.decisions.status[rows] == Status.CORRECTED) & (
             made.target[rows] == Meaning.POSE
         )
         stops &= ~made.fly[rows]
@@ -144,13 +144,13 @@ def test_t_is_that_of_the_rounded_numbers(bench_cell, bench_model):
         run = run_program(virtual_arm(SEED, tool=setup.tool), setup, made)
         rows = run.visit
         ends = made.config_given[rows] & (made.motion[rows] == Motion.JOINT)
-        safe = ends & (found.decisions.status[rows] == Status.SAFE)
+        safe = ends & (found.decisions.status[rows] == Status.CORRECTED)
         q = np.rad2deg(run.arrivals.q)
         bits = (made.values[rows, 7].astype(int)[:, None] >> np.arange(6)) & 1
         assert safe.sum() > 0 and (bits == (q < 0))[safe].all()
         assert np.abs(q[safe]).min() > 0.0199
         decisions = found.decisions
-        whys = [decisions.reasons[k] for k in decisions.why[rows[ends & ~safe]]]
+        whys = [decisions.reasons[k].text for k in decisions.why[rows[ends & ~safe]]]
         near += sum("within 0.02 deg of 0" in why for why in whys)
     assert anew > 5 and near > 5
 
@@ -206,7 +206,7 @@ def test_s_need_not_change_where_the_arm_turns_over(
         made = read_program(output, bench_cell).visits
         run = run_program(virtual_arm(SEED, tool=setup.tool), setup, made)
         rows, q = run.visit, run.arrivals.q
-        good = found.decisions.status[rows] == Status.SAFE
+        good = found.decisions.status[rows] == Status.CORRECTED
         good &= made.config_given[rows]
         branch = bench_cell.arm.branch(q)
         s = made.values[rows, 6].astype(int)

@@ -133,7 +133,7 @@ def landed(
     rows = landing.visit
     stops = ~given.fly[rows] & ~given.via[rows]
     stops &= rows > 0  # where the arm begins, its joints lie nobody knows how
-    mended = stops & (found.decisions.status[rows] == Status.SAFE)
+    mended = stops & (found.decisions.status[rows] == Status.CORRECTED)
     before, after = (miss[mended] for miss in misses)
     sure = found.decisions.direction[rows[mended]].all(axis=1)
     left = int(stops.sum() - mended.sum())

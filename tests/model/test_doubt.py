@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.calibration.diagnosis.diagnose import _left_open
+from postproc.calibration.diagnosis.refit import only_arm
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.exceptions import ModelError
 from postproc.model.combination import Combination
@@ -68,6 +70,25 @@ def test_the_variance_has_it_by_every_way(doubted: tuple[Model, States]) -> None
             without.untold_variance(effects, at, values) + added,
             rtol=1e-9,
         )
+
+
+def test_the_arm_alone_is_as_unsure(doubted: tuple[Model, States]) -> None:
+    model, states = doubted
+    np.testing.assert_allclose(
+        only_arm(model).std_error(NJ, states), model.std_error(NJ, states), rtol=1e-12
+    )
+
+
+def test_an_extended_model_keeps_it_unless_it_was_found(
+    doubted: tuple[Model, States],
+) -> None:
+    model, states = doubted
+    assert model.doubt is not None
+    kept, own = _left_open(model, only_arm(model)), model.effects.where("arm")
+    assert kept is not None
+    np.testing.assert_array_equal(kept.covariance, model.doubt.kept(own).covariance)
+    yields = Combination((*model.effects.effects, Compliance.on(Batch(NJ, states))))
+    assert _left_open(model, replace(model, effects=yields)) is None
 
 
 def test_it_goes_by_the_names_of_parameters(doubted: tuple[Model, States]) -> None:

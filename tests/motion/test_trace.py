@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from postproc.diagnostics import Reason
 from postproc.motion import trace as trace_module
 from postproc.motion.planner import plan
 from postproc.motion.replan import replan_all
@@ -56,7 +57,7 @@ def at(arm: Arm, tool: np.ndarray, q: np.ndarray) -> np.ndarray:
     return (arm.flange(q[None]) @ tool)[0]
 
 
-def reason(traced: Trace, v: int) -> str:
+def reason(traced: Trace, v: int) -> Reason:
     return REASONS[traced.reason[v]]
 
 

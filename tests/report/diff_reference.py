@@ -63,8 +63,11 @@ def json_of(
     left: Sequence[DiffRow],
 ) -> str:
     """Write all of it as JSON."""
-    told = {"rows": [r._asdict() for r in rows], "left": [r._asdict() for r in left]}
-    head = {"schema": "postproc-difference", "version": 1}
+    told = {
+        "rows": [r._asdict() for r in rows],
+        "uncorrected": [r._asdict() for r in left],
+    }
+    head = {"schema": "postproc-difference", "version": 2}
     found = {**head, "stamped": stamped, "counts": counts, **told}
     return json.dumps(found, indent=1) + "\n"
 

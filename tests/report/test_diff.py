@@ -51,10 +51,10 @@ def test_the_table_shows_units_lines_and_a_summary(desk):
     found = cli("diff", source, out)
     assert "|c| mm" in found.stdout and "\x1b" not in found.stdout
     assert "2 lines with other numbers, change mean" in found.stdout
-    assert found.stdout.rstrip().endswith("visits: 2 safe")
+    assert found.stdout.rstrip().endswith("visits: 2 corrected")
     (desk.folder / "out.pdl.postproc.json").unlink()
     bare = cli("diff", source, out).stdout  # nobody tells what came of the targets
-    assert "change mm" in bare and "safe" not in bare and "J1-6" not in bare
+    assert "change mm" in bare and "corrected" not in bare and "J1-6" not in bare
 
 
 FAR = "MOVE LINEAR TO POS(9000.0, 0.0, 0.0, 0.0, 175.0, 0.0, '')"
@@ -65,15 +65,17 @@ def test_directions_and_statuses_are_those_of_the_report(desk):
     out = desk.folder / "out.pdl"
     report = desk.report(source, "-o", out)["targets"]
     found = json.loads(cli("diff", source, out, "--json", "-").stdout)
-    told = {row["line"]: row for row in (*found["rows"], *found["left"])}
-    assert sorted(told) == [5, 6, 7, 8] and [r["line"] for r in found["left"]] == [7, 8]
+    told = {row["line"]: row for row in (*found["rows"], *found["uncorrected"])}
+    assert sorted(told) == [5, 6, 7, 8] and [
+        r["line"] for r in found["uncorrected"]
+    ] == [7, 8]
     for row in report:
         mine = told[row["line"]]
         assert mine["direction"] == row["lambda"]
-        assert (mine["status"], mine["why"]) == (row["status"], row["why"])
+        assert (mine["status"], mine["reason"]) == (row["status"], row["reason"])
         size = sum(c * c for c in row["correction_mm"]) ** 0.5
         assert mine["correction_mm"] == pytest.approx(size, abs=1e-4)
-    assert found["counts"]["safe"] == found["counts"]["guarded"] == 2
+    assert found["counts"]["corrected"] == found["counts"]["rejected"] == 2
 
 
 def test_a_line_with_several_statuses_counts_its_visits(desk):
@@ -84,14 +86,14 @@ def test_a_line_with_several_statuses_counts_its_visits(desk):
     out = desk.folder / "out.pdl"
     report = desk.report(source, "-o", out)["targets"]
     found = [row["status"] for row in report]
-    assert found == ["safe", "safe", "safe", "display", "safe"]
+    assert found == ["corrected", "corrected", "corrected", "runtime", "corrected"]
     *others, row = json.loads(cli("diff", source, out, "--json", "-").stdout)["rows"]
     assert not any(other["visits"] for other in others)
-    assert row["visits"] == {"display": 1, "safe": 1}
-    assert (row["status"], row["why"]) == ("display", report[3]["why"])
+    assert row["visits"] == {"runtime": 1, "corrected": 1}
+    assert (row["status"], row["reason"]) == ("runtime", report[3]["reason"])
     assert row["correction_mm"] > 0.5 and row["original"] != row["compensated"]
     listed = cli("diff", source, out).stdout
-    assert f"display: {row['why']} (1 display, 1 safe)\n" in listed
+    assert f"runtime: {row['reason']} (1 runtime, 1 corrected)\n" in listed
 
 
 def test_what_was_left_alone_is_listed_with_its_reason(desk):
@@ -99,7 +101,7 @@ def test_what_was_left_alone_is_listed_with_its_reason(desk):
     out = desk.folder / "out.pdl"
     desk.compensate(source, "-o", out)
     listed = cli("diff", source, out).stdout.partition("left as they were:")[2]
-    assert "6  MOVE LINEAR" in listed and "guarded: out of reach" in listed
+    assert "6  MOVE LINEAR" in listed and "rejected: out of reach" in listed
 
 
 def test_a_record_of_other_bytes_is_not_believed(desk):

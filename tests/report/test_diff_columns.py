@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.outcome import LineOutcomes, Status
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.report.diff import (
     Difference,
     DiffRow,
@@ -72,6 +73,13 @@ def as_lines(lines: list[str]) -> TextLines:
     return TextLines.of("\n".join(lines).encode("latin-1"))
 
 
+REASONS = (
+    NO_REASON,
+    Reason(Code.ARC_UNDETERMINED, "too near"),
+    Reason(Code.NO_TARGET, "\x1b[31mé "),
+)
+
+
 def told_of(rng: np.random.Generator, lines: int) -> LineOutcomes:
     """Tell something of most lines."""
     line = np.flatnonzero(rng.random(lines) < 0.8) + 1
@@ -79,11 +87,14 @@ def told_of(rng: np.random.Generator, lines: int) -> LineOutcomes:
         line,
         rng.integers(0, len(Status), len(line)),
         rng.integers(0, 3, len(line)),
-        ("", "too near", "\x1b[31mé "),
+        REASONS,
         rng.integers(-1, 3, (len(line), 6)),
         np.where(rng.random(len(line)) < 0.1, np.nan, rng.random(len(line))),
         {s.name.lower(): int(s) for s in Status},
-        {k: {"guarded": 1, "safe": k} for k in rng.integers(0, len(line), 9).tolist()},
+        {
+            k: {"rejected": 1, "corrected": k}
+            for k in rng.integers(0, len(line), 9).tolist()
+        },
     )
 
 
@@ -94,7 +105,8 @@ def with_told(row: DiffRow, told: LineOutcomes) -> DiffRow:
         return row
     return row._replace(
         status=Status(told.status[at[0]]).name.lower(),
-        why=told.reasons[told.why[at[0]]],
+        code=told.reasons[told.why[at[0]]].name,
+        reason=told.reasons[told.why[at[0]]].text,
         direction=tuple(told.direction[at[0]].tolist()),
         correction_mm=float(told.correction_mm[at[0]]),
         visits=dict(told.mixed.get(int(at[0]), {})),

@@ -31,11 +31,11 @@ def printed(rows, out=None):
 
 
 def test_columns_are_aligned_and_nothing_trails():
-    lines = printed([["1", "a", "safe"], ["100", "bbb", "guarded: near"]])
+    lines = printed([["1", "a", "corrected"], ["100", "bbb", "rejected: near"]])
     assert lines == [
         "  n  name  status",
-        "  1  a     safe",
-        "100  bbb   guarded: near",
+        "  1  a     corrected",
+        "100  bbb   rejected: near",
     ]
 
 
@@ -61,9 +61,9 @@ def test_a_late_wide_cell_widens_its_column_from_there_on():
 def test_colours_only_on_a_terminal_that_wants_them(monkeypatch):
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("TERM", "xterm")
-    rows = [["1", "a", "guarded: near"], ["2", "b", "safe"]]
+    rows = [["1", "a", "rejected: near"], ["2", "b", "corrected"]]
     head, guarded, safe = printed(rows, Screen())
-    assert "\x1b[1m" in head and "\x1b[33mguarded: near\x1b[0m" in guarded
+    assert "\x1b[1m" in head and "\x1b[33mrejected: near\x1b[0m" in guarded
     assert "\x1b" not in safe
     assert "\x1b" not in "".join(printed(rows))
     monkeypatch.setenv("NO_COLOR", "1")
@@ -71,7 +71,7 @@ def test_colours_only_on_a_terminal_that_wants_them(monkeypatch):
 
 
 def test_cells_cannot_steer_the_terminal():
-    assert "\\x1b[2J" in printed([["1", "\x1b[2J", "safe"]], Screen())[1]
+    assert "\\x1b[2J" in printed([["1", "\x1b[2J", "corrected"]], Screen())[1]
 
 
 def test_arrows():

@@ -70,7 +70,7 @@ def test_a_job_is_compensated_for_the_state_that_the_cell_declares(
     campaign, payload, temperature
 ):
     rows = compensate(campaign, payload, temperature)
-    assert [row["status"] for row in rows] == ["safe", "safe"]
+    assert [row["status"] for row in rows] == ["corrected", "corrected"]
     found = cli("simulate", campaign / "out.pdl", "--cell", campaign / "now.toml",
                 "--reference", campaign / "job.pdl", "--seed", 3, "--effects", EFFECTS,
                 "--json", "-")  # fmt: skip
@@ -98,7 +98,7 @@ def test_another_state_is_another_correction(campaign):
 )
 def test_a_state_that_was_not_surveyed_is_refused(campaign, payload, temperature, why):
     for row in compensate(campaign, payload, temperature):
-        assert row["status"] == "guarded" and re.search(why, row["why"]), row
+        assert row["status"] == "rejected" and re.search(why, row["reason"]), row
         assert row["corrected"] == row["original"]
 
 
@@ -106,7 +106,7 @@ def test_a_load_that_was_not_surveyed_costs_certainty_and_is_bounded_by_the_cell
     campaign,
 ):
     known, heavy = (compensate(campaign, p, 26) for p in (120, 200))
-    assert [row["status"] for row in heavy] == ["safe", "safe"]
+    assert [row["status"] for row in heavy] == ["corrected", "corrected"]
     for less, more in zip(known, heavy, strict=True):
         assert np.linalg.norm(more["std_error_mm"]) > np.linalg.norm(
             less["std_error_mm"]
@@ -119,5 +119,5 @@ def test_a_load_that_was_not_surveyed_costs_certainty_and_is_bounded_by_the_cell
         "--model", campaign / "m.json", "-o", campaign / "b.pdl",
         "--report", campaign / "b.json")  # fmt: skip
     for row in json.loads((campaign / "b.json").read_bytes())["targets"]:
-        assert row["status"] == "guarded" and "load" in row["why"], row
+        assert row["status"] == "rejected" and "load" in row["reason"], row
         assert row["corrected"] == row["original"]

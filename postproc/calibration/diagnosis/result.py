@@ -92,7 +92,7 @@ class Finding:
             "told": self.told,
             "group": [str(family) for family in self.rivals],
             "kept": True,
-            "of_setup": self.of_setup,
+            "setup_effects": self.of_setup,
             "impossible": list(self.impossible),
         }
 
@@ -233,15 +233,15 @@ class Diagnosis:
             ],
             "next_measurements": degrees.tolist(),
             "next_measurements_why": self.why_next,
-            "rows_weighed_down": [
+            "downweighted_rows": [
                 {"id": d.id, "line": d.line, "why": d.why} for d in self.dropped
             ],
             "directions": None if self.directions is None else asdict(self.directions),
-            "not_excluded": list(self.not_excluded),
-            "fixed_points": list(self.fixed_points),
+            "undetectable": list(self.not_excluded),
+            "monuments": list(self.fixed_points),
             "flanks_at_stops": self.flanks,
             "notes": list(self.notes),
-            "set_anew": None if self.set_anew is None else self.set_anew.to_dict(),
+            "frame_shift": None if self.set_anew is None else self.set_anew.to_dict(),
         }
 
 

@@ -38,10 +38,10 @@ def log_evidence(blocks: ReducedCandidates, square: Floats, rows: int) -> Floats
 
     Args:
         blocks: Reduced candidates.
-        square: |z|^2 of every draw, (draws,).
+        square: |z|^2 of every draw, (draws,), or of each for every block, (c, draws).
         rows: Number of scalar rows N.
     """
-    gain, share = blocks.gain, blocks.along**2 / square
+    gain, share = blocks.gain, blocks.along**2 / np.atleast_2d(square)[:, None]
     largest = gain.max(axis=1)
     if gain.shape[1] == 1:
         single = np.maximum(largest, 1e-300)[:, None]

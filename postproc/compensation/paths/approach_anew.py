@@ -85,7 +85,11 @@ def bad_approaches(work: PathWork) -> set[int]:
     stops = work.latest.kept.decisions.status[work.own - 1]
     others = np.flatnonzero(unsure & ~_unsure(work.source.kept))
     asked = np.array(sorted(work.approaches), dtype=np.int64)
-    bad = unsure[asked] | (status[asked] != Status.SAFE) | (stops[asked] != Status.SAFE)
+    bad = (
+        unsure[asked]
+        | (status[asked] != Status.CORRECTED)
+        | (stops[asked] != Status.CORRECTED)
+    )
     cause = np.searchsorted(asked, others, side="right") - 1
     return {*asked[bad].tolist(), *asked[cause[cause >= 0]].tolist()}
 

@@ -64,7 +64,7 @@ def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
     if splitter is None and setting.options.reapproach:
         raise PostprocError(
             f"reapproach: targets are not approached anew in {language.name} programs. "
-            "Leave it out: side-not-sure says how to approach them"
+            "Leave it out: direction-uncertain says how to approach them"
         )
     work = PathWork(draft, first, setting, write, splitter)
     if splitter is not None and setting.options.reapproach:

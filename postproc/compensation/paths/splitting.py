@@ -33,7 +33,7 @@ ALIKE = 1e-6  # a tool whose axes turn by less keeps its orientation
 def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int, str]:
     """Say why moves of a program must stay in one piece, by their visit."""
     status, before = decisions.status, np.maximum(v.before, 0)
-    corrected = (status == Status.SAFE) | (status == Status.UNCHANGED)
+    corrected = (status == Status.CORRECTED) | (status == Status.UNCHANGED)
     ends = (v.literal >= 0) & (v.target == Meaning.POSE) & corrected
     has = (v.literal >= 0) & (len(v.literals) > 0)
     taught = np.zeros(len(v), dtype=bool)

@@ -10,7 +10,6 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.continuity import STEP
 from postproc.compensation.correction import (
     BY_VISIT,
     EXPLAINING,
@@ -33,6 +32,7 @@ from postproc.compensation.paths.taking_up import (
 )
 from postproc.compensation.program import Reading
 from postproc.compensation.rewrite import Output
+from postproc.diagnostics import Code
 from postproc.language.interface import Splitter
 from postproc.model.play import left_behind, verdicts_of_flanks
 from postproc.robot.pose import MM
@@ -223,7 +223,7 @@ class PathWork:
         """Say why points of a move cannot be corrected, "" where they can."""
         decided = self.latest.kept.decisions
         rows = self._on_way(v)
-        left = rows[decided.status[rows] != Status.SAFE]
+        left = rows[decided.status[rows] != Status.CORRECTED]
         if not len(left):
             return ""
         why = decided.reasons[decided.why[left[0]]]
@@ -232,8 +232,8 @@ class PathWork:
     def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""
         decided, via = self.latest.kept.decisions, self.latest.reading.visits.via
-        text = STEP.format(self.setting.cell.limits.correction_step_mm)
-        marked = np.array([why == text for why in decided.reasons])[decided.why]
+        steps = [one.code is Code.CORRECTION_STEP for one in decided.reasons]
+        marked = np.array(steps)[decided.why]
         begin = int(self.own[self.source.reading.visits.before[v]])
         pieces = enumerate(pairwise([begin, *self.ends(v)]))
         return [

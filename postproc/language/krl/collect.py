@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import collect
 from postproc.language.collect import (
     Conditions,
@@ -31,18 +32,31 @@ from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
 from postproc.robot.trajectory import Motion
 
 STOP, PASS, MAYBE = "stop", "pass", "maybe"
-_IPO = "$IPO_MODE is not known here"
-_STATUS = "bit 2 of S and bit 4 of T disagree, otherwise than at the other points"
-_STILL_TOOL = "$ORI_TYPE = #CONSTANT: the tool keeps the orientation it comes with"
+_IPO = Reason(Code.FRAME_UNKNOWN, "$IPO_MODE is not known here")
+_STATUS = Reason(
+    Code.CONFIGURATION_UNKNOWN,
+    "bit 2 of S and bit 4 of T disagree, otherwise than at the other points",
+)
+_STILL_TOOL = Reason(
+    Code.ORIENTATION_LAW,
+    "$ORI_TYPE = #CONSTANT: the tool keeps the orientation it comes with",
+)
 _NOT_TURNED = {
     "#constant": _STILL_TOOL,
-    "#ignore": "$ORI_TYPE = #IGNORE: the tool does not turn to the point",
+    "#ignore": Reason(
+        Code.ORIENTATION_LAW,
+        "$ORI_TYPE = #IGNORE: the tool does not turn to the point",
+    ),
 }
-_MAY_NOT_TURN = "which orientation the tool takes is not known here ($ORI_TYPE)"
+_MAY_NOT_TURN = Reason(
+    Code.ORIENTATION_LAW,
+    "which orientation the tool takes is not known here ($ORI_TYPE)",
+)
 TURNING = ("#var", "#joint")  # ways to the orientation of a point
-_SWAPPED = (
+_SWAPPED = Reason(
+    Code.FRAME_UNKNOWN,
     "$TOOL and $BASE were set with IPO_FRAME #TCP, which swaps them on some "
-    "controllers: set them anew with #BASE"
+    "controllers: set them anew with #BASE",
 )
 _NOT_SET = "an inline setting (WITH) is not known"
 
@@ -65,7 +79,7 @@ def visits_of(machine: KrlMachine) -> Visits:
     return collect.visits_of(machine, KRL_DIALECT, conditions, COMMENTS, moves)
 
 
-def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, str]:
+def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, Reason]:
     """Add what a move sets for itself; say where that is not known."""
     modes: KrlModes = v.modes
     given = [(v.row, one) for one in v.move.settings]
@@ -77,9 +91,10 @@ def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, str]:
         reader = ModeReader(machine.task, row, v.scope)
         after = reader.assigned(modes, setting)
         if after is None:
-            return modes, f"{_NOT_SET}: {setting.target.name.upper()}"
+            text = f"{_NOT_SET}: {setting.target.name.upper()}"
+            return modes, Reason(Code.SETTING_UNTRACKED, text)
         modes = after
-    return modes, ""
+    return modes, NO_REASON
 
 
 @dataclass(frozen=True)
@@ -101,7 +116,7 @@ def _conditions(
     base: Pose,
     end: str,
     odd: bool,
-    early: frozenset[str],
+    early: frozenset[Reason],
 ) -> Conditions:
     """Say what an arrival is carried out with."""
     modes, unset = _effective(machine, v)
@@ -113,10 +128,10 @@ def _conditions(
         blocked -= OF_TRACK
     given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
     if v.goal.target != Meaning.JOINTS:
-        given += (modes.base.why, "" if modes.interpolation else _IPO)
+        given += (modes.base.why, NO_REASON if modes.interpolation else _IPO)
         given += (_swapped(modes),)
-    given += (_STATUS if odd else "",)
-    given += (NO_LOAD if modes.load == LOST_LOAD else "",)
+    given += (_STATUS if odd else NO_REASON,)
+    given += (NO_LOAD if modes.load == LOST_LOAD else NO_REASON,)
     return Conditions(
         tool=modes.tool.pose,
         base=base,
@@ -144,10 +159,10 @@ def _load(modes: KrlModes) -> tuple[float, ...]:
     return () if unknown else (*modes.load, *(math.nan,) * 3)[:4]
 
 
-def _swapped(modes: KrlModes) -> str:
+def _swapped(modes: KrlModes) -> Reason:
     """Return why frames that were set for a fixed tool hold for no other move."""
     remote = modes.tool.remote or modes.base.remote
-    return _SWAPPED if remote and modes.interpolation != "#tcp" else ""
+    return _SWAPPED if remote and modes.interpolation != "#tcp" else NO_REASON
 
 
 def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
@@ -238,7 +253,7 @@ def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
             v.goal = FoundGoal(Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, why=PARTIAL)
 
 
-def _not_turned(modes: KrlModes) -> str:
+def _not_turned(modes: KrlModes) -> Reason:
     """Say why the tool need not turn to a point; frames that are lost come first."""
     lost = modes.tool.why or modes.base.why
     return _NOT_TURNED.get(modes.orientation, lost or _MAY_NOT_TURN)

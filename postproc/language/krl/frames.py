@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.collect import IDENTITY, Pose, composed, flat
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMPONENTS, KRL_DIALECT
@@ -29,19 +30,26 @@ class KrlFrame:
 
     Attributes:
         pose: Where it is.
-        why: Why targets with it cannot be compensated, "" where they can.
+        why: Why targets with it cannot be compensated.
         taught: It was taught with the arm, and contains its error.
         remote: It was set for a tool that stands still; controllers differ in which
             of the two frames they take for it then.
     """
 
     pose: Pose
-    why: str = ""
+    why: Reason = NO_REASON
     taught: bool = False
     remote: bool = False
 
 
 ZERO = KrlFrame(IDENTITY)
+
+
+def no_frame(text: str, code: Code = Code.FRAME_UNKNOWN) -> KrlFrame:
+    """Return a frame that is not known, and why."""
+    return KrlFrame((), Reason(code, text))
+
+
 NUMBERS = {"$tool": "tool_no", "$base": "base_no"}  # in FDAT
 TABLES = {"$tool": "tool_data", "$base": "base_data"}
 _WHICH = "which entry of {} it takes is known only when the program runs"
@@ -87,7 +95,7 @@ class FrameReader:
             ):
                 number = self.task.index(step, self.row, self.here)
                 if number is None or len(number) != 1:
-                    return KrlFrame((), _WHICH.format(table.upper()))
+                    return no_frame(_WHICH.format(table.upper()))
                 return self.entry(table, number[0])
             case said.Operation(operator=":", operands=(first, second)):
                 return self._product(self.frame(first), self.frame(second))
@@ -114,16 +122,16 @@ class FrameReader:
                     "$base", self.task.number(first, self.row, self.here)
                 )
             case "ek" | "lk" | "ey":
-                return KrlFrame((), _CHAINED.format(name.upper()))
-        return KrlFrame((), f"what {name.upper()} gives is not known")
+                return no_frame(_CHAINED.format(name.upper()), Code.EXTERNAL_AXES)
+        return no_frame(f"what {name.upper()} gives is not known")
 
     def numbered(self, name: str, number: float) -> KrlFrame:
         """Return the tool or the base that BAS sets for a number; 0 is none."""
         entry, table = whole(number), TABLES[name]
         if entry is None:
-            return KrlFrame((), f"the number of its {name.upper()} is not known")
+            return no_frame(f"the number of its {name.upper()} is not known")
         if not self.task.is_global(table, self.here):
-            return KrlFrame((), _DOUBLE.format(table.upper()))
+            return no_frame(_DOUBLE.format(table.upper()))
         found = ZERO if entry <= 0 else self.entry(table, entry)
         first, second = (self._correction(name, *pair) for pair in CORRECTIONS[name])
         return self._product(self._product(first, found), second)
@@ -138,19 +146,19 @@ class FrameReader:
             return ZERO
         shown = name.upper()
         if on is not True:
-            why = _MAY_BE_ON.format(switch.upper(), frame.upper(), shown)
-            return KrlFrame((), why)
+            return no_frame(_MAY_BE_ON.format(switch.upper(), frame.upper(), shown))
         if isinstance(found, KrlFrame):
             return found
-        return KrlFrame((), _CORRECTED.format(frame.upper(), shown))
+        return no_frame(_CORRECTED.format(frame.upper(), shown))
 
     def entry(self, table: str, number: int) -> KrlFrame:
         """Read an entry of TOOL_DATA or BASE_DATA."""
         shown = f"{table.upper()}[{number}]"
         if number <= 0:
-            return KrlFrame((), f"{shown} is no frame that is known")
+            return no_frame(f"{shown} is no frame that is known")
         if table == "base_data" and self._is_chained(number):
-            return KrlFrame((), _CHAINED.format(f"MACHINE_FRAME_DAT[{number}]"))
+            chain = _CHAINED.format(f"MACHINE_FRAME_DAT[{number}]")
+            return no_frame(chain, Code.EXTERNAL_AXES)
         found = self._element(table, number)
         return found or KrlFrame((), self._unknown(shown, table))
 
@@ -187,10 +195,10 @@ class FrameReader:
         known = value.number("mach_def_index") if isinstance(value, KrlRecord) else 1.0
         return not known == 0.0
 
-    def _unknown(self, shown: str, name: str) -> str:
-        why = self.task.untold(name, self.here)
-        where = f" ({CONFIG}.dat)" if "declared" in why else ""
-        return f"{shown} {why}{where}"
+    def _unknown(self, shown: str, name: str) -> Reason:
+        code, text = self.task.untold(name, self.here)
+        where = f" ({CONFIG}.dat)" if code is Code.UNDECLARED_VARIABLE else ""
+        return Reason(code, f"{shown} {text}{where}")
 
     def _record(self, operand: said.Operand) -> KrlFrame:
         """Read a frame that is written or named."""
@@ -204,7 +212,7 @@ class FrameReader:
             )
         if isinstance(operand, said.DataObject):
             return KrlFrame((), self._unknown(operand.name.upper(), operand.name))
-        return KrlFrame((), "a frame is not written whole")
+        return no_frame("a frame is not written whole")
 
     def _is_taught(self, name: str) -> bool:
         """Tell whether a named frame was taught."""

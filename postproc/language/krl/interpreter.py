@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.language.collect import FoundGoal, cell_pose
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
@@ -43,8 +43,11 @@ _ACTING = (
     said.Assignment, said.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
     said.ContinueWord, said.InterruptSwitched, said.PathTrigger, said.InterruptDeclared,
 )  # fmt: skip
-_INTERRUPT = "an interrupt or a trigger may move the arm, or change its settings"
-_RESUMED = "RESUME or BRAKE may end the way to it anywhere"
+_INTERRUPT = Reason(
+    Code.BESIDE_PROGRAM,
+    "an interrupt or a trigger may move the arm, or change its settings",
+)
+_RESUMED = Reason(Code.ENDS_ELSEWHERE, "RESUME or BRAKE may end the way to it anywhere")
 MOVES, BRAKES, RESUMES = "moves", "brake", "resume"
 """What statements may do to moves that are under way."""
 _Effects = tuple[frozenset[str], list[tuple[int, HeadedRows]]]
@@ -67,7 +70,7 @@ class KrlMachine(TaskMachine):
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
     _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
-    _before: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
+    _before: dict[Reason, set[int]] = field(default_factory=lambda: defaultdict(set))
 
     @classmethod
     def of(cls, task: KrlTask, start: Start) -> KrlMachine:
@@ -85,7 +88,9 @@ class KrlMachine(TaskMachine):
         self.call(0, first.name, first.routines[0], None, -1, here)
         self.follow_all()
         for name, (file, row) in self._assumed.items():
-            self.say(file, row, Code.ASSUMED_STILL, f"{name.upper()} {ASSUMED}")
+            self.say(
+                file, row, Code.ROUTINE_ASSUMED_MOTIONLESS, f"{name.upper()} {ASSUMED}"
+            )
 
     # What a statement is.
 
@@ -364,7 +369,7 @@ class KrlMachine(TaskMachine):
             return here
         return replace(here, modes=replace(modes, active=frozenset(left))).lost()
 
-    def _begin_early(self, why: str, here: Arrived) -> None:
+    def _begin_early(self, why: Reason, here: Arrived) -> None:
         """Note that an interrupt may come in moves before it is switched on.
 
         The program is ahead of the arm, unless it has waited for it.
@@ -373,12 +378,12 @@ class KrlMachine(TaskMachine):
             self._before[why] |= here.origins
 
     @cached_property
-    def early(self) -> Mapping[int, frozenset[str]]:
+    def early(self) -> Mapping[int, frozenset[Reason]]:
         """Return visits on whose way an interrupt may come that is switched on later.
 
         The program is ahead by `FURTHEST_AHEAD` moves at most.
         """
-        found: dict[int, frozenset[str]] = {}
+        found: dict[int, frozenset[Reason]] = {}
         for why, origins in self._before.items():
             reached = set(origins)
             for _ in range(FURTHEST_AHEAD):
@@ -453,7 +458,7 @@ class KrlMachine(TaskMachine):
                 yield file, text
 
     @cached_property
-    def everywhere(self) -> frozenset[str]:
+    def everywhere(self) -> frozenset[Reason]:
         """Return why no target can be compensated, once all ways are followed.
 
         An interrupt that no way declares, or that no way switches on, may be on at any

@@ -8,8 +8,9 @@ from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any
 
+from postproc.diagnostics import Code, Reason
 from postproc.language.krl import syntax as said
-from postproc.language.krl.frames import NUMBERS, ZERO, FrameReader, KrlFrame
+from postproc.language.krl.frames import NUMBERS, ZERO, FrameReader, KrlFrame, no_frame
 from postproc.language.krl.program import whole
 from postproc.language.krl.store import (
     CORRECTION_FRAMES,
@@ -28,8 +29,7 @@ from postproc.robot.pose import MM
 UNKNOWN = -1.0  # a number that is not known
 CELL_LOAD: tuple[float, ...] = ()
 LOST_LOAD: tuple[float, ...] = (-1.0,)
-LOST_FRAME = KrlFrame(
-    (),
+LOST_FRAME = no_frame(
     "which $TOOL and $BASE hold here is not known: set them anew behind what is not "
     "followed, or on every way here",
 )
@@ -82,9 +82,9 @@ class KrlModes:
     load: tuple[float, ...] = CELL_LOAD
     store: KrlStore = NOTHING_SET
     perhaps: bool = False
-    declared: frozenset[tuple[int, str]] = frozenset()
-    active: frozenset[tuple[int, str]] = frozenset()
-    blocked: frozenset[str] = frozenset()
+    declared: frozenset[tuple[int, Reason]] = frozenset()
+    active: frozenset[tuple[int, Reason]] = frozenset()
+    blocked: frozenset[Reason] = frozenset()
 
     def joined(self, other: KrlModes) -> KrlModes:
         """Keep what is the same on another way here."""
@@ -143,12 +143,21 @@ _SWITCHED_OFF: Sequence[tuple[str, object]] = (
 _KEPT_ON = "tool_corr_on"  # old controllers take the frame back, but not the switch
 BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
 """Commands of BAS that change neither frames nor blending nor speed."""
-NO_LOAD = "which $LOAD holds here is not known: set it again on every way here"
-SOFT = "an axis is soft ($SOFT_PLCL)"
-GENERATOR = "a function generator ($TECH) moves the tool off its path"
-AXIS_LOAD = "the program sets a load on an axis ($LOAD_A1 to $LOAD_A3)"
-IGNORED = "the track need not go where targets say ($EX_AX_IGNORE)"
-MOVED_BASE = "$ROBROOT or $WORLD is set by the program"
+NO_LOAD = Reason(
+    Code.LOAD_UNKNOWN,
+    "which $LOAD holds here is not known: set it again on every way here",
+)
+SOFT = Reason(Code.SOFT_AXIS, "an axis is soft ($SOFT_PLCL)")
+GENERATOR = Reason(
+    Code.SETTING_UNTRACKED, "a function generator ($TECH) moves the tool off its path"
+)
+AXIS_LOAD = Reason(
+    Code.SETTING_UNTRACKED, "the program sets a load on an axis ($LOAD_A1 to $LOAD_A3)"
+)
+IGNORED = Reason(
+    Code.EXTERNAL_AXES, "the track need not go where targets say ($EX_AX_IGNORE)"
+)
+MOVED_BASE = Reason(Code.SETTING_UNTRACKED, "$ROBROOT or $WORLD is set by the program")
 # System variables that change nothing of where targets are and from which side they are
 # reached; those in the first list do not stop what is planned ahead either.
 PLANNED = frozenset(
@@ -182,15 +191,17 @@ HARMLESS = frozenset(
 
 
 SUBMIT = "a submit program may set {} at any time"
-_TRACK_BESIDE = "a submit program may move external axes"
-_SENSOR_BESIDE = "a submit program may switch on a sensor that moves the arm"
+_TRACK_BESIDE = Reason(Code.BESIDE_PROGRAM, "a submit program may move external axes")
+_SENSOR_BESIDE = Reason(
+    Code.BESIDE_PROGRAM, "a submit program may switch on a sensor that moves the arm"
+)
 OF_TRACK = frozenset([IGNORED, _TRACK_BESIDE])
 """Reasons that count where the cell has a track."""
 _ASYNCHRONOUS = frozenset("asyptp asycont asycancel asystop".split())
 _BAS_SETS = frozenset(["$tool", "$base"])  # without them nothing else counts
 _FIELDS: Mapping[str, Mapping[str, Any]] = {
-    "$tool": {"tool": KrlFrame((), SUBMIT.format("$TOOL"))},
-    "$base": {"base": KrlFrame((), SUBMIT.format("$BASE"))},
+    "$tool": {"tool": no_frame(SUBMIT.format("$TOOL"), Code.BESIDE_PROGRAM)},
+    "$base": {"base": no_frame(SUBMIT.format("$BASE"), Code.BESIDE_PROGRAM)},
     "$vel": {"speed": UNKNOWN},
     "$vel_axis": {"share": UNKNOWN},
     "$apo": {"distance": UNKNOWN, "overlap": UNKNOWN},
@@ -202,7 +213,7 @@ _FIELDS: Mapping[str, Mapping[str, Any]] = {
 @cache
 def _unsettled(
     written: frozenset[str], called: frozenset[str]
-) -> tuple[Mapping[str, Any], frozenset[str]]:
+) -> tuple[Mapping[str, Any], frozenset[Reason]]:
     """Return the modes that submit programs unsettle, and why targets are left.
 
     Args:
@@ -211,14 +222,15 @@ def _unsettled(
     """
     if "bas" in called:
         written |= _BAS_SETS
-    changed, why = dict[str, Any](), set[str]()
+    changed, why = dict[str, Any](), set[Reason]()
     for name in sorted(n for n in written if n.startswith("$")):
         if name in _FIELDS:
             changed |= _FIELDS[name]
         elif name == "$ex_ax_ignore":
             why.add(IGNORED)
         elif name in _SETTING or name not in PLANNED | HALTING | HARMLESS:
-            why.add(SUBMIT.format(name.upper()))
+            text = SUBMIT.format(name.upper())
+            why.add(Reason(Code.BESIDE_PROGRAM, text))
     why |= {_TRACK_BESIDE} if called & _ASYNCHRONOUS else set()
     senses = any(n.startswith("rsi_") or n == "touchsense" for n in called)
     return changed, frozenset(why | ({_SENSOR_BESIDE} if senses else set()))
@@ -297,7 +309,7 @@ class ModeReader:
         which = one.target.name[1:]
         if one.target.steps:
             why = f"a component of {one.target.name.upper()} is set by the program"
-            return modes.with_(**{which: KrlFrame((), why)})
+            return modes.with_(**{which: no_frame(why)})
         found = self.frames(modes).frame(one.value)
         return modes.with_(**{which: found})
 

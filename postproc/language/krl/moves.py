@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.collect import (
     FoundGoal,
     FoundShift,
@@ -25,7 +26,7 @@ from postproc.language.krl.dialect import (
     abc_from_rotation,
     rotation_from_abc,
 )
-from postproc.language.krl.frames import FrameReader, KrlFrame
+from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame
 from postproc.language.krl.program import whole
 from postproc.language.krl.task import (
     POSITIONS,
@@ -35,7 +36,7 @@ from postproc.language.krl.task import (
 )
 from postproc.language.machine import Scope
 from postproc.language.shifts import Shift, ShiftKind
-from postproc.language.visits import NO_TARGET, Meaning
+from postproc.language.visits import Meaning
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -46,12 +47,23 @@ AXES = ("a1", "a2", "a3", "a4", "a5", "a6")
 OUTSIDE = ("e1", "e2", "e3", "e4", "e5", "e6")
 PLACE = COMPONENTS[:6]
 RUN_TIME = "it is known only when the program runs"
+AT_RUN_TIME = Reason(Code.RUNTIME_VALUE, RUN_TIME)
+
+
+def no_target(text: str) -> Reason:
+    """Return the reason of a move that holds no target of its own."""
+    return Reason(Code.NO_TARGET, f"the move holds no target of its own: {text}")
+
+
 HOME = ("xhome", "home", "$h_pos")  # that of the cell, where no file says more
 HOMES = (*HOME, "xhome1", "xhome2", "xhome3", "xhome4", "xhome5", "$axis_home")
-AT_HOME = f"{NO_TARGET}: it is a home position"
+AT_HOME = no_target("it is a home position")
 PRESENT = ("$pos_act", "$axis_act")
 BEFORE = ("$axis_act_meas", "$axis_int", "$pos_int")  # where it was, or nearly is
-SPLINE = "a point of a spline of joint moves: how the arm goes there is not known"
+SPLINE = Reason(
+    Code.ENDS_ELSEWHERE,
+    "a point of a spline of joint moves: how the arm goes there is not known",
+)
 _ALONE = ("ptp", "lin", "circ", "sptp", "slin", "scirc")
 # Words of moves that are known in no spline block, in one of paths, in one of joints.
 _POINTS = {
@@ -59,14 +71,27 @@ _POINTS = {
     (True, False): ("spl", "slin", "scirc"),
     (True, True): ("sptp",),
 }
-PARTIAL = (
+PARTIAL = Reason(
+    Code.PARTIAL_TARGET,
     "numbers are missing: they stay what they were commanded before, so that it moves "
-    "along with the point before it"
+    "along with the point before it",
 )
-NO_STATUS = "a PTP without S and T: the controller chooses the configuration"
-ACCURATE = "S says that it was taught with the controller's own accuracy model"
-ODD_STATUS = "S or T is no such number"
-ANGLE = f"CA ends the arc elsewhere than at its end point: {RUN_TIME}"
+NO_STATUS = Reason(
+    Code.CONFIGURATION_UNKNOWN,
+    "a PTP without S and T: the controller chooses the configuration",
+)
+ACCURATE = Reason(
+    Code.SETTING_UNTRACKED,
+    "S says that it was taught with the controller's own accuracy model",
+)
+NOT_BY_JOINTS = Reason(
+    Code.TRAJECTORY_UNKNOWN, "it is joint angles, and no PTP goes to them"
+)
+COMPUTED = Reason(Code.COMPUTED_TARGET, "it is computed from other data")
+ODD_STATUS = Reason(Code.CONFIGURATION_UNKNOWN, "S or T is no such number")
+ANGLE = Reason(
+    Code.ENDS_ELSEWHERE, f"CA ends the arc elsewhere than at its end point: {RUN_TIME}"
+)
 
 
 @dataclass
@@ -121,7 +146,8 @@ class KrlGoals:
             return
         reader = _Goal(self, move, row, here)
         angle = self._angle(move, row, here)
-        why = ANGLE if move.angle is not None and math.isnan(angle) else ""
+        unknown = move.angle is not None and math.isnan(angle)
+        why = ANGLE if unknown else NO_REASON
         if move.via is not None:
             goal = reader.end(move.via)
             yield KrlVisit(
@@ -131,7 +157,8 @@ class KrlGoals:
         if why:
             goal = not_reached(goal, ANGLE)
         yield KrlVisit(
-            here, row, motion, False, goal, modes, why=SPLINE if in_joints else "",
+            here, row, motion, False, goal, modes,
+            why=SPLINE if in_joints else NO_REASON,
             arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
         )  # fmt: skip
 
@@ -198,7 +225,7 @@ class _Goal:
             case said.DataObject(name=name) if name in PRESENT:
                 return self._stay(name)
             case said.DataObject(name=name) if name in BEFORE:
-                return _left(f"{NO_TARGET}: {RUN_TIME}", name=name)
+                return _left(no_target(RUN_TIME), name=name)
             case said.DataObject(name=name) if name in HOMES:
                 return self._home(operand)
             case said.Operation(operator=":", operands=(first, second)):
@@ -206,7 +233,7 @@ class _Goal:
             case said.KrlAggregate() | said.DataObject():
                 return self._point(operand)
             case _:
-                return _left(RUN_TIME)
+                return _left(AT_RUN_TIME)
 
     # Points.
 
@@ -215,8 +242,7 @@ class _Goal:
         name = operand.name if isinstance(operand, said.DataObject) else ""
         found = self.task.value(operand, self.row, self.here)
         if not isinstance(found, KrlRecord) or not found.whole:
-            why = f"{name} {self.task.untold(name, self.here)}" if name else RUN_TIME
-            return _left(why, name=name)
+            return _left(self._untold(name) if name else AT_RUN_TIME, name=name)
         names = {key for key, _ in found.fields}
         if names & set(AXES):
             goal = self._axes(found)
@@ -224,9 +250,14 @@ class _Goal:
             goal = self._pose(found)
         if not name:
             return goal
-        if goal.why == PARTIAL:  # what data lack may be told elsewhere
+        if goal.why.code is Code.PARTIAL_TARGET:  # what data lack may be told elsewhere
             return _left(PARTIAL, name=name)
         return self._named(goal, operand)
+
+    def _untold(self, name: str) -> Reason:
+        """Say why a name stands for no known point."""
+        code, text = self.task.untold(name, self.here)
+        return Reason(code, f"{name} {text}")
 
     def _named(self, goal: FoundGoal, operand: said.Operand) -> FoundGoal:
         """Say what is known of a point beside its numbers."""
@@ -260,12 +291,12 @@ class _Goal:
         """Read six joint angles; only PTP goes to them."""
         numbers = _numbers(found, AXES)
         if not self._by_joints:
-            return _left("it is joint angles, and no PTP goes to them")
+            return _left(NOT_BY_JOINTS)
         if numbers is None:
             return self._partial(found, AXES, Meaning.PARTIAL_JOINTS)
         file, slots = _places(numbers)
         values = [number.value for number in numbers]
-        why = "" if file >= 0 else "it is computed from other data"
+        why = NO_REASON if file >= 0 else COMPUTED
         return FoundGoal(
             Meaning.JOINTS, (*values, 0.0, 0.0), file, (*slots, -1, -1), NO_SLOTS,
             aux=self._outside(found), why=why,
@@ -284,9 +315,9 @@ class _Goal:
         aux, why = self._outside(found), self._status(values[6], values[7])
         if self._by_joints and NOT_WRITTEN in values[6:]:
             return _left(NO_STATUS)
-        if self._by_joints and why == ODD_STATUS:
+        if self._by_joints and why.code is Code.CONFIGURATION_UNKNOWN:
             return _left(why)
-        why = why or ("" if file >= 0 else "it is computed from other data")
+        why = why or (NO_REASON if file >= 0 else COMPUTED)
         return FoundGoal(
             Meaning.POSE, tuple(values), file, (*slots, *own), NO_SLOTS, aux=aux,
             why=why,
@@ -310,13 +341,13 @@ class _Goal:
         values += [math.nan] * (WIDTH - len(values))
         return FoundGoal(meaning, tuple(values), aux=self._outside(found), why=PARTIAL)
 
-    def _status(self, s: float, t: float) -> str:
-        """Say what speaks against a position's S and T, "" for nothing."""
+    def _status(self, s: float, t: float) -> Reason:
+        """Say what speaks against a position's S and T."""
         if any(f != NOT_WRITTEN and (f < 0 or whole(f) is None) for f in (s, t)):
             return ODD_STATUS
         if s >= UNKNOWN_STATUS:
             return ODD_STATUS
-        return ACCURATE if s > 0 and int(s) & MEASURED else ""
+        return ACCURATE if s > 0 and int(s) & MEASURED else NO_REASON
 
     def _outside(self, found: KrlRecord) -> tuple[float, ...]:
         """Return the external axes that count: declared by the cell, or not 0."""
@@ -333,9 +364,9 @@ class _Goal:
         """
         within = self.goals.block(self.row, self.here) is not None
         if within or self.move.via is not None:
-            return _left(f"{NO_TARGET}: {RUN_TIME}", name=name)
+            return _left(no_target(RUN_TIME), name=name)
         meaning = Meaning.BY if self._by_joints else Meaning.RELATIVE_UFRAME
-        why = f"{NO_TARGET}: it stays where it is"
+        why = no_target("it stays where it is")
         return FoundGoal(meaning, (0.0,) * WIDTH, name=name, why=why)
 
     def _home(self, operand: said.DataObject) -> FoundGoal:
@@ -359,7 +390,7 @@ class _Goal:
         behind = isinstance(first, said.DataObject) and self._is_point(first)
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, said.DataObject):
-            return _left(RUN_TIME)
+            return _left(AT_RUN_TIME)
         base = self._point(point)
         frames = FrameReader(self.task, self.row, self.here, _NO, _NO)
         shift = frames.frame(other)
@@ -367,7 +398,7 @@ class _Goal:
             pins = base.pins or f"{base.name} is shifted by what {RUN_TIME}"
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
-                name=base.name, why=base.why or RUN_TIME, pins=pins,
+                name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
             )  # fmt: skip
         if behind and self._by_joints:
             pins = base.pins or f"{base.name} is shifted without S and T"
@@ -434,9 +465,9 @@ class _Goal:
         if not isinstance(operand, said.KrlAggregate) or not isinstance(
             found, KrlRecord
         ):
-            return _left(RUN_TIME)
+            return _left(AT_RUN_TIME)
         if not found.whole:
-            return _left(RUN_TIME)
+            return _left(AT_RUN_TIME)
         names = {key for key, _ in found.fields}
         values = {name: found.number(name) for name in names - {"s", "t"}}
         if self._by_joints and names <= {*AXES, *OUTSIDE}:
@@ -445,7 +476,7 @@ class _Goal:
         place = tuple(values.get(name, 0.0) for name in PLACE[:3])
         turned = any(values.get(name, 0.0) for name in PLACE[3:])
         if self._by_joints or turned or self.move.via is not None:
-            return _left(f"{NO_TARGET}: a step that is not followed")
+            return _left(no_target("a step that is not followed"))
         tool = "#tool" in self.move.words
         meaning = Meaning.RELATIVE_TOOL if tool else Meaning.RELATIVE_UFRAME
         return self._stepped(meaning, (*place, *(0.0,) * 5), values)
@@ -454,15 +485,15 @@ class _Goal:
         self, meaning: Meaning, values: tuple[float, ...], given: dict[str, float]
     ) -> FoundGoal:
         if any(given.get(name, 0.0) for name in OUTSIDE):
-            return _left(f"{NO_TARGET}: it moves an external axis")
-        why = f"{NO_TARGET}: it goes on from where the arm is"
+            return _left(no_target("it moves an external axis"))
+        why = no_target("it goes on from where the arm is")
         return FoundGoal(meaning, values, why=why)
 
 
-_NO = KrlFrame((), RUN_TIME)
+_NO = no_frame(RUN_TIME)
 
 
-def _left(why: str, name: str = "") -> FoundGoal:
+def _left(why: Reason, name: str = "") -> FoundGoal:
     """Return a destination that nobody knows."""
     return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
 

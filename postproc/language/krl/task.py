@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from postproc.diagnostics import Code
 from postproc.language.flow import HeadedRows
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMMENTS
@@ -178,15 +179,18 @@ class KrlTask:
         """Return data by their index: the file, the routine and the name of them."""
         return self._own.get(place, {})
 
-    def untold(self, name: str, here: Scope) -> str:
-        """Say why a name stands for no known value."""
+    def untold(self, name: str, here: Scope) -> tuple[Code, str]:
+        """Say why a name stands for no known value; the text goes behind the name."""
+        code = Code.RUNTIME_VALUE
         if name in here.parameters:
-            return "is a parameter: what is given for it is not followed"
+            return code, "is a parameter: what is given for it is not followed"
         if self.place(name, here) is None:
-            return "is declared in no file at hand, or in several of them"
+            text = "is declared in no file at hand, or in several of them"
+            return Code.UNDECLARED_VARIABLE, text
         if name in self.written:
-            return "may be changed by the program: it is known only when that runs"
-        return "has no value that is known before the program runs"
+            text = "may be changed by the program: it is known only when that runs"
+            return code, text
+        return Code.NO_VALUE, "has no value that is known before the program runs"
 
     @cached_property
     def written(self) -> frozenset[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.language.interface import Record
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.disturbances import DISTURBING
@@ -94,12 +94,15 @@ def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> No
     machine.enter(context, place)
     why = f"{name}, which is not followed, runs this move"
     nothing = Nothing(why)
+    reason = Reason(Code.NEVER_REACHED, why)
     for row in range(body.first + 1, body.last):
         statement = program.statement(row)
         if isinstance(statement, ast.Move):
             store = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
             store.set(**dict.fromkeys(FRAMES, nothing))
-            at = Execution(here.world, place, row, store, here.volatile, context, why)
+            at = Execution(
+                here.world, place, row, store, here.volatile, context, reason
+            )
             move(machine, at, statement)
 
 
@@ -228,7 +231,8 @@ def opaque_call(
         case RoutineEffect.TRACKS:
             _track(here, name, arguments)
         case RoutineEffect.KNOWN:
-            _say(here, Code.ASSUMED_STILL, name, "is not in the files at hand: it is "
+            _say(here, Code.ROUTINE_ASSUMED_MOTIONLESS, name,
+                 "is not in the files at hand: it is "
                  "on the list of routines known neither to move the arm nor to set "
                  "frames (docs/routines.md); if it does, say so under [routines] "
                  "in the cell file, or set assume_motion")  # fmt: skip
@@ -333,7 +337,7 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
     if isinstance(held, Position):
         held = owned(here, statement.target.name, target.key, held)
     if isinstance(held, Nothing) and target.component == ():
-        here.store.forget(target.key, held.why)
+        here.store.forget(target.key, Nothing(held.why, code=held.code))
     else:
         here.store.write(target.key, held)
 
@@ -437,8 +441,9 @@ def _new_value(
     match target.component:
         case ("pos", _):
             if not isinstance(value, Position):
-                why = value.why if isinstance(value, Nothing) else "it is no position"
-                return Nothing(why)
+                if isinstance(value, Nothing):
+                    return Nothing(value.why, code=value.code)
+                return Nothing("it is no position")
             return replace(value, aux=held.aux, taught=value.taught or held.taught)
         case ("aux", axis):
             return held.with_aux(axis, number)
@@ -451,5 +456,5 @@ def _blank(here: Execution, name: str, held: Value) -> Position:
     """Return a position of which nothing is known yet."""
     type_ = here.world.type_of(here.place, name)
     joints = type_ is not None and type_.name == "jointpos"
-    never = isinstance(held, Nothing) and held.why.startswith("it has no value")
+    never = isinstance(held, Nothing) and held.code is Code.NO_VALUE
     return Position(joints, aux=() if never else None)

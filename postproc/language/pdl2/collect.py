@@ -21,6 +21,7 @@ from postproc.arrays import (
     slim,
     spans,
 )
+from postproc.diagnostics import Code, Reason
 from postproc.language.names import NameColumn
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
@@ -258,10 +259,14 @@ def _visits_of(wanted: Ints, slots: Indices, literal: Indices) -> dict[int, int]
 MOST_AXES = 12  # auxiliary axes that are told
 
 
-TORN = "a number of the target belongs to another target too"
-APART = (
+TOO_COMPLEX = Reason(Code.TOO_COMPLEX, "the program is too complex to be followed")
+TORN = Reason(
+    Code.NUMBERS_NOT_OWN, "a number of the target belongs to another target too"
+)
+APART = Reason(
+    Code.NUMBERS_NOT_OWN,
     "some of its numbers stand in the program, others in another file: write them in "
-    "one"
+    "one",
 )
 
 
@@ -328,8 +333,7 @@ def _collected(
     collector = Collector(machine, columns, settings)
     collector.fill(zip(offsets.tolist(), runs, strict=False))
     if machine.exhausted:
-        why = "the program is too complex to be followed"
-        columns.reason[:] = collector.reasons[why]
+        columns.reason[:] = collector.reasons[TOO_COMPLEX]
     collector.names.settle()
     return collector
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Indices, Interned, Ints, chunks, is_one_value, slim, spans
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.marks import MEASURE
 from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
@@ -58,7 +59,7 @@ class SettingColumns:
     def __init__(self) -> None:
         self._kept: list[Settings] = []
         self._rows = Interned[int]()
-        self._problems: list[tuple[str, str]] = []
+        self._problems: list[tuple[Reason, Reason]] = []
         self._frames = Interned[tuple[tuple[float, ...], bool]]()
         self._loads = Interned([stated_load({})])
         self._table: dict[str, list[Any]] = {}
@@ -83,8 +84,8 @@ class SettingColumns:
         """Return the state of the settings of a row."""
         return self._kept[row]
 
-    def problem(self, row: int, target: Meaning) -> str:
-        """Return why a visit cannot be compensated under these settings, or ""."""
+    def problem(self, row: int, target: Meaning) -> Reason:
+        """Return why a visit cannot be compensated under these settings."""
         pose, joints = self._problems[row]
         return joints if target in _WITHOUT_UFRAME else pose
 
@@ -174,36 +175,49 @@ def _override(settings: Settings) -> float:
     return product
 
 
-def _unknown(settings: Settings, names: tuple[str, ...]) -> str:
-    """Say which of some settings are not known, and why, "" where all are."""
+def _unknown(settings: Settings, names: tuple[str, ...]) -> Reason:
+    """Say which of some settings are not known, and why."""
     alike: dict[str, list[str]] = {}
+    missing = False
     for name in names:
-        if why := _why_not_known(settings, name):
-            alike.setdefault(why, []).append(f"${name.upper()}")
-    return "; ".join(
+        if unknown := _why_not_known(settings, name):
+            alike.setdefault(unknown.why, []).append(f"${name.upper()}")
+            missing |= unknown.code is Code.NO_VALUE
+    if not alike:
+        return NO_REASON
+    text = "; ".join(
         f"{', '.join(some)} {'is' if len(some) == 1 else 'are'} not known here: {why}"
         for why, some in alike.items()
     )
+    return Reason(Code.NO_VALUE if missing else Code.FRAME_UNKNOWN, text)
 
 
-def _why_not_known(settings: Settings, name: str) -> str:
-    """Say why a setting is not known, "" where it is."""
+def _why_not_known(settings: Settings, name: str) -> Nothing | None:
+    """Say why a setting is not known, None where it is."""
     value = settings.get(name)
     if isinstance(value, Nothing):
-        return value.why
+        return value
     if name not in _FRAMES or (
         isinstance(value, Position) and value.complete and not value.joints
     ):
-        return ""
+        return None
     partly = isinstance(value, Position) and not value.joints
-    return "a part of it is not known" if partly else "it is no known position"
+    return Nothing("a part of it is not known" if partly else "it is no known position")
 
 
 # Columns of visits: those of all moves of a program in a few array passes.
 
 _COMPUTED = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)  # may move along with a literal
 MOST_CODES = 2**62  # combinations of columns that an integer tells apart
-_UNREAD = "a number of the target cannot be read"
+_UNREAD = Reason(Code.UNREADABLE_NUMBER, "a number of the target cannot be read")
+
+
+_RECURSIVE = Reason(
+    Code.RECURSION, "it stands in a routine that calls itself, which is not followed"
+)
+_AXES_UNKNOWN = Reason(
+    Code.EXTERNAL_AXES, "its auxiliary axes are not known before the program runs"
+)
 
 
 class VisitColumns:
@@ -309,7 +323,7 @@ class Collector:
     settings: SettingColumns
     configs: Interned[str] = field(default_factory=lambda: Interned([""]))
     names: NameColumn = field(default_factory=lambda: NameColumn([""]))
-    reasons: Interned[str] = field(default_factory=lambda: Interned([""]))
+    reasons: Interned[Reason] = field(default_factory=lambda: Interned([NO_REASON]))
 
     def fill(self, runs: Iterable[tuple[int, MoveRun]]) -> None:
         """Fill the visits of all runs; each is given with the first of its visits."""
@@ -479,45 +493,47 @@ class Collector:
     def _reasons(self, moves: ProgramMoves) -> None:
         """Say why moves must not be compensated: many moves, few combinations."""
         c, runs = self.columns, [run for _, run in moves.runs]
-        whole = Interned[str]()
+        whole = Interned[Reason]()
         kinds: list[Indices]
         kinds = [moves.first, whole.of([self._reason(run) for run in runs])[moves.run]]
         kinds += [moves.form, c.setting[moves.visit], c.target[moves.visit], moves.last]
         which, example = _alike(kinds)
-        texts, of_runs = [*self.reasons], [*whole]
+        firsts, of_runs = [*self.reasons], [*whole]
         reasons = []
         for first, run, form, setting, target, last in zip(
             *(kind[example].tolist() for kind in kinds), strict=True
         ):
-            reason = texts[first] or of_runs[run] or moves.forms[form].reason
+            reason = firsts[first] or of_runs[run] or moves.forms[form].reason
             problem = self.settings.problem(setting, Meaning(target))
-            why = reason or problem or texts[last] or self.machine.handler
+            why = reason or problem or firsts[last] or self.machine.handler
             reasons.append(self.reasons[why])
         c.reason[moves.visit] = np.array(reasons, dtype=np.int64)[which]
 
-    def _reason(self, run: MoveRun) -> str:
-        """Return why no move of a run can be compensated, "" where it can."""
+    def _reason(self, run: MoveRun) -> Reason:
+        """Return why no move of a run can be compensated."""
         if run.reason or id(run.place.body) not in self.machine.recursive:
             return run.reason
-        return "it stands in a routine that calls itself, which is not followed"
+        return _RECURSIVE
 
-    def aux_problem(self, axes: tuple[int, ...] | None) -> str:
+    def aux_problem(self, axes: tuple[int, ...] | None) -> Reason:
         """Return why a target with some auxiliary axes stays, None: not known which."""
         kinds = self.machine.world.start.aux
         if axes is None:
             if kinds and all(kind == "gun" for kind in kinds.values()):
-                return ""
-            return "its auxiliary axes are not known before the program runs"
+                return NO_REASON
+            return _AXES_UNKNOWN
         for axis in axes:
             kind = kinds.get(axis)
             if kind is None:
-                return (
+                text = (
                     f"auxiliary axis {axis} is not declared: say under [aux] in the "
                     "cell file whether it is a gun, a track or a positioner"
                 )
+                return Reason(Code.EXTERNAL_AXES, text)
             if kind != "gun":
-                return f"auxiliary axis {axis} is a {kind}: it moves arm or part"
-        return ""
+                text = f"auxiliary axis {axis} is a {kind}: it moves arm or part"
+                return Reason(Code.EXTERNAL_AXES, text)
+        return NO_REASON
 
     def is_listed(self, name: str) -> bool:
         """Tell whether the cell file says that a point was taught."""

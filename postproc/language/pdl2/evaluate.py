@@ -422,14 +422,15 @@ def invalidate_key(here: ProgramPoint, key: str, why: str) -> None:
     """Forget what a key and its parts hold: any of it may still be there."""
     if key in here.store.compound or here.world.first_parts(key):
         here.world.loosen(key, why)
-    here.store.forget(key, why)
+    here.store.forget(key, Nothing(why))
 
 
 def fill(
     here: ProgramPoint, key: str, name: str, origin: str, parts: dict[str, Value]
 ) -> None:
     """Let a key hold parts, and nothing else."""
-    here.store.forget(key, f"{origin}, of which it is a copy, has no value for it")
+    why = f"{origin}, of which it is a copy, has no value for it"
+    here.store.forget(key, Nothing(why))
     for suffix, value in parts.items():
         if isinstance(value, Position):
             value = owned(here, name, key + suffix, value)

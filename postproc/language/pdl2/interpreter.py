@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.language.interface import Start
 from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
@@ -332,7 +332,8 @@ def _unknown(machine: Machine, here: Execution, statement: ast.Unknown) -> None:
     invalidate_names(here, words_in(statement.text), why)
     arrived = frozenset[int]()
     if _MOVES.match(statement.text):
-        goal = Goal(Meaning.UNKNOWN, reason="the move statement is not understood")
+        reason = Reason(Code.UNKNOWN_STATEMENT, "the move statement is not understood")
+        goal = Goal(Meaning.UNKNOWN, reason=reason)
         form, come = MoveForm(Motion.JOINT), machine.predecessors(here)
         arrival = single(here, form, come, here.store.settings, goal)
         arrived = frozenset({machine.record(here, 1, arrival)})
@@ -370,7 +371,7 @@ def run_broken(machine: Machine, here: Execution) -> None:
     body = here.place.body
     program = here.place.program
     why = f"the block structure is broken (line {body.blocks.broken})"
-    here.reason = why
+    here.reason = Reason(Code.BLOCK_STRUCTURE, why)
     for row in range(body.first + 1, body.last):
         said = ast.action(program.statement(row))
         if isinstance(said, ast.Move):
@@ -523,7 +524,10 @@ def _enter(world: World, file: ValueFile, entry: Entry, key: str, arm: int) -> N
     """Enter a value that is no known point, where there is any, or another arm's."""
     value: Value | None = entry.numbers[0] if entry.numbers else None
     if entry.kind in POSITIONS:
-        value = Nothing(f"its value is not initialised in {file.source.name}")
+        value = Nothing(
+            f"its value is not initialised in {file.source.name}",
+            code=Code.LSV_UNINITIALISED,
+        )
     if entry.kind == "VEC":
         x, y, z = entry.numbers[:3]
         value = Vector((x, y, z))
@@ -691,7 +695,8 @@ def _cancelling_handler(
 def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> None:
     line = int(place.program.lines.line[row])
     machine.interrupted = True
-    machine.handler = f"a condition handler (line {line}) may move the arm at any time"
+    text = f"a condition handler (line {line}) may move the arm at any time"
+    machine.handler = Reason(Code.HANDLER_MOVES, text)
     machine.world.report_once(
         place.program,
         row,

@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from postproc.arrays import Ints
-from postproc.diagnostics import Code
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.context import CALLED, Context, Point
 from postproc.language.pdl2.effects import PURE, circles, invocations, references
@@ -37,14 +37,14 @@ class Goal:
         numbers: Six numbers, None where not known.
         position: The position value where there is one.
         distance: For NEAR and FOR [mm].
-        reason: Why it cannot be compensated, "" where it can.
+        reason: Why it cannot be compensated.
     """
 
     target: Meaning
     numbers: Numbers = _NO_NUMBERS
     position: Position | None = None
     distance: float | None = None
-    reason: str = ""
+    reason: Reason = NO_REASON
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +53,7 @@ class MoveForm:
 
     Attributes:
         motion: Trajectory.
-        reason: Why that is not known, or why none can be compensated, "" where they
-            can.
+        reason: Why that is not known, or why none can be compensated.
         fly: MOVEFLY.
         via: The VIA point of an arc.
         slots: Number slots of the six numbers that stand in the move, () where it goes
@@ -65,7 +64,7 @@ class MoveForm:
     """
 
     motion: Motion
-    reason: str = ""
+    reason: Reason = NO_REASON
     fly: bool = False
     via: bool = False
     slots: tuple[int, ...] = ()
@@ -91,7 +90,7 @@ class MoveRun:
         point: Row of the variable file that each goes to, (k,); WRITTEN where the
             numbers stand in the move, HELD where its goal was evaluated.
         goals: These, by the index of the move.
-        reason: Why none of them can be compensated, "" where they can.
+        reason: Why none of them can be compensated.
     """
 
     place: Place
@@ -102,7 +101,7 @@ class MoveRun:
     settings: Settings
     point: Ints
     goals: Mapping[int, Goal]
-    reason: str = ""
+    reason: Reason = NO_REASON
 
     def __len__(self) -> int:
         """Return the number of visits."""
@@ -149,7 +148,7 @@ class Execution(ProgramPoint):
     """A point of the execution with the way that led to it."""
 
     context: Context = field(default_factory=Context)
-    reason: str = ""  # why nothing here may be compensated
+    reason: Reason = NO_REASON  # why nothing here may be compensated
 
 
 @dataclass
@@ -167,8 +166,7 @@ class Machine:
         widened: Loops that are not unrolled.
         recursive: Bodies (by id) that call themselves, directly or not.
         interrupted: A condition handler may move the arm at any time.
-        handler: Why no move can be compensated that a handler may interrupt, "" where
-            none moves the arm.
+        handler: Why no move can be compensated that a handler may interrupt.
         cycle_left: A condition handler may begin the cycle again at any time.
         exhausted: The program is too complex to be followed to the end.
     """
@@ -186,7 +184,7 @@ class Machine:
     volatile: frozenset[str] = frozenset()
     recursive: set[int] = field(default_factory=set)
     interrupted: bool = False
-    handler: str = ""
+    handler: Reason = NO_REASON
     cycle_left: bool = False
     exhausted: bool = False
     rows: int = 0

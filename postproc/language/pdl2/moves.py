@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from postproc.diagnostics import Code
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.effects import goes_to_target, references
 from postproc.language.pdl2.evaluate import SINGLE, parts_under
@@ -18,7 +18,7 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.store import Settings
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector, unsure
-from postproc.language.visits import ELSEWHERE, NO_TARGET, Meaning
+from postproc.language.visits import ELSEWHERE, Meaning
 from postproc.robot.trajectory import Motion
 
 # Nodes of paths as destinations: where the one position of a node stands.
@@ -124,8 +124,8 @@ def goal_of(here: Execution, statement: ast.Move, motion: Motion) -> Goal:
     return Goal(Meaning.UNKNOWN, reason=_why(statement.how))
 
 
-def _why(word: str) -> str:
-    return f"{NO_TARGET} ({word})"
+def _why(word: str) -> Reason:
+    return Reason(Code.NO_TARGET, f"the move holds no target of its own ({word})")
 
 
 def _no_target(target: Meaning, numbers: tuple[float | None, ...], word: str) -> Goal:
@@ -172,7 +172,7 @@ def _along(here: Execution, path: ast.Expression) -> Goal:
         f"the nodes of a path are not followed (MOVE ALONG {name}): the next move is "
         "taken to come from an unknown place"
     )
-    return Goal(Meaning.UNKNOWN, reason=reason)
+    return Goal(Meaning.UNKNOWN, reason=Reason(Code.POSITION_UNKNOWN, reason))
 
 
 def absolute(here: Execution, expression: ast.Expression) -> Goal:
@@ -223,21 +223,34 @@ def _check_declared(here: Execution, name: str) -> None:
 def from_value(value: Value, system: bool = False) -> Goal:
     """Tell what a move to a value means; `system`: to that of a system variable."""
     if isinstance(value, Nothing):
-        return Goal(Meaning.UNKNOWN, reason=f"the target is not known: {value.why}")
+        reason = Reason(value.code, f"the target is not known: {value.why}")
+        return Goal(Meaning.UNKNOWN, reason=reason)
     if not isinstance(value, Position):
-        return Goal(Meaning.UNKNOWN, reason="the target is no position")
+        return Goal(Meaning.UNKNOWN, reason=NO_POSITION)
     if not value.complete:
-        reason = "the target is known only in part before the program runs"
-        return Goal(Meaning.UNKNOWN, position=value, reason=reason)
-    reason = value.derived
-    if reason:
-        reason = f"the target is computed: {reason}"
-    elif system:
-        reason = "the target is a system variable"
-    elif not value.editable:
-        reason = "a number of the target is computed, not written"
+        return Goal(Meaning.UNKNOWN, position=value, reason=IN_PART)
     target = Meaning.JOINTS if value.joints else Meaning.POSE
-    return Goal(target, value.numbers, value, reason=reason)
+    return Goal(target, value.numbers, value, reason=_computed(value, system))
+
+
+NO_POSITION = Reason(Code.RUNTIME_VALUE, "the target is no position")
+IN_PART = Reason(
+    Code.RUNTIME_VALUE, "the target is known only in part before the program runs"
+)
+SYSTEM = Reason(Code.COMPUTED_TARGET, "the target is a system variable")
+COMPUTED = Reason(
+    Code.COMPUTED_TARGET, "a number of the target is computed, not written"
+)
+
+
+def _computed(value: Position, system: bool) -> Reason:
+    """Say why the numbers of a known position cannot be written."""
+    if value.derived:
+        text = f"the target is computed: {value.derived}"
+        return Reason(Code.COMPUTED_TARGET, text)
+    if system:
+        return SYSTEM
+    return NO_REASON if value.editable else COMPUTED
 
 
 # What one move statement means at a point of the execution.
@@ -267,7 +280,8 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
     if whose is None:
         named = statement.arm is not None
         unsure = "the arm that moves (ARM[..]) is known only at run time"
-        reason = unsure if named else here.other_default()
+        text = unsure if named else here.other_default()
+        reason = Reason(Code.OTHER_ARM, text)
     reason = here.reason or reason
     predecessors = machine.predecessors(here)
     several = len(predecessors) > 1
@@ -289,13 +303,18 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
         store.last |= predecessors if statement.til is None else {ELSEWHERE}
 
 
+ALONG_WITH = Reason(
+    Code.COORDINATED_ARMS, "it runs along with another arm's move (SYNCMOVE)"
+)
+
+
 def _beside(machine: Machine, here: Execution, statement: ast.Move) -> None:
     """Let the moves of SYNCMOVE clauses happen: ours runs along with another arm's."""
     for along in statement.sync:
         ours = along.arm is not None and here.is_ours(along.arm) is not False
         if ours and here.is_ours(statement.arm) is False:
             reason = here.reason
-            here.reason = reason or "it runs along with another arm's move (SYNCMOVE)"
+            here.reason = reason or ALONG_WITH
             move(machine, here, along)
             here.reason = reason
         else:
@@ -337,7 +356,7 @@ def _with(here: Execution, statement: ast.Move) -> Settings:
 
 def motion_of(
     here: Execution, statement: ast.Move, settings: Settings
-) -> tuple[Motion, str]:
+) -> tuple[Motion, Reason]:
     """Return the trajectory of a move, and why it is not known or not followed."""
     said: Value | None = statement.trajectory.lower() or settings.get("move_type")
     with_ = any(r.name == "$move_type" for r, _ in statement.settings)
@@ -351,11 +370,15 @@ def motion_of(
             "move_type",
             "the move names no trajectory and $MOVE_TYPE is not set: taken as JOINT",
         )
-        return Motion.JOINT, ""
+        return Motion.JOINT, NO_REASON
     motion = _MOTIONS.get(said) if isinstance(said, str) else None
     if motion is None:
         what = said.upper() if isinstance(said, str) else "its trajectory ($MOVE_TYPE)"
-        return Motion.JOINT, f"{what} is not followed or known only at run time"
+        text = f"{what} is not followed or known only at run time"
+        return Motion.JOINT, Reason(Code.TRAJECTORY_UNKNOWN, text)
     if motion is Motion.CIRCULAR and statement.via is None:
-        return motion, "the arc has no VIA point in this statement"
-    return motion, ""
+        return motion, NO_VIA
+    return motion, NO_REASON
+
+
+NO_VIA = Reason(Code.ARC_UNDETERMINED, "the arc has no VIA point in this statement")

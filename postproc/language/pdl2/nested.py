@@ -288,7 +288,7 @@ def find_fields(
         if count[names[at]] > 1:
             text = "has two entries: it is not compensated; delete one"
             findings.append(
-                (end, _finding(lines, said, row, row, Code.LSV_TWICE, text))
+                (end, _finding(lines, said, row, row, Code.LSV_DUPLICATE, text))
             )
             unread.add(names[at])
             continue

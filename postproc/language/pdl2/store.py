@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
+from postproc.diagnostics import Code
 from postproc.language.pdl2.values import Nothing, Value, join, unsure
-from postproc.language.visits import NO_VALUE
 
 # A mapping that is cheap to copy and to compare: what copies share stays shared.
 
@@ -80,7 +80,9 @@ Log = tuple[str, "Log | None"]
 MANY = -3  # origin: one of so many visits that they are not told apart
 MOST_ORIGINS = 500
 
-NEVER_SET = Nothing(NO_VALUE)
+NEVER_SET = Nothing(
+    "it has no value in the program or its variable file", code=Code.NO_VALUE
+)
 
 
 @dataclass
@@ -182,11 +184,11 @@ class Store:
             del self.logs[part]
         del self.logs[key]
 
-    def forget(self, key: str, why: str) -> None:
+    def forget(self, key: str, unknown: Nothing) -> None:
         """What a variable and all its elements hold is no longer known."""
         held = self.read(key)
         self._drop_parts(key)
-        self.write(key, unsure(Nothing(why), held))
+        self.write(key, unsure(unknown, held))
 
     def set(self, **settings: Value) -> None:
         """Change frames or motion variables (names without ``$``)."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.diagnostics import Code
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
 # What the analysis knows of a value: a number, a text, a position, or why nothing.
@@ -26,10 +27,12 @@ class Nothing:
     Attributes:
         why: Ends a message.
         of: Numbers (by their index in the job) of positions that it may be.
+        code: What kind of reason that is for a target.
     """
 
     why: str
     of: frozenset[int] = frozenset()
+    code: Code = Code.RUNTIME_VALUE
 
     def __eq__(self, other: object) -> bool:
         """Unknown is unknown, whatever the reason."""

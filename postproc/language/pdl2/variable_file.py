@@ -153,7 +153,9 @@ def _named_twice(
 ) -> Iterator[Finding]:
     for row in twice:
         text = f"{entries.name[row]} has two entries: it is not compensated; delete one"
-        found = Diagnostic(source.name, int(entries.line[row]), Code.LSV_TWICE, text)
+        found = Diagnostic(
+            source.name, int(entries.line[row]), Code.LSV_DUPLICATE, text
+        )
         yield int(records.closed[row]), found
 
 

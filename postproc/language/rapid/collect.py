@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import collect
 from postproc.language.collect import Conditions, Pose, cell_pose, composed
 from postproc.language.rapid.dialect import COMMENTS, RAPID_DIALECT
@@ -19,12 +20,15 @@ from postproc.language.visits import Meaning, Visits
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
-_GRIP = "what the arm carries is not known here (GripLoad)"
-_PART_ALONE = (
+_GRIP = Reason(Code.LOAD_UNKNOWN, "what the arm carries is not known here (GripLoad)")
+_PART_ALONE = Reason(
+    Code.LOAD_UNKNOWN,
     "GripLoad states a part, and the tool states no mass of its own: what the arm "
-    "carries in all is not known. State the mass in tooldata"
+    "carries in all is not known. State the mass in tooldata",
 )
-_SHIFT = "the program displacement (PDispOn, PDispSet) is not known here"
+_SHIFT = Reason(
+    Code.FRAME_UNKNOWN, "the program displacement (PDispOn, PDispSet) is not known here"
+)
 
 
 def visits_of(machine: RapidMachine) -> Visits:
@@ -88,19 +92,20 @@ def _displaced(wobj: FrameOfMove, shift: tuple[float, ...]) -> Pose:
     return composed(wobj.pose, pose_of_numbers(shift))
 
 
-def _unweighed(v: RapidVisit) -> str:
-    """Say why it is not known what the arm carries, "" where it is."""
+def _unweighed(v: RapidVisit) -> Reason:
+    """Say why it is not known what the arm carries."""
     if v.total:
-        return ""
+        return NO_REASON
     if not v.modes.grip:
         return _GRIP
-    return _PART_ALONE if v.modes.grip[0] and not v.tool.load else ""
+    alone = v.modes.grip[0] and not v.tool.load
+    return _PART_ALONE if alone else NO_REASON
 
 
-def _reasons(v: RapidVisit) -> tuple[str, ...]:
+def _reasons(v: RapidVisit) -> tuple[Reason, ...]:
     """Say why a visit cannot be compensated."""
     given = (*sorted(v.modes.blocked), v.why, v.goal.why, v.tool.why)
     if v.goal.target == Meaning.JOINTS:
         return (*given, _unweighed(v))
-    unknown = v.modes.shift == UNKNOWN_SHIFT
-    return (*given, v.wobj.why, _SHIFT if unknown else "", _unweighed(v))
+    shift = _SHIFT if v.modes.shift == UNKNOWN_SHIFT else NO_REASON
+    return (*given, v.wobj.why, shift, _unweighed(v))

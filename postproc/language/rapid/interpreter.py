@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeGuard
 
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.language.collect import FoundGoal
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
@@ -650,8 +650,14 @@ class RapidMachine(TaskMachine):
 
 
 _LEFT = "may move the arm, or change how it moves, in a way that is not followed"
-_TRAP = "a TRAP of the task may move the arm, or change its settings, at any time"
-_HANDLER = "the error handler of its routine may move the arm, or change its settings"
+_TRAP = Reason(
+    Code.BESIDE_PROGRAM,
+    "a TRAP of the task may move the arm, or change its settings, at any time",
+)
+_HANDLER = Reason(
+    Code.BESIDE_PROGRAM,
+    "the error handler of its routine may move the arm, or change its settings",
+)
 
 
 def _is_text(operand: said.Operand | None) -> TypeGuard[said.StringLiteral]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from postproc.diagnostics import Code, Reason
 from postproc.language.rapid import syntax as said
 from postproc.language.visits import OrientationLaw, Switch
 
@@ -41,7 +42,7 @@ class Modes:
     wrist: bool = False
     override: float = 1.0
     grip: tuple[float, ...] = EMPTY_HAND
-    blocked: frozenset[str] = frozenset()
+    blocked: frozenset[Reason] = frozenset()
     pending: frozenset[tuple[str, Any]] = frozenset()
 
     def joined(self, other: Modes) -> Modes:
@@ -114,15 +115,26 @@ ANYTHING: frozenset[tuple[str, Any]] = frozenset(
 
 OTHERWISE = replace(LOST, wrist=True)  # differs from `AT_START` in every mode
 
-OFFSET = "external axes are offset (EOffsOn, EOffsSet)"
+OFFSET = Reason(Code.AXIS_OFFSET, "external axes are offset (EOffsOn, EOffsSet)")
 # Instructions that let the arm go elsewhere than targets say, and those that end it.
 BLOCKING = {
-    "softact": ("softdeact", "an axis is soft (SoftAct)"),
-    "corrcon": ("corrdiscon corrclear", "a sensor may correct the path (CorrCon)"),
-    "syncmoveon": ("syncmoveoff", "it moves together with another arm (SyncMoveOn)"),
+    "softact": ("softdeact", Reason(Code.SOFT_AXIS, "an axis is soft (SoftAct)")),
+    "corrcon": (
+        "corrdiscon corrclear",
+        Reason(Code.SENSOR_GUIDED, "a sensor may correct the path (CorrCon)"),
+    ),
+    "syncmoveon": (
+        "syncmoveoff",
+        Reason(
+            Code.COORDINATED_ARMS, "it moves together with another arm (SyncMoveOn)"
+        ),
+    ),
     "eoffson": ("eoffsoff", OFFSET),
     "eoffsset": ("eoffsoff", OFFSET),
-    "waitwobj": ("dropwobj", "the work object is on a conveyor (WaitWObj)"),
+    "waitwobj": (
+        "dropwobj",
+        Reason(Code.CONVEYOR, "the work object is on a conveyor (WaitWObj)"),
+    ),
 }
 _ENDING = {name: why for ends, why in BLOCKING.values() for name in ends.split()}
 ONE_OF_MANY = frozenset(["corrcon", "corrdiscon", "waitwobj", "dropwobj"])
@@ -183,28 +195,41 @@ def changed_modes(
             return replace(modes, grip=load(placed[0] if placed else None))
     which = _which(name, placed)
     if name in BLOCKING:
-        return replace(modes, blocked=modes.blocked | {BLOCKING[name][1] + which})
+        begun = _about(BLOCKING[name][1], which)
+        return replace(modes, blocked=modes.blocked | {begun})
     if name in _ENDING:
-        ended = _ENDING[name] + which
-        kept = {why for why in modes.blocked if not _ends(name, ended, why)}
+        kept = {why for why in modes.blocked if not _ends(name, which, why)}
         return replace(modes, blocked=frozenset(kept))
     return modes if name in HARMLESS else replace(LOST, blocked=modes.blocked)
 
 
 def _which(name: str, placed: Sequence[said.Operand | None]) -> str:
-    """Say which of several couplings an instruction begins or ends, "" for all."""
+    """Say which of several couplings an instruction begins or ends, "" for all.
+
+    That is ``?`` where it is not known.
+    """
     if name not in ONE_OF_MANY:
         return ""
     one = placed[0] if placed else None
     plain = isinstance(one, said.DataObject) and not one.steps
-    return f": {one.name}" if plain and isinstance(one, said.DataObject) else ": ?"
+    return one.name if plain and isinstance(one, said.DataObject) else _ANY
 
 
-def _ends(name: str, ended: str, why: str) -> bool:
+_ANY = "?"
+
+
+def _about(reason: Reason, which: str) -> Reason:
+    """Say of a reason which of several couplings it is about."""
+    if not which:
+        return reason
+    return replace(reason, text=f"{reason.text}: {which}", about=which)
+
+
+def _ends(name: str, which: str, why: Reason) -> bool:
     """Return True if an instruction ends what leaves targets."""
-    if name in ONE_OF_MANY:
-        return why == ended and not why.endswith("?")
-    return why.startswith(ended)
+    if why.code is not _ENDING[name].code:
+        return False
+    return name not in ONE_OF_MANY or why.about == which != _ANY
 
 
 def given_modes(

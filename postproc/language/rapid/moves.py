@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.collect import (
     IDENTITY,
     FoundGoal,
@@ -53,11 +54,12 @@ Z0 = 0.3  # [mm]
 PLACEHOLDER = 0.01  # [kg] masses up to here, as of tool0, state nothing
 UNKNOWN_ZONE = -1.0
 RUN_TIME = "it is known only when the program runs"
+AT_RUN_TIME = Reason(Code.RUNTIME_VALUE, RUN_TIME)
 # Options whose moves are left.
 _LEFT_BY = {
-    "id": "it moves together with another arm (\\ID)",
-    "corr": "a sensor may correct the path (\\Corr)",
-    "track": "a sensor may correct the path (\\Track)",
+    "id": Reason(Code.COORDINATED_ARMS, "it moves together with another arm (\\ID)"),
+    "corr": Reason(Code.SENSOR_GUIDED, "a sensor may correct the path (\\Corr)"),
+    "track": Reason(Code.SENSOR_GUIDED, "a sensor may correct the path (\\Track)"),
 }
 AT_A_STOP = (
     "spotl",
@@ -67,6 +69,17 @@ AT_A_STOP = (
     "calibl",
     "calibj",
 )  # they weld standing still
+_LOAD_UNKNOWN = Reason(Code.LOAD_UNKNOWN, "the load that \\TLoad names is not known")
+_COMPUTED = Reason(Code.COMPUTED_TARGET, "it is computed from other data")
+_NO_QUATERNION = Reason(Code.UNREADABLE_NUMBER, "no quaternion")
+_NO_TOOL = Reason(Code.FRAME_UNKNOWN, "its tool is declared in no file at hand")
+_SEARCH = Reason(Code.ENDS_ELSEWHERE, "where a search ends is not known before")
+_STAYS = Reason(
+    Code.ENDS_ELSEWHERE, "only external axes move: the arm stays where it is"
+)
+_CARRIED = Reason(
+    Code.CONVEYOR, "its work object is moved by a mechanical unit (ufmec, ufprog)"
+)
 _SYSTEM = "it stands in a system module, which is read and not rewritten"
 
 
@@ -78,7 +91,7 @@ class FrameOfMove:
         pose: Where it is, the rows of (4, 4) [m] one after the other; empty where that
             is not known.
         held: Robhold: the arm holds it.
-        why: Why targets with it cannot be compensated, "" where they can.
+        why: Why targets with it cannot be compensated.
         taught: It was taught with the arm, and contains its error.
         load: Of a tool: mass [kg] and its centre in the flange frame [mm]; empty where
             the numbers are a placeholder, or not known.
@@ -86,7 +99,7 @@ class FrameOfMove:
 
     pose: Pose
     held: bool
-    why: str = ""
+    why: Reason = NO_REASON
     taught: bool = False
     load: tuple[float, ...] = ()
 
@@ -133,7 +146,7 @@ class Goals:
         ends = signature.operands(one.arguments)
         tool, wobj, zone, speed = self._conditions(one, ends, row, scope)
         motion = _motion(one.name, signature)
-        why = "" if signature.reaches else _ends_elsewhere(one.name)
+        why = NO_REASON if signature.reaches else _ends_elsewhere(one.name)
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
         total, untold = self._total(one, row, scope)
         why = why or untold
@@ -167,15 +180,15 @@ class Goals:
 
     def _total(
         self, one: said.Instruction, row: int, scope: Scope
-    ) -> tuple[tuple[float, ...], str]:
+    ) -> tuple[tuple[float, ...], Reason]:
         r"""Read ``\TLoad``: all that the arm carries, and why that is not known."""
         given = [argument for argument in one.arguments if argument.name == "tload"]
         if not given:
-            return (), ""
+            return (), NO_REASON
         found = self.load(given[0].value, row, scope)
         if not found or given[0].passed_on:
-            return (), "the load that \\TLoad names is not known"
-        return (() if found == EMPTY_HAND else found), ""
+            return (), _LOAD_UNKNOWN
+        return (() if found == EMPTY_HAND else found), NO_REASON
 
     def _conditions(
         self,
@@ -238,7 +251,7 @@ class Goals:
                 own = operand is written  # not given to a routine, which may read it
                 return shifted if own else _fixed(shifted)
             case _:
-                return FoundGoal(Meaning.UNKNOWN, NOTHING, why=RUN_TIME)
+                return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
 
     def _point(
         self,
@@ -255,14 +268,15 @@ class Goals:
                 return plain
         found = _numbers(self.task.record(operand, row, scope), joints)
         if found is None:
-            why = f"{name} {self._untold(name, scope)}" if name else RUN_TIME
+            why = self._untold(name, scope) if name else AT_RUN_TIME
             return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
         shown = name + self._element(operand, row, scope)
         main, aux = found
         file, slots = self._own_places(main, operand, row, scope)
         values = [number.value for number in main]
         values += [0.0] * (WIDTH - len(values))
-        why = "" if joints or _is_unit(values[3:7]) else "no quaternion"
+        known = joints or _is_unit(values[3:7])
+        why = NO_REASON if known else _NO_QUATERNION
         return FoundGoal(
             Meaning.JOINTS if joints else Meaning.POSE,
             tuple(values),
@@ -270,7 +284,7 @@ class Goals:
             slots,
             name=shown,
             aux=aux,
-            why=why or ("" if file >= 0 else "it is computed from other data"),
+            why=why or (NO_REASON if file >= 0 else _COMPUTED),
             pins=self._pinned(name, scope),
         )
 
@@ -330,18 +344,22 @@ class Goals:
                 spelt.append("{" + ",".join(f"{k:g}" for k in at) + "}")
         return "".join(spelt)
 
-    def _untold(self, name: str, scope: Scope) -> str:
+    def _untold(self, name: str, scope: Scope) -> Reason:
         """Say why a name stands for no known point."""
-        found = self.task.datum(name, scope)
+        found, code = self.task.datum(name, scope), Code.RUNTIME_VALUE
         if found is None:
-            return "is no data of the files at hand, or of several of them"
-        if found[1].declared.value is None:
-            return "has no value in the files at hand"
-        if self.task.is_changed_beside(*found):
-            return f"may be changed by another task at any time: {RUN_TIME}"
-        if self.task.constant(name, scope) is None:
-            return f"may be changed by the program: {RUN_TIME}"
-        return f"has an element or value that is not known: {RUN_TIME}"
+            code = Code.UNDECLARED_VARIABLE
+            text = "is no data of the files at hand, or of several of them"
+        elif found[1].declared.value is None:
+            code, text = Code.NO_VALUE, "has no value in the files at hand"
+        elif self.task.is_changed_beside(*found):
+            code = Code.BESIDE_PROGRAM
+            text = f"may be changed by another task at any time: {RUN_TIME}"
+        elif self.task.constant(name, scope) is None:
+            text = f"may be changed by the program: {RUN_TIME}"
+        else:
+            text = f"has an element or value that is not known: {RUN_TIME}"
+        return Reason(code, f"{name} {text}")
 
     def _pinned(self, name: str, scope: Scope) -> str:
         """Say why a point must keep its numbers."""
@@ -367,7 +385,7 @@ class Goals:
         placed = [one.value for one in arguments if not one.name]
         turns = {one.name: one.value for one in arguments if one.name}
         if len(placed) != 4:
-            return FoundGoal(Meaning.UNKNOWN, NOTHING, why=RUN_TIME)
+            return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
         base = self.goal(placed[0], POINT, row, scope)
         shift = [self.task.number(one, row, scope) for one in placed[1:]]
         angles = [
@@ -378,7 +396,7 @@ class Goals:
             pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=_from(base),
-                name=base.name, why=base.why or RUN_TIME, pins=pins,
+                name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
             )  # fmt: skip
         values = _moved(np.array(base.values), name, shift, angles)
         turned = any(angles)
@@ -419,7 +437,7 @@ class Goals:
     def _tool(self, arguments: _Arguments) -> FrameOfMove:
         operand = arguments.of_type("tooldata")
         if operand is None:
-            return FrameOfMove((), True, "its tool is declared in no file at hand")
+            return FrameOfMove((), True, _NO_TOOL)
         return self._frame("tool", operand, arguments)
 
     def _wobj(self, arguments: _Arguments) -> FrameOfMove:
@@ -451,7 +469,7 @@ class Goals:
         found = self.task.record(operand, arguments.row, arguments.scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
-            why = f"{name} {self._untold(name, arguments.scope)}"
+            why = self._untold(name, arguments.scope)
             return FrameOfMove((), kind == "tool", why)
         return replace(read, taught=self.task.is_taught(name, found))
 
@@ -581,11 +599,9 @@ class _Arguments:
         return np.nan
 
 
-def _ends_elsewhere(name: str) -> str:
+def _ends_elsewhere(name: str) -> Reason:
     """Say why a move does not end at its target."""
-    if name.startswith("search"):
-        return "where a search ends is not known before"
-    return "only external axes move: the arm stays where it is"
+    return _SEARCH if name.startswith("search") else _STAYS
 
 
 @cache
@@ -716,10 +732,10 @@ def _wobj_of(found: Nested | None) -> FrameOfMove | None:
     user, object_ = _pose_numbers(found[3]), _pose_numbers(found[4])
     if user is None or object_ is None or not isinstance(held, WrittenNumber):
         return None
-    why = ""
+    why = NO_REASON
     if (isinstance(unit, str) and unit.strip('"')) or not (
         isinstance(fixed, WrittenNumber) and fixed.value
     ):
-        why = "its work object is moved by a mechanical unit (ufmec, ufprog)"
+        why = _CARRIED
     pose = composed(pose_of_numbers(user), pose_of_numbers(object_))
     return FrameOfMove(pose, bool(held.value), why)

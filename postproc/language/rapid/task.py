@@ -103,9 +103,8 @@ class RapidTask:
             one = next((part for part in one if isinstance(part, tuple)), one[0])
         if not isinstance(one, WrittenNumber) or one.slot < 0:
             return False
-        text = self.files[one.file].text
-        line = text.source.line_of(int(text.start[one.slot]))
-        return line in self.taught_lines[one.file]
+        text, lines = self.files[one.file].text, self.taught_lines[one.file]
+        return not lines.isdisjoint(text.lines(text.row_of(one.slot)))
 
     def routine(self, name: str, here: Scope) -> tuple[int, str, HeadedRows] | None:
         """Find the routine that a name means, None where it is not sure."""

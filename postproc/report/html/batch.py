@@ -14,9 +14,21 @@ from postproc.report.html.page import render
 SCRIPTS = ("page.js", "figures.js")
 Entry = tuple[str, str, Mapping[str, Any]]  # path, status and facts of a file
 
-PROGRAM = ("done", "left", "failed")  # statuses of programs, the others are of files
-SAID = {"done": "compensated", "left": "targets left alone", "failed": "absent"}
-CLASS = {"done": "safe", "left": "guarded", "failed": "unsafe"}  # of the style sheet
+PROGRAM = (
+    "done",
+    "uncorrected",
+    "failed",
+)  # statuses of programs, the others are of files
+SAID = {
+    "done": "compensated",
+    "uncorrected": "targets not corrected",
+    "failed": "absent",
+}
+CLASS = {
+    "done": "corrected",
+    "uncorrected": "rejected",
+    "failed": "conflict",
+}  # of the style sheet
 
 
 @dataclass(frozen=True)
@@ -59,7 +71,7 @@ class BatchRow:
     def remarks(self) -> list[str]:
         """List why it is absent, what was left alone, and what else was found."""
         error = self.facts.get("error")
-        lists = (self.facts.get("left_alone"), self.facts.get("findings"))
+        lists = (self.facts.get("uncorrected_lines"), self.facts.get("findings"))
         found = [str(line) for part in lists for line in part or ()]
         return [str(error), *found] if error else found
 
@@ -73,7 +85,7 @@ def batch_report(title: str, entries: Iterable[Entry]) -> str:
     """
     found = list(entries)
     rows = [BatchRow(*entry) for entry in found if entry[1] in PROGRAM]
-    worst = {"failed": 0, "left": 1, "done": 2}
+    worst = {"failed": 0, "uncorrected": 1, "done": 2}
     rows.sort(key=lambda row: (worst[row.status], row.place))
     largest = [mm for row in rows if (mm := row.mm("largest_mm")) is not None]
     return render(
@@ -86,7 +98,7 @@ def batch_report(title: str, entries: Iterable[Entry]) -> str:
         counts={name: sum(row.status == name for row in rows) for name in PROGRAM},
         others=sum(entry[1] == "copied" for entry in found),
         visits=sum(row.count("visits") or 0 for row in rows),
-        alone=sum(row.count("left") or 0 for row in rows),
+        alone=sum(row.count("uncorrected") or 0 for row in rows),
         largest=max(largest, default=None),
     )
 

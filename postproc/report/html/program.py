@@ -153,7 +153,7 @@ def columns_of(outcome: Outcome) -> PageColumns:
     return PageColumns(
         files=v.files,
         names=v.names,
-        reasons=d.reasons,
+        reasons=tuple(reason.text for reason in d.reasons),
         heads=v.dialect.heads,
         visit=np.arange(1, n + 1),
         file=v.file,
@@ -235,7 +235,7 @@ def columns_from(targets: Sequence[Mapping[str, Any]]) -> PageColumns:
         name=names.index([t["name"] for t in targets]),
         move=np.array([moves[t["move"]] for t in targets], dtype=np.int64),
         status=np.array([statuses[t["status"]] for t in targets], dtype=np.int64),
-        why=reasons.index([t["why"] for t in targets]),
+        why=reasons.index([t["reason"] for t in targets]),
         direction=_numbers(targets, "lambda", 6).astype(np.int64),
         q_deg=_numbers(targets, "q_deg", 6),
         original=_numbers(targets, "original", width),
@@ -265,8 +265,10 @@ def shares_from(targets: Sequence[Mapping[str, Any]]) -> PageShares:
     effects = tuple(dict.fromkeys(str(name) for shares in told for name in shares))
     rows = [[shares.get(name) for name in effects] for shares in told]
     size = np.array(rows, dtype=np.float64).reshape(len(targets), len(effects))
-    axes = 3 if any("free_mm" in t for t in targets) else 0
-    free, std = (_numbers(targets, k, axes) for k in ("free_mm", "free_std_mm"))
+    axes = 3 if any("nonparametric_mm" in t for t in targets) else 0
+    free, std = (
+        _numbers(targets, k, axes) for k in ("nonparametric_mm", "nonparametric_std_mm")
+    )
     return PageShares(effects, size, free, std)
 
 
@@ -291,8 +293,8 @@ STEPS = {
     "correction_mm": 1e-4,
     "std_mm": 1e-4,
     "share_mm": 1e-4,
-    "free_mm": 1e-4,
-    "free_std_mm": 1e-4,
+    "nonparametric_mm": 1e-4,
+    "nonparametric_std_mm": 1e-4,
 }
 
 
@@ -309,7 +311,7 @@ def choose(columns: PageColumns, most: int = MOST) -> Ints:
     if n <= most:
         return np.arange(n)
     left = np.flatnonzero(
-        np.isin(columns.status, (Status.UNSAFE, Status.GUARDED, Status.DISPLAY))
+        np.isin(columns.status, (Status.CONFLICT, Status.REJECTED, Status.RUNTIME))
     )
     left = _evenly(left, most // 2)
     size = np.nan_to_num(columns.size_mm)
@@ -342,8 +344,8 @@ def pack(columns: PageColumns, shares: PageShares) -> dict[str, Any]:
         "correction_mm": columns.correction_mm,
         "std_mm": columns.std_mm,
         "share_mm": shares.size_mm[columns.visit - 1],
-        "free_mm": shares.free_mm[columns.visit - 1],
-        "free_std_mm": shares.free_std_mm[columns.visit - 1],
+        "nonparametric_mm": shares.free_mm[columns.visit - 1],
+        "nonparametric_std_mm": shares.free_std_mm[columns.visit - 1],
     }
     packed = {
         key: {
@@ -455,7 +457,7 @@ def _texts(source: Source, lines: Iterable[int]) -> list[str]:
 
 BINS = 40
 EXAMPLES = 12  # visits named in a group
-LEFT_ALONE = (Status.UNSAFE, Status.GUARDED, Status.DISPLAY)  # most urgent first
+LEFT_ALONE = (Status.CONFLICT, Status.REJECTED, Status.RUNTIME)  # most urgent first
 
 
 @dataclass(frozen=True)
@@ -520,7 +522,7 @@ def tell_counts(columns: PageColumns) -> dict[str, int]:
 
 def histogram(columns: PageColumns) -> dict[str, Any]:
     """Count the lengths of the corrections that were made."""
-    size = columns.size_mm[columns.status == Status.SAFE]
+    size = columns.size_mm[columns.status == Status.CORRECTED]
     size = size[np.isfinite(size)]
     if len(size) == 0:
         return {"edges_mm": [], "counts": []}
@@ -531,7 +533,7 @@ def histogram(columns: PageColumns) -> dict[str, Any]:
 
 def uncertainty(columns: PageColumns) -> dict[str, float | None]:
     """Summarise the standard errors at the corrected targets, over the axes [mm]."""
-    rows = columns.status == Status.SAFE
+    rows = columns.status == Status.CORRECTED
     size = np.linalg.norm(columns.std_mm[rows], axis=1)
     size = size[np.isfinite(size)]
     if len(size) == 0:
@@ -655,7 +657,7 @@ def _page(program: ProgramPage) -> str:
         SCRIPTS,
         program=program,
         counts=tell_counts(columns),
-        corrected=int((columns.status == Status.SAFE).sum()),
+        corrected=int((columns.status == Status.CORRECTED).sum()),
         groups=left_alone(columns),
         predicted=finite(program.predicted),
         sigma=uncertainty(columns),

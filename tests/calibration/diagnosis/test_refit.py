@@ -176,7 +176,7 @@ def test_a_base_that_moved_is_told_and_compensated(later: Later) -> None:
     anew = found.diagnosis.set_anew
     assert anew is not None and not anew.bent
     assert "since the given model the base has moved" in tell(found.diagnosis)
-    assert set(found.diagnosis.to_dict()["set_anew"]) == {
+    assert set(found.diagnosis.to_dict()["frame_shift"]) == {
         "base_mm", "turn_mrad", "tool_mm",
     }  # fmt: skip
     there = sample_survey(later.arm, 200, seed=SEED + 2, within=later.corner)

@@ -209,3 +209,15 @@ def test_what_the_model_takes_is_not_left_over() -> None:
     rest = np.random.default_rng(0).standard_normal(len(projection.rest))
     rest += 9.0 * taken @ (taken.T @ rest)  # priors of the model are off by ten
     assert leftovers(replace(projection, rest=rest), seed=0)[0].p_value > 0.05
+
+
+@pytest.mark.parametrize("width", [1, 2])
+def test_every_block_may_be_weighed_against_rows_of_its_own(width: int) -> None:
+    rng = np.random.default_rng(width)
+    gain = rng.uniform(1.0, 9.0, (7, width))
+    along, square = rng.standard_normal((7, width, 1)), rng.uniform(40.0, 90.0, (7, 1))
+    together = log_evidence(ReducedCandidates((), gain, along), square, 60)
+    for k in range(7):
+        one = ReducedCandidates((), gain[k : k + 1], along[k : k + 1])
+        alone = log_evidence(one, square[k], 60)
+        np.testing.assert_allclose(together[k], alone[0], rtol=1e-12)

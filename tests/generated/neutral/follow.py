@@ -60,7 +60,7 @@ def misfit(visits: Visits, visit: int, step: Step, rapid: bool) -> str:
     """Say in what a visit differs from a step of a run, "" in nothing."""
     if bool(visits.via[visit]) != step.via:
         return "another point of an arc"
-    if ANYTHING.search(visits.reasons[visits.reason[visit]]):
+    if ANYTHING.search(visits.reasons[visits.reason[visit]].text):
         return ""
     tool, uframe = int(visits.tool[visit]), int(visits.uframe[visit])
     if tool >= 0 and not same(visits.frames[tool], step.tool):

@@ -85,7 +85,7 @@ def lands(seed: int, language: str, cell: Cell, model: Model) -> Found:
     assert done.exit_code in (DONE, NOT_ALL)
     outputs = given_back(one.text.files, done)
     found.visits += len(done.visits)
-    found.corrected += done.decisions.count(Status.SAFE)
+    found.corrected += done.decisions.count(Status.CORRECTED)
     found.reasons.update(reasons(done))
     for run in range(RUNS if seed % 2 else 1):
         asked, ran = (one.steps(files, run) for files in (one.text.files, outputs))
@@ -122,7 +122,7 @@ def given_back(files: Mapping[str, bytes], done: Outcome) -> dict[str, bytes]:
 def reasons(done: Outcome) -> list[str]:
     """Return why visits are not corrected."""
     d = done.decisions
-    return [d.reasons[w] for w in d.why[d.status != Status.SAFE].tolist()]
+    return [d.reasons[w].text for w in d.why[d.status != Status.CORRECTED].tolist()]
 
 
 def count(
@@ -146,13 +146,13 @@ def count(
                 found.wrong.append((seed, line, "the arm cannot reach it any more"))
             break
         pair = before[k], now[k]
-        safe = bool((d.status[mine] == Status.SAFE).all())
+        safe = bool((d.status[mine] == Status.CORRECTED).all())
         unsure = bool((np.abs(d.side[mine]) < SURE).any())
         size = np.linalg.norm(d.std_error[mine], axis=1).max() / MM
         if not safe:
             found.error_mm[ALONG].append(pair)
             if not old.target.computed:
-                why = {d.reasons[d.why[row]] for row in mine}
+                why = {d.reasons[d.why[row]].text for row in mine}
                 text = f"went to new numbers, though: {' / '.join(why)}"
                 found.wrong.append((seed, line, text))
         elif (visits.tool[mine] < 0).any() or (

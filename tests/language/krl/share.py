@@ -40,13 +40,13 @@ def outcomes(path: Path, cell: Path, model: Path) -> Counter[str]:
     for file in np.unique(v.file).tolist():
         for line in np.unique(v.line[v.file == file]).tolist():
             rows = np.flatnonzero((v.file == file) & (v.line == line))
-            why = next((v.reasons[k] for k in v.reason[rows].tolist() if k), "")
+            why = next((v.reasons[k].text for k in v.reason[rows].tolist() if k), "")
             if (
                 any(word in why for word in NO_TARGET)
                 or v.target[rows[0]] in NO_TARGETS
             ):
                 found["no target"] += 1
-            elif (status[rows] == Status.SAFE).all():
+            elif (status[rows] == Status.CORRECTED).all():
                 found["corrected"] += 1
             else:
                 found[why or "rejected where it is driven"] += 1

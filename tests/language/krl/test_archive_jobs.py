@@ -51,14 +51,14 @@ def test_handling_with_a_gripper():
         "$OUT[18]=TRUE", "ENDIF", "DRY:", *lin("XP2"), *ptp("XP1"),
         "H50(GRP_APO,1,2,GCONT)", "P00 (#EXT_PGNO,#PGNO_ACKN,DMY[],0 )", *HOME,
     )  # fmt: skip
-    assert left(found) == [] and codes(found) == {Code.ASSUMED_STILL}
+    assert left(found) == [] and codes(found) == {Code.ROUTINE_ASSUMED_MOTIONLESS}
 
 
 def test_arc_welding_with_old_and_modern_forms():
     found = job(*INI, *HOME, *ptp("XP1"), *lin("XP2")[:-1], *ARC,
                 f"SLIN XP1{NEW}", "ArcMainNG(#ArcOnBeforeSplSingle, WDAT1, WP1)",
                 f"SLIN XP2{NEW}", *HOME)  # fmt: skip
-    assert left(found) == [] and codes(found) == {Code.ASSUMED_STILL}
+    assert left(found) == [] and codes(found) == {Code.ROUTINE_ASSUMED_MOTIONLESS}
 
 
 def test_a_load_that_changes_with_the_part():

@@ -35,7 +35,7 @@ def notes(outcome, code):
 
 
 def corrected(outcome):
-    return int((outcome.decisions.status == Status.SAFE).sum())
+    return int((outcome.decisions.status == Status.CORRECTED).sum())
 
 
 def shared(cell, seed):
@@ -63,7 +63,7 @@ def test_the_arm_lands_where_it_is_to(bench_cell, bench_model, seed):
         for text in (files, {**files, **found.outputs})
     )
     landing, rows = land(body, setup, given, made), found.decisions
-    safe = (rows.status == Status.SAFE) & ~found.visits.fly & ~found.visits.via
+    safe = (rows.status == Status.CORRECTED) & ~found.visits.fly & ~found.visits.via
     sure = (safe & (rows.direction != 0).all(axis=1))[landing.visit]
     miss = 1e3 * np.linalg.norm(landing.error, axis=1)[sure & (landing.visit > 0)]
     assert len(miss) > 10 and miss.max() <= 0.1

@@ -127,7 +127,7 @@ ARC = [
 def test_routines_of_packages_are_still(name):
     found = job("LIN XP1", f"{name}(1, XP1)", "LIN XP1")
     assert reasons(found) == ["", ""] and origins(found) == [[START], [0]]
-    notes = [d for d in found.diagnostics if d.code == Code.ASSUMED_STILL]
+    notes = [d for d in found.diagnostics if d.code == Code.ROUTINE_ASSUMED_MOTIONLESS]
     assert len(notes) == (package_routines()[name] != "ahead")
     strict = job(
         "LIN XP1", f"{name}(1, XP2)", "LIN XP1", start=Start(assume_motion=True)
@@ -142,7 +142,10 @@ def test_routines_of_packages_are_still(name):
 def test_inline_forms_of_arc_welding_are_read():
     found = job("$APO.CDIS=5", *ARC, *ARC)
     assert reasons(found) == ["", ""]
-    assert len([d for d in found.diagnostics if d.code == Code.ASSUMED_STILL]) == 1
+    assert (
+        len([d for d in found.diagnostics if d.code == Code.ROUTINE_ASSUMED_MOTIONLESS])
+        == 1
+    )
 
 
 def test_inline_forms_blend_across_the_collision_monitor():

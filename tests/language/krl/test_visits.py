@@ -84,7 +84,7 @@ def origins(found):
 
 def reasons(found):
     v = found.visits
-    return [v.reasons[k] for k in v.reason.tolist()]
+    return [v.reasons[k].text for k in v.reason.tolist()]
 
 
 def codes(found):

@@ -64,7 +64,7 @@ def described(resolved: Resolved, *texts: str) -> str:
         parts += [f"measure {v.measure_id[i]}"] * bool(v.measure_id[i])
         kept = v.literals.pinned[v.literal[i]] if v.literal[i] >= 0 else ""
         parts += [f"stays, for {kept}"] * bool(kept)
-        parts += [f"because {v.reasons[v.reason[i]]}"] * bool(v.reason[i])
+        parts += [f"because {v.reasons[v.reason[i]].text}"] * bool(v.reason[i])
         out.append("; ".join(parts))
     out += [f"! {d.line} {d.code}" for d in resolved.diagnostics]
     return "\n".join(out) + "\n"

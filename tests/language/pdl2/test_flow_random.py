@@ -51,7 +51,7 @@ def fits(visits: Visits, visit: int, executed: Executed) -> bool:
 
 def recursive(visits: Visits, visit: int) -> bool:
     """Tell whether a visit stands where values may be those of another call."""
-    return "calls itself" in visits.reasons[visits.reason[visit]]
+    return "calls itself" in visits.reasons[visits.reason[visit]].text
 
 
 def same_goal(visits: Visits, visit: int, executed: Executed) -> bool:

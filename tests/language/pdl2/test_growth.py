@@ -88,5 +88,5 @@ def test_a_program_beyond_the_limit_is_listed_once_and_left(job_cell, monkeypatc
     lines = [k + 1 for k, line in enumerate(tree(1 << 14)["job.pdl"].splitlines())
              if b"MOVE" in line]  # fmt: skip
     assert visits.line.tolist() == lines and len(lines) == 14
-    assert all("too complex" in visits.reasons[k] for k in visits.reason)
+    assert all("too complex" in visits.reasons[k].text for k in visits.reason)
     assert (visits.pred == ELSEWHERE).all()

@@ -20,7 +20,7 @@ def body(text: str, start: Start | None = None, declared: str = "") -> Resolved:
 
 
 def reasons(found: Resolved) -> list[str]:
-    return [found.visits.reasons[i] for i in found.visits.reason]
+    return [found.visits.reasons[i].text for i in found.visits.reason]
 
 
 def test_pages_of_one_job_are_one_flow() -> None:
@@ -175,7 +175,7 @@ def test_each_routine_that_is_not_at_hand_is_listed_once() -> None:
     assert lines == [
         (4, "unknown-routine"),
         (7, "unknown-routine"),
-        (8, "assumed-still"),
+        (8, "routine-assumed-motionless"),
     ]
 
 

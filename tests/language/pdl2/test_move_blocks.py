@@ -174,4 +174,6 @@ def test_moves_that_are_looked_at_twice_are_listed_once() -> None:
     )
     visits = resolve(parse(source_from_bytes("a.pdl", text.encode()))).visits
     assert visits.line.tolist() == [6, 7]
-    assert all("known only at run time" in visits.reasons[k] for k in visits.reason)
+    assert all(
+        "known only at run time" in visits.reasons[k].text for k in visits.reason
+    )

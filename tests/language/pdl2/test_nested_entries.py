@@ -56,7 +56,7 @@ def known(found: Resolved) -> list[float | int]:
     v = found.visits
     free = [k >= 0 and not v.literals.pinned[k] for k in v.literal.tolist()]
     x = v.values[:, 0].tolist()
-    return [x[i] if free[i] and not v.reasons[v.reason[i]] else UNKNOWN
+    return [x[i] if free[i] and not v.reasons[v.reason[i]].text else UNKNOWN
             for i in range(len(v))]  # fmt: skip
 
 
@@ -161,7 +161,7 @@ def test_elements_of_a_field_are_not_nodes():
 def test_a_name_that_a_path_and_something_else_have_is_neither():
     variables = read(path("NODE[1]") + "pth POS Priv\n" + place(5))
     assert not variables.entries
-    assert {d.code for d in variables.diagnostics} == {"lsv-twice"}
+    assert {d.code for d in variables.diagnostics} == {"lsv-duplicate"}
 
 
 def test_too_many_values_are_none():
@@ -180,7 +180,7 @@ def test_node_lines_belong_to_paths_only():
 def test_a_node_of_its_own_settings_is_not_gone_to_as_a_whole():
     text = path("NODE[1]") + " $LIN_SPD REA\n 0.5\n"
     found = followed(text, "MOVE LINEAR TO pth.NODE[1]", "MOVE LINEAR TO q")
-    assert "settings of its own ($LIN_SPD, $MAIN_POS)" in found.visits.reasons[1]
+    assert "settings of its own ($LIN_SPD, $MAIN_POS)" in found.visits.reasons[1].text
     assert known(followed(text, "MOVE LINEAR TO pth.NODE[1].$MAIN_POS")) == [1.0]
 
 
@@ -258,7 +258,7 @@ def test_what_a_head_says_holds_for_all_parts():
     values = path("NODE[1]", head="pth PATH nd Arm: 2 Priv")
     found = followed(values, "MOVE LINEAR TO pth.NODE[1]").visits
     assert found.literal.tolist() == [UNKNOWN]
-    assert "arm 2" in found.reasons[found.reason[0]]
+    assert "arm 2" in found.reasons[found.reason[0]].text
 
 
 def test_edits_hit_their_node_and_nothing_else():

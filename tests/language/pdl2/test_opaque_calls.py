@@ -38,7 +38,7 @@ def last(found: Resolved, file: int = 0) -> tuple[Meaning, list[int], str]:
     """Return target, origins and reason of the last visit in a file."""
     v = found.visits
     row = max(n for n in range(len(v)) if v.file[n] == file)
-    reason = v.reasons[v.reason[row]]
+    reason = v.reasons[v.reason[row]].text
     return Meaning(v.target[row]), v.predecessors(row).tolist(), reason
 
 
@@ -90,7 +90,7 @@ def test_a_page_calls_a_routine_of_the_program_that_calls_it():
     head = ["IMPORT 'page'", "ROUTINE s EXPORTED FROM page"]
     head += routine("r", f"MOVE LINEAR TO {AT}")
     found = resolved(program("job", head, ["s"]), page=page)
-    assert "assumed-still" not in codes(found) and len(found.visits) == 1
+    assert "routine-assumed-motionless" not in codes(found) and len(found.visits) == 1
 
 
 def test_recursion_through_another_file_forgets_what_that_file_changes():
@@ -114,7 +114,7 @@ def test_moves_that_a_function_may_make_are_listed_with_their_points():
     origins = [v.predecessors(n).tolist() for n in range(len(v))]
     assert sorted(origins) == [[ELSEWHERE], [-1]]
     unknown = origins.index([ELSEWHERE])
-    assert "f, which is not followed" in v.reasons[v.reason[unknown]]
+    assert "f, which is not followed" in v.reasons[v.reason[unknown]].text
     assert len(set(v.literal.tolist())) == 1  # so that its numbers stay
 
 

@@ -74,7 +74,7 @@ def test_the_nodes_change_and_nothing_else(made):
     differ = [at for at, (old, new) in enumerate(pairs, start=1) if old != new]
     assert differ == [5, 9, 11]
     assert "MOVE ALONG seam goes to it too" in found.stderr
-    assert "job.pdl:11: guarded: other programs may read this variable" in found.stderr
+    assert "job.pdl:11: rejected: other programs may read this variable" in found.stderr
 
 
 def test_it_is_restored_and_checked(made):

@@ -30,7 +30,7 @@ def followed(*body: str, head: list[str] = HEAD, **said: object) -> Resolved:
 
 
 def reasons(found: Resolved) -> list[str]:
-    return [found.visits.reasons[k] for k in found.visits.reason.tolist()]
+    return [found.visits.reasons[k].text for k in found.visits.reason.tolist()]
 
 
 def codes(found: Resolved) -> list[str]:
@@ -112,7 +112,7 @@ def test_what_the_cell_says_by_name_holds_against_its_patterns() -> None:
 def test_the_shipped_list_counts_unless_calls_are_strict() -> None:
     body = [FIRST, "spot(1)", THEN]
     assert reasons(followed(*body)) == ["", ""]
-    assert codes(followed(*body)) == ["assumed-still"]
+    assert codes(followed(*body)) == ["routine-assumed-motionless"]
     strict = followed(*body, assume_motion=True)
     assert reasons(strict)[1] and codes(strict) == ["unknown-routine"]
     assert reasons(followed(*body, assume_motion=True, motionless=("spot",))) == [

@@ -97,7 +97,7 @@ TO_G = "MOVE LINEAR TO g"
 def test_an_imported_position_is_known_only_if_the_cell_says_so() -> None:
     found = followed(TO_G, head=IMPORTED, values=VALUES)
     assert places(found) == [0]
-    (why,) = (found.visits.reasons[k] for k in found.visits.reason)
+    (why,) = (found.visits.reasons[k].text for k in found.visits.reason)
     assert "[variables] constant" in why
     for pattern in ("g", "other.g", "other.*"):
         said = followed(TO_G, head=IMPORTED, values=VALUES, constant=(pattern,))
@@ -113,7 +113,7 @@ def test_an_imported_position_that_is_written_at_hand_is_not_constant() -> None:
 def test_a_frame_that_is_imported_is_not_known() -> None:
     move = f"MOVE LINEAR TO {P.format(3)}"
     found = followed("$UFRAME := g", move, head=IMPORTED, values=VALUES)
-    assert "$UFRAME is not known" in found.visits.reasons[found.visits.reason[0]]
+    assert "$UFRAME is not known" in found.visits.reasons[found.visits.reason[0]].text
 
 
 def test_a_position_of_our_own_that_is_exported_keeps_its_value() -> None:

@@ -15,7 +15,7 @@ GIVEN = [f"a[{k}] := {AT}" for k in (1, 2, 3)]
 
 def read(head, body):
     v = resolved(program("job", head, body)).visits
-    return v, [v.reasons[k] for k in v.reason.tolist()]
+    return v, [v.reasons[k].text for k in v.reason.tolist()]
 
 
 @pytest.mark.parametrize("head", [

@@ -27,7 +27,7 @@ def job(assigned: str) -> Resolved:
 def test_a_component_set_by_the_program_leaves_the_target_alone(component: str) -> None:
     visits = job(f"p.{component} := 9.25").visits
     assert visits.literal.tolist() == [-1, 0]
-    assert "others in another file" in visits.reasons[visits.reason[0]]
+    assert "others in another file" in visits.reasons[visits.reason[0]].text
     assert visits.reason[1] == 0
     assert visits.values[0, "XYZAER".index(component)] == 9.25
 

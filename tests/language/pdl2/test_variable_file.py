@@ -76,14 +76,14 @@ def test_values_and_their_places() -> None:
 def test_what_is_wrong_is_said() -> None:
     found, _ = resolved()
     v = found.visits
-    reasons = [v.reasons[i] for i in v.reason]
+    reasons = [v.reasons[i].text for i in v.reason]
     assert "not initialised" in reasons[3]
     assert "no value" in reasons[5]
     assert "not initialised" in reasons[6]
     assert "arm 2" in reasons[7]
     codes = {d.code for d in found.diagnostics if d.file == "job.lsv"}
     assert codes == {
-        "lsv-twice",
+        "lsv-duplicate",
         "lsv-incomplete",
         "lsv-uninitialised",
         "lsv-undeclared",
@@ -113,5 +113,5 @@ def test_an_auxiliary_axis_must_be_declared() -> None:
     program = parse(source_from_bytes("job.pdl", PDL))
     for aux, word in (({}, "not declared"), ({1: "track"}, "track")):
         v = resolve(program, Start(aux=aux), variables).visits
-        assert word in v.reasons[v.reason[0]]
+        assert word in v.reasons[v.reason[0]].text
         assert v.literal[0] >= 0

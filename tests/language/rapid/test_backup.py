@@ -56,7 +56,7 @@ def test_data_of_system_modules_are_known(backup):
     (backup / "out").mkdir()
     found = run(backup)
     assert found.exit_code == 0, found.stderr
-    assert "3 visits (3 safe)" in found.stderr and "user.sys" not in found.stderr
+    assert "3 visits (3 corrected)" in found.stderr and "user.sys" not in found.stderr
     assert {p.name for p in (backup / "out").iterdir()} == {
         "Job.mod", "Job.mod.postproc.json"}  # fmt: skip
 

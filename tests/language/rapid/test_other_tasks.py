@@ -38,7 +38,7 @@ def job(*lines, other="", declared="", body="", names=(BESIDE,)):
 
 def reasons(found):
     v = found.visits
-    return [v.reasons[k] for k in v.reason.tolist()][1:]  # without home
+    return [v.reasons[k].text for k in v.reason.tolist()][1:]  # without home
 
 
 def pins(found):

@@ -60,7 +60,7 @@ def origins(found):
 
 def reasons(found):
     v = found.visits
-    return [v.reasons[k] for k in v.reason.tolist()]
+    return [v.reasons[k].text for k in v.reason.tolist()]
 
 
 def codes(found):
@@ -413,7 +413,7 @@ ENDMODULE
 """
     visits = read_program({"m.mod": text.encode()}, bench_cell).visits
     assert visits.line.tolist() == [8] and visits.literal.tolist() == [-1]
-    assert "known only when the program runs" in visits.reasons[visits.reason[0]]
+    assert "known only when the program runs" in visits.reasons[visits.reason[0]].text
 
 
 def taught(found):

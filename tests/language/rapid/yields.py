@@ -42,7 +42,7 @@ def reasons_of(task: list[Path]) -> list[str]:
     visits, lines = found.visits, dict[tuple[int, int], str]()
     for k in range(len(visits)):
         place = int(visits.file[k]), int(visits.line[k])
-        why = visits.reasons[int(visits.reason[k])]
+        why = visits.reasons[int(visits.reason[k])].text
         lines[place] = lines.get(place, "") or why
     counted = [why for why in lines.values() if not any(b in why for b in BESIDE)]
     missed = sum(map(len, found.missed.values()))

@@ -8,16 +8,21 @@ import numpy as np
 
 from postproc.compensation.outcome import Decisions, Outcome, Status
 from postproc.compensation.record import Sidecar
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.visits import Diagnostic, Literals, NumberPlaces, Visits
 from postproc.model.statistics import ErrorStatistics
 
 REASONS = (
-    "",
-    "its arrivals differ by more than conflict_mm = 0.02 (see --shared-points clone)",
-    "its numbers are not written in the program",
-    "joint 5 is within 3 deg of the wrist singularity",
-    "this move holds no target",
+    NO_REASON,
+    Reason(
+        Code.ARRIVALS_DIFFER,
+        "its arrivals differ by more than conflict_mm = 0.02 "
+        "(see --shared-points clone)",
+    ),
+    Reason(Code.NUMBERS_NOT_OWN, "its numbers are not written in the program"),
+    Reason(Code.SINGULAR_WRIST, "joint 5 is within 3 deg of the wrist singularity"),
+    Reason(Code.NO_TARGET, "this move holds no target"),
 )
 FIRST_LINE = 4  # of the moves in `program_text`
 
@@ -116,14 +121,14 @@ def decisions_of(visits: Visits, seed: int) -> Decisions:
     side = np.sign(np.sin(turn[:, None] * np.arange(1, 7) + 0.3)).astype(np.int64)
     side[:: max(n // 7, 1), 4] = 0
     status = np.zeros(n, dtype=np.int64)
-    kinds = [Status.UNSAFE, Status.DISPLAY, Status.GUARDED, Status.UNCHANGED]
+    kinds = [Status.CONFLICT, Status.RUNTIME, Status.REJECTED, Status.UNCHANGED]
     for k, kind in enumerate(kinds):
         status[3 + k :: 40] = kind
     why = np.array([0, 1, 2, 3, 4])[status]
     correction = 1e-3 * np.column_stack(
         [0.6 * np.cos(turn), 0.5 + 0.2 * side[:, 0], 0.4 * np.sin(turn)]
     ) + rng.normal(0.0, 2e-5, (n, 3))
-    correction[status != Status.SAFE] = 0.0
+    correction[status != Status.CORRECTED] = 0.0
     corrected = np.array(visits.values)
     corrected[:, :3] += correction * 1e3
     q = rng.uniform(-1.5, 1.5, (n, 6))
@@ -142,7 +147,7 @@ def outcome_of(
     """Make the outcome of a program of n moves."""
     visits = visits_of(n, name, names)
     decisions = decisions_of(visits, seed)
-    safe = decisions.status == Status.SAFE
+    safe = decisions.status == Status.CORRECTED
     left = np.random.default_rng(seed).normal(0.0, 5e-6, (int(safe.sum()), 3))
     return Outcome(
         program=name,

@@ -8,13 +8,13 @@ from tests.report.html.test_program import NASTY, Elements
 FIGURES = {"mean": 1.2, "std": 0.1, "p95": 1.4, "max": 1.5}
 DONE = {
     "visits": 7,
-    "safe": 6,
-    "left": 0,
+    "corrected": 6,
+    "uncorrected": 0,
     "largest_mm": 1.625,
     "before_mm": FIGURES,
     "after_mm": {**FIGURES, "mean": 0.004},
 }
-LEFT = {**DONE, "left": 2, "left_alone": ["a.pdl:3: guarded: too near"]}
+LEFT = {**DONE, "left": 2, "left_alone": ["a.pdl:3: rejected: too near"]}
 
 
 def page(*entries):
@@ -30,7 +30,7 @@ def texts(html):
 def test_programs_are_listed_with_their_figures_the_absent_first():
     html = page(
         ("b/done.pdl", "done", DONE),
-        ("a/left.pdl", "left", LEFT),
+        ("a/left.pdl", "uncorrected", LEFT),
         ("z/bad.pdl", "failed", {"error": "is no program text"}),
         ("notes.txt", "copied", {}),
         ("old.pdl", "removed", {}),
@@ -38,15 +38,15 @@ def test_programs_are_listed_with_their_figures_the_absent_first():
     rows = texts(html)
     assert list(rows) == ["z/bad.pdl", "a/left.pdl", "b/done.pdl"]
     assert "is no program text" in rows["z/bad.pdl"] and "–" in rows["z/bad.pdl"]
-    assert "a.pdl:3: guarded: too near" in rows["a/left.pdl"]
+    assert "a.pdl:3: rejected: too near" in rows["a/left.pdl"]
     assert "1.625" in rows["b/done.pdl"] and "1.200 → 0.0040" in rows["b/done.pdl"]
     assert '<span class="value">3</span><span class="note">2 compensated' in html
 
 
 def test_names_and_findings_are_never_markup():
-    plain = Elements(page(("a.pdl", "left", LEFT)))
-    nasty = {**LEFT, "left_alone": [NASTY], "findings": []}
-    html = page((NASTY, "left", nasty))
+    plain = Elements(page(("a.pdl", "uncorrected", LEFT)))
+    nasty = {**LEFT, "uncorrected_lines": [NASTY], "findings": []}
+    html = page((NASTY, "uncorrected", nasty))
     found = Elements(html)
     assert found.tags == plain.tags
     assert not found.fetched

@@ -166,7 +166,10 @@ def test_a_target_shows_the_shares_of_the_effects(browser: Any, folder: Path) ->
     data = json.loads(report_text(outcome_of(30)))
     for target in data["targets"]:
         target["share_mm"] = {"backlash": 0.125, "<b>x</b>": 0.5, "thermal": None}
-        target |= {"free_mm": [0.3, 0.0, 0.4], "free_std_mm": [0.0, 0.03, 0.04]}
+        target |= {
+            "nonparametric_mm": [0.3, 0.0, 0.4],
+            "nonparametric_std_mm": [0.0, 0.03, 0.04],
+        }
     show(browser, folder, "shares", program_report_from_json(data))
     click(browser, "#targets tbody tr[data-row='11']")
     rows = browser.find_elements("css selector", "#detail .shares tbody tr")
@@ -214,20 +217,20 @@ def test_a_click_into_the_view_leads_to_the_row(program: Any) -> None:
 def test_links_of_what_was_left_alone_lead_to_it(program: Any) -> None:
     click(program, "#left a")
     selected = program.find_element("css selector", "#targets tr.selected")
-    assert "unsafe" in selected.text
+    assert "conflict" in selected.text
 
 
 def test_statuses_filter_table_and_view(program: Any) -> None:
-    for status in ("safe", "display", "unchanged"):
+    for status in ("corrected", "runtime", "unchanged"):
         boxes = program.find_elements("css selector", "#statuses label")
         next(b for b in boxes if f" {status} " in b.text).click()
     shown = texts(program, "status")
-    assert len(shown) == 14 and {s[2:] for s in shown} == {"unsafe", "guarded"}
+    assert len(shown) == 14 and {s[2:] for s in shown} == {"conflict", "rejected"}
     until(
         program,
         "const names = document.getElementById('view').data.map((t) => t.name || '');"
-        "return !names.some((n) => n.startsWith('safe'))"
-        " && names.some((n) => n.startsWith('guarded'))",
+        "return !names.some((n) => n.startsWith('corrected'))"
+        " && names.some((n) => n.startsWith('rejected'))",
     )
 
 
@@ -287,7 +290,7 @@ def test_classes_are_told_by_symbols_too(program: Any, mode: str) -> None:
     until(
         program,
         "return !document.getElementById('view').data"
-        ".some((t) => (t.name || '').startsWith('safe'))",
+        ".some((t) => (t.name || '').startsWith('corrected'))",
     )
     kinds = program.execute_script(
         "return document.getElementById('view').data.filter((t) => t.customdata)"

@@ -104,7 +104,7 @@ def test_left_alone_comes_first_and_in_words() -> None:
     text = program_report(outcome)
     assert text.index('id="left"') < text.index('id="bench"') < text.index("Time</h2>")
     groups = left_alone(columns_of(outcome))
-    assert [g.status for g in groups] == ["unsafe", "guarded", "display"]
+    assert [g.status for g in groups] == ["conflict", "rejected", "runtime"]
     assert [g.count for g in groups] == [5, 5, 5]
     assert groups[0].examples[0] == (4, "panel.pdl", FIRST_LINE + 3, "")
     for group in groups:
@@ -171,7 +171,7 @@ def test_a_page_has_what_free_forms_predict(job_cell, job_model, free_model) -> 
         outcome = compensate(written(FIRST, POSE), job_cell, model, name="job.pdl")
         direct = program.shares_of(outcome)
         again = program.shares_from(json.loads(report_text(outcome))["targets"])
-        for key in ("free_mm", "free_std_mm"):
+        for key in ("nonparametric_mm", "nonparametric_std_mm"):
             assert getattr(direct, key).shape == (2, width)
             np.testing.assert_allclose(
                 getattr(direct, key), getattr(again, key), atol=1e-5
@@ -203,7 +203,11 @@ def test_numbers_survive_packing() -> None:
         wanted = getattr(columns, key).ravel()
         np.testing.assert_allclose(values, wanted, atol=0.5001 * step)
     assert len(packed["effects"]) == 3
-    for key, given in (("share_mm", size), ("free_mm", free), ("free_std_mm", std)):
+    for key, given in (
+        ("share_mm", size),
+        ("nonparametric_mm", free),
+        ("nonparametric_std_mm", std),
+    ):
         told = packed["numbers"][key]
         assert told["width"] == 3
         values = np.array(told["values"]).reshape(50, 3) * told["step"]
@@ -215,7 +219,7 @@ def test_numbers_survive_packing() -> None:
 def test_the_histogram_counts_every_correction() -> None:
     columns = columns_of(outcome_of(400))
     counted = histogram(columns)
-    assert sum(counted["counts"]) == (columns.status == Status.SAFE).sum()
+    assert sum(counted["counts"]) == (columns.status == Status.CORRECTED).sum()
     assert counted["edges_mm"][-1] == pytest.approx(columns.size_mm.max(), abs=1e-6)
 
 
@@ -223,7 +227,7 @@ def test_a_page_of_a_huge_program_keeps_what_matters() -> None:
     columns = columns_of(outcome_of(5000))
     rows = program.choose(columns, most=1000)
     assert len(rows) == 1000 and (np.diff(rows) > 0).all()
-    left = np.isin(columns.status, (Status.UNSAFE, Status.GUARDED, Status.DISPLAY))
+    left = np.isin(columns.status, (Status.CONFLICT, Status.REJECTED, Status.RUNTIME))
     assert np.isin(np.flatnonzero(left), rows).all()
     assert int(np.argmax(columns.size_mm)) in rows
     gaps = np.diff(rows)
@@ -234,7 +238,7 @@ def test_too_many_left_alone_leave_room_for_others() -> None:
     columns = columns_of(outcome_of(5000))
     rows = program.choose(columns, most=200)
     assert len(rows) == 200
-    assert (columns.status[rows] == Status.SAFE).sum() >= 80
+    assert (columns.status[rows] == Status.CORRECTED).sum() >= 80
 
 
 def test_source_lines_are_those_of_the_file() -> None:

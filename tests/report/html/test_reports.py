@@ -204,7 +204,7 @@ def test_evidence_is_told_in_words_too() -> None:
     assert "joint_map of joint 3" in text
     assert "nothing is missing" in diagnosis_report(noise())
     told = "3 readings of 1 fixed points: <the tracker did not move"
-    seen = {"fixed_points": [told], "not_excluded": ["waves & more"]}
+    seen = {"monuments": [told], "undetectable": ["waves & more"]}
     page = diagnosis_report(noise() | seen)
     assert told.replace("<", "&lt;") in page and "waves &amp; more" in page
     assert "Not excluded" in page and "Not excluded" not in text

@@ -64,9 +64,9 @@ class Columns {
 
 Columns.ARROWS = ["↓", "·", "↑"];
 Columns.STATUS = {
-  safe: { mark: "●", symbol: "circle", colour: Page.COLOURS.blue, told: "safe: corrected" },
-  unsafe: { mark: "■", symbol: "square", colour: Page.COLOURS.vermillion, told: "unsafe: arrivals disagree" },
-  guarded: { mark: "◆", symbol: "diamond", colour: Page.COLOURS.orange, told: "guarded: correction not trusted" },
-  display: { mark: "✚", symbol: "cross", colour: Page.COLOURS.purple, told: "display only: value known at run time" },
+  corrected: { mark: "●", symbol: "circle", colour: Page.COLOURS.blue, told: "corrected" },
+  conflict: { mark: "■", symbol: "square", colour: Page.COLOURS.vermillion, told: "conflict: arrivals disagree" },
+  rejected: { mark: "◆", symbol: "diamond", colour: Page.COLOURS.orange, told: "rejected: correction not trusted" },
+  runtime: { mark: "✚", symbol: "cross", colour: Page.COLOURS.purple, told: "runtime: value known at run time only" },
   unchanged: { mark: "○", symbol: "circle-open", colour: Page.COLOURS.grey, told: "unchanged: nothing to correct" },
 };

@@ -20,7 +20,7 @@ class Paths {
     button.addEventListener("click", () => this.select(k));
     return Page.element("tr", {}, Page.element("td", {}, button), Page.element("td", {}, path.move),
       number(path.length_mm, 1), number(path.max_mm.before, 3), number(path.max_mm.after, 3), number(path.at_mm.after, 1),
-      Page.element("td", {}, path.joint.after ? `J${path.joint.after}` : "–"), number(path.unsure_mm.after, 3),
+      Page.element("td", {}, path.joint.after ? `J${path.joint.after}` : "–"), number(path.uncertainty_mm.after, 3),
       Page.element("td", {}, this.strip(path)));
   }
 

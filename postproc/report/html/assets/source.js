@@ -103,7 +103,7 @@ class Detail {
 
   // What free forms, which no law explains, have of it, and how surely.
   free(i) {
-    const c = this.columns, told = ["free_mm", "free_std_mm"].map((key) => [...c.of(key, i)]);
+    const c = this.columns, told = ["nonparametric_mm", "nonparametric_std_mm"].map((key) => [...c.of(key, i)]);
     if (!told[0].length) return "";
     const cells = (values) => [...values, Math.hypot(...values)].map((v) => Page.number(v, 4));
     return Detail.table("Of it free forms, base frame [mm]", ["", "x", "y", "z", "length"],

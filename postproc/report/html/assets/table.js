@@ -164,7 +164,7 @@ Table.LENGTH = 100;
       value: (c, i) => c.sigma[i], cell: (c, i) => Page.number(c.sigma[i], 3) },
     { key: "sides", label: "J1–6", kind: "sides", title: "Direction in which each joint arrives: ↑ +, ↓ −, · not known",
       value: (c, i) => c.arrows(i), cell: (c, i) => c.arrows(i) },
-    { key: "why", label: "why", kind: "why", value: (c, i) => c.reasons[c.why[i]], cell: (c, i) => c.reasons[c.why[i]] },
+    { key: "why", label: "reason", kind: "why", value: (c, i) => c.reasons[c.why[i]], cell: (c, i) => c.reasons[c.why[i]] },
   ];
 }
-Table.URGENCY = ["unsafe", "guarded", "display", "safe", "unchanged"];
+Table.URGENCY = ["conflict", "rejected", "runtime", "corrected", "unchanged"];

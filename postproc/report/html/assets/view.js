@@ -195,6 +195,6 @@ class View {
 View.THIN = 0.12;  // least proportion of an axis
 View.MOST = 12000;  // targets drawn at a time
 View.SCALES = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
-View.LEFT = new Set(["unsafe", "guarded", "display"]);
+View.LEFT = new Set(["conflict", "rejected", "runtime"]);
 View.SHADES = ["#fdc527", "#d9a528", "#8c6f63", "#4a4a8f", "#0d0887"];  // light to dark: told apart in grey too
 View.SYMBOLS = ["circle-open", "circle", "diamond-open", "diamond", "square"];
