@@ -436,7 +436,43 @@ def find_data_list(program: Path) -> Path | None:
     return _beside(program, data_list_of(program.name))
 
 
-def find_shared_list(program: Path, within: Path | None = None) -> Path | None:
+class FolderListing:
+    """What folders hold; each is read once, so that many programs of one are cheap."""
+
+    def __init__(self) -> None:
+        """Begin without any folder."""
+        self._entries: dict[Path, tuple[Path, ...]] = {}
+        self._named: dict[Path, dict[str, Path]] = {}
+        self._submits: dict[Path, tuple[Path, ...]] = {}
+
+    def entries(self, folder: Path) -> tuple[Path, ...]:
+        """Return what a folder holds, in order; nothing where it is none."""
+        if folder not in self._entries:
+            found = sorted(folder.iterdir()) if folder.is_dir() else []
+            self._entries[folder] = tuple(found)
+        return self._entries[folder]
+
+    def named(self, folder: Path, name: str) -> Path | None:
+        """Find a file of a name, in any case, in a folder."""
+        if folder not in self._named:
+            entries = reversed(self.entries(folder))
+            self._named[folder] = {path.name.lower(): path for path in entries}
+        return self._named[folder].get(name.lower())
+
+    def submits(self, folder: Path, below: bool = False) -> tuple[Path, ...]:
+        """Return the submit programs of a folder, or of all folders below it, too."""
+        if not below:
+            own = (p for p in self.entries(folder) if is_submit(p.name))
+            return tuple(p for p in own if p.is_file())
+        if folder not in self._submits:
+            found = sorted(p for p in folder.rglob("*.*") if is_submit(p.name))
+            self._submits[folder] = tuple(p for p in found if p.is_file())
+        return self._submits[folder]
+
+
+def find_shared_list(
+    program: Path, within: Path | None = None, listing: FolderListing | None = None
+) -> Path | None:
     """Find ``$config.dat``: beside a source, or where a controller keeps it.
 
     In an archive programs stand in ``R1/Program``, at any depth, and the list in
@@ -445,19 +481,22 @@ def find_shared_list(program: Path, within: Path | None = None) -> Path | None:
     Args:
         program: The source.
         within: A folder that nothing outside of is looked at.
+        listing: What folders hold; default: they are read.
     """
     if not data_list_of(program.name):
         return None
-    program = program.absolute()
-    found = _beside(program, SHARED_LIST)
-    for folder in list(program.parent.parents)[:ARCHIVE_DEPTH]:
-        if found is not None or (within is not None and not _is_below(folder, within)):
+    folder, listing = program.absolute().parent, listing or FolderListing()
+    found = listing.named(folder, SHARED_LIST)
+    for above in list(folder.parents)[:ARCHIVE_DEPTH]:
+        if found is not None or (within is not None and not _is_below(above, within)):
             break
-        found = _beside(folder / "System" / program.name, SHARED_LIST)
+        found = listing.named(above / "System", SHARED_LIST)
     return found
 
 
-def find_shared(program: Path, within: Path | None = None) -> tuple[Path, ...]:
+def find_shared(
+    program: Path, within: Path | None = None, listing: FolderListing | None = None
+) -> tuple[Path, ...]:
     """Find what a source shares with others: ``$config.dat``, and submit programs.
 
     Submit programs stand beside either, or anywhere in the archive that the list
@@ -466,16 +505,18 @@ def find_shared(program: Path, within: Path | None = None) -> tuple[Path, ...]:
     Args:
         program: The source.
         within: A folder that nothing outside of is looked at.
+        listing: What folders hold; default: they are read.
     """
-    program = program.absolute()
-    found = find_shared_list(program, within)
-    if not data_list_of(program.name) or not program.parent.is_dir():
+    folder, listing = program.absolute().parent, listing or FolderListing()
+    if not data_list_of(program.name) or not folder.is_dir():
         return ()
-    in_archive = found is not None and found.parent.name.lower() == "system"
-    files = sorted(found.parent.parent.rglob("*.*")) if found and in_archive else []
-    folders = dict.fromkeys([found.parent] if found else []) | {program.parent: None}
-    files += [p for folder in folders for p in sorted(folder.iterdir())]
-    names = {p.name.lower(): p for p in files if is_submit(p.name) and p.is_file()}
+    found = find_shared_list(program, within, listing)
+    submits: list[Path] = []
+    if found is not None and found.parent.name.lower() == "system":
+        submits += listing.submits(found.parent.parent, below=True)
+    for place in dict.fromkeys([folder] if found is None else [found.parent, folder]):
+        submits += listing.submits(place)
+    names = {path.name.lower(): path for path in submits}
     return (*(() if found is None else (found,)), *names.values())
 
 

@@ -21,6 +21,7 @@ from postproc.exceptions import OutputError, ProgramError
 from postproc.files import (
     LARGEST,
     TEMPORARY,
+    FolderListing,
     base_name,
     data_list_of,
     find_shared,
@@ -83,7 +84,8 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
             continue
         folders[place.rpartition("/")[0]].append(place)
         sizes[place] = size
-    found = [_sort(root, names, plan) for names in folders.values()]
+    listing = FolderListing()
+    found = [_sort(root, names, plan, listing) for names in folders.values()]
     units = [unit for part in found for unit in part.units]
     only_read = {place for unit in units for place in _rewritten_nowhere(unit)}
     kept = [p for unit in units if unit.program in only_read for p in unit.own]
@@ -133,7 +135,9 @@ class _Folder:
     notes: list[tuple[str, str]]
 
 
-def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
+def _sort(
+    root: Path, places: Sequence[str], plan: BatchPlan, listing: FolderListing
+) -> _Folder:
     """Sort the files of one folder into programs, what belongs to them, and others."""
     part = _Folder([], [], {}, [])
     system = {p for p in places if is_system_file(root / p)}
@@ -162,7 +166,7 @@ def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
     for main, pages in _joined(named, variables, arms).items():
         setup = plan.setup_of(programs[main], arms[main])
         own = [programs[page] for page in pages]
-        reads = _shared(root, programs[main])
+        reads = _shared(root, programs[main], listing)
         _add_unit(programs[main], own, reads, variables, setup, part)
     return part
 
@@ -173,11 +177,11 @@ def _rewritten_nowhere(unit: Unit) -> list[str]:
     return [p for p in unit.reads if not is_beside(PurePosixPath(p), program)]
 
 
-def _shared(root: Path, program: str) -> tuple[str, ...]:
+def _shared(root: Path, program: str, listing: FolderListing) -> tuple[str, ...]:
     """Return the places of what a program shares with others, and only reads."""
     root = root.absolute()
     path = root / program
-    found = find_shared(path, within=root)
+    found = find_shared(path, within=root, listing=listing)
     if is_program(program):
         found += language_of(program).reads(path)
     inside = (one for one in found if root in one.parents)

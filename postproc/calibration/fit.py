@@ -51,6 +51,7 @@ from postproc.exceptions import MeasurementError, ModelError
 from postproc.model.combination import Combination
 from postproc.model.doubt import Doubt
 from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.effects.effect import Effect
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
 from postproc.model.effects.station_shift import StationShift
@@ -75,6 +76,7 @@ Frame = Literal["base", "tracker"]
 
 SAME_POINT = 1e-4  # [m] nests that are nearer are one, or the cell has not said
 NOTABLE = 0.002  # [mm] at the tool by rounded joint angles
+OPEN = 0.01  # [mm] at the tool by effects that rows neither show nor rule out
 TURNED = 3e-3  # [rad] that a plate may be turned by, as far as a tracker can tell
 
 
@@ -358,6 +360,7 @@ def _conclude(
         *drifts(fitted),
         *wrong_nests(fitted, rows.points),
         *_rounding(model, fitted),
+        *_left_open(doubt, fitted),
         *found.notes,
         *direction,
         *file_steps(fitted, survey),
@@ -405,6 +408,29 @@ def _rounding(model: Model, fitted: Fit) -> tuple[str, ...]:
         f"{size:.3f} mm at the tool (rms), which no effect can take out of these rows. "
         "Write more decimals, or give the survey program (--program)",
     )
+
+
+def _left_open(doubt: Doubt | None, fitted: Fit) -> tuple[str, ...]:
+    """Name what may be there, where stated errors are notably larger for it."""
+    if doubt is None:
+        return ()
+    c, effects = fitted.combination, doubt.effects.effects
+    variance = doubt.variance(c, c.at(fitted.batch, fitted.values))
+    size = float(np.sqrt(variance.sum(axis=1).mean())) / MM
+    if size < OPEN:
+        return ()
+    names = " or ".join(dict.fromkeys(e.name for e in effects))
+    state = ", and state mounting under [robot]" if _any_direction(effects) else ""
+    return (
+        f"these rows do not tell whether there is {names}: not corrected, but the "
+        f"stated errors have {size:.3f} mm at the tool (rms) of it. Measure more "
+        f"poses, with more decimals of joint angles{state}",
+    )
+
+
+def _any_direction(effects: tuple[Effect, ...]) -> bool:
+    """Return True if effects are of weight along another direction than stated."""
+    return any(e.settings().get("along") is not None for e in effects)
 
 
 def drifts(fitted: Fit) -> tuple[str, ...]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from postproc.calibration.doubt import Alternative, _apart, doubt_of
 from postproc.calibration.evidence import posterior
+from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, beside
 from postproc.calibration.selection import fit_survey, model_of
@@ -16,7 +18,7 @@ from postproc.model.effects.compliance import Compliance
 from postproc.model.kinematics import Batch
 from postproc.robot.state import States
 from tests.calibration.simulator import NJ, random_arm
-from tests.campaign_files import FLOOR, Setup
+from tests.campaign_files import FLOOR, Setup, write_cell
 from tests.campaign_rows import Habit, as_mounted, measure, unseen
 
 WALL, CEILING = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -85,6 +87,20 @@ def test_a_stiff_arm_that_rows_show_to_be_stiff_is_no_less_sure() -> None:
         model_of(fitted, survey, doubt=d).std_error(NJ, states) for d in (None, doubt)
     )
     assert np.mean(with_) < 1.03 * np.mean(without)
+
+
+def test_a_fit_names_what_is_left_open(tmp_path: Path) -> None:
+    survey = campaign(1, SOFT, ONE_DECIMAL, poses=30)[1]
+    told = {}
+    for said in ("", "mounting"):
+        cell = write_cell(tmp_path / f"cell{said}.toml", FLOOR, said)
+        found = fit_measurements(survey, cell, validate=False)
+        assert found.model.doubt is not None
+        told[said] = [w for w in found.report.warnings if "do not tell whether" in w]
+    (free,), (stated,) = told[""], told["mounting"]
+    assert "compliance: not corrected" in free
+    assert free.endswith("state mounting under [robot]")
+    assert "mounting" not in stated
 
 
 def test_the_correction_stays() -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from postproc.exceptions import ProgramError
-from postproc.files import find_shared, is_system_source
+from postproc.files import FolderListing, find_shared, is_system_source
 from postproc.language.interface import Start
 from postproc.language.krl.language import Krl
 from postproc.language.source import Source
@@ -173,3 +175,32 @@ def test_shared_files_of_an_archive_are_found(tmp_path):
     assert names[0] == "$config.dat"
     assert sorted(names[1:]) == ["SPS.SUB", "own.sub", "plc.sub"]
     assert find_shared(tmp_path / "R1" / "a.pdl") == ()
+
+
+def test_an_archive_is_walked_once_for_all_its_programs(tmp_path, monkeypatch):
+    system = tmp_path / "R1" / "System"
+    programs = [tmp_path / "R1" / "Program" / f"d{k}" / f"p{k}.src" for k in range(5)]
+    for path in (*programs, system / "$config.dat", system / "sps.sub",
+                 programs[0].with_name("own.SUB"), programs[1].with_name("$CONFIG.DAT"),
+                 tmp_path / "R1" / "Program" / "plc.sub"):  # fmt: skip
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"")
+    alone = [find_shared(path, tmp_path) for path in programs]
+    assert len({*alone}) == 2 and {len(found) for found in alone} == {1, 4}
+    walked = []
+    for name in ("rglob", "iterdir"):
+        once = getattr(Path, name)
+        monkeypatch.setattr(Path, name, lambda self, *given, own=once: (
+            walked.append((own, self)) or own(self, *given)))  # fmt: skip
+    listing = FolderListing()
+    assert [find_shared(path, tmp_path, listing) for path in programs] == alone
+    assert len(walked) == len({*walked})
+
+
+def test_a_program_is_found_in_its_archive_from_its_own_folder(tmp_path, monkeypatch):
+    program = tmp_path / "R1" / "Program" / "job.src"
+    for path in (program, tmp_path / "R1" / "System" / "$config.dat"):
+        path.parent.mkdir(parents=True)
+        path.write_bytes(b"")
+    monkeypatch.chdir(program.parent)
+    assert find_shared(Path("job.src")) == find_shared(program) != ()
