@@ -87,7 +87,7 @@ def batch(
         from postproc.report.terminal import progress_bar
 
         asked = changes_of(changes, orientation, shared_points, path_tolerance)
-        made = make_plan(plan, cell, model, Options(temperature), asked)
+        made = make_plan(plan, cell, model, Options(temperature=temperature), asked)
         check_places([html], [cell, model, plan])
         for line in _archive_lines(source, made):
             say(line)

@@ -124,7 +124,7 @@ def compensate(
         check_places(outputs, [given, variables, cell, model])
         asked = changes_of(changes, orientation, shared_points, path_tolerance)
         loaded = load_cell(cell, changes=asked)
-        options = Options(temperature, timing=loaded.compensation.timing)
+        options = Options(temperature=temperature, timing=loaded.compensation.timing)
         fitted = as_model(model, loaded.arm)
         files = ProgramFiles.open(program, variables)
         if variables_out is not None:
@@ -265,7 +265,9 @@ def explain(
         with busy("plan"):
             files = ProgramFiles.open(program, variables)
             loaded = load_cell(cell, changes=changes_of(changes))
-            options = Options(temperature, timing=loaded.compensation.timing)
+            options = Options(
+                temperature=temperature, timing=loaded.compensation.timing
+            )
             fitted = None if model is None else load_model(model)
             found = tell(files, loaded, fitted, options=options)
         for text in listed(found.findings(line), every):

@@ -42,17 +42,17 @@ class Options:
             preload_backlash, reapproach, path_tolerance_mm: See `CompensationSection`.
     """
 
-    temperature: float | None = None
-    explained: bool = False
-    timing: bool | None = AS_IN_CELL
-    orientation: bool = AS_IN_CELL
     shared_points: SharedPoints = AS_IN_CELL
     edit_exported: bool = AS_IN_CELL
+    temperature: float | None = None
+    orientation: bool = AS_IN_CELL
     assume_motion: bool = AS_IN_CELL
+    explained: bool = False
+    timing: bool | None = AS_IN_CELL
+    path_tolerance_mm: float | None = AS_IN_CELL
     max_inserted: int = AS_IN_CELL
     preload_backlash: bool = AS_IN_CELL
     reapproach: bool = AS_IN_CELL
-    path_tolerance_mm: float | None = AS_IN_CELL
 
     def within(self, cell: Cell) -> Options:
         """Return them with what the cell says of all that is not given.

@@ -101,6 +101,7 @@ class Worker:
             str(self.root): "<root>",
             f"postproc {self.version}": "postproc <version>",
             f'"version": "{self.version}"': '"version": "<version>"',
+            f'{{"postproc": "{self.version}"': '{"postproc": "<version>"',
         }
         return {
             what: hashlib.sha256(data).hexdigest()
