@@ -12,7 +12,6 @@ from postproc.cli.common import (
     HtmlOption,
     JsonOption,
     ModelOption,
-    SeedOption,
     SetOption,
     app,
     as_path,
@@ -53,7 +52,6 @@ def diagnose(
         Path | None,
         typer.Option("--path", help="TRACK.csv: readings while --program ran."),
     ] = None,
-    seed: SeedOption = 0,
     changes: SetOption = None,
 ) -> None:
     """Find what the model lacks, trace it to an effect, and add that effect."""
@@ -67,7 +65,7 @@ def diagnose(
         files = data or []
         inputs = [*files, cell, model, program, path]
         check_places([output, as_path(json), html, plot], inputs)
-        how = {"program": program, "seed": seed}
+        how = {"program": program}
         loaded = load_cell(cell, changes=changes_of(changes))
         with stage_bar() as progress:
             on_the_way, found = _diagnosed(

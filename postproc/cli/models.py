@@ -153,7 +153,6 @@ def fit(
         str | None,
         typer.Option("--effects", help="Effects of the full method, comma separated."),
     ] = None,
-    seed: SeedOption = 0,
     program: Annotated[
         Path | None,
         typer.Option("--program", help="The survey program, for id, x, y, z files."),
@@ -181,7 +180,6 @@ def fit(
                 method=method.value,
                 effects=names,
                 program=program,
-                seed=seed,
                 progress=progress,
             )
             if not found.rejected:
@@ -241,7 +239,6 @@ def compare(
     blocks: Annotated[
         int, typer.Option("--cv-blocks", min=0, help="Test on so many blocks in turn.")
     ] = 0,
-    seed: SeedOption = 0,
     changes: SetOption = None,
 ) -> None:
     """Fit every method to the same rows, and test it on the same others."""
@@ -253,7 +250,7 @@ def compare(
         others = test or []
         check_places([as_path(json), html, plot], [*data, *others, cell])
         loaded = load_cell(cell, changes=changes_of(changes))
-        held = Held(others, blocks, seed)
+        held = Held(others, blocks)
         with busy("fit every method"):
             found = compare_files(data, loaded, None, held)
         if json:

@@ -94,6 +94,7 @@ class FoundGoal:
         pins: Why the numbers must stay, "" where they need not.
         shared: Other programs may read it too.
         shift: How it is shifted from a point, None where it is not, or not known.
+        holds: File and first number of a shift that keeps its numbers for this move.
     """
 
     target: Meaning
@@ -107,6 +108,7 @@ class FoundGoal:
     pins: str = ""
     shared: bool = False
     shift: FoundShift | None = None
+    holds: tuple[int, int] = (-1, -1)
 
     @property
     def writes(self) -> tuple[int, tuple[int, ...]]:
@@ -384,6 +386,7 @@ def _aux(found: Sequence[FoundVisit]) -> np.ndarray:
 
 _NO_LITERAL = -2  # follows numbers that are no literal
 MOST_NUMBERS = 17  # of a target
+UNKNOWN_POINT = "its move shifts a point, too, whose numbers are not known or computed"
 TAUGHT_SHIFT = "a target that is computed from it is marked as taught"
 ANY_ELEMENT = "a move goes to an element of {} that only the run tells"
 BESIDE = (
@@ -454,13 +457,16 @@ def _pinned(
     pinned = []
     for v in rows:
         file, slots = v.goal.writes
-        shift = v.goal.shift if v.goal.is_rewritten_by_shift else None
-        own = elements.get(_array_of(v.goal.name), "") if shift is None else shift.pins
+        by = v.goal.shift if v.goal.is_rewritten_by_shift else None
+        own = elements.get(_array_of(v.goal.name), "") if by is None else by.pins
         pinned.append(stays.get((file, slots[0]), "") or own)
     for v in found:
         at = index.get(v.goal.point, -1)
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
+        shift = index.get(v.goal.holds, -1)
+        if shift >= 0:
+            pinned[shift] = pinned[shift] or UNKNOWN_POINT
     return pinned
 
 

@@ -154,29 +154,18 @@ def test_options_say_how_a_file_is_to_be_read(desk, survey, fit):
         "map.toml", "[columns]\n" + "".join(f'{n} = "{c}"\n' for n, c in names.items())
     )
     renamed = {names[n]: v for n, v in survey.items()}
-    how = (
-        "--set",
-        f"measurements.columns={form}",
-        "--set",
-        "measurements.delimiter=|",
-        "--set",
-        "measurements.decimal=,",
-    )
+    how = ("--set", f"measurements.columns={form}",
+           "--set", "measurements.delimiter=|",
+           "--set", "measurements.decimal=,")  # fmt: skip
     found = fit(renamed, *how, delimiter="|", decimal=",")
     assert found.exit_code == 0, found.stderr
     mapped = json.loads((desk.folder / "m.json").read_bytes())
     assert fit(survey).exit_code == 0
     plain = json.loads((desk.folder / "m.json").read_bytes())
     assert mapped["parameters"] == plain["parameters"]
-    found = fit(
-        renamed,
-        *how[:2],
-        "--set",
-        "measurements.delimiter=;",
-        delimiter="|",
-        decimal=",",
-    )
+    other = ("--set", "measurements.delimiter=;")
+    found = fit(renamed, *how[:2], *other, delimiter="|", decimal=",")
     assert found.exit_code == 2
     assert re.search(r"s\.csv:1: column c0, .* is missing", found.stderr)
     found = fit(survey, "--set", "measurements.decimal=x")
-    assert found.exit_code == 2 and "write . or ," in found.stderr
+    assert found.exit_code == 2 and "'.' or ','" in found.stderr

@@ -68,4 +68,4 @@ def test_what_moves_along_is_named(bench_cell, bench_model, case, text):
     d = compensate(
         files[name], bench_cell, bench_model, name=name, pages=pages
     ).decisions
-    assert any(text in reason for reason in d.reasons), d.reasons
+    assert any(text in reason.text for reason in d.reasons), d.reasons

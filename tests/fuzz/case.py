@@ -22,6 +22,7 @@ from postproc.robot.cell import Cell
 
 LIMIT = 2.0  # [s] of processor time, for files of up to
 SIZE = 100_000  # bytes
+BOM = b"\xef\xbb\xbf"
 SHIFT = (0.25, -1.75, 3.125)  # of a position, or of the first three joints
 _NUMBER = re.compile(rb"-?\d+(?:\.\d+)?")
 
@@ -167,7 +168,8 @@ def check_bytes(
 def without_stamp(name: str, data: bytes) -> bytes:
     """Take out the stamp: line 1, or the line behind the header of a module."""
     if name.endswith(".pdl") or name.endswith(".lsv"):
-        found = re.match(rb"-- postproc [^\r\n]*(?:\r\n|\n|\r)", data)
+        line = re.compile(rb"-- postproc [^\r\n]*(?:\r\n|\n|\r)")
+        found = line.match(data, len(BOM) * data.startswith(BOM))
     else:
         line = rb"[!;] postproc \S+ model=\S+ source=[0-9a-f]{64}(?:\r\n|\n|\r)"
         found = re.match(line, data) or re.search(rb"(?<=[\r\n%])[ \t]*" + line, data)

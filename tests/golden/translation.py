@@ -14,12 +14,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tests.golden.case import HERE, Case
+from tests.golden.case import HERE, Case, kept
 from tests.golden.record import Record
 
 TABLE = HERE / "translation.toml"
 PROGRAMS = (".pdl", ".lsv", ".mod", ".src", ".dat")
-PRINTED = ("stdout", "stderr")
+PRINTED, TOML = ("stdout", "stderr"), ".toml"
 BLANKS = re.compile(r" {2,}|[-\u2500]{2,}")  # columns are as wide as their words
 
 
@@ -57,11 +57,12 @@ class Translation:
 
     def case(self, case: Case) -> Case:
         """Return a case in the words of the base."""
+        given = {k: kept()[name] for k, name in case.files.items() if k.endswith(TOML)}
         texts = {
             place: _replaced(data.decode("latin-1"), self.cells).encode("latin-1")
-            if place.endswith(".toml")
+            if place.endswith(TOML)
             else data
-            for place, data in case.texts.items()
+            for place, data in {**given, **case.texts}.items()
         }
         commands = tuple(
             " ".join(self.arguments.get(word, word) for word in line.split(" "))

@@ -111,6 +111,6 @@ def cells_of(row: DiffRow, told: bool) -> list[str]:
     cells = [row.file, str(row.line or ""), row.target, old, "->" if new else "", new]
     cells.append("" if size is None else f"{size:.3f}")
     others = ", ".join(f"{n} {name}" for name, n in row.visits.items())
-    why = f"{row.why} ({others})" if row.why and others else row.why or others
+    why = f"{row.reason} ({others})" if row.reason and others else row.reason or others
     status = f"{row.status}: {why}" if why else row.status
     return [*cells, arrows(row.direction), status] if told else cells

@@ -391,20 +391,20 @@ class _Goal:
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, said.DataObject):
             return _left(AT_RUN_TIME)
-        base = self._point(point)
+        base, held = self._point(point), self._held(other)
         frames = FrameReader(self.task, self.row, self.here, _NO, _NO)
         shift = frames.frame(other)
         if base.target != Meaning.POSE or not shift.pose:
             pins = base.pins or f"{base.name} is shifted by what {RUN_TIME}"
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
-                name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
+                name=base.name, why=base.why or AT_RUN_TIME, pins=pins, holds=held,
             )  # fmt: skip
         if behind and self._by_joints:
             pins = base.pins or f"{base.name} is shifted without S and T"
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
-                name=base.name, why=NO_STATUS, pins=pins,
+                name=base.name, why=NO_STATUS, pins=pins, holds=held,
             )  # fmt: skip
         values, turns = _linked(base.values, shift, behind)
         found = self._shift(base, other, shift, behind)
@@ -414,7 +414,15 @@ class _Goal:
             Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name,
             self._outside_of(base, other) if behind else base.aux,
             base.why, pins, base.shared, found,
+            held if found.slots[0] < 0 else (-1, -1),
         )  # fmt: skip
+
+    def _held(self, other: said.Operand) -> tuple[int, int]:
+        """Return where the numbers of a shift begin that stand in the move itself."""
+        value = self.task.value(other, self.row, self.here)
+        numbers = _numbers(value, PLACE) if isinstance(value, KrlRecord) else None
+        file, slots = _places(numbers or ())
+        return (file, slots[0]) if file == self.here.file and slots else (-1, -1)
 
     def _outside_of(self, base: FoundGoal, other: said.Operand) -> tuple[float, ...]:
         """Return the external axes of ``point : other``: those that stand on the right.

@@ -387,6 +387,9 @@ class Goals:
         if len(placed) != 4:
             return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
         base = self.goal(placed[0], POINT, row, scope)
+        at = int(self.task.files[scope.file].text.first[row])
+        x = placed[1]
+        held = (scope.file, at + x.slot) if isinstance(x, said.Num) else (-1, -1)
         shift = [self.task.number(one, row, scope) for one in placed[1:]]
         angles = [
             self.task.number(turns[axis], row, scope) if axis in turns else 0.0
@@ -396,7 +399,7 @@ class Goals:
             pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=_from(base),
-                name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
+                name=base.name, why=base.why or AT_RUN_TIME, pins=pins, holds=held,
             )  # fmt: skip
         values = _moved(np.array(base.values), name, shift, angles)
         turned = any(angles)
@@ -410,7 +413,7 @@ class Goals:
         pins = base.pins or (f"{name} turns it" if turned and fixed else "")
         return FoundGoal(
             Meaning.POSE, values, base.file, NO_SLOTS, _from(base), base.name, base.aux,
-            base.why, pins, shift=found,
+            base.why, pins, shift=found, holds=held if fixed else (-1, -1),
         )  # fmt: skip
 
     def _found_shift(

@@ -101,3 +101,13 @@ def test_a_written_shift_is_taught_by_its_statement():
     visits = read(go("p1"), move)
     assert visits.literals.taught[visits.literal[2]]
     assert not visits.literals.taught[visits.literal[1]]
+
+
+def test_a_shift_of_a_point_that_is_computed_keeps_its_numbers():
+    points = LIST.replace("0.950898", "0.5+0.45")
+    moves = ["FOR i FROM 1 TO 3 DO", go("list{i}"),
+             "MoveL Offs(list{i},0,0,20),v200,fine,t\\WObj:=w;", "ENDFOR"]  # fmt: skip
+    declared = "CONST robtarget list{{3}}:=[{}];"
+    pins = [read(*moves, declared=declared.format(own)).literals.pinned
+            for own in (LIST, points)]  # fmt: skip
+    assert not any(pins[0]) and any("shifts a point, too" in pin for pin in pins[1])

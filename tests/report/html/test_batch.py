@@ -14,7 +14,11 @@ DONE = {
     "before_mm": FIGURES,
     "after_mm": {**FIGURES, "mean": 0.004},
 }
-LEFT = {**DONE, "left": 2, "left_alone": ["a.pdl:3: rejected: too near"]}
+LEFT = {
+    **DONE,
+    "uncorrected": 2,
+    "uncorrected_lines": ["a.pdl:3: rejected: too near"],
+}
 
 
 def page(*entries):
