@@ -1,6 +1,6 @@
 # make demo    survey, fit, compensate and check the sample programs on a virtual arm
 # make test    all tests
-# make lint    ruff and mypy
+# make lint    ruff, mypy, and the words of names, help, messages and pages
 # make lock    pin what is installed, in requirements/; UPGRADE=1: to the newest versions
 # make chaos   kill 200 batches of 300 files at random moments and resume them; end 50 long runs by signals
 # make awkward   200 drawn surveys of every awkward kind: fitted, or refused in words
@@ -56,6 +56,7 @@ lint: $(STAMP)
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/ruff format --check .
 	@$(VENV)/bin/mypy
+	@$(PYTHON_BIN) docs/tools/words.py
 
 lock:
 	@PATH="$(abspath $(VENV))/bin:$$PATH" bash .ci/lock $(if $(UPGRADE),--upgrade)

@@ -273,11 +273,11 @@ def cause_in_any_frame(survey: Measurements, arm: Arm) -> str:
     some = np.unique(np.linspace(0, len(survey) - 1, TRIED).astype(np.int64))
     states, position, names = survey.states, survey.position, survey.stations
 
-    def left(states: States, position: Floats) -> float:
+    def gap(states: States, position: Floats) -> float:
         found = register(arm, states, position, NOTHING, np.zeros(0), names)
         return typical_gap(found, arm, states, position)
 
-    if left(states[some], position[some]) < CLOSE:
+    if gap(states[some], position[some]) < CLOSE:
         return (
             "The positions look like the tracker's frame: use "
             "--set measurements.frame=tracker"
@@ -288,7 +288,7 @@ def cause_in_any_frame(survey: Measurements, arm: Arm) -> str:
     )
     for guess in chain(_guesses(states, position), offsets):
         rows = some[~np.isnan(guess.position[some]).any(axis=1)]
-        if left(guess.states[rows], guess.position[rows]) < CLOSE:
+        if gap(guess.states[rows], guess.position[rows]) < CLOSE:
             return guess.all_rows
     return UNKNOWN
 

@@ -329,7 +329,7 @@ def tracker_motion(rows: ReferenceRows, time: Floats, order: Floats) -> TrackerM
     free = 3.0 * (len(own) - len(places))
     slow = drift.in_time(own, motions)
 
-    def tried(jump: float | None) -> tuple[Floats, float, float]:
+    def fit_motion(jump: float | None) -> tuple[Floats, float, float]:
         """Fit one form of motion: values, nats and noise."""
         columns = _about_mean(_with_jump(slow, jump, own, motions), which)
         smooth, sudden = (np.array([p.scale for p in drift.parameters()]), JUMPS)
@@ -338,9 +338,9 @@ def tracker_motion(rows: ReferenceRows, time: Floats, order: Floats) -> TrackerM
         values, nats, sigma = _fit(columns.reshape(len(y), -1) * scales, y, free, group)
         return values * scales, nats, sigma
 
-    jump, (values, nats, sigma) = None, tried(None)
+    jump, (values, nats, sigma) = None, fit_motion(None)
     moments = np.unique(own)
-    knocked = {t: tried(t) for t in ((moments[1:] + moments[:-1]) / 2).tolist()}
+    knocked = {t: fit_motion(t) for t in ((moments[1:] + moments[:-1]) / 2).tolist()}
     if knocked:
         likeliest = max(knocked, key=lambda t: knocked[t][1])
         at_once, more, scatter = knocked[likeliest]

@@ -160,20 +160,20 @@ def _compared(model: Model, arm: Arm, found: Reversals, i: int) -> _OneReversal:
     usual = whitener.variance(model.noise).mean(axis=0)
     scale = 1.0 / (model.reading_spread * np.sqrt(usual))
 
-    def predicted(side: Floats) -> Floats:
+    def predict(side: Floats) -> Floats:
         """Where the tool is, less its mean, in units of a reading's noise."""
         there = np.array(came)
         there[:, drive] = came[:, drive] * side
         moved = model.error(arm, states.with_(direction=there))
-        return whitened(batch.walk.tcp + moved)
+        return whiten(batch.walk.tcp + moved)
 
-    def whitened(place: Floats) -> Floats:
+    def whiten(place: Floats) -> Floats:
         turned = (place @ whitener.turn[0].T) * scale
         return np.asarray(turned - turned.mean(axis=0)).reshape(-1)
 
-    on_flank = predicted(np.ones(len(own)))
-    by_width = [predicted(on_the_way(1.0 - back / w, w)) for w in WIDTHS]
-    left = whitened(own.position) - on_flank
+    on_flank = predict(np.ones(len(own)))
+    by_width = [predict(on_the_way(1.0 - back / w, w)) for w in WIDTHS]
+    left = whiten(own.position) - on_flank
     return _OneReversal(left, np.array(by_width) - on_flank)
 
 

@@ -79,11 +79,11 @@ def with_whole_turns(text: str) -> str:
     '<origin rpy="0 -1.5707963267948966 1.5"/>'
     """
 
-    def mended(found: re.Match[str]) -> str:
+    def mend(found: re.Match[str]) -> str:
         words = " ".join(map(_whole_turn, found[3].split()))
         return f"{found[1]}{found[2]}{words}{found[2]}"
 
-    return RPY.sub(mended, text)
+    return RPY.sub(mend, text)
 
 
 def _whole_turn(word: str) -> str:

@@ -147,14 +147,14 @@ def registrations(
         model: The model.
     """
 
-    def left(rows: Measurements) -> float:
+    def mean_gap(rows: Measurements) -> float:
         error = model.error(cell.arm, rows.states)
         gap = rows.position - Batch(cell.arm, rows.states).walk.tcp - error
         return float(np.linalg.norm(gap, axis=1).mean()) / MM
 
     spent = 6 * len(placed.transforms) + 3 * len(placed.probes)
     free = max(3 * len(seen) - spent, 1)
-    own = left(base) * float(np.sqrt(3 * len(seen) / free))
+    own = mean_gap(base) * float(np.sqrt(3 * len(seen) / free))
     told = (
         f"registered from its own rows the file is left {own:.4f} mm on average "
         f"({spent} numbers of {3 * len(seen)} readings counted)"
@@ -164,7 +164,7 @@ def registrations(
         return (told,)
     there = station_of(survey, cell.arm, seen.states, seen.position, seen.stations)
     station = seen.states.station
-    as_fitted = left(
+    as_fitted = mean_gap(
         replace(
             seen,
             states=there.on_probes(seen.states),

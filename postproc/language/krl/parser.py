@@ -39,12 +39,12 @@ def _tokens(c: Children, kind: str) -> list[str]:
 
 
 def _routine(kind: str) -> Callable[[Children], said.KrlRoutine]:
-    def built(c: Children) -> said.KrlRoutine:
+    def build(c: Children) -> said.KrlRoutine:
         parameters = next((x for x in c if type(x) is tuple), ())
         shared = bool(_tokens(c, "GLOBAL"))
         return said.KrlRoutine(kind, _tokens(c, "NAME")[0], parameters, shared)
 
-    return built
+    return build
 
 
 # Without DECL only these begin a declaration: other pairs of names may be commands.
@@ -130,13 +130,13 @@ def _spline(c: Children) -> said.SplineBlock:
 
 
 def _called(make: Callable[[str, tuple[said.Argument, ...]], Any]) -> Any:
-    def built(c: Children) -> Any:
+    def build(c: Children) -> Any:
         given = c[1]
         if len(given) == 1 and given[0].value is None:
             given = ()
         return make(_low(c[0]), given)
 
-    return built
+    return build
 
 
 def _aggregate(c: Children) -> said.KrlAggregate:

@@ -45,14 +45,14 @@ def _after_scope(c: Children) -> Children:
 
 
 def _routine(kind: str) -> Callable[[Children], said.RoutineHead]:
-    def built(c: Children) -> said.RoutineHead:
+    def build(c: Children) -> said.RoutineHead:
         rest = list(_after_scope(c))
         parameters = rest.pop() if isinstance(rest[-1], tuple) else ()
         returns = _low(rest[0]) if kind == "func" else ""
         local = _scope(c) == "local"
         return said.RoutineHead(kind, _low(rest[-1]), parameters, local, returns)
 
-    return built
+    return build
 
 
 def _data(c: Children) -> said.DataDeclaration:
