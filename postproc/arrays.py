@@ -42,7 +42,7 @@ def read_only(columns: object) -> None:
 MANY = 40_000  # rows
 
 
-def give_back(rows: int = MANY) -> None:
+def release_memory(rows: int = MANY) -> None:
     """Give memory that is free by now back to the system, after work on many rows."""
     if rows >= MANY:
         _native.give_back()
@@ -87,7 +87,7 @@ def few_rows(column: NDArray[Any]) -> NDArray[Any]:
     return column[:1] if is_one_value(column) else column
 
 
-def taken(
+def take_rows(
     column: NDArray[Any], rows: NDArray[np.int64] | NDArray[np.bool_] | slice
 ) -> NDArray[Any]:
     """Take rows of a column; one value stays one value.
@@ -175,11 +175,11 @@ class Cells:
         """Open, part and close the values of every row."""
         return replace(self, between=(begin, between, end))
 
-    def listed(self) -> Cells:
+    def bracket_rows(self) -> Cells:
         """Write the values of every row as a list in square brackets."""
         return self.within(b"[", b", ", b"]")
 
-    def ragged(self, first: Ints) -> Cells:
+    def group_rows(self, first: Ints) -> Cells:
         """Let every row have so many values: where they begin, and at last end."""
         return replace(self, first=np.ascontiguousarray(first, dtype=np.int64))
 
@@ -188,7 +188,7 @@ class Cells:
         return replace(self, left=left, instead=instead)
 
 
-def fixed(values: Floats, decimals: int) -> Cells:
+def format_fixed(values: Floats, decimals: int) -> Cells:
     """Write numbers, (n,) or (n, k), as ``%.3f`` does for 3 decimals.
 
     >>> text_of(2, [fixed(np.array([-0.0625, np.nan]), 3), Cells(b" ")])
@@ -215,7 +215,7 @@ def whole(values: Indices) -> Cells:
     return Cells(whole=np.ascontiguousarray(_in_columns(values), dtype=np.int64))
 
 
-def named(texts: Sequence[K], index: Indices, text: Callable[[K], str]) -> Cells:
+def format_texts(texts: Sequence[K], index: Indices, text: Callable[[K], str]) -> Cells:
     """Write one of some texts for every row, as UTF-8.
 
     Args:
@@ -254,7 +254,7 @@ T = TypeVar("T")
 CHUNK = 2048  # rows at a time
 
 
-def in_chunks(work: Callable[[slice], T], n: int, size: int = CHUNK) -> list[T]:
+def map_chunks(work: Callable[[slice], T], n: int, size: int = CHUNK) -> list[T]:
     """Do the work on slices of n rows, one after the other.
 
     >>> in_chunks(lambda rows: (rows.start, rows.stop), 5, 2)
@@ -283,7 +283,7 @@ def spans(begin: Indices, count: Indices) -> Ints:
     return np.repeat(begin - offset, count) + np.arange(int(count.sum()))
 
 
-def among(values: Indices, some: Indices) -> Bools:
+def isin_sorted(values: Indices, some: Indices) -> Bools:
     """Tell which values, (n,), are among some in ascending order, (m,).
 
     >>> among(np.array([7, 2, 9]), np.array([2, 5, 9])).tolist()

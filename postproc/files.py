@@ -96,7 +96,7 @@ def _check_folder(place: Path) -> None:
         raise OutputError(place, "is a folder", "Name the file to write in it")
     if is_stream(place):
         return
-    place = _followed(place)
+    place = _follow_link(place)
     if place.exists() and not place.is_file():
         cure = "Give a file, a pipe or a terminal"
         raise OutputError(place, "is neither a file nor a pipe", cure)
@@ -150,7 +150,7 @@ class _Shield:
             signal.signal(number, signal.SIG_DFL)
 
     @contextmanager
-    def held(self) -> Iterator[None]:
+    def hold(self) -> Iterator[None]:
         """Let the block come to its end first."""
         self._held = True
         try:
@@ -186,7 +186,7 @@ def write_all(files: Mapping[Path, Content]) -> None:
         with _Shield() as shield, _Temporaries(shield) as ready:
             for path, data in files.items():
                 if not is_stream(path):
-                    ready.write(_followed(path), data)
+                    ready.write(_follow_link(path), data)
             for path, data in files.items():
                 if is_stream(path):
                     _write_through(path, data)
@@ -215,7 +215,7 @@ class NamedText:
     data: bytes
 
 
-def named_text(file: str | Path | bytes, name: str) -> Path | NamedText:
+def open_text(file: str | Path | bytes, name: str) -> Path | NamedText:
     """Take a file as it is given: by its path, or as bytes with a name."""
     return NamedText(name, file) if isinstance(file, bytes) else Path(file)
 
@@ -237,7 +237,7 @@ class _Temporaries:
 
     def open(self, place: Path) -> IO[bytes]:
         """Open a temporary file for a place."""
-        with self._shield.held():
+        with self._shield.hold():
             start = f".{place.name[:100]}."
             handle, name = tempfile.mkstemp(TEMPORARY, start, place.parent)
             _unfinished.add(name)
@@ -254,7 +254,7 @@ class _Temporaries:
 
     def rename(self) -> None:
         """Give all files their names; make that durable."""
-        with self._shield.held():
+        with self._shield.hold():
             for name, place in self._ready:
                 os.replace(name, place)
         for folder in {place.parent for _, place in self._ready}:
@@ -289,7 +289,7 @@ def disk_error(exc: OSError, path: str | Path) -> OutputError:
     return OutputError(path, _reason(exc), cure)
 
 
-def _followed(path: Path) -> Path:
+def _follow_link(path: Path) -> Path:
     """Return the file that a link leads to, whether it is there yet or not."""
     return Path(os.path.realpath(path)) if path.is_symlink() else path
 

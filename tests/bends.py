@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.calibration.diagnosis.investigate import trace
 from postproc.calibration.diagnosis.search import with_effects
-from postproc.calibration.diagnosis.trace import trace
+from postproc.calibration.effect_selection import attribute_drift
 from postproc.calibration.regression import Fit
-from postproc.calibration.selection import told_apart
 from postproc.model.effects.bending import Bending
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.simulation import Planted, stream, virtual_arm
 from tests.calibration.planted import ARM, BASE, TRACKER, Campaign, states_of, survey
 from tests.undeclared_trial import moved
@@ -98,7 +98,7 @@ def run(job: tuple[int, float, float]) -> Trial:
         )
         for most in (1, 2, 99)
     }
-    kept = told_apart(found.search.fit, None)
+    kept = attribute_drift(found.search.fit, None)
     return Trial(
         *job, tuple(worth(informed, k) for k in range(len(laws))),
         named[1], named[2], named[99], left(c, base, kept, informed),
@@ -115,7 +115,7 @@ def worth(informed: Fit, number: int) -> float:
 def left(c: Campaign, *fits: Fit) -> tuple[float, float, float]:
     """Tell what fits leave of the true errors of unseen poses, mean [mm]."""
     fresh = survey(c.arm, c.arm.seed + 10**6, UNSEEN)
-    truth, batch = c.arm.error(fresh), Batch(ARM, states_of(fresh))
+    truth, batch = c.arm.error(fresh), ArmStates(ARM, states_of(fresh))
     rest = (truth - moved(f, batch, ("arm", "state")) for f in fits)
     a, b, d = (1e3 * float(np.linalg.norm(r, axis=1).mean()) for r in rest)
     return a, b, d

@@ -25,7 +25,7 @@ from postproc.calibration.fit import Calibration, Frame, fit_measurements
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.stops import pool_readings
 from postproc.exceptions import PostprocError
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import READING, Model
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -127,7 +127,7 @@ def false_names(
     """
     yields = isinstance(true, Yielding)
     states, c = found.survey.states, found.model.effects
-    batch, named, own = Batch(arm, states), [], []
+    batch, named, own = ArmStates(arm, states), [], []
     if yields:
         load = true.torque(states.q)[:, None, list(SOFT)]  # type: ignore[union-attr]
         own.append(batch.jacobian[:, :, list(SOFT)] * load)
@@ -160,7 +160,7 @@ def errors(
     there = registered.on_probes(states)
     T = placed(0)
     read = (arm.tcp(states.q, states.tool) + true - T[:3, 3]) @ T[:3, :3]
-    at = registered.to_base(read) - Batch(arm, there).walk.tcp
+    at = registered.to_base(read) - ArmStates(arm, there).walk.tcp
     still = replace(model.noise, tracker=0.0, joint=0.0, stop=0.0, rounding=0.0)
     sure = {k: v for k, v in model.statistics.items() if k != READING}
     predicted_read = replace(model, noise=still, statistics=sure).reading(arm, there)

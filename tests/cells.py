@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from postproc.calibration.diagnosis.trace import trace
-from postproc.calibration.selection import told_apart
+from postproc.calibration.diagnosis.investigate import trace
+from postproc.calibration.effect_selection import attribute_drift
 from postproc.exceptions import PostprocError
 from postproc.model.effects import BY_NAME
 from postproc.model.effects.effect import Family
@@ -175,7 +175,7 @@ def run(job: tuple[int, float, int]) -> str:
     asked = [place(PlantedMotion.parse(t)) for t in texts]
     first = {told(f) for f in families if f is not None}
     every = {told(f) for group in groups for f in group if f is not None}
-    kept = told_apart(traced.search.fit, None)
+    kept = attribute_drift(traced.search.fit, None)
     plain, _ = true_errors(c, seed, base, kept, surveyed=True)
     named = [
         str(f.family)

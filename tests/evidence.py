@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.fit import fit
 from postproc.calibration.measurements import Measurements
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.calibration.survey_program import write_survey
 from postproc.cli.simulate import setup_of, simulate_file, visits_of
-from postproc.compensation.command import new_numbers, solve_visits
 from postproc.compensation.compensate import compensate
+from postproc.compensation.inverse_model import new_numbers, solve_visits
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import plan_visits, read_program, with_measured_play
 from postproc.compensation.program import states_of as planned_states

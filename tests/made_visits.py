@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.language.pdl2.dialect import PDL2_DIALECT
+from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.visits import Literals, NumberPlaces, Visits
 from postproc.robot.pose import pose_from_record
 

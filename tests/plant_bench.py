@@ -20,10 +20,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from unittest.mock import patch
 
-from postproc.compensation import together
-from postproc.compensation.options import AS_USUAL
-from postproc.compensation.record import restore_file
-from postproc.compensation.together import Given
+from postproc.compensation import micro_batch
+from postproc.compensation.micro_batch import Given
+from postproc.compensation.options import DEFAULT_OPTIONS
+from postproc.compensation.sidecar import restore_file
 from postproc.model.model import load_model
 from postproc.robot.cell import load_cell
 from tests.batch.dask_cluster import Cluster
@@ -88,13 +88,13 @@ def passes(plant: Plant, found: Findings) -> None:
     programs = [Given(path.name, path.read_bytes(), None, {}) for path in paths]
 
     def spent(visits: int) -> float:
-        with patch.object(together, "PASS", visits):
+        with patch.object(micro_batch, "PASS", visits):
             start = time.process_time()
-            together.compensate_batch(programs, cell, model, AS_USUAL)
+            micro_batch.compensate_batch(programs, cell, model, DEFAULT_OPTIONS)
             return time.process_time() - start
 
-    spent(together.PASS)  # every line is parsed once
-    runs = {"alone": lambda: spent(0), "beside": lambda: spent(together.PASS)}
+    spent(micro_batch.PASS)  # every line is parsed once
+    runs = {"alone": lambda: spent(0), "beside": lambda: spent(micro_batch.PASS)}
     took = _in_turns(runs)
     alone, beside = (1000 * took[name] / ROUNDS / len(paths) for name in runs)
     text = f"{alone:.0f} ms, {beside:.0f} ms ({alone / beside:.1f} times)"

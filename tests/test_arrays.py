@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from postproc import _native, arrays
-from postproc.arrays import Cells, fixed, named, shortest, text_of, whole
+from postproc.arrays import Cells, format_fixed, format_texts, shortest, text_of, whole
 
 AWKWARD = (
     0.0, -0.0, 0.5, -0.5, 1.5, 0.125, 2.675, 1e-5, 9.9999e-5, 1e-4, -1e-12, 9999.5,
@@ -40,7 +40,7 @@ def lines(column: Cells, n: int) -> list[str]:
 @pytest.mark.parametrize("decimals", [*range(11), 15, 16, 18, 25, 400])
 def test_fixed_is_what_python_writes(numbers, decimals: int) -> None:
     wanted = [f"{v:.{decimals}f}".replace("nan", "null") for v in numbers.tolist()]
-    assert lines(fixed(numbers, decimals), len(numbers)) == wanted
+    assert lines(format_fixed(numbers, decimals), len(numbers)) == wanted
 
 
 @pytest.mark.parametrize("decimals", [None, 0, 2, 4, 9, 10, 17])
@@ -63,9 +63,9 @@ def test_rows_are_json() -> None:
     values = np.array([[0.5, np.nan], [1.0, 2.0]])
     rows = [
         whole(np.array([1, 20_000])).behind(b'{"a": '),
-        fixed(values, 2).listed().unless(np.array([False, True]), b"[]"),
-        named(("x", 'é "b"'), np.array([1, 0]), json.dumps).behind(b', "c": '),
-        named("-0+", np.array([[0, 1], [2, 2]]), json.dumps).listed(),
+        format_fixed(values, 2).bracket_rows().unless(np.array([False, True]), b"[]"),
+        format_texts(("x", 'é "b"'), np.array([1, 0]), json.dumps).behind(b', "c": '),
+        format_texts("-0+", np.array([[0, 1], [2, 2]]), json.dumps).bracket_rows(),
         Cells(b"}\n"),
     ]
     rows[1] = rows[1].behind(b', "b": ')
@@ -80,7 +80,7 @@ def test_rows_are_json() -> None:
 def test_rows_of_different_lengths() -> None:
     first = np.array([0, 2, 2, 3])
     column = Cells(b"", numbers=np.array([[1.5], [2.0], [np.nan]]), first=first)
-    assert lines(column.listed(), 3) == ["[1.5, 2.0]", "[]", "[null]"]
+    assert lines(column.bracket_rows(), 3) == ["[1.5, 2.0]", "[]", "[null]"]
 
 
 def test_texts_are_strings_of_json() -> None:
@@ -111,7 +111,10 @@ def test_what_does_not_fit_is_refused() -> None:
 
 def test_no_rows() -> None:
     empty = np.empty((0, 3))
-    assert text_of(0, [fixed(empty, 2), named((), np.empty(0, int), str)]) == b""
+    assert (
+        text_of(0, [format_fixed(empty, 2), format_texts((), np.empty(0, int), str)])
+        == b""
+    )
 
 
 def below(rows, left, gap, widths):
@@ -131,7 +134,7 @@ def test_tables_stand_below_each_other(left: tuple[bool, ...]) -> None:
     texts = ("", "a", "éà", "a longer one ", "\u2191\u2193")
     index, size = rng.integers(0, 5, n), rng.normal(0, 10.0 ** rng.integers(-3, 5, n))
     given = {7: ["as", "it", "is"], n - 1: ["x" * 60, "", "y "]}
-    columns = [named(texts, index, str), fixed(size, 2), whole(index)]
+    columns = [format_texts(texts, index, str), format_fixed(size, 2), whole(index)]
     rows = [
         given.get(k, [texts[i], f"{s:.2f}", str(i)])
         for k, (i, s) in enumerate(zip(index.tolist(), size.tolist(), strict=True))

@@ -8,12 +8,12 @@ import warnings
 import numpy as np
 import pytest
 
-from postproc.calibration.plausibility import check_survey
 from postproc.calibration.registration import register
+from postproc.calibration.survey_checks import check_survey
 from postproc.exceptions import MeasurementError
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects.curve import Curve
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from tests.awkward import draw, run
 from tests.calibration.simulator import NJ, random_states, survey_of
 
@@ -45,13 +45,13 @@ def test_no_curve_over_ways_that_are_not_known() -> None:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = Curve.candidates(Batch(NJ, states))
+        found = Curve.candidates(ArmStates(NJ, states))
     assert not any("loop" in name for c in found for name in c.effect.source)  # type: ignore[attr-defined]
 
 
 def test_readings_of_one_place_are_refused_as_such() -> None:
     states = random_states(100, np.random.default_rng(0))
-    position = Batch(NJ, states).walk.tcp
+    position = ArmStates(NJ, states).walk.tcp
     frozen = survey_of(states, np.repeat(position[:1], 100, axis=0))
     with pytest.raises(MeasurementError, match="all 100 positions lie within"):
         check_survey(frozen, NJ)

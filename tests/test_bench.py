@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from postproc.compensation.command import solve
+from postproc.compensation.inverse_model import solve
 from postproc.compensation.program import plan_visits, read_program, states_of
 from postproc.robot.cell import load_cell
 from tests.bench.__main__ import CELL

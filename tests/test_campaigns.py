@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from postproc.calibration.stops import pool_readings, stops_of
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from tests.calibration.simulator import NJ, random_arm, random_states
 from tests.campaign_files import FLOOR, Setup, as_filed, as_informed, placed, write_cell
 from tests.campaign_rows import (
@@ -86,7 +86,7 @@ def test_a_cell_says_where_weight_pulls(tmp_path: Path, weight, said: str) -> No
     states = random_states(20, np.random.default_rng(0))
     assert NJ.file.links is not None
     own = torque(NJ, states.q, np.array(NJ.file.links.mass_kg), along)
-    np.testing.assert_allclose(Batch(arm, states).loads.gravity, own, atol=1e-4)
+    np.testing.assert_allclose(ArmStates(arm, states).loads.gravity, own, atol=1e-4)
     bare = write_cell(tmp_path / "cell.toml", weight, "").arm
     assert tuple(bare.weight) == FLOOR
 

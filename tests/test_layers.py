@@ -42,9 +42,9 @@ ONLY = {
 JOINED = {
     "calibration.measured_program": {"program", "program_files"},
     "calibration.diagnosis.measured_path": {
-        "paths.accuracy",
-        "paths.flanks",
-        "paths.measured",
+        "paths.path_error",
+        "paths.backlash_steps",
+        "paths.track_alignment",
         "paths.servo_lag",
         "program",
         "program_files",
@@ -55,17 +55,17 @@ JOINED = {
 # Which modules know one effect in particular: all others take effects as they come.
 KNOWING = {
     # Waves inside a map are what it names.
-    "calibration.diagnosis.waves": {"transmission"},
+    "calibration.diagnosis.harmonics": {"transmission"},
     # The others move along the chain that it deviates.
-    "model.combination": {"geometry"},
+    "model.effect_sum": {"geometry"},
     # The native kernel makes its columns and those of the joints itself.
     "model.variance": {"geometry"},
     # Any survey must determine it, or be refused.
-    "calibration.plausibility": {"base_shift", "geometry"},
+    "calibration.survey_checks": {"base_shift", "geometry"},
     # What the frame of the rows explains is no mistake of them.
     "calibration.likely_causes": {"base_shift", "placement"},
     # What the methods of the literature train.
-    "calibration.published": {"elm", "geometry", "maps"},
+    "calibration.baselines": {"elm", "geometry", "maps"},
     # How the rows were measured decides: frame, probe points, orientations, a slip.
     "calibration.fit": {"placement", "probe", "station_shift", "tool_shift"},
     # A fit must leave less than registration alone; weight makes any arm yield.
@@ -75,7 +75,7 @@ KNOWING = {
     "calibration.weight_direction": {"compliance"},
     "calibration.doubt": {"compliance"},
     # The given model's zero of a joint holds the mean of what the model lacks.
-    "calibration.diagnosis.refit": {"joint_offset"},
+    "calibration.diagnosis.model_update": {"joint_offset"},
     "calibration.diagnosis.jumps": {"part_motion", "step"},
     # A law of the weight goes on to further joints; a cell is told beside no name.
     "calibration.diagnosis.search": {
@@ -89,8 +89,8 @@ KNOWING = {
     # A registration is what that effect fits, by the rigid motions of a base.
     "calibration.registration": {"placement"},
     # A tracker that drifts moves fixed points rigidly.
-    "calibration.references": {"base_shift", "tracker_drift"},
-    "calibration.selection": {"probe_turn", "tool_shift"},
+    "calibration.monuments": {"base_shift", "tracker_drift"},
+    "calibration.effect_selection": {"probe_turn", "tool_shift"},
     "calibration.diagnosis.files": {"placement"},
 }
 
@@ -220,7 +220,7 @@ def test_each_foreign_library_is_imported_in_one_module() -> None:
     assert {name.split(".")[0] for name in spread.pop("typer", [])} <= {"cli"}
     # Grammars have one door, and every language one to what comes of its own.
     doors = {name.split(".")[-1] for name in spread.pop("lark", [])}
-    assert doors == {"grammars", "parser"}
+    assert doors == {"grammars", "parser", "template_parser"}
     # The second opinion shares no way of calling it with what it judges.
     assert spread.pop("ruckig", []) == ["motion.ruckig", "verify.ruckig_move"]
     assert not spread, spread
@@ -265,7 +265,14 @@ def test_languages_are_known_by_their_interface_alone() -> None:
 
 def test_there_is_one_way_to_compensate() -> None:
     """The command line and the batch know `compensate` only, none of its steps."""
-    steps = {"iterate", "decide", "rewrite", "command", "eligibility", "clones"}
+    steps = {
+        "iterate",
+        "decisions",
+        "rewrite",
+        "inverse_model",
+        "eligibility",
+        "clones",
+    }
     for name, path in modules():
         if name.split(".")[0] in {"cli", "batch", "report"}:
             inside = {f"compensation.{step}" for step in steps}

@@ -17,21 +17,28 @@ import pytest
 from postproc import _native
 from postproc.arrays import floats
 from postproc.compensation.compensate import compensate
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects.backlash import Backlash
 from postproc.model.effects.backlash_profile import BacklashProfile
 from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.geometry import Geometry
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.variance import parameter_variance
 from postproc.motion import blending
 from postproc.motion import path as cartesian
 from postproc.motion.branches import OTHER_TURN, on_other_turns, on_written_turns
 from postproc.motion.path import ROUNDS, BlendCoupling
-from postproc.robot import direction, play, pose
+from postproc.robot import backlash_operator, direction, pose
 from postproc.robot.arm import DH
+from postproc.robot.backlash_operator import (
+    NOTHING,
+    Edges,
+    PlayOperator,
+    chains_of,
+    passing,
+    prefix,
+)
 from postproc.robot.inverse import ClosedForm
-from postproc.robot.play import NOTHING, Clamps, Edges, chains_of, passing, prefix
 from postproc.robot.pose import rotation_from_vector
 from postproc.robot.state import make_states
 from tests.reference import kinematics, paths, statements
@@ -86,7 +93,7 @@ def test_the_chain(chain, random, laid_out):
     q[7, 2] = np.nan
     q, points = laid_out(q), laid_out(points)
     for given in ((q, points), (q, np.ones(3)), (q, points, beta)):
-        assert np.allclose(chain.placed(*given), kinematics.placed(chain, *given),
+        assert np.allclose(chain.place(*given), kinematics.placed(chain, *given),
                            **CLOSE)  # fmt: skip
     # A pose with an angle that is no number is none at all there, in part here.
     found, meant = chain.flange(q), kinematics.flange(chain, q)
@@ -97,7 +104,7 @@ def test_the_chain(chain, random, laid_out):
 
 def test_what_is_seen_along_the_chain(chain, random, laid_out):
     q, points = random.uniform(-7, 7, (60, 6)), random.normal(size=(60, 3))
-    packed, q, points = chain.packed(), laid_out(q), laid_out(points)
+    packed, q, points = chain.pack(), laid_out(q), laid_out(points)
     frames, given = kinematics.frames(chain, q), (floats(q), floats(points))
     found = _native.frames(packed, given[0]).reshape(-1, 7, 4, 4)
     assert np.allclose(found, frames, **CLOSE)
@@ -164,7 +171,7 @@ def test_play(random, laid_out):
     q = laid_out(np.cumsum(random.normal(size=(500, 6)), axis=0))
     q[123:124], begins = np.nan, laid_out(random.random(500) < 0.02)
     begins[124:125] = True
-    steps = Clamps(*map(np.ascontiguousarray, (q - 0.7, q + 0.7)))
+    steps = PlayOperator(*map(np.ascontiguousarray, (q - 0.7, q + 0.7)))
     for how in (None, np.ascontiguousarray(begins)):
         found, meant = prefix(steps, how), plain.prefix(steps, how)
         assert np.array_equal(found.lo, meant.lo, equal_nan=True)
@@ -180,7 +187,7 @@ def test_walks_with_turning_values(random):
     uneven = np.flatnonzero(random.random(len(values)) < 0.1)
     edges = Edges(np.empty(0), source, values, start, uneven)
     angles = random.normal(size=(20, 6))
-    found = play._refined(angles, source, values, edges)
+    found = backlash_operator._insert_turning_values(angles, source, values, edges)
     meant = plain.refined(angles, source, values, start, uneven)
     assert np.array_equal(found.start, meant[1])
     assert len(found.values) > len(values)  # some joint did turn
@@ -217,7 +224,7 @@ def test_states_that_are_no_numbers_end():
     # Two visits that lead to each other, one of them from an unknown place.
     first, source = np.array([0, 1, 3]), np.array([1, 0, -1])
     chains = chains_of(np.zeros((2, 6)), np.eye(6), first, source)
-    steps = Clamps(np.full((3, 6), np.nan), np.full((3, 6), np.nan))
+    steps = PlayOperator(np.full((3, 6), np.nan), np.full((3, 6), np.nan))
     found = direction._states(chains, steps, np.ones(6), NOTHING.play)
     assert len(found.lo) == 2
 
@@ -313,7 +320,7 @@ def test_corners_that_pull(random):
 def test_backlash_along_the_gear(effect, bench_cell, random):
     q, sizes = random.uniform(-7, 7, (300, 6)), random.normal(size=36)
     q[5, 1], q[::2] = np.nan, q[::2] / 10.0
-    batch = Batch(bench_cell.arm, make_states(q, random.uniform(-1, 1, (300, 6))))
+    batch = ArmStates(bench_cell.arm, make_states(q, random.uniform(-1, 1, (300, 6))))
     p = sizes[: len(effect.parameters())]
     meant = np.zeros((300, 6))
     joints = np.asarray(effect.acts_on(), dtype=int)
@@ -334,7 +341,10 @@ def test_uncertain_parameters(base, more, bench_cell, random):
     q, direction = random.uniform(-3, 3, (43, 6)), random.uniform(-1, 1, (43, 6))
     q[5, 1] = np.nan
     states = make_states(q, direction, random.uniform(-0.3, 0.3, (43, 3)))
-    at, covariance = effects.at(Batch(bench_cell.arm, states), values), root @ root.T
+    at, covariance = (
+        effects.at(ArmStates(bench_cell.arm, states), values),
+        root @ root.T,
+    )
     found, columns = parameter_variance(effects, at, covariance), effects.columns(at)
     meant = np.einsum("nkp,pq,nkq->nk", columns, covariance, columns)
     assert np.allclose(found, meant, rtol=1e-9, atol=0, equal_nan=True)
@@ -380,11 +390,11 @@ def test_corners_of_a_program(bench_cell, bench_model, monkeypatch):
         assert np.allclose(found[0].path, path, **CLOSE)
         assert np.allclose(found[1], share, **CLOSE)
 
-    compared("_passed", corners)
-    compared("_resampled", samples)
+    compared("_pass_corners", corners)
+    compared("_resample", samples)
     source = (PROGRAMS / "milling.pdl").read_bytes()
     compensate(source, bench_cell, bench_model)
-    assert {"_passed", "_resampled"} <= set(seen)
+    assert {"_pass_corners", "_resample"} <= set(seen)
 
 
 # Long work lets other threads run, and ends when it is asked to.

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.calibration.diagnosis.refit import Revision
-from postproc.calibration.diagnosis.trace import trace
+from postproc.calibration.diagnosis.investigate import trace
+from postproc.calibration.diagnosis.model_update import Revision
+from postproc.calibration.effect_selection import attribute_drift
 from postproc.calibration.regression import Fit, fit_effects
-from postproc.calibration.selection import told_apart
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.base_shift import rigid_columns
 from postproc.model.effects.effect import Effect, Origin, Parameter
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.simulation import VirtualArm, VirtualArrivals, stream
 from tests.calibration.planted import (
     ARM,
@@ -81,7 +81,7 @@ class Known(Effect):
     def parameters(self) -> tuple[Parameter, ...]:
         return (Parameter("size", "1", 1.0, "size"),)
 
-    def columns(self, batch: Batch) -> np.ndarray:
+    def columns(self, batch: ArmStates) -> np.ndarray:
         return self.table[batch.states.order.astype(int)][:, :, None]
 
 
@@ -116,7 +116,7 @@ def run(kind: str, seed: int, size: float) -> Trial:
     laws = [law for law in c.arm.laws if law.effect != "backlash"]
     truth = [(law.effect, list(law.joints), law.source) for law in laws]
     hits = [_hit(law, found) for law in truth]
-    kept = told_apart(traced.search.fit, None)  # as `diagnose` writes it
+    kept = attribute_drift(traced.search.fit, None)  # as `diagnose` writes it
     plain, registered = true_errors(c, seed, base, kept)
     return Trial(
         kind, seed, size, truth, traced.verdict, found,
@@ -182,7 +182,7 @@ def true_errors(
     if surveyed:
         seen = stream(seed, "temperature").choice(c.arrivals.temperature, FRESH)
         fresh = replace(fresh, temperature=seen)
-    truth, batch = c.arm.error(fresh), Batch(ARM, states_of(fresh))
+    truth, batch = c.arm.error(fresh), ArmStates(ARM, states_of(fresh))
     informed = _informed(c, seed, fresh, truth)
     told = ("arm", "state")
     left = [
@@ -195,7 +195,7 @@ def true_errors(
     return (plain[0], plain[1], plain[2]), (registered[0], registered[1], registered[2])
 
 
-def moved(fit: Fit, batch: Batch, origins: tuple[Origin, ...]) -> np.ndarray:
+def moved(fit: Fit, batch: ArmStates, origins: tuple[Origin, ...]) -> np.ndarray:
     """What effects of some origins do to other states, (n, 3) [m]."""
     keep = tuple(e for e in fit.combination.effects if e.belongs_to() in origins)
     values = fit.values[fit.combination.where(*origins)]
@@ -210,7 +210,7 @@ def _mean_mm(left: np.ndarray) -> float:
     return float(np.linalg.norm(left, axis=1).mean() * 1e3)
 
 
-def without_rigid(batch: Batch, left: np.ndarray) -> np.ndarray:
+def without_rigid(batch: ArmStates, left: np.ndarray) -> np.ndarray:
     """Take the rigid displacement out of errors that fits them best, (n, 3) [m]."""
     rigid = rigid_columns(batch).reshape(-1, 6)
     motion = np.linalg.lstsq(rigid, left.reshape(-1))[0]
@@ -238,5 +238,5 @@ def _informed(c: Campaign, seed: int, fresh: VirtualArrivals, truth: np.ndarray)
         seen = sum(displacement(clean, seed, p, c.arrivals, rows) for p in c.planted)
         there = truth - clean.error(fresh)
         effects.append(Known(np.concatenate([seen, there])))
-    batch = Batch(ARM, c.states)
+    batch = ArmStates(ARM, c.states)
     return fit_effects(batch, c.position, tuple(effects), tuple(TRACKER))

@@ -21,13 +21,13 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.calibration.diagnosis.library import Projection
-from postproc.calibration.diagnosis.refit import revise
-from postproc.calibration.diagnosis.trace import trace
+from postproc.calibration.diagnosis.candidates import Projection
+from postproc.calibration.diagnosis.investigate import trace
+from postproc.calibration.diagnosis.model_update import revise
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.regression import Fit, fit_effects
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.model.effects import BASE_EFFECTS, propose
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.state import States, make_states
@@ -125,7 +125,7 @@ def size_of(clean: VirtualArm, laws: Sequence[Law], a: VirtualArrivals) -> float
     states = states_of(a)
     position = clean.measure(a, TRACKER, stream(clean.seed, "sizes"))
     effects = propose(BASE_EFFECTS, ARM, states)
-    fit = fit_effects(Batch(ARM, states), position, effects, tuple(TRACKER))
+    fit = fit_effects(ArmStates(ARM, states), position, effects, tuple(TRACKER))
     more = replace(clean, laws=(*clean.laws, *laws)).tcp(a) - clean.tcp(a)
     left = Projection.of(fit).filter(fit.whiten(more)[:, None])
     return float(np.sqrt((left**2).mean()))
@@ -186,7 +186,7 @@ def measured(seed: int, size: float, given: str, nothing: bool = False) -> Yield
         for a, n in ((first, "first"), (fresh, "fresh"))
     )
     model = model_of(fit_survey(old, ARM, GIVEN[given], TRACKER), old)
-    base = revise(new, model, Batch(ARM, new.states), tuple(TRACKER))[0]
+    base = revise(new, model, ArmStates(ARM, new.states), tuple(TRACKER))[0]
     return Yielding(clean, arm, laws, fresh, unseen, model, base, new.position)
 
 
@@ -196,7 +196,7 @@ def run(seed: int, size: float, given: str, nothing: bool = False) -> WeightTria
     start = time.process_time()
     traced = trace(y.base, seed=0)
     seconds = time.process_time() - start
-    there = Batch(ARM, states_of(y.unseen))
+    there = ArmStates(ARM, states_of(y.unseen))
     told = (
         y.model.error(ARM, there.states),
         moved(traced.search.fit, there, ("arm", "state")),
@@ -234,10 +234,10 @@ def _informed(y: Yielding) -> Floats:
         known.append(Known(np.concatenate(table)))
     states = states_of(y.fresh)
     effects = (*propose(BASE_EFFECTS, ARM, states), *known)
-    fit = fit_effects(Batch(ARM, states), y.position, effects, tuple(TRACKER))
+    fit = fit_effects(ArmStates(ARM, states), y.position, effects, tuple(TRACKER))
     later = states_of(y.unseen)
     later = replace(later, order=later.order + len(states))
-    return moved(fit, Batch(ARM, later), ("arm", "state", "setup"))
+    return moved(fit, ArmStates(ARM, later), ("arm", "state", "setup"))
 
 
 def main() -> None:

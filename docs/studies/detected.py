@@ -15,9 +15,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.stats import beta
 
-from postproc.calibration.fit import into_base_frame, stated_points, wrong_nests
+from postproc.calibration.effect_selection import fit_survey
+from postproc.calibration.fit import into_base_frame, points_of_cell, wrong_nests
 from postproc.calibration.measurements import Measurements
-from postproc.calibration.selection import fit_survey
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.placement import Placement
 from tests.calibration.simulator import (
@@ -144,7 +144,7 @@ def _told_seen_from(survey: Measurements, seed: int) -> tuple[str, ...]:
     """Say it of the same rows as a tracker sees them that stands anywhere."""
     turn = Rotation.random(random_state=seed).as_matrix()
     seen = replace(survey, position=(survey.position - STAND) @ turn)
-    points, (placed, found) = stated_points(seen), into_base_frame(seen, NJ)
+    points, (placed, found) = points_of_cell(seen), into_base_frame(seen, NJ)
     fit = fit_survey(placed, NJ, BASE_EFFECTS, found.tracker, (Placement.name,))
     return wrong_nests(fit, points)
 

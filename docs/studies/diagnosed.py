@@ -14,12 +14,12 @@ from measured import BLIND_TOOL, FLANGE, SETUP, _registered
 
 from postproc.calibration.diagnosis.diagnose import Extension, extend_model
 from postproc.calibration.diagnosis.result import Finding
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.fit import into_base_frame
 from postproc.calibration.measurements import Measurements, read_survey_file
-from postproc.calibration.selection import fit_survey, model_of
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import BASE_EFFECTS
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.pose import MM
@@ -66,7 +66,7 @@ def campaign(name: str, folder: Path, arm: Arm) -> str:
 
 def left(rows: Measurements, arm: Arm, model: Model) -> np.ndarray:
     """Return what a model's compensation would leave, (n, 3) [m]."""
-    nominal = Batch(arm, rows.states).walk.tcp
+    nominal = ArmStates(arm, rows.states).walk.tcp
     return np.asarray(rows.position - nominal - model.error(arm, rows.states))
 
 

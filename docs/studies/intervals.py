@@ -19,7 +19,7 @@ from postproc.calibration.measurements import Measurements, read_survey_file
 from postproc.calibration.registration import predict_registered
 from postproc.calibration.tables import TableFormat
 from postproc.exceptions import PostprocError
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell, load_cell
@@ -98,7 +98,7 @@ class Outcome:
     std: np.ndarray
 
     @property
-    def held(self) -> float:
+    def hold(self) -> float:
         """Share of coordinates inside."""
         return float((np.abs(self.left) < WITHIN * self.std).mean())
 
@@ -116,7 +116,7 @@ class Outcome:
 def judged(model: Model, arm: Arm, rows: Measurements) -> Outcome:
     """Compare readings of the set-up that the model knows, base frame."""
     read = model.reading(arm, rows.states)
-    left = rows.position - Batch(arm, rows.states).walk.tcp - read.error
+    left = rows.position - ArmStates(arm, rows.states).walk.tcp - read.error
     return Outcome(left, read.std)
 
 
@@ -167,12 +167,12 @@ def pooled(
                 held_out(series, draw(len(series.rows), seed), frame)
                 for seed in range(seeds)
             ]
-            shares = [f.held for f in found]
+            shares = [f.hold for f in found]
             left, std = (np.concatenate([getattr(f, k) for f in found])
                          for k in ("left", "std"))  # fmt: skip
             every = Outcome(left, std)
             yield (
-                f"| {series.name}, {title} | {frame} | {100 * every.held:.1f} % "
+                f"| {series.name}, {title} | {frame} | {100 * every.hold:.1f} % "
                 f"| {100 * min(shares):.1f} to {100 * max(shares):.1f} % "
                 f"| {left.size} | {std.mean() * 1e3:.3f} | {every.error * 1e3:.3f} |"
             )
@@ -182,9 +182,9 @@ def told(fitted: str, rows: str, found: Outcome) -> str:
     """Write one row of the second table."""
     wide = Outcome(found.left, np.hypot(found.std, found.between))
     return (
-        f"| {fitted} | {rows} | {100 * found.held:.0f} % "
+        f"| {fitted} | {rows} | {100 * found.hold:.0f} % "
         f"| {found.std.mean() * 1e3:.3f} "
-        f"| {found.between * 1e3:.3f} | {100 * wide.held:.0f} % "
+        f"| {found.between * 1e3:.3f} | {100 * wide.hold:.0f} % "
         f"| {found.error * 1e3:.3f} |"
     )
 
@@ -203,7 +203,7 @@ def another(fitted: Series, series: Series) -> Iterator[str]:
     model = fit_measurements(fitted.rows, fitted.cell, frame="tracker").model
     rows = series.rows
     placed, read = predict_registered(model, arm, rows.states, rows.position)
-    tcp = Batch(arm, placed.on_probes(rows.states)).walk.tcp
+    tcp = ArmStates(arm, placed.on_probes(rows.states)).walk.tcp
     left = placed.to_base(rows.position) - tcp - read.error
     yield told(fitted.name, series.name, Outcome(left, read.std))
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.fit import into_base_frame
 from postproc.calibration.measurements import Measurements, read_survey_file
 from postproc.calibration.registration import register
-from postproc.calibration.selection import fit_survey, model_of
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import BASE_EFFECTS
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.arm import Arm, load_arm
 
@@ -54,7 +54,7 @@ def held_out(
     survey, placed = into_base_frame(series[train], arm)
     fit = fit_survey(survey, arm, effects, placed.tracker, SETUP)
     tool = np.tile(placed.probes[0], (len(test), 1))
-    batch = Batch(arm, series.states[test].with_(tool=tool))
+    batch = ArmStates(arm, series.states[test].with_(tool=tool))
     gap = placed.to_base(series.position[test]) - batch.walk.tcp
     return np.asarray(gap - fit.combination.error(batch, fit.values))
 
@@ -110,7 +110,7 @@ def _registered(
 ) -> np.ndarray:
     placed = register(arm, series.states, series.position, effects, values)
     tool = np.tile(placed.probes[0], (len(series), 1))
-    batch = Batch(arm, series.states.with_(tool=tool))
+    batch = ArmStates(arm, series.states.with_(tool=tool))
     gap = placed.to_base(series.position) - batch.walk.tcp
     return np.asarray(gap - effects.error(batch, values))
 
@@ -126,7 +126,7 @@ def blind(folder: Path) -> list[str]:
     for name in "abcdefgh":
         survey = read_survey_file(folder / f"{name}_survey.csv", arm, BLIND_TOOL)
         verify = read_survey_file(folder / f"{name}_verify.csv", arm, BLIND_TOOL)
-        error = verify.position - Batch(arm, verify.states).walk.tcp
+        error = verify.position - ArmStates(arm, verify.states).walk.tcp
         base = _model(survey, arm, BASE_EFFECTS)
         full = _model(survey, arm, None)
         left = [

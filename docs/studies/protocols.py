@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from postproc.calibration.baselines import MethodRow, compare_on
 from postproc.calibration.measurements import Measurements
-from postproc.calibration.published import MethodRow, compare_on
 from postproc.model.effects import elm
 from postproc.model.effects.elm import HiddenLayer
 from postproc.model.kinematics import NOMINAL, Deviation, walk

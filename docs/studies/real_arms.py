@@ -29,10 +29,10 @@ from postproc.calibration.fit import Calibration, fit_measurements
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.registration import predict_registered
 from postproc.exceptions import PostprocError
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects.maps import MOST_CENTRES
 from postproc.model.effects.placement import Placement
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.model.model_file import Method
 from postproc.model.statistics import ErrorStatistics
@@ -259,7 +259,7 @@ def judge(model: Model, data: DataSet, rows: Measurements, same: bool) -> Outcom
         states = states if placed is None else placed.on_probes(states)
         read = model.reading(arm, states)
     position = position if placed is None else placed.to_base(position)
-    return Outcome(position - Batch(arm, states).walk.tcp - read.error, read.std)
+    return Outcome(position - ArmStates(arm, states).walk.tcp - read.error, read.std)
 
 
 def pooled(draws: list[dict[str, Outcome]]) -> dict[str, Outcome]:

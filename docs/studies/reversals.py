@@ -17,8 +17,8 @@ from pathlib import Path
 import paths
 
 from postproc.calibration.fit import fit
+from postproc.model.backlash_width import verdicts_of_flanks
 from postproc.model.effects import BASE_EFFECTS
-from postproc.model.play import verdicts_of_flanks
 from postproc.robot.cell import load_cell
 from postproc.simulation.arm import GearKind
 

@@ -22,9 +22,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from postproc.calibration.diagnosis.diagnose import extend_model
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.measurements import Measurements
-from postproc.calibration.selection import fit_survey, model_of
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.pose import MM, lengths
 from postproc.robot.state import States
@@ -71,7 +71,7 @@ class Change:
     bent: np.ndarray
 
     @classmethod
-    def drawn(cls, seed: int, name: str) -> Change:
+    def draw(cls, seed: int, name: str) -> Change:
         """Draw it."""
         rng = np.random.default_rng([seed, 9])
         turn, shift, bent = (rng.normal(0, s, 3) for s in (1e-4, 2e-4, 3e-4))
@@ -82,7 +82,7 @@ class Change:
 
     def seen(self, position: np.ndarray, states: States) -> np.ndarray:
         """Move positions (n, 3) [m] as base and tool have moved."""
-        flange = Batch(ARM, states).walk.flange[:, :3, :3]
+        flange = ArmStates(ARM, states).walk.flange[:, :3, :3]
         return (position + flange @ self.bent) @ self.turn.T + self.shift
 
     def truth(self, there: VirtualArrivals) -> np.ndarray:
@@ -127,7 +127,7 @@ class Outcome:
 
 def outcome(seed: int, name: str, poses: int, whole: bool) -> Outcome:
     """Survey an arm, measure it again and diagnose that."""
-    arm, change = virtual_arm(seed, BASE), Change.drawn(seed, name)
+    arm, change = virtual_arm(seed, BASE), Change.draw(seed, name)
     survey = measured(arm, sample_survey(arm, SURVEYED, seed=seed), "old")
     model = model_of(fit_survey(survey, ARM, None, TRACKER), survey)
     within = WORKING_RANGE if whole else around(seed)

@@ -6,11 +6,11 @@ import time
 
 import numpy as np
 
-from postproc.calibration.published import fit_method
-from postproc.calibration.selection import fit_survey, model_of
-from postproc.calibration.survey import design_survey
+from postproc.calibration.baselines import fit_method
+from postproc.calibration.effect_selection import fit_survey, model_of
+from postproc.calibration.pose_design import design_survey
 from postproc.model.effects import BASE_EFFECTS
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.state import States, make_states
 from tests.calibration.simulator import (
@@ -38,7 +38,7 @@ def fitted(states: States, measured: np.ndarray, effects: object = None) -> Mode
 def truth_of(arm: Simulated, states: States) -> np.ndarray:
     """Return the true errors of an arm, (n, 3) [m]."""
     true = arm.tcp(states.q, states.direction, states.tool)
-    return true - Batch(NJ, states).walk.tcp
+    return true - ArmStates(NJ, states).walk.tcp
 
 
 def left(model: Model, arm: Simulated, held: States) -> float:
@@ -58,7 +58,7 @@ def against_the_limit(seeds: int) -> list[str]:
         model = fitted(states, measured)
         held = random_states(500, rng, PLATE)
         truth = truth_of(arm, held)
-        noisy = arm.measure(held, rng)[0] - Batch(NJ, held).walk.tcp
+        noisy = arm.measure(held, rng)[0] - ArmStates(NJ, held).walk.tcp
         p = model.predict(NJ, held)
         ours.append(np.linalg.norm(truth - p.error, axis=1).mean() / MM)
         best = informed(states, measured, held)

@@ -19,7 +19,7 @@ from postproc.calibration.fit import fit_measurements
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects import propose
 from postproc.model.effects.compliance import Compliance
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 BASE = ("geometry", "backlash", "registration", "tracker_drift")
 BESIDE = (
@@ -41,7 +41,7 @@ def lines(data: DataSet, series: str) -> Iterator[str]:
     placed = first.model.registration
     assert placed is not None, "a series in the frame of its tracker"
     states, position = placed.on_probes(rows.states), placed.to_base(rows.position)
-    batch = Batch(data.cell.arm, states)
+    batch = ArmStates(data.cell.arm, states)
     laws = [p for p in Compliance.on(batch).pieces() if p.joints[0] in JOINTS]
     least: float | None = None
     for more in BESIDE:

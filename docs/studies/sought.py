@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.calibration.selection import fit_best, told_apart
+from postproc.calibration.effect_selection import attribute_drift, fit_best
 from postproc.model.effects import BASE_EFFECTS
 from tests.calibration.planted import TRACKER, Campaign, campaign
 from tests.undeclared_trial import true_errors
@@ -39,7 +39,9 @@ def trial(kind: str, size: float, seed: int) -> tuple[list[float], tuple[str, ..
     """Return true errors [mm], and what the fit named."""
     c = campaign(seed, (kind,), size, ROWS)
     c = untold(c) if kind == "warmup" else c
-    fit = told_apart(fit_best(c.declared, c.states, c.position, tuple(TRACKER)), None)
+    fit = attribute_drift(
+        fit_best(c.declared, c.states, c.position, tuple(TRACKER)), None
+    )
     plain, _ = true_errors(c, seed, c.base_fit(), fit)
     named = [e.name for e in fit.combination.effects if e.name not in BASE_EFFECTS]
     return list(plain), tuple(dict.fromkeys(named)) or ("nothing",)

@@ -18,10 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.fit import several_points
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.calibration.survey_files import read_measurements
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import Model
@@ -62,7 +62,7 @@ def informed(cell: Cell, survey: Measurements, arm: VirtualArm) -> Model:
 
 def _moved(fit: Fit):
     shift = fit.design.shift(fit.values)
-    return fit.batch.moved(fit.combination.deviation(fit.values), shift)
+    return fit.batch.move(fit.combination.deviation(fit.values), shift)
 
 
 def _stepped(fit: Fit, root: np.ndarray) -> Fit:

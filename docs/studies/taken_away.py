@@ -23,7 +23,7 @@ from postproc.calibration.diagnosis.diagnose import extend_model
 from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements
 from postproc.model.effects.placement import Placement
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.model.statistics import ErrorStatistics
 
@@ -50,7 +50,7 @@ def left(model: Model, data: DataSet, rows: Measurements) -> ErrorStatistics:
     states = rows.states if placed is None else placed.on_probes(rows.states)
     position = rows.position if placed is None else placed.to_base(rows.position)
     read = model.reading(arm, states)
-    return ErrorStatistics.of(position - Batch(arm, states).walk.tcp - read.error)
+    return ErrorStatistics.of(position - ArmStates(arm, states).walk.tcp - read.error)
 
 
 def trial(

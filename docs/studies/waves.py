@@ -18,15 +18,15 @@ from data_sets import descriptions
 from real_arms import DEFAULT, fitted, read_once
 
 from postproc.calibration.fit import Calibration
-from postproc.model.combination import Combination
-from postproc.model.kinematics import Batch
+from postproc.model.effect_sum import Combination
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 
 
 def told(found: Calibration, arm: Arm) -> Iterator[str]:
     """Write a row for every wave, by joint and order."""
     rows, model = [], found.model
-    batch = Batch(arm, found.survey.states)
+    batch = ArmStates(arm, found.survey.states)
     for effect, part in zip(model.effects.effects, model.effects.slices, strict=True):
         values = model.values[part]
         size = effect.amplitude(values, model.covariance[part, part])

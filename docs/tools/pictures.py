@@ -25,7 +25,7 @@ from postproc.model.effects.thermal import Thermal
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.effects.transmission import Transmission
 from postproc.model.effects.windup import Windup
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.state import States, make_states
 
@@ -56,12 +56,12 @@ def swept(joint: int, low: float, high: float, n: int = 181) -> tuple[Array, Arr
 
 def turned(effect: JointEffect, at: States, joint: int, **p: float) -> Array:
     """Return the error of a joint [mrad] for parameters by name."""
-    return effect.angles(Batch(ARM, at), vector(effect, p))[:, joint - 1] / MRAD
+    return effect.angles(ArmStates(ARM, at), vector(effect, p))[:, joint - 1] / MRAD
 
 
 def moved(effect: Effect, at: States, **p: float) -> Array:
     """Return how far the TCP is moved [mm] for parameters by name."""
-    return effect.displacement(Batch(ARM, at), vector(effect, p)) / MM
+    return effect.displacement(ArmStates(ARM, at), vector(effect, p)) / MM
 
 
 def vector(effect: Effect, given: dict[str, float]) -> Array:

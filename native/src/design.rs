@@ -1,4 +1,4 @@
-//! Sums over the rows of a design matrix: `postproc.calibration.design`.
+//! Sums over the rows of a design matrix: `postproc.calibration.design_matrix`.
 //!
 //! The column of what turns a joint is the joint's column of the Jacobian by a number, and
 //! of the splines of a joint four differ from 0 at a row: sums over rows touch a hundred of

@@ -1,5 +1,5 @@
 //! Names of a program, a million of them without an object each:
-//! `postproc.language.names`.
+//! `postproc.language.symbol_column`.
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyIndexError;

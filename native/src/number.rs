@@ -1,4 +1,4 @@
-//! Numbers in texts, read and written: `postproc.language.scan` and `.rewrite`.
+//! Numbers in texts, read and written: `postproc.language.lexer` and `.rewrite`.
 
 use std::io::Write;
 

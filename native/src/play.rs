@@ -1,4 +1,4 @@
-//! The play operator: `postproc.robot.play`.
+//! The play operator: `postproc.robot.backlash_operator`.
 
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

@@ -1,4 +1,4 @@
-//! A text that differs from one read before in numbers: `postproc.language.scan`.
+//! A text that differs from one read before in numbers: `postproc.language.lexer`.
 
 use std::ops::Range;
 

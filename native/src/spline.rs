@@ -1,4 +1,4 @@
-//! Natural cubic splines through the waypoints of many runs: `postproc.motion.time_law`.
+//! Natural cubic splines through the waypoints of many runs: `postproc.motion.topp`.
 //!
 //! With the step h and the slope m of an interval, the first derivatives d satisfy
 //! d_i-1 / h_i-1 + 2 d_i (1/h_i-1 + 1/h_i) + d_i+1 / h_i = 3 (m_i-1 / h_i-1 + m_i / h_i), and

@@ -1,4 +1,4 @@
-//! Statements, but for their numbers and numbered names: `postproc.language.statements`.
+//! Statements, but for their numbers and numbered names: `postproc.language.statement_table`.
 //!
 //! `tests/reference/statements.py` defines with regular expressions where a statement of
 //! RAPID ends, `tests/reference/krl_lines.py` where one of KRL does.

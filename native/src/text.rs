@@ -1,4 +1,4 @@
-//! Lines of a file, but for their numbers and numbered names: `postproc.language.scan`.
+//! Lines of a file, but for their numbers and numbered names: `postproc.language.lexer`.
 //!
 //! `tests/reference/text.py` defines with regular expressions what is a number, a string,
 //! a comment and a name, one line at a time.

@@ -1,4 +1,4 @@
-//! The fastest ds/dt along given paths: `postproc.motion.time_law`.
+//! The fastest ds/dt along given paths: `postproc.motion.topp`.
 //!
 //! Reachability analysis (Pham and Pham: A New Approach to Time-Optimal Path
 //! Parameterization Based on Reachability Analysis, IEEE Transactions on Robotics 2018).

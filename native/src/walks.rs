@@ -1,4 +1,4 @@
-//! Ways between visits and what passing them does to plays: `postproc.robot.play`.
+//! Ways between visits and what passing them does to plays: `postproc.robot.backlash_operator`.
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyIndexError;

@@ -34,7 +34,7 @@ def missing_in_cell(archive: Archive, cell: Cell) -> list[str]:
     return found
 
 
-def _placed(cell: Cell, archive: Archive) -> np.ndarray:
+def _arm_pose_record(cell: Cell, archive: Archive) -> np.ndarray:
     """Return where the cell places the arm, as a position record."""
     if not archive.root:
         return np.array(NO_SHIFT)
@@ -46,7 +46,9 @@ def _lines(archive: Archive, cell: Cell) -> Iterator[str]:
     file = cell.file
     if "absolute_accuracy" not in file.robot.model_fields_set:
         yield "absolute_accuracy = false   # under [robot], if it is off on this arm"
-    apart = np.abs(np.subtract(archive.root or NO_SHIFT, _placed(cell, archive)))
+    apart = np.abs(
+        np.subtract(archive.root or NO_SHIFT, _arm_pose_record(cell, archive))
+    )
     if apart.max() > NEAR:
         numbers = [round(v, 4) for v in archive.root]
         yield "[base]   # of the arm, by the archive"

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from postproc.arrays import data_frame
 from postproc.batch.plan import BatchPlan, make_plan
-from postproc.compensation.options import AS_USUAL
-from postproc.compensation.outcome import LEFT_ALONE, with_left
+from postproc.compensation.options import DEFAULT_OPTIONS
+from postproc.compensation.outcome import LEFT_ALONE, add_uncorrected
 from postproc.compensation.pages import program_arm, read_head
-from postproc.compensation.record import (
+from postproc.compensation.sidecar import (
     FileRecord,
     LeftLine,
     Sidecar,
@@ -98,7 +98,7 @@ class Checked:
         found = self.findings
         return data_frame({name: [getattr(f, name) for f in found] for name in names})
 
-    def accepting_left(self) -> Checked:
+    def allow_uncorrected(self) -> Checked:
         """Return it without targets left alone: somebody has looked at them."""
         kept = tuple(f for f in self.findings if f.code != Code.LEFT_ALONE)
         return Checked(self.programs, kept)
@@ -142,7 +142,7 @@ def check(
         raise PostprocError("--set: no cell is given. Give --cell or --plan")
     made, cells = None, []
     if plan is not None:
-        made = make_plan(Path(plan), None, None, AS_USUAL, changes)
+        made = make_plan(Path(plan), None, None, DEFAULT_OPTIONS, changes)
         cells += [setup.cell for setup in made.setups]
     if cell is not None:
         cells.append(load_cell(cell, changes=changes))
@@ -193,7 +193,9 @@ def check_tree(
     names = {place.lower(): place for place in places}
     look = _Look(folder, source, current, names, assume_motion)
     findings = [f for place in places for f in look.at(place)]
-    findings += _mixed(folder, [place for place in places if current(place) is None])
+    findings += _find_mixed_models(
+        folder, [place for place in places if current(place) is None]
+    )
     if source is not None:
         findings += _absent(source, set(places))
     programs = sum(map(is_program, places))
@@ -216,7 +218,7 @@ def _places(root: Path) -> Iterator[str]:
             yield (Path(parent) / name).relative_to(root).as_posix()
 
 
-def _mixed(root: Path, places: Sequence[str]) -> Iterator[CheckFinding]:
+def _find_mixed_models(root: Path, places: Sequence[str]) -> Iterator[CheckFinding]:
     """Find modules of a task, and sources with data lists, of different models."""
     models: dict[str, dict[str, str]] = {}
     for place in places:
@@ -279,7 +281,7 @@ class _Look:
                     place, Code.UNCOMPENSATED, "its program is not beside it"
                 )
         elif is_compiled(place) and self._existing(program_of(place)):
-            yield from self._compiled(place)
+            yield from self._check_compiled(place)
 
     def _existing(self, place: str) -> str | None:
         """Return the file of a name, whatever its case."""
@@ -313,7 +315,7 @@ class _Look:
             return
         yield from self._model(place, sidecar)
         if self.assume_motion:
-            yield from _assumed(place, sidecar)
+            yield from _find_assumed_routines(place, sidecar)
         yield from self._content(place, data, sidecar)
         if values := self._existing(variables_of(place)):
             yield from self._content(values, read_input(self.root / values), sidecar)
@@ -336,7 +338,7 @@ class _Look:
             if stamp is not None:
                 text = "is stamped, and its record does not know it"
                 yield CheckFinding(place, Code.NO_RECORD, text)
-            yield from _left_alone(place, {}, sidecar.left_in(name))
+            yield from _find_uncorrected(place, {}, sidecar.list_uncorrected_in(name))
             yield from self._source(place, sha256(data))
             return
         if sha256(data) != record.output_sha256:
@@ -347,7 +349,9 @@ class _Look:
             yield CheckFinding(
                 place, Code.NO_RECORD, "its stamp is not that of its record"
             )
-        yield from _left_alone(place, record.targets, sidecar.left_in(name))
+        yield from _find_uncorrected(
+            place, record.targets, sidecar.list_uncorrected_in(name)
+        )
         yield from self._source(place, record.source_sha256)
 
     def _source(self, place: str, digest: str) -> Iterator[CheckFinding]:
@@ -361,7 +365,7 @@ class _Look:
             text = "its source has changed since: compensate it again"
             yield CheckFinding(place, Code.SOURCE_CHANGED, text)
 
-    def _compiled(self, place: str) -> Iterator[CheckFinding]:
+    def _check_compiled(self, place: str) -> Iterator[CheckFinding]:
         """Check that a compiled file is not that of the uncompensated program."""
         if self.source is not None and (self.source / place).is_file():
             if read_input(self.source / place) == read_input(self.root / place):
@@ -369,11 +373,11 @@ class _Look:
                 yield CheckFinding(place, Code.UNCOMPENSATED, text)
 
 
-def _left_alone(
+def _find_uncorrected(
     place: str, targets: Mapping[str, Any], left: tuple[LeftLine, ...]
 ) -> Iterator[CheckFinding]:
     """Find targets that could have been compensated and kept their value."""
-    told = with_left(targets, left)
+    told = add_uncorrected(targets, left)
     codes = "".join(str(int(status)) for status in LEFT_ALONE)
     columns = (told["status"], told["line"], told["reason"])
     rows = [row for row in zip(*columns, strict=False) if row[0] in codes]
@@ -386,7 +390,7 @@ def _left_alone(
         )
 
 
-def _assumed(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
+def _find_assumed_routines(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
     """Find routines that were assumed motionless because the shipped list says so."""
     for file, line, message in sidecar.assumed:
         text = f"line {line} of {file}: {message}; compensate it with assume_motion"

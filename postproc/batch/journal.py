@@ -208,7 +208,9 @@ class Summary:
         """Say which programs are absent, have targets left alone, were removed."""
         return [
             *_some("absent", (f"{place}: {why}" for place, why in self.problems)),
-            *_some("left alone", (f"{p}: {_left(n)}" for p, n in self.left)),
+            *_some(
+                "left alone", (f"{p}: {_describe_uncorrected(n)}" for p, n in self.left)
+            ),
             *_some("note", (f"{place}: {why}" for place, why in self.notes)),
             *_some("removed, no source any more", self.removed),
         ]
@@ -217,7 +219,7 @@ class Summary:
 TITLES = ("programs and files", "files", "unchanged", "visits", "left alone")
 
 
-def _left(visits: int) -> str:
+def _describe_uncorrected(visits: int) -> str:
     """Say what of a program was left alone."""
     return f"{visits} visits" if visits else "moves that are never reached"
 

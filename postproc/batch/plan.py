@@ -48,7 +48,7 @@ class JobSetup:
             "cell": _in_first_words(self.cell.file.model_dump(mode="json")),
             "arm": self.cell.arm.file.model_dump(mode="json"),
             "model": self.model.id,
-            "options": _options_in_first_words(self.options.told()),
+            "options": _options_in_first_words(self.options.to_dict()),
         }
         text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
@@ -343,7 +343,7 @@ class Result:
     seconds: float = 0.0
 
 
-def failed(unit: Unit, problem: str, seconds: float = 0.0) -> Result:
+def make_failure(unit: Unit, problem: str, seconds: float = 0.0) -> Result:
     """Return the result of a unit of which nothing came."""
     return Result(unit, 2, {}, {"error": problem}, seconds)
 

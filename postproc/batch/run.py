@@ -17,7 +17,7 @@ from postproc.batch.journal import Journal, JournalEntry, Summary, read_entries
 from postproc.batch.plan import BatchPlan, Result, Task, Unit, digest_of
 from postproc.batch.tree import Tree, refuse_overlap, scan
 from postproc.batch.workers import WorkerPool, work_through
-from postproc.compensation.record import SUFFIX, file_sha256, sha256
+from postproc.compensation.sidecar import SUFFIX, file_sha256, sha256
 from postproc.exceptions import DiskFullError, OutputError
 from postproc.files import (
     TEMPORARY,
@@ -36,7 +36,7 @@ HASTE = 1.5  # [s] that a run may take to stop in good order
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def lock_folder(folder: Path) -> Iterator[None]:
     """Hold a folder for this run alone; create it where it is missing.
 
     The lock lies on the folder itself: nothing is left behind, and it is gone with
@@ -131,7 +131,7 @@ class StopRequest:
         self._end.daemon = True
         self._end.start()
 
-    def _heard(self) -> None:
+    def _end_in_order(self) -> None:
         """Come to the end in good order."""
         if self._end is not None:
             self._end.cancel()
@@ -146,7 +146,7 @@ def stoppable() -> Iterator[StopRequest]:
     try:
         yield stop
     finally:
-        stop._heard()
+        stop._end_in_order()
         for number, handler in zip(signals, before, strict=True):
             signal.signal(number, handler)
 
@@ -267,7 +267,7 @@ Gather = Callable[[BatchPlan], WorkerPool]
 
 
 @dataclass(frozen=True)
-class Order:
+class BatchOptions:
     """What the user wants.
 
     Attributes:
@@ -294,7 +294,9 @@ def default_log(target: Path) -> Path:
     return target.with_name(f"{target.name}.batch.jsonl")
 
 
-def batch(order: Order, gather: Gather, told: Told = lambda done, of: None) -> Summary:
+def batch(
+    order: BatchOptions, gather: Gather, told: Told = lambda done, of: None
+) -> Summary:
     """Compensate a tree.
 
     Args:
@@ -308,7 +310,7 @@ def batch(order: Order, gather: Gather, told: Told = lambda done, of: None) -> S
         ProgramError: The source tree cannot be read.
     """
     refuse_overlap(order.source, order.target)
-    with locked(order.target), stoppable() as stop:
+    with lock_folder(order.target), stoppable() as stop:
         present = sweep(order.target)
         tree = scan(order.source, order.plan)
         check_room(order.target, tree.size, present)
@@ -326,7 +328,7 @@ def batch(order: Order, gather: Gather, told: Told = lambda done, of: None) -> S
 class BatchRun:
     """One run: what earlier ones did, what this one has done so far."""
 
-    def __init__(self, order: Order, tree: Tree, told: Told) -> None:
+    def __init__(self, order: BatchOptions, tree: Tree, told: Told) -> None:
         """Take over from earlier runs.
 
         Raises:

@@ -12,8 +12,9 @@ from typing import Any
 from postproc.batch.plan import BatchPlan, JobSetup, Unit
 from postproc.batch.tree import scan
 from postproc.compensation.options import Options
-from postproc.compensation.program import prepared
-from postproc.compensation.record import (
+from postproc.compensation.program import prepare_cell
+from postproc.compensation.second_opinion import second_opinion
+from postproc.compensation.sidecar import (
     SUFFIX,
     FileRecord,
     Sidecar,
@@ -21,7 +22,6 @@ from postproc.compensation.record import (
     restore,
     sidecar_path,
 )
-from postproc.compensation.second_opinion import second_opinion
 from postproc.exceptions import PostprocError
 from postproc.files import name_read, program_of, read_input, variables_of
 from postproc.verify.extra import require
@@ -47,10 +47,10 @@ class TreeOpinion:
         """Return 1 where a difference is beyond its bound."""
         return 0 if self.opinion.agrees else 1
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
         skipped = [{"place": place, "why": why} for place, why in self.skipped]
-        told = self.opinion.told() | {"programs": self.programs, "skipped": skipped}
+        told = self.opinion.to_dict() | {"programs": self.programs, "skipped": skipped}
         keys = "programs", "agrees", "seconds", "rows", "skipped"
         return {key: told[key] for key in keys}
 
@@ -69,19 +69,19 @@ def judge_tree(folder: Path, plan: BatchPlan) -> TreeOpinion:
     opinions: list[Opinion] = []
     skipped, left = [], ENOUGH
     with TemporaryDirectory(prefix="postproc-") as place:
-        _restored(folder, Path(place))
+        _restore_sources(folder, Path(place))
         for unit in sorted(scan(Path(place), plan).units, key=lambda u: u.program):
             setup = plan.setups[unit.setup]
             try:
-                opinions.append(_judged(folder, Path(place), unit, setup, left))
+                opinions.append(_judge_program(folder, Path(place), unit, setup, left))
                 left = left.less(opinions[-1])
             except PostprocError as exc:
                 skipped.append((unit.program, str(exc)))
-    table = Opinion.joined(str(folder), opinions)
+    table = Opinion.join(str(folder), opinions)
     return TreeOpinion(table, len(opinions), tuple(skipped))
 
 
-def _restored(folder: Path, target: Path) -> None:
+def _restore_sources(folder: Path, target: Path) -> None:
     """Write the sources of a tree, and all else as it is; what cannot be is absent."""
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
         if path.name.endswith(SUFFIX) or path.is_symlink():
@@ -112,7 +112,7 @@ def _records(path: Path) -> Mapping[str, FileRecord]:
     return found
 
 
-def _judged(
+def _judge_program(
     folder: Path, sources: Path, unit: Unit, setup: JobSetup, left: Allowance
 ) -> Opinion:
     """Judge one program with its pages.
@@ -128,7 +128,7 @@ def _judged(
     names = ("assume_motion", "strict_calls")  # now, and in records of before 0.2
     assumed = any(record.options.get(name) for name in names)
     own = Options(assume_motion=assumed)
-    cell = prepared(setup.cell, setup.model, own)
+    cell = prepare_cell(setup.cell, setup.model, own)
     return second_opinion(source, output, cell, record, left)
 
 

@@ -16,7 +16,7 @@ from postproc.compensation.pages import (
     program_arm,
     read_head,
 )
-from postproc.compensation.record import SUFFIX
+from postproc.compensation.sidecar import SUFFIX
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import (
     LARGEST,
@@ -163,10 +163,10 @@ def _sort(
         part.notes += [
             (place, f"{n!r} is outside of its folder: not followed") for n in outside
         ]
-    for main, pages in _joined(named, variables, arms).items():
+    for main, pages in _assign_pages(named, variables, arms).items():
         setup = plan.setup_of(programs[main], arms[main])
         own = [programs[page] for page in pages]
-        reads = _shared(root, programs[main], listing)
+        reads = _find_shared(root, programs[main], listing)
         _add_unit(programs[main], own, reads, variables, setup, part)
     return part
 
@@ -177,7 +177,7 @@ def _rewritten_nowhere(unit: Unit) -> list[str]:
     return [p for p in unit.reads if not is_beside(PurePosixPath(p), program)]
 
 
-def _shared(root: Path, program: str, listing: FolderListing) -> tuple[str, ...]:
+def _find_shared(root: Path, program: str, listing: FolderListing) -> tuple[str, ...]:
     """Return the places of what a program shares with others, and only reads."""
     root = root.absolute()
     path = root / program
@@ -200,7 +200,7 @@ def _by_base(
     return found
 
 
-def _joined(
+def _assign_pages(
     named: Mapping[str, Iterable[str]],
     variables: Mapping[str, str],
     arms: Mapping[str, int],

@@ -25,11 +25,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from postproc import __version__
-from postproc.batch.plan import JobSetup, Result, Task, Unit, failed
+from postproc.batch.plan import JobSetup, Result, Task, Unit, make_failure
+from postproc.compensation.micro_batch import Given, compensate_batch
 from postproc.compensation.outcome import Outcome, Status
-from postproc.compensation.parallel import end_with_parent
-from postproc.compensation.record import SUFFIX
-from postproc.compensation.together import Given, compensate_batch
+from postproc.compensation.sidecar import SUFFIX
+from postproc.compensation.workers import end_with_parent
 from postproc.exceptions import PostprocError
 from postproc.files import name_read, variables_of
 from postproc.robot.pose import MM
@@ -45,7 +45,7 @@ Chunk = tuple[Task, ...]
 
 
 @dataclass
-class Pace:
+class ThroughputEstimate:
     """How fast a worker is, learned from what it has done.
 
     Attributes:
@@ -67,7 +67,7 @@ class Pace:
         return LASTING * self.size / self.seconds if self.seconds > 0 else FIRST
 
 
-def chunks(tasks: Iterator[Task], pace: Pace) -> Iterator[Chunk]:
+def chunks(tasks: Iterator[Task], pace: ThroughputEstimate) -> Iterator[Chunk]:
     """Join tasks of the same setup, as many as last about a second by now."""
     waiting: list[Task] = []
     size = 0
@@ -127,7 +127,7 @@ def work_through(
         pool: The workers.
         stopped: Tells whether the user wants to stop.
     """
-    pace = Pace()
+    pace = ThroughputEstimate()
     waiting = chunks(tasks, pace)
     running: dict[Working, Chunk] = {}
     lost: list[Task] = []
@@ -189,7 +189,7 @@ def _one_by_one(
             yield from _results(future, pool)
         except pool.losses:
             pool.renew()
-            yield failed(task.unit, _LOST)
+            yield make_failure(task.unit, _LOST)
 
 
 # The process that workers are forked from.
@@ -231,7 +231,7 @@ def run_tasks(tasks: Sequence[Task], setup: JobSetup, version: str) -> list[Resu
     """
     if version != __version__:
         text = f"the worker has postproc {__version__}, the run {version}: make equal"
-        return [failed(task.unit, text) for task in tasks]
+        return [make_failure(task.unit, text) for task in tasks]
     start = perf_counter()
     found = outcomes_of(tasks, setup)
     results = [_result(*pair) for pair in zip(tasks, found, strict=True)]
@@ -241,14 +241,14 @@ def run_tasks(tasks: Sequence[Task], setup: JobSetup, version: str) -> list[Resu
 
 def outcomes_of(tasks: Sequence[Task], setup: JobSetup) -> list[Outcome | Exception]:
     """Compensate the programs of tasks; what fails for all of them is told of each."""
-    given = [_given(task) for task in tasks]
+    given = [_name_files(task) for task in tasks]
     try:
         return compensate_batch(given, setup.cell, setup.model, setup.options)
     except Exception as exc:
         return [exc for _ in tasks]
 
 
-def _given(task: Task) -> Given:
+def _name_files(task: Task) -> Given:
     """Name the files of a task as its programs name each other."""
     unit, sources = task.unit, task.files
     pages = {_file_name(page): sources[page] for page in unit.pages}
@@ -271,14 +271,14 @@ def _result(task: Task, found: Outcome | Exception) -> Result:
             outputs = _outputs(unit, task.files, found)
             return Result(unit, found.exit_code, outputs, facts_of(found))
         case PostprocError():
-            return failed(unit, str(found))
+            return make_failure(unit, str(found))
         case RecursionError():
-            return failed(unit, "is nested too deeply")
+            return make_failure(unit, "is nested too deeply")
         case MemoryError():
-            return failed(unit, "needs more memory than there is")
+            return make_failure(unit, "needs more memory than there is")
     # A defect of ours, or of a library.
     what = f"internal error: {type(found).__name__}: {found}"
-    return failed(unit, f"{what}; please report it with the program")
+    return make_failure(unit, f"{what}; please report it with the program")
 
 
 def _outputs(
@@ -298,7 +298,7 @@ def _outputs(
         if place == unit.program and unit.variables is not None:
             belongs.insert(0, unit.variables)
         own = {n: _file_name(b) for n, b in place_of.items() if b in belongs}
-        record = outcome.record.renamed(own)
+        record = outcome.record.rename_files(own)
         outputs[place + SUFFIX] = b"".join(record.to_json())
         outputs |= {b: new.get(b, sources[b]) for b in belongs}
     return outputs
@@ -307,7 +307,7 @@ def _outputs(
 def facts_of(outcome: Outcome) -> dict[str, Any]:
     """Sum up an outcome for the log."""
     statuses = outcome.decisions.status
-    left = outcome.left_alone()
+    left = outcome.list_uncorrected()
     return {
         "version": __version__,
         "model": outcome.model,

@@ -6,20 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from postproc.calibration.fit import Frame, into_base_frame
-from postproc.calibration.measurements import Measurements
-from postproc.calibration.plausibility import check_survey
-from postproc.calibration.published import (
+from postproc.calibration.baselines import (
     Comparison,
     Trial,
     blocks_of,
     compare_in,
-    random_said,
     random_split,
+    random_stated,
     span_of,
 )
-from postproc.calibration.reversals import split_reversals
+from postproc.calibration.fit import Frame, into_base_frame
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.reversal_test import split_reversals
 from postproc.calibration.stops import pool_readings
+from postproc.calibration.survey_checks import check_survey
 from postproc.calibration.survey_files import read_measurements, survey_frame
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.exceptions import PostprocError
@@ -64,7 +64,7 @@ class Held:
         if not self.blocks:
             train, held = random_split(poses_of(survey.states), self.seed)
             pairs = [(survey[train], survey[held])]
-            return pairs, random_said(train, held, self.seed)
+            return pairs, random_stated(train, held, self.seed)
         if not 2 <= self.blocks <= len(survey) // 2:
             raise PostprocError(
                 f"--cv-blocks {self.blocks}: {len(survey)} rows can be cut into 2 to "

@@ -17,7 +17,7 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.diagnosis.held_out import Folds, regions, whole_poses
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.model.noise import poses_of
 from postproc.model.statistics import ErrorStatistics
@@ -138,7 +138,7 @@ def regions_of(survey: Measurements) -> Ints:
     return whole_poses(regions(survey.states.q), poses_of(survey.states))
 
 
-def held_out(
+def predict_held_out(
     survey: Measurements, arm: Arm, fit: FitRows, part: Ints, used: Bools
 ) -> HeldOutRows:
     """Predict every part of the rows by a fit of all others.
@@ -157,7 +157,7 @@ def held_out(
         out = np.flatnonzero(part == k)
         fitted, model = fit(survey[part != k])
         states = survey.states[out]
-        batch = Batch(arm, states)
+        batch = ArmStates(arm, states)
         read = model.reading(arm, states)
         error[out] = survey.position[out] - batch.walk.tcp - read.error
         std[out] = read.std
@@ -166,7 +166,7 @@ def held_out(
     return HeldOutRows(error, std, part, used, poses_of(survey.states), tracker)
 
 
-def held_out_linearly(fit: Fit, part: Ints) -> HeldOutRows:
+def predict_held_out_linearly(fit: Fit, part: Ints) -> HeldOutRows:
     """Predict every part by the others, effects and prior scales as in a fit.
 
     Args:
@@ -179,7 +179,7 @@ def held_out_linearly(fit: Fit, part: Ints) -> HeldOutRows:
     tracker = fit.noise.tracker_std(fit.position) ** 2 / fit.batch.states.readings
     noise = noise + tracker[:, None] + fit.whitener.extra
     error, std = np.empty((n, 3)), np.empty((n, 3))
-    for rows, values, covariance in folds.solved():
+    for rows, values, covariance in folds.solve():
         design = fit.design[rows]
         error[rows] = fit.residual[rows] + design.times(fit.values - values)
         known = design.variance(covariance)

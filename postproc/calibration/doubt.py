@@ -22,9 +22,9 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.evidence import (
     LOG_SPREAD,
     Normal,
-    inverted,
+    invert_information,
     maximise,
-    widened,
+    widen_covariance,
 )
 from postproc.calibration.regression import Fit, beside
 from postproc.calibration.weight_direction import (
@@ -32,12 +32,12 @@ from postproc.calibration.weight_direction import (
     degrees_between,
     unit_directions,
 )
-from postproc.model.combination import Combination
 from postproc.model.doubt import Doubt
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.effect import Effect
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 TILTED = float(np.log(0.02))  # odds of another direction of weight than the cell's
 YIELDS = float(np.log(3.0))  # odds of joints that yield: most joints of most arms do
@@ -73,7 +73,7 @@ class Alternative:
             way = np.concatenate([part * way for part in along])
         return cls(way, group.reshape(-1), positive, odds)
 
-    def weighed(self, normal: Normal) -> tuple[float, Floats]:
+    def vary_masses(self, normal: Normal) -> tuple[float, Floats]:
         """Weigh it against nothing.
 
         Args:
@@ -94,7 +94,9 @@ class Alternative:
         std = np.sqrt(np.diag(found.covariance)[self.positive])
         above = found.mean[self.positive] / np.maximum(std, 1e-300)
         gain += float((log_ndtr(above) + np.log(2.0)).sum())
-        moments = widened(own, self.group, found) + np.outer(found.mean, found.mean)
+        moments = widen_covariance(own, self.group, found) + np.outer(
+            found.mean, found.mean
+        )
         return gain, way @ moments @ way.T
 
 
@@ -145,7 +147,7 @@ def _of_weight(fitted: Fit, mounted: bool) -> list[Rivals]:
     return [(lacking, rivals)] if lacking else []
 
 
-def _along_any(batch: Batch, yields: bool) -> Rivals:
+def _along_any(batch: ArmStates, yields: bool) -> Rivals:
     """List the directions of weight, each a mix of those along the base's axes.
 
     Args:
@@ -169,14 +171,14 @@ def _second_moments(normal: Normal, asked: Sequence[Rivals]) -> Floats:
     for effects, rivals in asked:
         part = slice(first, first + len(Combination(effects).parameters))
         own = replace(normal, gram=normal.gram[part, part], moment=normal.moment[part])
-        moments[part, part] = _mixed(own, rivals)
+        moments[part, part] = _average_moments(own, rivals)
         first = part.stop
     return moments
 
 
-def _mixed(normal: Normal, rivals: Sequence[Alternative]) -> Floats:
+def _average_moments(normal: Normal, rivals: Sequence[Alternative]) -> Floats:
     """Average second moments over rivals, and over none of them being there, (q, q)."""
-    weighed = [rival.weighed(normal) for rival in rivals]
+    weighed = [rival.vary_masses(normal) for rival in rivals]
     probable = softmax(np.array([0.0, *(gain for gain, _ in weighed)]))[1:]
     mixed: Floats = np.tensordot(probable, np.stack([m for _, m in weighed]), axes=1)
     return mixed
@@ -193,11 +195,11 @@ def _apart(laid: Fit, count: int) -> tuple[Normal, Floats]:
     own = np.arange(len(laid.values)) < count
     s = np.exp(laid.log_scale)[laid.group[own]]
     gram = normal.gram[np.ix_(own, own)]
-    _, inverse, told = inverted(np.eye(count) + gram * np.outer(s, s))
+    _, inverse, told = invert_information(np.eye(count) + gram * np.outer(s, s))
     inside = inverse if told is None else told
     across = normal.gram[np.ix_(own, ~own)]
     taken = s[:, None] * (inside @ (s[:, None] * across))
-    return normal.left_to_prior(own, s), taken
+    return normal.marginalise(own, s), taken
 
 
 def _matters(fitted: Fit, laid: Fit, doubt: Doubt) -> bool:

@@ -56,7 +56,7 @@ class Normal:
         rows: Floats = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
         return rows
 
-    def left_to_prior(self, aside: Bools, s: Floats) -> Normal:
+    def marginalise(self, aside: Bools, s: Floats) -> Normal:
         """Integrate over some parameters, which have known prior scales.
 
         With Z their columns, rows that had unit variance have 1 + Z s^2 Z^T: exactly
@@ -67,7 +67,9 @@ class Normal:
             s: Their prior scales, (k,).
         """
         rest, own = ~aside, self.gram[np.ix_(aside, aside)]
-        log_det, inverse, told = inverted(np.eye(len(s)) + own * np.outer(s, s))
+        log_det, inverse, told = invert_information(
+            np.eye(len(s)) + own * np.outer(s, s)
+        )
         across = self.gram[np.ix_(rest, aside)] * s
         inside = inverse if told is None else told
         mixed, moment = across @ inside, s * self.moment[aside]
@@ -139,7 +141,7 @@ class Solved:
         log_det, told = _invert_lower(lower), None
         if log_det is None:
             _native.scaled(gram, s, lower)
-            log_det, lower, told = _of_told(_mirrored(lower))
+            log_det, lower, told = _invert_above_rounding(_mirror_lower(lower))
         moment = s * normal.moment
         z = _times(lower, moment) if told is None else told @ moment
         fit = normal.square - float(moment @ z)
@@ -149,16 +151,16 @@ class Solved:
         return cls(log_scale, s, lower, z, evidence)
 
     @property
-    def told(self) -> Floats:
+    def to_dict(self) -> Floats:
         """Diagonal of P: the share of each prior variance that is left, (p,)."""
         return np.diag(self.lower)
 
     def posterior(self) -> Posterior:
         """Write it in units of the prior scales before the data rescale them."""
-        covariance = _mirrored(self.lower)
+        covariance = _mirror_lower(self.lower)
         covariance *= self.s[:, None]
         covariance *= self.s
-        effective = float((1.0 - self.told).sum())
+        effective = float((1.0 - self.to_dict).sum())
         return Posterior(
             self.s * self.z, covariance, self.log_scale, self.log_evidence, effective
         )
@@ -175,7 +177,7 @@ def posterior(normal: Normal, group: Ints, log_scale: Floats) -> Posterior:
     return Solved.at(normal, group, log_scale).posterior()
 
 
-def inverted(B: Floats) -> tuple[float, Floats, Floats | None]:
+def invert_information(B: Floats) -> tuple[float, Floats, Floats | None]:
     """Invert 1 + C, where C has no negative eigenvalue.
 
     Columns that are nearly the same, on scales far above what the rows tell of them,
@@ -187,7 +189,11 @@ def inverted(B: Floats) -> tuple[float, Floats, Floats | None]:
     """
     lower = np.array(B, order="C")
     log_det = _invert_lower(lower)
-    return _of_told(B) if log_det is None else (log_det, _mirrored(lower), None)
+    return (
+        _invert_above_rounding(B)
+        if log_det is None
+        else (log_det, _mirror_lower(lower), None)
+    )
 
 
 def _invert_lower(lower: Floats) -> float | None:
@@ -210,7 +216,7 @@ def _invert_lower(lower: Floats) -> float | None:
     return log_det
 
 
-def _of_told(B: Floats) -> tuple[float, Floats, Floats | None]:
+def _invert_above_rounding(B: Floats) -> tuple[float, Floats, Floats | None]:
     """Invert 1 + C by its eigenvalues, those that are rounding counting as 1."""
     values, vectors = np.linalg.eigh(B)
     told = values > _rounding(np.diag(B))
@@ -225,7 +231,7 @@ def _rounding(diagonal: Floats) -> float:
     return ROUNDED * len(diagonal) * float(np.finfo(float).eps) * size
 
 
-def _mirrored(lower: Floats) -> Floats:
+def _mirror_lower(lower: Floats) -> Floats:
     """Fill the upper half from the lower one."""
     full: Floats = np.tril(lower)
     full += np.tril(lower, -1).T
@@ -315,7 +321,7 @@ class _Here:
     ) -> _Here:
         """Solve the regression at log scales u."""
         solved = Solved.at(normal, group, u, room)
-        z, told, count = solved.z, solved.told, len(u)
+        z, told, count = solved.z, solved.to_dict, len(u)
         both = np.bincount(group, told + z**2, count)
         slope = both - np.bincount(group, minlength=count) - u / LOG_SPREAD**2
         curvature = 2.0 * _native.by_groups(solved.lower, z, group, count)
@@ -348,7 +354,7 @@ class _Here:
         return out, rise
 
 
-def widened(normal: Normal, group: Ints, at: Posterior) -> Floats:
+def widen_covariance(normal: Normal, group: Ints, at: Posterior) -> Floats:
     """Covariance at prior scales that are known no better than the data tell them.
 
     A scale that g well-determined parameters have told leaves a Student t with g

@@ -15,7 +15,7 @@ ENOUGH_REPEATS = 5  # that tell scatter of arrivals from errors of a pose
 CHANCE = 1.0  # standard errors of the errors of poses, within which there are none
 
 
-def expected_noise(fitted: Fit) -> Noise:
+def expect_noise(fitted: Fit) -> Noise:
     """Return the noise of other poses than those of a fit.
 
     Rounded joint angles are an error of the file: it is taken off the scatter of
@@ -27,7 +27,7 @@ def expected_noise(fitted: Fit) -> Noise:
     that belongs to one of them is taken to be no larger than what all of them share.
     """
     noise = _without_rounding(fitted)
-    if repeated_approaches(fitted.batch.states) >= ENOUGH_REPEATS:
+    if count_repeats(fitted.batch.states) >= ENOUGH_REPEATS:
         return noise
     J = fitted.design.jacobian
     sheet = fitted.batch.arm.repeatability / ISO_RP
@@ -84,7 +84,7 @@ def _mean_of_visits(fitted: Fit) -> float:
     return of_stop * fitted.poses / stops
 
 
-def repeated_approaches(states: States) -> int:
+def count_repeats(states: States) -> int:
     """Count the stops beyond the first at a pose that is approached in one way."""
     key = np.column_stack([poses_of(states), states.direction, states.order])
     stops = np.unique(key, axis=0)

@@ -10,53 +10,53 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from postproc.arrays import Floats, data_frame
+from postproc.calibration.backward_elimination import ENOUGH
+from postproc.calibration.baselines import fit_method, too_wide
+from postproc.calibration.effect_selection import Progress, model_of, no_progress
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.monument_frame import monuments_of
-from postproc.calibration.plausibility import (
-    check_orientations,
-    check_registered,
-    check_stops,
-    check_survey,
-    lost_without,
-)
+from postproc.calibration.nest_check import find_groups, find_wrong_nest
 from postproc.calibration.predict import predict
-from postproc.calibration.published import fit_method, too_wide
 from postproc.calibration.registration import (
     NEAR_FLANGE,
     NEAR_POINT,
+    find_undetermined_axes,
     register,
     typical_gap,
-    undetermined_axes,
 )
 from postproc.calibration.regression import NEARLY, Fit, fit_effects
 from postproc.calibration.report import FitReport, report_fit, report_method
-from postproc.calibration.reversals import (
+from postproc.calibration.reversal_test import (
     Reversals,
     newer_widths,
     split_reversals,
 )
-from postproc.calibration.selection import Progress, model_of, silent
 from postproc.calibration.stops import pool_readings
+from postproc.calibration.survey_checks import (
+    check_orientations,
+    check_registered,
+    check_stops,
+    check_survey,
+    list_losses,
+)
 from postproc.calibration.survey_files import (
     MeasurementFile,
     read_measurements,
     survey_frame,
 )
 from postproc.calibration.tables import DETECT, TableFormat
-from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.calibration.validation import FitTask, Validated, validate_fit
-from postproc.calibration.weighing import ENOUGH
 from postproc.calibration.weight_direction import direction_warning, level_warning
 from postproc.exceptions import MeasurementError, ModelError
-from postproc.model.combination import Combination
 from postproc.model.doubt import Doubt
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
 from postproc.model.effects.station_shift import StationShift
 from postproc.model.effects.tool_shift import ToolShift
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, Monument
 from postproc.model.model_file import Method
 from postproc.model.noise import angle_step
@@ -180,7 +180,7 @@ def fit(
     name: str = "measurements.csv",
     reading: TableFormat = DETECT,
     seed: int = 0,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Calibration:
     """Fit a model to measurement files.
 
@@ -230,7 +230,7 @@ def fit_measurements(
     effects: Sequence[str] | None = None,
     frame: Frame = "base",
     seed: int = 0,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
     validate: bool = True,
 ) -> Calibration:
     """Fit a model to measurements, see `fit`.
@@ -248,7 +248,7 @@ def fit_measurements(
     """
     rows = _prepare(survey, cell, frame)
     if method != "full":
-        return _dated(_published(rows, cell, frame, method, seed))
+        return _dated(_fit_published(rows, cell, frame, method, seed))
     task = FitTask(
         rows.survey, cell.arm, effects, rows.tracker, rows.setup, rows.mounted
     )
@@ -302,9 +302,9 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
     tracker, setup = cell.tracker, several_points(survey)
     placed, points, monuments = None, None, monuments_of(survey)
     if frame == "tracker":
-        points = stated_points(survey)
+        points = points_of_cell(survey)
         survey, placed = into_base_frame(survey, cell.arm)
-        if cell.levelled:
+        if cell.is_levelled:
             level = level_warning(placed, cell.arm.weight)
             survey = replace(survey, warnings=(*survey.warnings, *level))
         tracker, setup = placed.origin, (Placement.name,)
@@ -314,7 +314,7 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
     if frame == "base":
         setup = (*setup, *file_shifts(survey, cell.arm, cell.tracker))
     survey = check_orientations(survey, cell.arm)
-    notes = (*survey.warnings, *lost_without(cell.arm, survey))
+    notes = (*survey.warnings, *list_losses(cell.arm, survey))
     survey = replace(survey, warnings=notes)
     mounted = cell.file.robot.mounting is not None
     return PreparedRows(
@@ -322,7 +322,7 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
     )
 
 
-def _published(
+def _fit_published(
     rows: PreparedRows, cell: Cell, frame: Frame, method: Method, seed: int
 ) -> Calibration:
     """Fit a method of the literature."""
@@ -356,7 +356,7 @@ def _conclude(
     model = replace(model, flank_widths=widths)
     notes = (
         *survey.warnings,
-        *moved_tools(fitted, survey),
+        *find_moved_tools(fitted, survey),
         *drifts(fitted),
         *wrong_nests(fitted, rows.points),
         *_rounding(model, fitted),
@@ -372,7 +372,7 @@ def _conclude(
     return Calibration(model, report, survey, cell, frame)
 
 
-def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
+def find_moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
     """Tell of rows that look as if the tool, or the nest, had moved between them."""
     told = [
         f"the tool or its nest slipped {_at(survey, effect.row)}: fitted as "
@@ -439,7 +439,7 @@ def drifts(fitted: Fit) -> tuple[str, ...]:
     left = _mean_mm(fitted.residual[used])
     for effect, part in zip(c.effects, c.slices, strict=True):
         if state := effect.refers_to():
-            kept = _mean_mm((fitted.residual + fitted.moved(part))[used])
+            kept = _mean_mm((fitted.residual + fitted.move(part))[used])
             told.append(
                 f"{effect.name} in time: rows are left {left:.4f} mm off, {kept:.4f} "
                 f"mm with it left in. Predictions are for {state}"
@@ -486,7 +486,7 @@ def _as_turned(points: Floats) -> Floats:
     return covariance
 
 
-def stated_points(survey: Measurements) -> Floats | None:
+def points_of_cell(survey: Measurements) -> Floats | None:
     """Say where the cell has the nests, (k, 3) [m], None where it has one or none."""
     points = _points(survey.states)
     gaps = np.linalg.norm(points[:, None] - points, axis=2)
@@ -519,7 +519,7 @@ def file_shifts(
     """
     if not StationShift.may_show(survey.states):
         return ()
-    batch = Batch(arm, survey.states)
+    batch = ArmStates(arm, survey.states)
     origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
     names = (*BASE_EFFECTS, *several_points(survey))
     fits = [
@@ -539,7 +539,7 @@ def file_steps(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
     for effect, part in zip(c.effects, c.slices, strict=True):
         if not isinstance(effect, StationShift):
             continue
-        moved = np.linalg.norm(fitted.moved(part), axis=1)
+        moved = np.linalg.norm(fitted.move(part), axis=1)
         for s in effect.stations:
             size = float(moved[survey.states.station == s].mean()) / MM
             told.append(
@@ -607,7 +607,7 @@ def in_base_frame(
 
 def probe_note(placed: Registration, arm: Arm, states: States) -> tuple[str, ...]:
     """Say in one sentence what a tool that never turned leaves unknown of its probe."""
-    axes = undetermined_axes(placed, arm, states)
+    axes = find_undetermined_axes(placed, arm, states)
     if len(axes) == 0:
         return ()
     how = "never turned" if len(axes) == 3 else "turned about one axis only"

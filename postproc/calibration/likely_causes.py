@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from postproc.arrays import Bools, Floats
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.registration import register, typical_gap
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects.base_shift import rigid_motions
 from postproc.model.effects.placement import Placement
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
@@ -109,7 +109,7 @@ def find_cause(
     def in_base(position: Floats) -> Floats:
         return position if placed is None else placed.to_base(position)
 
-    before = _left(arm, states, in_base(position), error)
+    before = _residual_lengths(arm, states, in_base(position), error)
     bad = before > CLOSE
     few = max(FEWEST, SOME * len(before))
     if len(before) < ENOUGH_ROWS or bad.sum() < few:
@@ -125,7 +125,7 @@ def find_cause(
         ),
     )
     for guess in guesses:
-        after = _left(arm, guess.states, in_base(guess.position), error)
+        after = _residual_lengths(arm, guess.states, in_base(guess.position), error)
         shown = _explanation(before, np.where(np.isnan(after), np.inf, after))
         if shown is not None:
             share, rank, rows, place = shown
@@ -137,9 +137,11 @@ def find_cause(
     return min(near, key=lambda f: f[1])[2]
 
 
-def _left(arm: Arm, states: States, position: Floats, error: ErrorOf) -> Floats:
+def _residual_lengths(
+    arm: Arm, states: States, position: Floats, error: ErrorOf
+) -> Floats:
     """Return by how much positions differ from those expected, (n,) [m]."""
-    expected = Batch(arm, states).walk.tcp + error(states)
+    expected = ArmStates(arm, states).walk.tcp + error(states)
     return np.asarray(np.linalg.norm(position - expected, axis=1))
 
 
@@ -257,7 +259,7 @@ def _offset(
     by = 0.0
     for _ in range(OFFSET_STEPS):
         q = states.q + by * np.eye(6)[joint]
-        batch = Batch(arm, states.with_(q=q))
+        batch = ArmStates(arm, states.with_(q=q))
         gap = position - batch.walk.tcp - error(batch.states)
         column = batch.jacobian[:, :, joint]
         lever = np.maximum((column**2).sum(axis=1), 1e-9)
@@ -301,7 +303,7 @@ def _offset_in_any_frame(survey: Measurements, arm: Arm, joint: int) -> float:
         found = register(
             arm, turned, survey.position, NOTHING, np.zeros(0), survey.stations
         )
-        batch = Batch(arm, found.on_probes(turned))
+        batch = ArmStates(arm, found.on_probes(turned))
         gap = found.to_base(survey.position, states.station) - batch.walk.tcp
         beside = Placement.propose(arm, states).columns(batch)
         columns = np.concatenate([batch.jacobian[:, :, [joint]], beside], axis=2)
@@ -367,7 +369,7 @@ def _place(survey: Measurements, arm: Arm, rows: Bools) -> Registration:
 
 def _gap(survey: Measurements, arm: Arm, placed: Registration) -> Floats:
     """Return what a registration leaves of the nominal arm, (n,) [m]."""
-    tcp = Batch(arm, placed.on_probes(survey.states)).walk.tcp
+    tcp = ArmStates(arm, placed.on_probes(survey.states)).walk.tcp
     return np.asarray(np.linalg.norm(placed.to_base(survey.position) - tcp, axis=1))
 
 
@@ -398,7 +400,7 @@ def wrong_directions(survey: Measurements, arm: Arm, model: Model) -> str | None
     if survey.inferred.all() or len(states) < ENOUGH_ROWS:
         return None
     predicted = model.error(arm, states)
-    read = survey.position - Batch(arm, states).walk.tcp
+    read = survey.position - ArmStates(arm, states).walk.tcp
     y = _beside_setup(read - predicted, arm, states)
     best, text_of_best = LESS * float(np.median(np.linalg.norm(y, axis=1))), None
     for text, side in _other_directions(states.direction):
@@ -448,7 +450,7 @@ def _other_directions(side: Floats) -> Iterator[tuple[str, Floats]]:
 
 def _beside_setup(error: Floats, arm: Arm, states: States) -> Floats:
     """Leave out what a shift and a turn of the base explain, (n, 3) [m]."""
-    rigid = rigid_motions(Batch(arm, states).walk.tcp).reshape(-1, 6)
+    rigid = rigid_motions(ArmStates(arm, states).walk.tcp).reshape(-1, 6)
     flat = error.reshape(-1)
     return np.asarray(flat - rigid @ np.linalg.lstsq(rigid, flat)[0]).reshape(-1, 3)
 

@@ -13,9 +13,14 @@ from postproc.calibration.measurements import (
     read_points,
     read_stations,
 )
-from postproc.calibration.references import split_references
+from postproc.calibration.monuments import split_references
 from postproc.calibration.tables import DETECT, TableFormat
-from postproc.compensation.program import Planned, plan_visits, read_program, states_of
+from postproc.compensation.program import (
+    PlannedProgram,
+    plan_visits,
+    read_program,
+    states_of,
+)
 from postproc.compensation.program_files import read_files
 from postproc.exceptions import MeasurementError
 from postproc.files import NamedText
@@ -62,7 +67,7 @@ def join_program(
     lost = np.flatnonzero(np.isnan(states.q).any(axis=1))
     if len(lost):
         row = order[lost[0]]
-        raise _unplanned(
+        raise _error_without_plan(
             table.path, ids[row], int(table.line[row]), planned, int(rows[row])
         )
     stations, station = read_stations(table)
@@ -79,8 +84,8 @@ def join_program(
     )
 
 
-def _unplanned(
-    data: Path, name: str, line: int, planned: Planned, visit: int
+def _error_without_plan(
+    data: Path, name: str, line: int, planned: PlannedProgram, visit: int
 ) -> MeasurementError:
     """Say that a measured visit has no planned state."""
     problem = f"the program's visit {name} cannot be planned: {planned.reasons[visit]}"

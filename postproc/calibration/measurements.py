@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.calibration.references import (
+from postproc.calibration.monuments import (
     APART,
     ONE_POINT,
     ReferenceRows,
@@ -241,12 +241,12 @@ def concatenate(parts: Sequence[Measurements]) -> Measurements:
         MeasurementError: A file is there twice, or readings of fixed points tell
             nothing.
     """
-    if _moved_between(parts):
-        return replace(_joined(_tied([steady(p) for p in parts])), motion=None)
-    return _steadied(_joined(parts))
+    if _has_moved_points(parts):
+        return replace(_join_files(_tie_files([steady(p) for p in parts])), motion=None)
+    return _remove_drift(_join_files(parts))
 
 
-def _moved_between(parts: Sequence[Measurements]) -> bool:
+def _has_moved_points(parts: Sequence[Measurements]) -> bool:
     """Return True if a fixed point is elsewhere in another file."""
     places: dict[str, Floats] = {}
     for part in parts:
@@ -264,10 +264,10 @@ def steady(survey: Measurements) -> Measurements:
     fixed = survey.references
     if fixed is None or (np.bincount(fixed.which) < 2).any():
         return survey
-    return _steadied(survey)
+    return _remove_drift(survey)
 
 
-def _steadied(survey: Measurements) -> Measurements:
+def _remove_drift(survey: Measurements) -> Measurements:
     """Take out of the positions what readings of fixed points say of the tracker."""
     if survey.references is None:
         return survey
@@ -276,7 +276,7 @@ def _steadied(survey: Measurements) -> Measurements:
     passed = getattr(states, motion.drift.clock)
     return replace(
         survey,
-        position=survey.position - motion.moved(passed, survey.position),
+        position=survey.position - motion.move(passed, survey.position),
         motion=motion,
         warnings=(*survey.warnings, *motion.tell()),
     )
@@ -288,7 +288,7 @@ TIES = 3  # fixed points, not on a line, that tell where another station stood
 LOOSE = 2e-4  # [m] what they may be off by afterwards
 
 
-def _tied(parts: Sequence[Measurements]) -> list[Measurements]:
+def _tie_files(parts: Sequence[Measurements]) -> list[Measurements]:
     """Bring files into the frame of the first, where they share its fixed points."""
     name = parts[0].stations[0] or parts[0].path.name
     first = replace(parts[0], stations=(name, *parts[0].stations[1:]))
@@ -338,7 +338,7 @@ def places_of_points(rows: Measurements) -> dict[str, Floats]:
     position = fixed.position
     if motion is not None:
         passed = fixed.time if motion.drift.clock == "time" else fixed.order
-        position = position - motion.moved(passed, position)
+        position = position - motion.move(passed, position)
     own = {n: [m == n for m in fixed.name] for n in set(fixed.name)}
     return {name: position[rows].mean(axis=0) for name, rows in own.items()}
 
@@ -357,13 +357,13 @@ def _in_frame(rows: Measurements, T: Floats, station: str) -> Measurements:
     )  # fmt: skip
 
 
-def _joined(parts: Sequence[Measurements]) -> Measurements:
+def _join_files(parts: Sequence[Measurements]) -> Measurements:
     """Put several files one after the other."""
     first = parts[0]
     if len(parts) == 1:
         return first
     _check_given_once(parts)
-    names, station = _joined_stations(parts)
+    names, station = _join_stations(parts)
     joined = {
         name: np.concatenate([getattr(p.states, name) for p in parts])
         for name in first.states.__dataclass_fields__
@@ -378,14 +378,14 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
         path=first.path,
         states=States(order=order, station=station, **joined),
         position=np.concatenate([p.position for p in parts]),
-        ids=_joined_ids(parts),
+        ids=_join_ids(parts),
         line=np.concatenate([p.line for p in parts]),
         inferred=np.concatenate([p.inferred for p in parts]),
         sha256="+".join(p.sha256 for p in parts),
         dropped=tuple(d for p in parts for d in p.dropped),
         warnings=tuple(w for p in parts for w in p.warnings),
         rotation=np.concatenate(rotations) if len(rotations) == len(parts) else None,
-        visit=_joined_visits(parts),
+        visit=_join_visits(parts),
         references=join_references(
             [(p.references, by) for p, by in zip(parts, offsets, strict=True)]
         ),
@@ -411,7 +411,7 @@ def _check_given_once(parts: Sequence[Measurements]) -> None:
         first[rows] = part.path
 
 
-def _joined_ids(parts: Sequence[Measurements]) -> tuple[str, ...]:
+def _join_ids(parts: Sequence[Measurements]) -> tuple[str, ...]:
     """Name the rows of several files: ids of an earlier file get the file's name."""
     seen: set[str] = set()
     names: list[str] = []
@@ -422,7 +422,7 @@ def _joined_ids(parts: Sequence[Measurements]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _joined_visits(parts: Sequence[Measurements]) -> Ints | None:
+def _join_visits(parts: Sequence[Measurements]) -> Ints | None:
     """Number the visits of several files, (n,): no two files share one."""
     if all(part.visit is None for part in parts):
         return None
@@ -434,7 +434,7 @@ def _joined_visits(parts: Sequence[Measurements]) -> Ints | None:
     return np.concatenate(visits)
 
 
-def _joined_stations(
+def _join_stations(
     parts: Sequence[Measurements],
 ) -> tuple[tuple[str, ...], NDArray[np.int64]]:
     """Number the stations of several files: one name is one station.

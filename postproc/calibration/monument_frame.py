@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.calibration.measurements import Measurements, places_of_points
-from postproc.calibration.references import APART
+from postproc.calibration.monuments import APART
 from postproc.model.model import Monument
 from postproc.model.registration import rigid_fit
 from postproc.robot.pose import MM

@@ -12,8 +12,8 @@ from scipy.stats import chi2
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.evidence import Normal
-from postproc.model.combination import Combination
-from postproc.model.kinematics import Batch
+from postproc.model.effect_sum import Combination
+from postproc.model.kinematics import ArmStates
 from postproc.robot.pose import rotation_vector
 
 # Which rows are no measurements of this arm: wrong nest, disturbed beam, a knock.
@@ -196,7 +196,7 @@ class Turns:
     weight: Floats
 
     @classmethod
-    def of(cls, batch: Batch, rotation: Floats, mounting: Floats | None) -> Turns:
+    def of(cls, batch: ArmStates, rotation: Floats, mounting: Floats | None) -> Turns:
         """Compare measured orientations with the nominal arm's.
 
         Args:
@@ -220,15 +220,17 @@ class Turns:
         """Median angle from nominal to measured [rad]."""
         return float(np.median(np.linalg.norm(self.measured, axis=1)))
 
-    def left(self, effects: Combination, batch: Batch, values: Floats) -> Turns:
+    def subtract_effects(
+        self, effects: Combination, batch: ArmStates, values: Floats
+    ) -> Turns:
         """Take off what effects explain."""
         return replace(self, residual=self.measured - effects.turn(batch, values))
 
-    def linearised(self, effects: Combination, at: Batch) -> Turns:
+    def linearise(self, effects: Combination, at: ArmStates) -> Turns:
         """Differentiate at the kinematics of a batch."""
         return replace(self, columns=effects.rotation_columns(at))
 
-    def whitened(self) -> Floats:
+    def whiten(self) -> Floats:
         """Columns in standard deviations, (3 n, p)."""
         scale = (np.sqrt(self.weight) / self.std)[:, None, None]
         out: Floats = (self.columns * scale).reshape(-1, self.columns.shape[2])
@@ -236,14 +238,14 @@ class Turns:
 
     def normal(self, values: Floats, scales: Floats) -> Normal:
         """Write these rows as normal sums, see `Fit.normal`."""
-        X = self.whitened() * scales
+        X = self.whiten() * scales
         target = self.residual + self.columns @ values
         y = (target * (np.sqrt(self.weight) / self.std)[:, None]).reshape(-1)
         rows = 3.0 * float((self.weight > 0).sum())
         noise = 2.0 * rows * float(np.log(self.std))
         return Normal(X.T @ X, X.T @ y, float(y @ y), noise, rows)
 
-    def judged(self, covariance: Floats, row_weight: Floats, heavy: bool) -> Turns:
+    def weigh_rows(self, covariance: Floats, row_weight: Floats, heavy: bool) -> Turns:
         """Weigh the rows and estimate the scatter from what is left.
 
         Args:

@@ -13,13 +13,13 @@ import numpy as np
 
 from postproc.arrays import Floats, data_frame
 from postproc.calibration.measurements import Measurements
-from postproc.calibration.plausibility import check_against
 from postproc.calibration.readings import Readings, read_setup, rows_of
 from postproc.calibration.report import FreeForms
 from postproc.calibration.residuals import beside_all
+from postproc.calibration.survey_checks import check_against
 from postproc.calibration.survey_files import MeasuredFrame, survey_frame
 from postproc.calibration.tables import DETECT, TableFormat, TextTable, read_foreign
-from postproc.files import named_text, spreadsheet_text
+from postproc.files import open_text, spreadsheet_text
 from postproc.model.model import (
     FreePart,
     Model,
@@ -197,12 +197,12 @@ def predict(
     cell = as_cell(cell)
     model = as_model(model, cell.arm)
     model.check_arm(cell.arm)
-    table = read_foreign(named_text(states, name), reading.within(cell))
+    table = read_foreign(open_text(states, name), reading.within(cell))
     measured = table.has(*POSITION)
     if frame is None and measured and cell.measurements.frame is not None:
         frame = survey_frame(cell, None)
     asked = Readings(frame, refit, after)
-    if not asked.asked:
+    if not asked.is_asked:
         rows, read, placed = rows_of(table, cell, positions=False), None, ""
         if measured:
             check_against(rows, cell.arm, model)

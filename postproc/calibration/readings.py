@@ -8,21 +8,21 @@ import numpy as np
 
 from postproc.calibration.measurements import POSITION, Measurements, from_table, steady
 from postproc.calibration.monument_frame import at_monuments
-from postproc.calibration.plausibility import (
-    check_against,
-    check_own_registration,
-    check_stops,
-)
 from postproc.calibration.registration import (
     covers_a_plane,
     predict_registered,
     station_of,
 )
+from postproc.calibration.survey_checks import (
+    check_against,
+    check_own_registration,
+    check_stops,
+)
 from postproc.calibration.survey_files import MeasuredFrame, carrying_load
 from postproc.calibration.tables import TextTable
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.model.effects.effect import Effect
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, PredictedReading
 from postproc.model.registration import Registration
 from postproc.model.variance import moment_variance
@@ -58,7 +58,7 @@ class Readings:
             raise PostprocError(f"--refit {self.refit!r}: write registration")
 
     @property
-    def asked(self) -> bool:
+    def is_asked(self) -> bool:
         """Whether readings are predicted."""
         return self.frame is not None or self.refit is not None
 
@@ -108,7 +108,7 @@ def read_setup(
         if model.registration is None:
             problem = "the model holds no registration: it was fitted in the base frame"
             raise MeasurementError(table.path, problem, CURE)
-        rows = _placed(rows, model.registration)
+        rows = _place_rows(rows, model.registration)
         return ReadRows(rows, model.reading(cell.arm, rows.states), clock)
     return _of_tracker(rows, cell, model, clock)
 
@@ -126,11 +126,11 @@ def _of_tracker(rows: Measurements, cell: Cell, model: Model, clock: str) -> Rea
     elif not note:
         if placed is None:
             return _own_registration(rows, cell, model)
-        base = _placed(
+        base = _place_rows(
             rows, station_of(placed, arm, rows.states, rows.position, rows.stations)
         )
     read = model.reading(arm, base.states)
-    left = base.position - Batch(arm, base.states).walk.tcp - read.error
+    left = base.position - ArmStates(arm, base.states).walk.tcp - read.error
     off = float(np.median(np.linalg.norm(left, axis=1))) if len(left) else 0.0
     if off > MOVED and not note:
         found = _own_registration(rows, cell, model)
@@ -160,7 +160,7 @@ def _own_registration(rows: Measurements, cell: Cell, model: Model) -> ReadRows:
     )
     at = ", ".join(f"{v / MM:.1f}" for v in placed.tracker)
     note = f"\nregistration refitted: tracker at {at} mm in the base frame"
-    base = _placed(rows, placed)
+    base = _place_rows(rows, placed)
     spent = 6 * len(placed.transforms) + 3 * len(placed.probes)
     return ReadRows(base, read, f"{note}, {spent} numbers of {3 * len(rows)} readings")
 
@@ -173,8 +173,8 @@ def _own_registration_error(rows: Measurements, cell: Cell, model: Model) -> str
     placed, read = predict_registered(
         model, cell.arm, rows.states, rows.position, rows.stations
     )
-    base = _placed(rows, placed)
-    left = base.position - Batch(cell.arm, base.states).walk.tcp - read.error
+    base = _place_rows(rows, placed)
+    left = base.position - ArmStates(cell.arm, base.states).walk.tcp - read.error
     spent = 6 * len(placed.transforms) + 3 * len(placed.probes)
     free = max(left.size - spent, 1)
     mean = float(np.linalg.norm(left, axis=1).mean()) * np.sqrt(left.size / free)
@@ -184,7 +184,7 @@ def _own_registration_error(rows: Measurements, cell: Cell, model: Model) -> str
     )
 
 
-def _placed(rows: Measurements, placed: Registration) -> Measurements:
+def _place_rows(rows: Measurements, placed: Registration) -> Measurements:
     """Put rows in the tracker's frame into the base frame, at the probe points.
 
     Raises:
@@ -246,7 +246,7 @@ def clock_missing(
     changed = [was for was, now in pairs if now is not was]
     if not changed or len(states) == 0:
         return ""
-    at = Batch(cell.arm, states)
+    at = ArmStates(cell.arm, states)
     spread = np.sqrt(moment_variance(lost.effects, at, lost.values).mean()) / MM
     clocks = sorted({_column(effect) for effect in changed})
     return (

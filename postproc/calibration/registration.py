@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects.placement import POINT, Placement, unseen_axes
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, PredictedReading
 from postproc.model.registration import Registration, rigid_fit
 from postproc.robot.arm import Arm
@@ -55,7 +55,7 @@ def register(
     ids, which = np.unique(states.tool_id, return_inverse=True)
     stated = np.stack([states.tool[which == k].mean(axis=0) for k in range(len(ids))])
     near = NEAR_POINT if np.abs(stated).max() > 0 else NEAR_FLANGE
-    batch = Batch(arm, states)
+    batch = ArmStates(arm, states)
     at = arm_effects.at(batch, values)
     landed, R = batch.walk.tcp + arm_effects.error_at(at, batch, values), at.walk.flange
     flange = landed - np.einsum("nij,nj->ni", R, states.tool)
@@ -115,7 +115,7 @@ def _step(
     return np.asarray(step[: columns.shape[2]].reshape(-1, 3))
 
 
-def undetermined_axes(placed: Registration, arm: Arm, states: States) -> Floats:
+def find_undetermined_axes(placed: Registration, arm: Arm, states: States) -> Floats:
     """Find directions along which no row shows where a probe sits, (m, 3).
 
     A tool that never turned shows none; one that turned about one axis shows all but
@@ -129,14 +129,14 @@ def undetermined_axes(placed: Registration, arm: Arm, states: States) -> Floats:
     Returns:
         Unit vectors in the flange frame.
     """
-    walk = Batch(arm, placed.on_probes(states)).walk
+    walk = ArmStates(arm, placed.on_probes(states)).walk
     hidden = unseen_axes(walk.flange, walk.tcp, states.station)
     return np.array([unseen.axis for unseen in hidden]).reshape(-1, 3)
 
 
 def covers_a_plane(arm: Arm, states: States) -> bool:
     """Return True if the stops of rows do not lie about one line."""
-    tcp = Batch(arm, states).walk.tcp
+    tcp = ArmStates(arm, states).walk.tcp
     size = np.linalg.svd(tcp - tcp.mean(axis=0), compute_uv=False)
     return bool(size[1] > SPREAD * np.sqrt(len(tcp)))
 
@@ -154,7 +154,7 @@ def typical_gap(
     """
     if len(states) == 0:
         return 0.0
-    tcp = Batch(arm, registered.on_probes(states)).walk.tcp
+    tcp = ArmStates(arm, registered.on_probes(states)).walk.tcp
     gap = registered.to_base(position, states.station) - tcp
     return float(np.median(np.linalg.norm(gap, axis=1)))
 
@@ -223,12 +223,12 @@ def predict_registered(
     """
     effects, values, covariance = model.compensable()
     placed = register(arm, states, position, effects, values, stations)
-    batch = Batch(arm, placed.on_probes(states))
+    batch = ArmStates(arm, placed.on_probes(states))
     at = effects.at(batch, values)
     own = Placement.propose(arm, states).columns(at)
     A = own.reshape(3 * len(batch), -1)
     inverse = np.linalg.pinv(A)
-    left = model.untold_variance(effects, at, values)
+    left = model.unmodelled_variance(effects, at, values)
     if len(covariance):
         X = effects.columns(at).reshape(len(A), -1)
         X = X - A @ (inverse @ X)

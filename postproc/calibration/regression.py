@@ -9,13 +9,13 @@ import numpy as np
 from scipy.linalg import qr, solve_triangular
 
 from postproc.arrays import Floats, Ints
-from postproc.calibration.design import DesignMatrix
-from postproc.calibration.evidence import Normal, Posterior, maximise, widened
+from postproc.calibration.design_matrix import DesignMatrix
+from postproc.calibration.evidence import Normal, Posterior, maximise, widen_covariance
 from postproc.calibration.noise_estimate import estimate_noise
 from postproc.calibration.orientations import RowWeights, Turns, judge, student_weights
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects.effect import Effect
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.noise import Noise, poses_of
 from postproc.model.whitening import Whitener, Whitening
 
@@ -48,7 +48,7 @@ class Fit:
         turns: Measured orientations, where the survey has them.
     """
 
-    batch: Batch
+    batch: ArmStates
     combination: Combination
     error: Floats
     values: Floats
@@ -100,7 +100,7 @@ class Fit:
         few = self.effective < HARDLY * self.residual.size
         return None if few else self.covariance
 
-    def moved(self, part: slice) -> Floats:
+    def move(self, part: slice) -> Floats:
         """Move the positions by some of the parameters alone, (n, 3) [m]."""
         own = np.zeros(len(self.values))
         own[part] = self.values[part]
@@ -124,7 +124,7 @@ class Fit:
     def whitened(self) -> DesignMatrix:
         """Derivatives at the solution, whitened."""
         by = self.whitening
-        turned = self.design.turned(by.scale[:, :, None] * self.whitener.turn)
+        turned = self.design.rotate(by.scale[:, :, None] * self.whitener.turn)
         return replace(turned, blocks=by.blocks)
 
     @cached_property
@@ -162,7 +162,9 @@ class Fit:
             self.values / scales, self.covariance / np.outer(scales, scales),
             self.log_scale, self.log_evidence, self.effective,
         )  # fmt: skip
-        return widened(self.normal(), self.group, at) * np.outer(scales, scales)
+        return widen_covariance(self.normal(), self.group, at) * np.outer(
+            scales, scales
+        )
 
     @property
     def _tracker_variance(self) -> Floats:
@@ -224,7 +226,7 @@ NEARLY = Tolerance(3e-6, 2e-2)  # for fits that others begin with
 
 
 def fit_effects(
-    batch: Batch,
+    batch: ArmStates,
     position: Floats,
     effects: tuple[Effect, ...],
     origin: tuple[float, float, float] | None = None,
@@ -250,7 +252,7 @@ def fit_effects(
     heavy = HEAVY_TAILED if start is None else 0
     for number in range(PASSES):
         following = _pass(state, heavy=number < heavy)
-        if _settled(state, following, until) and number >= heavy:
+        if _has_settled(state, following, until) and number >= heavy:
             return following
         state = following
     return state
@@ -263,11 +265,11 @@ def beside(fitted: Fit, effects: tuple[Effect, ...]) -> Fit:
     """
     position, origin = fitted.position, fitted.noise.origin
     state = _begin(fitted.batch, position, Combination(effects), origin, fitted)
-    return _linearised(replace(state, whitener=fitted.whitener))
+    return _linearise(replace(state, whitener=fitted.whitener))
 
 
 def _begin(
-    batch: Batch,
+    batch: ArmStates,
     position: Floats,
     combination: Combination,
     origin: tuple[float, float, float] | None,
@@ -298,7 +300,7 @@ def _begin(
 
 def _pass(state: Fit, heavy: bool) -> Fit:
     """Do one pass: linearise, solve, estimate the noise, weigh the rows."""
-    state = _linearised(state)
+    state = _linearise(state)
     c, batch = state.combination, state.batch
     solved = maximise(state.normal(), state.group, state.log_scale)
     values = c.scales * solved.mean
@@ -308,12 +310,12 @@ def _pass(state: Fit, heavy: bool) -> Fit:
         state, values=values, covariance=covariance, log_scale=solved.log_scale,
         residual=residual, log_evidence=solved.log_evidence, effective=solved.effective,
     )  # fmt: skip
-    if not heavy and _bent(state, found) > BENT:
+    if not heavy and _measure_nonlinearity(state, found) > BENT:
         return found
-    return _weighed(found, heavy)
+    return _weigh_rows(found, heavy)
 
 
-def _bent(before: Fit, after: Fit) -> float:
+def _measure_nonlinearity(before: Fit, after: Fit) -> float:
     """Tell by how much a pass went beyond where it is linear, in sigma (rms)."""
     step = before.design.times(after.values - before.values)
     bend = before.whitener.rotate(after.residual - before.residual + step)
@@ -321,10 +323,10 @@ def _bent(before: Fit, after: Fit) -> float:
     return float(np.sqrt((bend**2 / variance).mean()))
 
 
-def _weighed(state: Fit, heavy: bool) -> Fit:
+def _weigh_rows(state: Fit, heavy: bool) -> Fit:
     """Estimate the noise from what is left, and weigh the rows by it."""
     c, batch, residual = state.combination, state.batch, state.residual
-    design = state.design.turned(state.whitener.turn)
+    design = state.design.rotate(state.whitener.turn)
     turned = state.whitener.rotate(residual)
     distance = state.whitener.distances(turned, state.noise, state.rows.weight)
     if heavy:
@@ -339,8 +341,8 @@ def _weighed(state: Fit, heavy: bool) -> Fit:
     )  # fmt: skip
     turns = state.turns
     if turns is not None:
-        turns = turns.left(c, batch, state.values)
-        turns = turns.judged(state.covariance, rows.weight, heavy)
+        turns = turns.subtract_effects(c, batch, state.values)
+        turns = turns.weigh_rows(state.covariance, rows.weight, heavy)
     whitener = _with_unknown_sides(state, state.values)
     return replace(state, noise=noise, rows=rows, turns=turns, whitener=whitener)
 
@@ -379,22 +381,22 @@ def _products(
     return out
 
 
-def _linearised(state: Fit) -> Fit:
+def _linearise(state: Fit) -> Fit:
     """Take columns and residuals at the present values."""
     c, batch = state.combination, state.batch
     at = _at(state, state.values)
     residual = state.error - c.error_at(at, batch, state.values)
     turns = state.turns
     if turns is not None:
-        turns = turns.left(c, batch, state.values).linearised(c, at)
+        turns = turns.subtract_effects(c, batch, state.values).linearise(c, at)
     design = state.design.at(c, at)
     return replace(state, design=design, residual=residual, turns=turns)
 
 
-def _at(state: Fit, values: Floats) -> Batch:
+def _at(state: Fit, values: Floats) -> ArmStates:
     """Take the kinematics at some values of the parameters."""
     shift = state.design.shift(values)
-    return state.batch.moved(state.combination.deviation(values), shift)
+    return state.batch.move(state.combination.deviation(values), shift)
 
 
 def _with_unknown_sides(state: Fit, values: Floats) -> Whitener:
@@ -407,7 +409,7 @@ def _with_unknown_sides(state: Fit, values: Floats) -> Whitener:
     return replace(state.whitener, extra=np.repeat(square[:, None], 3, axis=1))
 
 
-def _settled(before: Fit, after: Fit, until: Tolerance) -> bool:
+def _has_settled(before: Fit, after: Fit, until: Tolerance) -> bool:
     """Tell whether a pass changed nothing that matters."""
     moved = np.abs(after.residual - before.residual).max(initial=0.0)
     ratio = after.whitener.variance(after.noise) / before.whitener.variance(

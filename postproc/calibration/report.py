@@ -10,13 +10,13 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats
 from postproc.calibration.cross_validation import HeldOutError
-from postproc.calibration.directions import judge_directions
-from postproc.calibration.expected_noise import ENOUGH_REPEATS, repeated_approaches
+from postproc.calibration.direction_labels import judge_directions
+from postproc.calibration.expected_noise import ENOUGH_REPEATS, count_repeats
 from postproc.calibration.measurements import DroppedRow, Measurements
 from postproc.calibration.regression import Fit, Unseen, observe
-from postproc.calibration.reversals import tell_widths
+from postproc.calibration.reversal_test import tell_widths
 from postproc.model.effects.effect import Effect
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import FreePart, Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
@@ -213,8 +213,8 @@ def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
     return FitReport(
         parameters=_table(fit, shares),
         shares=effects,
-        correlated=_correlated(fit),
-        dropped=survey.dropped + weighed_down(fit, survey),
+        correlated=_list_correlated(fit),
+        dropped=survey.dropped + list_downweighted(fit, survey),
         spared=tuple(survey.ids[i] for i in np.flatnonzero(fit.rows.spared)),
         unseen=observe(fit.normal().root(), fit.combination.names, floor=1.0).unseen,
         before=ErrorStatistics.of(fit.error[used]),
@@ -230,13 +230,13 @@ def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
         flanks=tell_widths(model.flank_widths),
         pose_mm=float(np.sqrt(model.noise.pose_variance(jacobian).mean()) / MM),
         split=_split(fit),
-        repeated=_repeated(fit),
+        repeated=_describe_repeatability(fit),
     )
 
 
-def _repeated(fit: Fit) -> str:
+def _describe_repeatability(fit: Fit) -> str:
     """Say where the repeatability of a fit comes from."""
-    if repeated_approaches(fit.batch.states) >= ENOUGH_REPEATS:
+    if count_repeats(fit.batch.states) >= ENOUGH_REPEATS:
         return "estimated"
     return "estimated, at most the data sheet's: no approach was repeated"
 
@@ -244,7 +244,7 @@ def _repeated(fit: Fit) -> str:
 def _split(fit: Fit) -> str:
     """Describe which parts of the scatter the rows could tell apart."""
     stops = np.unique(fit.batch.states.order)
-    repeated = repeated_approaches(fit.batch.states)
+    repeated = count_repeats(fit.batch.states)
     if repeated >= ENOUGH_REPEATS:
         return f"by {repeated} repeated approaches"
     rows = f"{len(stops)} stops at {fit.poses} poses"
@@ -253,8 +253,8 @@ def _split(fit: Fit) -> str:
 
 def report_method(model: Model, survey: Measurements, arm: Arm) -> FitReport:
     """Report a method that has no named parameters."""
-    error = survey.position - Batch(arm, survey.states).walk.tcp
-    left = error - model.measured_error(arm, survey.states)
+    error = survey.position - ArmStates(arm, survey.states).walk.tcp
+    left = error - model.predict_measured(arm, survey.states)
     return FitReport(
         parameters=(),
         shares={},
@@ -380,7 +380,7 @@ def _table(fit: Fit, shares: Floats) -> tuple[ParameterRow, ...]:
     return tuple(rows)
 
 
-def _correlated(fit: Fit) -> tuple[tuple[str, str, float], ...]:
+def _list_correlated(fit: Fit) -> tuple[tuple[str, str, float], ...]:
     """List pairs of parameters that the data cannot tell apart well."""
     C = fit.covariance / np.outer(fit.std, fit.std)
     pairs = np.argwhere(np.triu(np.abs(C) > CORRELATED, 1))
@@ -388,7 +388,7 @@ def _correlated(fit: Fit) -> tuple[tuple[str, str, float], ...]:
     return tuple((names[i], names[j], float(C[i, j])) for i, j in pairs)
 
 
-def weighed_down(fit: Fit, survey: Measurements) -> tuple[DroppedRow, ...]:
+def list_downweighted(fit: Fit, survey: Measurements) -> tuple[DroppedRow, ...]:
     """List the rows that count less than fully, and why, worst first."""
     out = []
     less = np.flatnonzero(fit.rows.weight < 1.0)
@@ -398,10 +398,10 @@ def weighed_down(fit: Fit, survey: Measurements) -> tuple[DroppedRow, ...]:
         what = "dropped" if w == 0 else f"weight {w:.2f}"
         why = f"{what}: off by {size:.3f} mm, {d:.1f} sigma; its neighbours disagree"
         out.append(DroppedRow(survey.ids[i], int(survey.line[i]), why))
-    return (*out, *_turned_down(fit, survey))
+    return (*out, *_list_orientation_weights(fit, survey))
 
 
-def _turned_down(fit: Fit, survey: Measurements) -> Iterator[DroppedRow]:
+def _list_orientation_weights(fit: Fit, survey: Measurements) -> Iterator[DroppedRow]:
     """List the rows whose position counts more than their orientation."""
     if fit.turns is None:
         return

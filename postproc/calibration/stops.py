@@ -39,7 +39,7 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
     """
     if len(states) == 0:
         return np.zeros(0, dtype=np.int64)
-    begins = _commanded_elsewhere(states)
+    begins = _find_new_commands(states)
     begins |= _long_gaps(states.time, begins)
     run = np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)
     if visit is None:
@@ -52,7 +52,7 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
     return _in_order(label.reshape(-1))
 
 
-def _commanded_elsewhere(states: States) -> Bools:
+def _find_new_commands(states: States) -> Bools:
     """Find the rows that another pose, direction or payload precedes, (n - 1,)."""
     step = np.abs(np.diff(states.q, axis=0))
     moved = (step > max(SAME_POSE, restless(step))).any(axis=1)

@@ -16,7 +16,7 @@ from postproc.calibration.measurements import (
 )
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.exceptions import PostprocError
-from postproc.files import named_text
+from postproc.files import open_text
 from postproc.robot.cell import Cell, PointFrame, as_cell
 
 MeasuredFrame = Literal["base", "tracker"]
@@ -46,7 +46,7 @@ def read_measurements(
     cell = as_cell(cell)
     if len(files) == 1 and isinstance(files[0], Measurements):
         return files[0]
-    places = [named_text(f, name) for f in files if not isinstance(f, Measurements)]
+    places = [open_text(f, name) for f in files if not isinstance(f, Measurements)]
     if not places or len(places) < len(files):
         raise PostprocError("measurements: give files, or one survey that was read")
     reading = reading.within(cell)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.calibration.survey import design_survey, where_to_reverse
+from postproc.calibration.pose_design import design_survey, where_to_reverse
 from postproc.exceptions import PostprocError
 from postproc.files import write_all
 from postproc.robot.cell import Cell, load_cell
@@ -60,7 +60,7 @@ def survey_program(
             lines.append(f"  $TOOL := POS({xyz}, 0, 0, 0, '')")
         for letter, sign in (("a", 1.0), ("b", -1.0)):
             lines.append(f"  MOVE JOINT TO {_joints(q[i] - sign * BACK * side[i])}")
-            lines += _measured(f"{i + 1}{letter}", q[i])
+            lines += _write_measured_move(f"{i + 1}{letter}", q[i])
         for drive in (drive for pose, drive in reversals if pose == i):
             lines += _reversal(cell, q[i], side[i], int(i), drive)
     return "\n".join([*lines, f"END {name}", ""])
@@ -72,11 +72,11 @@ def _reversal(cell: Cell, q: Floats, side: Floats, pose: int, drive: int) -> lis
     back = -np.sign(coupling[drive] @ side) * np.linalg.inv(coupling)[:, drive]
     lines = [f"  MOVE JOINT TO {_joints(q - BACK * side)}"]
     for k, step in enumerate((0.0, *STEPS)):
-        lines += _measured(f"{pose + 1}.{drive + 1}.{k}", q + step * back)
+        lines += _write_measured_move(f"{pose + 1}.{drive + 1}.{k}", q + step * back)
     return lines
 
 
-def _measured(name: str, q: Floats) -> list[str]:
+def _write_measured_move(name: str, q: Floats) -> list[str]:
     """Write a move to a place that is measured."""
     return [
         f"  -- MEASURE {name}",

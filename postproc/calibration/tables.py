@@ -185,7 +185,7 @@ def read_table(
     if len(rows) < 1 + headed:
         raise MeasurementError(path, "has no measurements", EMPTY_CURE)
     body = rows[1:] if headed else rows
-    names = _strip_end(rows[0][1]) if headed else _numbered(body)
+    names = _strip_end(rows[0][1]) if headed else _number_columns(body)
     cells, names = _block(path, names, body, rows[0][0], headed)
     line = np.array([i for i, _ in body], dtype=np.int64)
     sign = decimal or _decimal(cells, split)
@@ -370,7 +370,7 @@ def _decimal(cells: NDArray[np.object_], split: str) -> str:
     return "," if comma else "."
 
 
-def _numbered(rows: list[Row]) -> list[str]:
+def _number_columns(rows: list[Row]) -> list[str]:
     """Name columns by their number, from 1: as many as the first rows have cells."""
     width = int(np.median([len(_strip_end(cells)) for _, cells in rows]))
     return [str(k + 1) for k in range(max(width, len(_strip_end(rows[0][1]))))]
@@ -526,7 +526,9 @@ def read_directions(
         travel = np.deg2rad(table.block(TRAVELS))
     if not table.has(*SIDES):
         clock = clock_of(table)
-        by, doubt = (clock, "") if clock else ("the order of the rows", _sorted(table))
+        by, doubt = (
+            (clock, "") if clock else ("the order of the rows", _describe_order(table))
+        )
         warnings = (
             f"{table.path}: no lambda columns; directions inferred from {by}, as JOINT "
             f"moves{doubt}",
@@ -766,7 +768,7 @@ def read_visits(table: TextTable) -> NDArray[np.int64] | None:
     return np.asarray(np.where(known, number.reshape(-1), -1), dtype=np.int64)
 
 
-def _sorted(table: TextTable) -> str:
+def _describe_order(table: TextTable) -> str:
     """Say whether the rows still are in the order in which they were measured."""
     for name in (*JOINTS, "x_mm", "y_mm", "z_mm"):
         step = np.diff(table.numbers(name)) if table.has(name) else np.zeros(0)

@@ -8,25 +8,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.calibration.backward_elimination import SURE, keep_needed, worth
 from postproc.calibration.cross_validation import (
     PARTS,
     HeldOutError,
     HeldOutRows,
     PairedErrors,
     choose,
-    held_out,
-    held_out_linearly,
     mean_error_mm,
     parts_of,
+    predict_held_out,
+    predict_held_out_linearly,
     regions_of,
     summarise,
 )
 from postproc.calibration.diagnosis.search import with_effects
 from postproc.calibration.doubt import doubt_of
+from postproc.calibration.effect_selection import (
+    Progress,
+    fit_survey,
+    model_of,
+    no_progress,
+)
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
-from postproc.calibration.selection import Progress, fit_survey, model_of, silent
-from postproc.calibration.weighing import SURE, keep_needed, worth
 from postproc.model.doubt import Doubt
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.compliance import Compliance
@@ -102,7 +107,7 @@ class FitTask:
         self,
         rung: Rung | None = None,
         rows: Measurements | None = None,
-        progress: Progress = silent,
+        progress: Progress = no_progress,
     ) -> Fit:
         """Fit the effects that were asked for, or others, to all rows or some."""
         chosen = rung or self.rung
@@ -123,7 +128,7 @@ class FitTask:
             found = self.fit(rung, rows)
             return found, model_of(found, rows, doubt=self.doubt(found))
 
-        return held_out(self.survey, self.arm, fit, part, used)
+        return predict_held_out(self.survey, self.arm, fit, part, used)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +164,7 @@ def validate_fit(task: FitTask, fitted: Fit) -> Validated:
         return Validated(fitted, None, notes=(note,))
     part = parts_of(fitted.pose, SEED)
     if poses > FEW_POSES:
-        rows = held_out_linearly(fitted, part)
+        rows = predict_held_out_linearly(fitted, part)
         return _conclude(task, fitted, rows, chosen=False)
     effects = fitted.combination.effects
     rung, rows, notes = _choose(task, effects, part, used)
@@ -227,9 +232,9 @@ def _plain_rungs(task: FitTask, used: Bools) -> tuple[Rung, ...]:
     tried where the rows hardly determine these.
     """
     refined = task.fit(REFINED)
-    usual = REFINED if _added(refined, USUAL, task) > SURE else USUAL
+    usual = REFINED if _weigh_addition(refined, USUAL, task) > SURE else USUAL
     loaded = _with_weight(usual)
-    if _added(task.fit(loaded), usual, task) > SURE:
+    if _weigh_addition(task.fit(loaded), usual, task) > SURE:
         usual = loaded
     independent = 3 * len(np.unique(task.survey.states.order[used]))
     if refined.effective < DETERMINED * independent:
@@ -243,7 +248,7 @@ def _with_weight(rung: Rung) -> Rung:
     return Rung(f"{rung.name},{name}", (*(rung.effects or ()), name))
 
 
-def _added(fitted: Fit, rung: Rung, task: FitTask) -> float:
+def _weigh_addition(fitted: Fit, rung: Rung, task: FitTask) -> float:
     """Weigh what a fit has besides some effects and the set-up [nats]."""
     names = (*(rung.effects or ()), *task.setup)
     return worth(
@@ -253,7 +258,7 @@ def _added(fitted: Fit, rung: Rung, task: FitTask) -> float:
 
 def _conclude(task: FitTask, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Validated:
     """Put figures together, and compare with a set-up without errors of the arm."""
-    region = held_out_linearly(fitted, regions_of(task.survey))
+    region = predict_held_out_linearly(fitted, regions_of(task.survey))
     error = summarise(rows, mean_error_mm(region), chosen)
     plain = task.errors(SET_UP, rows.part, rows.used)
     if PairedErrors.of(plain, rows).better or mean_error_mm(plain) < FLOOR / MM:

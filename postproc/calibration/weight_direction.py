@@ -12,7 +12,7 @@ from postproc.calibration.evidence import LOG_SPREAD, maximise
 from postproc.calibration.regression import NEARLY, Fit, beside, fit_effects
 from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.effect import Effect
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.registration import Registration
 
 CLEARLY = 10.0  # nats by which another direction must be better, and than none
@@ -56,9 +56,9 @@ def direction_warning(fitted: Fit) -> tuple[str, ...]:
     if gain < CLEARLY:
         return ()
     return (
-        f"the rows say that weight pulls along {_listed(along)} in the base frame of "
+        f"the rows say that weight pulls along {_format(along)} in the base frame of "
         f"the arm, as on {name}, by {gain:.0f} nats more than along "
-        f"{_listed(arm.weight)}, as the cell has it. Check how the arm is mounted, "
+        f"{_format(arm.weight)}, as the cell has it. Check how the arm is mounted, "
         "and state it: mounting under [robot], or [base]",
     )
 
@@ -77,8 +77,8 @@ def level_warning(placed: Registration, weight: Floats) -> tuple[str, ...]:
             at = f" at {name}" if len(placed.stations) > 1 else ""
             return (
                 f"the tracker{at} is levelled, and its z says that weight pulls along "
-                f"{_listed(along)} in the base frame of the arm, {apart:.0f} deg from "
-                f"{_listed(weight)}, as the cell has it. Check how the arm is mounted, "
+                f"{_format(along)} in the base frame of the arm, {apart:.0f} deg from "
+                f"{_format(weight)}, as the cell has it. Check how the arm is mounted, "
                 "and state it: mounting under [robot], or [base]; or is z of these "
                 "rows not up? Then leave levelled under [survey] out",
             )
@@ -130,12 +130,12 @@ def direction_evidence(
     if along is None:
         laid = beside(base, others)
     else:
-        batch = Batch(base.batch.arm.mounted(along), base.batch.states)
+        batch = ArmStates(base.batch.arm.mount(along), base.batch.states)
         laid = beside(replace(base, batch=batch), (*others, Compliance.on(batch)))
     known = np.array([e.free for e in laid.combination.effects
                       for _ in e.parameters()], dtype=bool)  # fmt: skip
     scales = np.exp(laid.log_scale)[laid.group[known]]
-    normal = laid.normal().left_to_prior(known, scales)
+    normal = laid.normal().marginalise(known, scales)
     used, group = np.unique(laid.group[~known], return_inverse=True)
     found = maximise(normal, group, laid.log_scale[used])
     value = found.log_evidence
@@ -158,7 +158,7 @@ def unit_directions() -> list[tuple[str, Floats]]:
     return [(name, v / np.linalg.norm(v)) for name, v in vectors.items()]
 
 
-def _listed(direction: Floats) -> str:
+def _format(direction: Floats) -> str:
     """Write a direction.
 
     >>> _listed(np.array([0.0, -0.0, -1.0]))

@@ -40,12 +40,12 @@ def main() -> None:
     _look_for_cycles_seldom()
     _look_for_no_plugins()
     from postproc.cli.commands import application
-    from postproc.cli.common import broken, say
+    from postproc.cli.common import report_os_error, say
 
     try:
         application("".join(sys.argv[1:2]))()
     except OSError as exc:
-        sys.exit(broken(exc))
+        sys.exit(report_os_error(exc))
     except Exception as exc:
         if os.environ.get("POSTPROC_DEBUG"):
             raise

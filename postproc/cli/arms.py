@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from postproc.cli.common import app, as_path, explained, say, write_text
+from postproc.cli.common import app, as_path, report_errors, say, write_text
 from postproc.exceptions import PostprocError
 from postproc.files import check_places
 
@@ -29,12 +29,12 @@ def list_arms() -> None:
     """List the shipped arms with their reach, repeatability and closed form."""
     from postproc.report.terminal import Column, table_text
     from postproc.robot.arm import load_arm
-    from postproc.robot.arm_file import shipped_arms
+    from postproc.robot.arm_file import list_shipped_arms
 
     titles = "reach [mm]", "RP [mm]", "inverse"
     columns = [Column("arm", "left"), *map(Column, titles)]
-    with explained():
-        rows = [_row(load_arm(name)) for name in shipped_arms()]
+    with report_errors():
+        rows = [_row(load_arm(name)) for name in list_shipped_arms()]
     typer.echo(table_text(columns, rows))
 
 
@@ -87,7 +87,7 @@ def from_urdf(
     from postproc.robot.ortho_parallel import arm_text
     from postproc.robot.urdf import read_chain
 
-    with explained(urdf):
+    with report_errors(urdf):
         check_places([as_path(output)], [urdf])
         if arm is not None and not verify:
             raise PostprocError("--arm: it is compared alone. Add --verify")
@@ -101,7 +101,7 @@ def from_urdf(
         text = None if arm is not None else arm_text(chain, repeatability, name)
         if text is not None:
             _say_what_lacks(chain)
-        if verify and not _verified(chain, text, arm):
+        if verify and not _verify_arm(chain, text, arm):
             raise typer.Exit(1)
         if text is not None:
             write_text(output, text)
@@ -111,16 +111,16 @@ def from_urdf(
 
 def _say_what_lacks(chain: UrdfChain) -> None:
     """Say why an arm file has no closed form, or no links."""
-    from postproc.robot.ortho_parallel import closed_form_obstacle
+    from postproc.robot.ortho_parallel import find_closed_form_obstacle
     from postproc.robot.urdf_links import placeholder
 
-    if obstacle := closed_form_obstacle(chain):
+    if obstacle := find_closed_form_obstacle(chain):
         say(obstacle)
     if (problem := placeholder(chain.weights)) is not None:
         say(f"{chain.path}: {problem}. [links] is not written")
 
 
-def _verified(chain: UrdfChain, text: str | None, arm: str | None) -> bool:
+def _verify_arm(chain: UrdfChain, text: str | None, arm: str | None) -> bool:
     """Compare the text of an arm file, or an arm, with Pinocchio's reading of a URDF.
 
     Raises:
@@ -159,7 +159,7 @@ def from_machine_dat(
     """Write the arm file of a KUKA arm: six axes with a spherical wrist."""
     from postproc.robot.machine_data import machine_arm_text, read_machine_data
 
-    with explained(machine):
+    with report_errors(machine):
         check_places([as_path(output)], [machine])
         text = machine_arm_text(read_machine_data(machine), repeatability, name)
         write_text(output, text)

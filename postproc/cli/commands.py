@@ -11,7 +11,7 @@ from typer.models import CommandInfo
 from postproc import __version__
 from postproc.cli import arms, loop, models, plant, programs
 from postproc.cli.click_classes import Command
-from postproc.cli.common import app, epilog, guarded
+from postproc.cli.common import app, epilog, guard_output
 
 NAME = "__name__"  # a command is called like its function
 
@@ -30,7 +30,7 @@ for _group, _commands in (
         _command.cls = Command
         _command.epilog = epilog(_group + _name_of(_command))
         if _command.callback is not None:
-            _command.callback = guarded(_command.callback)
+            _command.callback = guard_output(_command.callback)
 
 
 @app.callback(invoke_without_command=True)

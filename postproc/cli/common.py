@@ -129,7 +129,7 @@ def say(text: str) -> None:
         typer.echo("\n".join(map(printable, text.split("\n"))), err=True)
 
 
-def guarded(command: Callable[P, R]) -> Callable[P, R]:
+def guard_output(command: Callable[P, R]) -> Callable[P, R]:
     """Let a command end with 2 and in words where a place takes what it prints no more.
 
     What it printed is written when it returns: later, nobody could tell.
@@ -144,12 +144,12 @@ def guarded(command: Callable[P, R]) -> Callable[P, R]:
                 if sys.stdout is not None:
                     sys.stdout.flush()
         except OSError as exc:
-            raise typer.Exit(broken(exc)) from None
+            raise typer.Exit(report_os_error(exc)) from None
 
     return run
 
 
-def broken(exc: OSError) -> int:
+def report_os_error(exc: OSError) -> int:
     """Say why the system refused to go on, and return the exit code.
 
     That somebody has read enough is nothing to tell.
@@ -165,7 +165,7 @@ def broken(exc: OSError) -> int:
 
 
 @contextmanager
-def explained(*files: Path | None) -> Iterator[None]:
+def report_errors(*files: Path | None) -> Iterator[None]:
     """Turn an error that the user can mend into a message and exit code 2.
 
     Args:
@@ -176,7 +176,7 @@ def explained(*files: Path | None) -> Iterator[None]:
     except PostprocError as exc:
         say(f"postproc: {exc}")
         if isinstance(exc, FileError):
-            from postproc.cli.carets import point_at
+            from postproc.cli.source_excerpt import point_at
 
             if shown := point_at(exc, files):
                 say(shown)
@@ -318,10 +318,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 def epilog(command: str) -> str | None:
     """Write the examples of a command for the end of its help."""
     lines = EXAMPLES.get(command)
-    return None if lines is None else "\n".join([KEEP, "Examples:", *_indented(lines)])
+    return None if lines is None else "\n".join([KEEP, "Examples:", *_indent(lines)])
 
 
-def _indented(lines: tuple[str, ...]) -> list[str]:
+def _indent(lines: tuple[str, ...]) -> list[str]:
     """Indent the lines."""
     return [f"  {line}" for line in lines]
 
@@ -346,9 +346,9 @@ def stages(
     """
     out = out or sys.stderr
     if not out.isatty():
-        yield _logged(out) if log else lambda stage: None
+        yield _log_stages(out) if log else lambda stage: None
         return
-    told = _Told(out)
+    told = _StageLine(out)
     timer = threading.Timer(PATIENCE, told.show)
     timer.daemon = True
     timer.start()
@@ -360,14 +360,14 @@ def stages(
         told.hide()
 
 
-def _logged(out: TextIO) -> Callable[[str], None]:
+def _log_stages(out: TextIO) -> Callable[[str], None]:
     """Tell stages as lines."""
     from postproc.report.terminal import StageLog
 
     return StageLog(out)
 
 
-class _Told:
+class _StageLine:
     """The stage that was told last, shown from some time on."""
 
     def __init__(self, out: TextIO) -> None:

@@ -16,7 +16,7 @@ from postproc.cli.common import (
     app,
     as_path,
     changes_of,
-    explained,
+    report_errors,
     say,
     write_text,
 )
@@ -55,29 +55,29 @@ def diagnose(
     changes: SetOption = None,
 ) -> None:
     """Find what the model lacks, trace it to an effect, and add that effect."""
-    from postproc.calibration.diagnosis.diagnose import dumped, evidence_of
+    from postproc.calibration.diagnosis.diagnose import dump_json, evidence_of
     from postproc.report.diagnosis import tell
     from postproc.report.measured_path import tell_path
     from postproc.report.terminal import stage_bar
     from postproc.robot.cell import load_cell
 
-    with explained():
+    with report_errors():
         files = data or []
         inputs = [*files, cell, model, program, path]
         check_places([output, as_path(json), html, plot], inputs)
         how = {"program": program}
         loaded = load_cell(cell, changes=changes_of(changes))
         with stage_bar() as progress:
-            on_the_way, found = _diagnosed(
+            on_the_way, found = _diagnose_files(
                 files, path, cell=loaded, model=model, progress=progress, **how
             )
             if not found.rejected:
-                found.save(output or extended_path(model))
+                found.save(output or path_of_extension(model))
         if json:
             told = evidence_of(found)
             if on_the_way is not None:
                 told |= {"path": on_the_way.to_dict()}
-            write_text(json, dumped(schema("diagnosis") | told))
+            write_text(json, dump_json(schema("diagnosis") | told))
         if html is not None:
             from postproc.report.html import diagnosis_report
 
@@ -95,7 +95,7 @@ def diagnose(
             raise typer.Exit(2)
 
 
-def _diagnosed(
+def _diagnose_files(
     files: list[Path], path: Path | None, **how: Any
 ) -> tuple[PathDiagnosis | None, Extension]:
     """Diagnose points, or a path."""
@@ -110,7 +110,7 @@ def _diagnosed(
     return told, told.extension
 
 
-def extended_path(model_path: Path) -> Path:
+def path_of_extension(model_path: Path) -> Path:
     """Name the extended model's file when nobody did."""
     return model_path.with_name(f"{model_path.stem}.extended.json")
 
@@ -120,7 +120,7 @@ def history(model: Path, json: JsonOption = None) -> None:
     """Print what was added to a model and its parents, with before and after."""
     from postproc.report.diagnosis import history_json, history_text
 
-    with explained():
+    with report_errors():
         check_places([as_path(json)], [model])
         if json:
             write_text(json, history_json(model))
@@ -138,7 +138,7 @@ def report(
     """Make one self-contained page (HTML) of a report, model or diagnosis."""
     from postproc.report.html import report_file
 
-    with explained():
+    with report_errors():
         check_places([output], [source])
         report_file(source, output)
         say(f"{output}")

@@ -20,7 +20,7 @@ from postproc.cli.common import (
     as_path,
     busy,
     changes_of,
-    explained,
+    report_errors,
     say,
     split_names,
     stages,
@@ -73,7 +73,7 @@ def survey(
     """Write a measurement program; every pose is approached from both sides."""
     from postproc.calibration.survey_program import write_survey
 
-    with explained():
+    with report_errors():
         check_places([output], [cell])
         with busy("choose poses"):
             told = write_survey(cell, output, poses, mode, tracker, seed, reversals)
@@ -120,7 +120,7 @@ def simulate(
     from postproc.cli.simulate import simulate_file
     from postproc.robot.cell import load_cell
 
-    with explained():
+    with report_errors():
         check_places([output, track, as_path(json)], [program, cell, reference])
         with busy("run on the virtual arm"):
             often = rate if track is not None else 0.0
@@ -170,7 +170,7 @@ def fit(
     from postproc.robot.cell import load_cell
 
     names = None if effects is None else split_names(effects)
-    with explained():
+    with report_errors():
         check_places([output, html, as_path(json)], [*data, cell, program])
         loaded = load_cell(cell, changes=changes_of(changes))
         with stages(log=True) as progress:
@@ -214,7 +214,7 @@ def predict(
     from postproc.calibration import predict as prediction
     from postproc.robot.cell import load_cell
 
-    with explained():
+    with report_errors():
         check_places([output], [states, cell, model])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("predict"):
@@ -246,7 +246,7 @@ def compare(
     from postproc.report.fit import comparison_json, tell_comparison
     from postproc.robot.cell import load_cell
 
-    with explained():
+    with report_errors():
         others = test or []
         check_places([as_path(json), html, plot], [*data, *others, cell])
         loaded = load_cell(cell, changes=changes_of(changes))

@@ -21,11 +21,11 @@ from postproc.cli.common import (
     TemperatureOption,
     app,
     changes_of,
-    explained,
+    report_errors,
     say,
     write_text,
 )
-from postproc.compensation.options import AS_USUAL
+from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.files import check_places, is_program
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def batch(
     temperature: TemperatureOption = None,
 ) -> None:
     """Compensate a tree of programs; what could not be compensated is not in DST."""
-    with explained():
+    with report_errors():
         if scheduler is None:
             from postproc.batch.workers import start_server
 
@@ -91,7 +91,9 @@ def batch(
         check_places([html], [cell, model, plan])
         for line in _archive_lines(source, made):
             say(line)
-        order = run.Order(source, target, made, log or run.default_log(target), resume)
+        order = run.BatchOptions(
+            source, target, made, log or run.default_log(target), resume
+        )
         with progress_bar(f"{source} -> {target}") as told:
             summary = run.batch(order, _workers(jobs, scheduler, tls), told)
         _print_summary(summary)
@@ -178,16 +180,18 @@ def check(
     """
     from postproc.batch.check import check as look
 
-    with explained():
+    with report_errors():
         asked = changes_of(changes)
         found = look(
             folder, model=model, plan=plan, source=source, cell=cell, changes=asked
         )
         if allow_uncorrected:
-            found = found.accepting_left()
+            found = found.allow_uncorrected()
         judged = _second_opinion(folder, (cell, model, plan), second_opinion, asked)
         if json:
-            write_text(json, found.to_json(None if judged is None else judged.told()))
+            write_text(
+                json, found.to_json(None if judged is None else judged.to_dict())
+            )
         for finding in found.findings:
             say(str(finding))
         if judged is not None:
@@ -210,7 +214,7 @@ def _second_opinion(
     Raises:
         PostprocError: Somebody asked for it, and it cannot be given.
     """
-    from postproc.verify.extra import INSTALL, broken, load, missing
+    from postproc.verify.extra import INSTALL, explain_missing, load, missing
 
     if asked is False:
         return None
@@ -223,14 +227,14 @@ def _second_opinion(
         return None
     if asked:
         load()
-    elif problem := broken():
+    elif problem := explain_missing():
         say(problem)
         return None
     from postproc.batch.plan import make_plan
     from postproc.batch.second_opinion import judge_tree
 
     own = (None, None) if cell is None and plan is not None else (cell, model)
-    made = make_plan(plan, *own, AS_USUAL, changes)
+    made = make_plan(plan, *own, DEFAULT_OPTIONS, changes)
     judged = judge_tree(folder, made)
     return replace(judged, skipped=(*judged.skipped, *_without_rule(folder, made)))
 

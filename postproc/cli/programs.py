@@ -26,7 +26,7 @@ from postproc.cli.common import (
     as_path,
     busy,
     changes_of,
-    explained,
+    report_errors,
     say,
     write_text,
 )
@@ -48,7 +48,7 @@ def _explain_code(code: str | None) -> None:
 
     if code is None:
         return
-    with explained():
+    with report_errors():
         known = {one.value: one for one in Code}
         if code not in known:
             names = ", ".join(sorted(known))
@@ -107,8 +107,8 @@ def compensate(
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
     from postproc.cli.common import stages
-    from postproc.cli.jobs import Destination
-    from postproc.compensation import parallel
+    from postproc.cli.job_files import Destination
+    from postproc.compensation import workers
     from postproc.compensation.compensate import compensate as run
     from postproc.compensation.options import Options
     from postproc.compensation.program_files import ProgramFiles
@@ -117,7 +117,7 @@ def compensate(
     from postproc.robot.cell import load_cell
 
     given = None if is_stream(program) else Path(program)
-    with explained(given, variables):
+    with report_errors(given, variables):
         if report == Path(STREAM) and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         outputs = [output, report, html, variables_out]
@@ -129,7 +129,7 @@ def compensate(
         files = ProgramFiles.open(program, variables)
         if variables_out is not None:
             _check_values(variables_out, files)
-        crowd = processes or min(parallel.available(), CROWD)
+        crowd = processes or min(workers.available(), CROWD)
         with stages() as progress:
             outcome = run(
                 files, loaded, fitted, options=options, progress=progress,
@@ -178,13 +178,13 @@ def _check_values(place: Path, files: ProgramFiles) -> None:
 
 def _print_outcome(outcome: Outcome, every: bool) -> None:
     """Print what a person needs to know, on stderr."""
-    from postproc.cli.carets import point_at_visits
-    from postproc.report.findings import listed
+    from postproc.cli.source_excerpt import point_at_visits
+    from postproc.report.findings import list_findings
 
-    for line in listed(outcome.diagnostics, every):
+    for line in list_findings(outcome.diagnostics, every):
         say(line)
-    excerpts = point_at_visits(outcome, outcome.left_rows()[:SHOWN])
-    left = Counter(zip_longest(outcome.left_alone(), excerpts, fillvalue=""))
+    excerpts = point_at_visits(outcome, outcome.list_uncorrected_rows()[:SHOWN])
+    left = Counter(zip_longest(outcome.list_uncorrected(), excerpts, fillvalue=""))
     for (line, source), times in left.items():
         say(line if times == 1 else f"{line} ({times} times)")
         if source:
@@ -208,7 +208,7 @@ def diff(
     from postproc.report import diff as differ
     from postproc.report.diff_output import difference_pieces, print_difference
 
-    with explained():
+    with report_errors():
         check_places([as_path(json)], [original, compensated])
         with busy("compare"):
             found = differ.diff(original, compensated)
@@ -227,9 +227,9 @@ def restore(
     ] = None,
 ) -> None:
     """Give back the original program, byte for byte, from the sidecar record."""
-    from postproc.compensation.record import restore_file
+    from postproc.compensation.sidecar import restore_file
 
-    with explained():
+    with report_errors():
         for path in restore_file(compensated, output):
             say(f"restored {path}")
 
@@ -257,10 +257,10 @@ def explain(
     from postproc.compensation.program_files import ProgramFiles
     from postproc.model.model import load_model
     from postproc.report.explanation import explanation_json, print_explanation
-    from postproc.report.findings import listed
+    from postproc.report.findings import list_findings
     from postproc.robot.cell import load_cell
 
-    with explained(program, variables):
+    with report_errors(program, variables):
         check_places([as_path(json)], [program, cell, model, variables])
         with busy("plan"):
             files = ProgramFiles.open(program, variables)
@@ -270,7 +270,7 @@ def explain(
             )
             fitted = None if model is None else load_model(model)
             found = tell(files, loaded, fitted, options=options)
-        for text in listed(found.findings(line), every):
+        for text in list_findings(found.findings(line), every):
             say(text)
         if json:
             write_text(json, explanation_json(found, line))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Ints
-from postproc.compensation.paths.insertions import points_on_ways
+from postproc.compensation.paths.write_points import points_on_ways
 from postproc.compensation.program import read_program
 from postproc.compensation.program_files import read_files
 from postproc.exceptions import CellError

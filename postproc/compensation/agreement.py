@@ -48,7 +48,7 @@ def agree(
             (n, k) [mm], of which the first three are that of its place.
     """
     rows = np.flatnonzero(literal >= 0)
-    names, inverse, count = _counted(literal[rows])
+    names, inverse, count = _count_distinct(literal[rows])
     group = np.full(len(literal), -1, dtype=np.int64)
     group[rows] = inverse
     m = len(names)
@@ -74,7 +74,7 @@ def agree(
     return Agreement(names, group, all_usable, spread, mean, change, count)
 
 
-def _counted(literals: Ints) -> tuple[Ints, Ints, Ints]:
+def _count_distinct(literals: Ints) -> tuple[Ints, Ints, Ints]:
     """Return what differs, ascending, where it stands, and how often it does."""
     if (np.diff(literals) > 0).all():  # in the order of the program, each once
         once = np.ones(len(literals), dtype=np.int64)

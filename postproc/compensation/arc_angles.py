@@ -73,7 +73,7 @@ class ArcAngles:
             self.start[rows], self.via[rows], self.end[rows], self.angle[rows]
         )
 
-    def touched(self, moved: Bools) -> Bools:
+    def find_moved(self, moved: Bools) -> Bools:
         """Tell which of their ends move as some of n visits do, (n,)."""
         out = np.zeros(len(moved), dtype=bool)
         known = self.among(self.start >= 0)
@@ -134,7 +134,7 @@ def place_ends(visits: Visits, tcp: Floats, reasons: Reasons) -> Bools:
     return lost
 
 
-def written_points(
+def points_to_write(
     before: Floats, after: Floats, third: Floats
 ) -> tuple[Floats, Floats]:
     """Say what to write for the points of arcs so that they end where they should.

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.decide import Proposal
+from postproc.compensation.decisions import Proposal
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.outcome import Status
-from postproc.compensation.program import Reading, read_program
+from postproc.compensation.program import ParsedProgram, read_program
 from postproc.diagnostics import Code
-from postproc.language.interface import Cloner, NamedPoint
+from postproc.language.language import Cloner, NamedPoint
 from postproc.language.languages import language_of
 from postproc.language.source import CloneError, Edit, Source, apply
 from postproc.language.visits import Diagnostic, Visits
@@ -138,7 +138,7 @@ def _size(box: Box) -> float:
     )
 
 
-def connected(sets: Iterable[frozenset[int]]) -> list[frozenset[int]]:
+def unite_overlapping(sets: Iterable[frozenset[int]]) -> list[frozenset[int]]:
     """Unite the sets that overlap, in order of their smallest members.
 
     >>> [sorted(s) for s in connected([frozenset({1, 2}), frozenset({3}),
@@ -156,7 +156,7 @@ def connected(sets: Iterable[frozenset[int]]) -> list[frozenset[int]]:
 
 
 def with_lines_of(
-    before: Reading, after: Reading, edits: Sequence[Sequence[Edit]]
+    before: ParsedProgram, after: ParsedProgram, edits: Sequence[Sequence[Edit]]
 ) -> Visits | None:
     """Give the visits of a program with clones the lines that they had before.
 
@@ -205,7 +205,9 @@ STAYING = "clones would have to keep their numbers, too: nothing is cloned"
 NOTHING = np.zeros(0, dtype=np.int64)  # no literal gets new numbers
 
 
-def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading:
+def give_own_points(
+    reading: ParsedProgram, proposal: Proposal, cell: Cell
+) -> ParsedProgram:
     """Clone variables for moves whose arrivals at them disagree.
 
     Returns:
@@ -214,7 +216,7 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
         cloned, and what was not, is among the diagnostics.
     """
     work = _CloneWork.of(reading, proposal)
-    for literals in _disputed(work):
+    for literals in _list_disputed(work):
         work.separate(literals, cell.limits.conflict_mm)
     notes = (*reading.diagnostics, *work.notes)
     if not work.edits:
@@ -236,7 +238,7 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
         text = text if visits is None else STAYING
         found = Diagnostic(reading.sources[0].name, 1, Code.NOT_CLONED, text)
         return replace(reading, diagnostics=(*reading.diagnostics, found))
-    return Reading(
+    return ParsedProgram(
         again.texts, visits, notes, cloned, reading.sources, missed=reading.missed,
         untouched=reading.untouched,
     )  # fmt: skip
@@ -256,14 +258,14 @@ def _stops(visits: Visits) -> dict[MoveSlot, Ints]:
     return {stop: np.array(found) for stop, found in rows.items()}
 
 
-def _disputed(work: _CloneWork) -> list[frozenset[int]]:
+def _list_disputed(work: _CloneWork) -> list[frozenset[int]]:
     """List the literals that arrivals disagree on, with all that share their moves."""
     visits = work.reading.visits
     conflict = work.proposal.decisions.status == Status.CONFLICT
     disputed = set(visits.literal[conflict & (visits.literal >= 0)].tolist())
     found = (visits.literal[rows] for rows in work.stops.values())
     sets = [frozenset(literal[literal >= 0].tolist()) for literal in found]
-    together = connected(s for s in sets if len(s) > 1)
+    together = unite_overlapping(s for s in sets if len(s) > 1)
     joined = frozenset().union(*together)
     together += [frozenset({row}) for row in disputed - joined]
     return sorted((s for s in together if not disputed.isdisjoint(s)), key=min)
@@ -284,7 +286,7 @@ class _CloneWork:
         notes: What was cloned, and what was not.
     """
 
-    reading: Reading
+    reading: ParsedProgram
     proposal: Proposal
     cloner: Cloner
     stops: dict[MoveSlot, Ints]
@@ -294,7 +296,7 @@ class _CloneWork:
     notes: list[Diagnostic] = field(default_factory=list)
 
     @classmethod
-    def of(cls, reading: Reading, proposal: Proposal) -> _CloneWork:
+    def of(cls, reading: ParsedProgram, proposal: Proposal) -> _CloneWork:
         """Parse the files of a program."""
         sources = reading.sources
         cloner = language_of(sources[0].name).cloner(sources)
@@ -353,7 +355,7 @@ class _CloneWork:
         """Clone one variable, or say why not."""
         visits, variable = self.reading.visits, named[0]
         file = group.stops[0].file
-        declared = self.cloner.declared(variable)
+        declared = self.cloner.find_declaration(variable)
         lines = ", ".join(str(stop.line) for stop in group.stops)
         try:
             rows = sorted(group.bounds)

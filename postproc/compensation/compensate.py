@@ -8,42 +8,42 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.arrays import give_back
+from postproc.arrays import release_memory
 from postproc.compensation.arrivals import ArrivalStates
-from postproc.compensation.base import contradicted_base
-from postproc.compensation.correction import Correction, Draft, correct
-from postproc.compensation.first_cause import read_with_cause
-from postproc.compensation.notes import (
-    assumed_off,
+from postproc.compensation.base_frame_check import check_base
+from postproc.compensation.findings import (
     controller_unknown,
     flank_steps,
-    followed_pages,
+    list_followed_pages,
+    list_overruled_strings,
+    list_untimed_runs,
     listing_cost,
     missing_file,
     no_advice,
-    overruled_strings,
+    report_controller_assumption,
+    report_uncertain_frames,
+    report_uncertain_sides,
     tool_in_metres,
-    unsure_frames,
-    unsure_sides,
-    untimed_runs,
 )
+from postproc.compensation.first_cause import read_with_cause
 from postproc.compensation.options import (
-    AS_USUAL,
+    DEFAULT_OPTIONS,
     Clock,
+    Job,
     Options,
     Progress,
-    Setting,
-    silent,
+    no_progress,
 )
 from postproc.compensation.outcome import (
     Outcome,
     largest_motion,
-    left_elsewhere,
+    list_uncorrected_elsewhere,
     tell_arrivals,
 )
+from postproc.compensation.pipeline import CompensatedProgram, WindowResult, correct
 from postproc.compensation.program import (
-    Reading,
-    prepared,
+    ParsedProgram,
+    prepare_cell,
     read_program,
 )
 from postproc.compensation.program_files import (
@@ -51,20 +51,20 @@ from postproc.compensation.program_files import (
     ProgramFiles,
     program_files,
 )
-from postproc.compensation.record import Sidecar
 from postproc.compensation.rewrite import (
     Output,
     check_output,
     write_edits,
 )
-from postproc.compensation.targets import rounded_points, unknown_blends
+from postproc.compensation.sidecar import Sidecar
+from postproc.compensation.targets import report_rounded_points, unknown_blends
 from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
-from postproc.language.interface import Language
+from postproc.language.language import Language
 from postproc.language.languages import language_of
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
-from postproc.language.visits import Diagnostic, Visits, told_once
+from postproc.language.visits import Diagnostic, Visits, deduplicate
 from postproc.model.model import Model, as_model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.cell import Cell, as_cell
@@ -83,8 +83,8 @@ def compensate(
     name: str = "program.pdl",
     variables: bytes | str | Path | None = None,
     pages: Mapping[str, bytes] = NO_PAGES,
-    options: Options = AS_USUAL,
-    progress: Progress = silent,
+    options: Options = DEFAULT_OPTIONS,
+    progress: Progress = no_progress,
     processes: int = 1,
 ) -> Outcome:
     """Move every target of a program against the error the arm would make there.
@@ -118,14 +118,14 @@ def compensate(
     if judged:
         load()
     outcome = compensate_files(given, cell, model, options, progress, processes)
-    told = (*outcome.diagnostics, *given.told_of(cell))
+    told = (*outcome.diagnostics, *given.report_omissions(cell))
     outcome = replace(outcome, diagnostics=told, inputs=given.inputs)
     if not judged:
         return outcome
     from postproc.compensation.second_opinion import second_opinion
 
     output = {**outcome.sources, **outcome.outputs}
-    own = prepared(cell, model, options)
+    own = prepare_cell(cell, model, options)
     opinion = second_opinion(outcome.sources, output, own, outcome.record)
     return replace(outcome, opinion=opinion)
 
@@ -134,8 +134,8 @@ def compensate_files(
     given: ProgramFiles,
     cell: Cell,
     model: Model,
-    options: Options = AS_USUAL,
-    progress: Progress = silent,
+    options: Options = DEFAULT_OPTIONS,
+    progress: Progress = no_progress,
     processes: int = 1,
 ) -> Outcome:
     """Compensate a program that was read, without a second opinion: see `compensate`.
@@ -144,17 +144,17 @@ def compensate_files(
         PostprocError: As there.
     """
     files = given.by_name
-    refuse(files, cell, model)
-    cell = prepared(cell, model, options)
-    setting = Setting(cell, model, options, Clock(progress), processes)
+    check_preconditions(files, cell, model)
+    cell = prepare_cell(cell, model, options)
+    setting = Job(cell, model, options, Clock(progress), processes)
     with setting.clock("parse"):
         reading = read_with_cause(files, cell)
-        give_back(len(reading.visits))
+        release_memory(len(reading.visits))
     reading, kept = correct(reading, setting)
     return finish(given.name, reading, kept, setting)
 
 
-def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
+def check_preconditions(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
     """Refuse what must not be compensated at all.
 
     Raises:
@@ -210,7 +210,9 @@ def check_controller(cell: Cell, language: Language) -> None:
     )
 
 
-def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> Outcome:
+def finish(
+    name: str, reading: ParsedProgram, kept: WindowResult, setting: Job
+) -> Outcome:
     """Write what was corrected, verify it, and say what came of it.
 
     What runs a program in time, and puts points on its ways, takes a tenth of a short
@@ -220,9 +222,9 @@ def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> O
         VerificationError: The output is not what was meant.
     """
     output, again = write_and_verify(reading, kept, setting)
-    draft = Draft(reading, kept, output, None)
+    draft = CompensatedProgram(reading, kept, output, None)
     if setting.options.times(len(reading.visits)):
-        from postproc.compensation.in_time import run_in_time
+        from postproc.compensation.timing_comparison import run_in_time
 
         with setting.clock("time"):
             own = np.arange(len(reading.visits))
@@ -232,20 +234,20 @@ def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> O
             )  # fmt: skip
         draft = replace(draft, in_time=in_time)
     del again  # holds as much as the program
-    give_back(len(reading.visits))
+    release_memory(len(reading.visits))
     if setting.options.inserts:
-        from postproc.compensation.paths.correction import correct_paths
+        from postproc.compensation.paths.insertion_loop import correct_paths
 
         draft = correct_paths(draft, setting, write_and_verify)
     with setting.clock("report"):
         outcome = report(name, reading, draft, setting)
-    give_back(len(reading.visits))
+    release_memory(len(reading.visits))
     return outcome
 
 
 def write_and_verify(
-    reading: Reading, kept: Correction, setting: Setting
-) -> tuple[Output, Reading]:
+    reading: ParsedProgram, kept: WindowResult, setting: Job
+) -> tuple[Output, ParsedProgram]:
     """Write the numbers, and read what was written; return both.
 
     Raises:
@@ -254,10 +256,10 @@ def write_and_verify(
     clock = setting.clock
     with clock("rewrite"):
         output = write_edits(reading, kept.edits, setting.model.id)
-        give_back(len(reading.visits))
+        release_memory(len(reading.visits))
     with clock("verify"):
         again = read_program(output.files, setting.cell, reading.programs)
-        give_back(len(reading.visits))
+        release_memory(len(reading.visits))
         values = kept.decisions.corrected
         check_output(reading, again, output, kept.edited, values)
     return output, again
@@ -265,9 +267,9 @@ def write_and_verify(
 
 def report(
     name: str,
-    reading: Reading,
-    draft: Draft,
-    setting: Setting,
+    reading: ParsedProgram,
+    draft: CompensatedProgram,
+    setting: Job,
 ) -> Outcome:
     """Say what came of every visit, and what error the model expects now.
 
@@ -278,7 +280,10 @@ def report(
         setting: What it was compensated with.
     """
     kept, output, visits = draft.kept, draft.output, reading.visits
-    off = (assumed_off(name, setting.cell), *controller_unknown(name, setting.cell))
+    off = (
+        report_controller_assumption(name, setting.cell),
+        *controller_unknown(name, setting.cell),
+    )
     return Outcome(
         program=name,
         model=setting.model.id,
@@ -288,7 +293,7 @@ def report(
         decisions=kept.decisions,
         before=ErrorStatistics.of_sizes(kept.before),
         after=ErrorStatistics.of_sizes(kept.after),
-        diagnostics=told_once((*_findings(reading, draft, setting), *off)),
+        diagnostics=deduplicate((*_findings(reading, draft, setting), *off)),
         stages=setting.clock.stages,
         motion=largest_motion(kept.departure),
         position=kept.position,
@@ -298,12 +303,12 @@ def report(
     )
 
 
-def _record(reading: Reading, draft: Draft, setting: Setting) -> Sidecar:
+def _record(reading: ParsedProgram, draft: CompensatedProgram, setting: Job) -> Sidecar:
     """Keep what was changed, what was assumed, and what was left for other files."""
     output, visits, d = draft.output, reading.visits, draft.kept.decisions
     files = tuple(output.stamps)
     arrivals = tell_arrivals(visits, d, files)
-    told = setting.options.told()
+    told = setting.options.to_dict()
     return replace(
         output.sidecar(draft.reading, setting.model.id, told, arrivals),
         assumed=tuple(
@@ -311,12 +316,14 @@ def _record(reading: Reading, draft: Draft, setting: Setting) -> Sidecar:
             for x in reading.diagnostics
             if x.code == Code.ROUTINE_ASSUMED_MOTIONLESS
         ),
-        left=left_elsewhere(visits, d, files, reading.missed, reading.diagnostics),
+        left=list_uncorrected_elsewhere(
+            visits, d, files, reading.missed, reading.diagnostics
+        ),
     )
 
 
 def _findings(
-    reading: Reading, draft: Draft, setting: Setting
+    reading: ParsedProgram, draft: CompensatedProgram, setting: Job
 ) -> tuple[Diagnostic, ...]:
     """Say what was found: in the program, in the plan, and in what came of it."""
     kept, in_time, visits = draft.kept, draft.in_time, reading.visits
@@ -324,25 +331,23 @@ def _findings(
     advice = no_advice if in_time is None else in_time.advice
     return (
         *reading.diagnostics,
-        *followed_pages(visits, reading.untouched),
+        *list_followed_pages(visits, reading.untouched),
         *missing_file(visits),
-        *contradicted_base(visits, cell),
+        *check_base(visits, cell),
         *tool_in_metres(visits),
-        *overruled_strings(visits, kept.overruled),
-        *untimed_runs(visits, kept.untimed),
-        *rounded_points(visits, kept.away),
+        *list_overruled_strings(visits, kept.overruled),
+        *list_untimed_runs(visits, kept.untimed),
+        *report_rounded_points(visits, kept.away),
         *unknown_blends(visits, rows),
-        *unsure_sides(visits, rows, d.side, d.std_error, advice),
-        *unsure_frames(visits, rows, d.std_error, cell),
+        *report_uncertain_sides(visits, rows, d.side, d.std_error, advice),
+        *report_uncertain_frames(visits, rows, d.std_error, cell),
         *flank_steps(visits, rows, kept.position, d.side, setting.gap, cell.arm),
         *listing_cost(visits, rows, d.q, cell.arm),
         *(in_time.findings(visits) if in_time is not None else ()),
     )
 
 
-def _arrivals(
-    visits: Visits, kept: Correction, setting: Setting
-) -> ArrivalStates | None:
+def _arrivals(visits: Visits, kept: WindowResult, setting: Job) -> ArrivalStates | None:
     """Say what every visit is corrected for, None where nobody explains it."""
     if len(kept.travel) < len(visits):
         return None

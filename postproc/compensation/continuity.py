@@ -79,7 +79,7 @@ class PathCorrection:
             far = step > self.allowed + self.flanks
         return np.asarray((self.before >= 0) & far)
 
-    def bent(self, left: Bools, free: Bools) -> Bools:
+    def find_bent(self, left: Bools, free: Bools) -> Bools:
         """Tell which visits must stay since others do, (n,).
 
         A visit that would bend the path to a neighbour that is left by more than is
@@ -191,7 +191,7 @@ class _Wholes:
         found, whole = np.unique(whole, return_inverse=True)
         return cls((ARC, ANGLED, CURVE), found // max(n, 1), whole, visit)
 
-    def broken(self, moves: Bools) -> dict[Reason, Bools]:
+    def find_broken(self, moves: Bools) -> dict[Reason, Bools]:
         """Say which points must stay since others of their whole do, (n,) by reason.
 
         Args:
@@ -227,10 +227,10 @@ def keep_whole(
     wholes, along = _Wholes.of(visits), visits.follows >= 0
     while True:
         moves = reasons.none | along
-        for reason, rows in wholes.broken(moves).items():
+        for reason, rows in wholes.find_broken(moves).items():
             reasons.mark(rows, reason)
         free = reasons.none
-        lonely = path.bent(~free & ~given, free)
+        lonely = path.find_bent(~free & ~given, free)
         if not lonely.any():
             return
         reasons.mark(lonely, Reason(Code.PATH_BENT, BENT.format(step_mm)))

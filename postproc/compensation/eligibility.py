@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Interned, Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.dialect import Terms
+from postproc.language.pose_encoding import Terms
 from postproc.language.visits import OrientationLaw, Switch, Visits
 from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
 from postproc.motion.path import NEAR, arcs_of
@@ -105,14 +105,14 @@ class Overruled:
     branch: Bools
     turn: Bools
 
-    def unchecked(self, visits: Visits) -> Bools:
+    def find_unchecked(self, visits: Visits) -> Bools:
         """Tell where the program leaves open whether the string is checked, (n,)."""
         unset = visits.care == Switch.UNSET
         found: Bools = (self.branch & unset[:, CNFG]) | (self.turn & unset[:, TURN])
         return found
 
 
-def overruled(targets: Targets, plan: Plan) -> Overruled:
+def find_overruled(targets: Targets, plan: Plan) -> Overruled:
     """Compare where Cartesian paths arrive with their configuration strings."""
     path = plan.overruled & ~targets.via
     return Overruled(
@@ -142,13 +142,15 @@ def mark_configuration_flags(
     Returns:
         Whether what comes from a visit is doubtful, (n,).
     """
-    _mark_stops(visits, overruled(targets, plan), reasons)
+    _mark_stops(visits, find_overruled(targets, plan), reasons)
     _mark_misses(visits, targets, plan, reasons)
     doubtful = _mark_either_way(visits, targets, plan, arm, reasons)
     doubtful[:1] |= begun
     if not doubtful.any():
         return doubtful
-    sure = (targets.move == Motion.JOINT) & _placed(targets) & ~targets.nearest_turn
+    sure = (
+        (targets.move == Motion.JOINT) & _find_placed(targets) & ~targets.nearest_turn
+    )
     reached, on = _followers(visits, doubtful, sure)
     reasons.mark(reached, AFTER)
     return on
@@ -169,11 +171,11 @@ def mark_stranded(
     """
     stranded = STRANDS[plan.reason]
     if stranded.any():
-        reached, _ = _followers(visits, stranded, _placed(targets))
+        reached, _ = _followers(visits, stranded, _find_placed(targets))
         reasons.mark(reached, STRANDED)
 
 
-def _placed(targets: Targets) -> Bools:
+def _find_placed(targets: Targets) -> Bools:
     """Tell which targets are where they are wherever the arm comes from, (n,)."""
     posed = (targets.kind == TargetKind.POSE) & (targets.slot >= 0)
     return np.asarray((targets.kind == TargetKind.JOINTS) | posed)
@@ -214,7 +216,7 @@ def _mark_either_way(
     placed &= ~np.isnan(plan.q[:, 0])
     joint = placed & (targets.move == Motion.JOINT)
     wrist = placed & ~joint & targets.wrist_joint
-    branch = wrist | (joint & _doubted(visits.care[:, CNFG]))
+    branch = wrist | (joint & _is_doubtful(visits.care[:, CNFG]))
     turn = wrist | (joint & _turns_doubted(visits, targets))
     if branch.any():
         branch &= _from_other_branch(visits, targets, plan, arm, branch)
@@ -232,7 +234,7 @@ def _mark_either_way(
     return np.asarray(branch | turn)
 
 
-def _doubted(switch: Ints) -> Bools:
+def _is_doubtful(switch: Ints) -> Bools:
     return np.asarray((switch == Switch.OFF) | (switch == Switch.UNKNOWN))
 
 
@@ -240,7 +242,7 @@ def _turns_doubted(visits: Visits, targets: Targets) -> Bools:
     """Tell where written turns and the nearest ones may both be meant, (n,)."""
     checked, multi = visits.care[:, TURN], visits.care[:, MULTI]
     nearest = (checked == Switch.ON) | (checked == Switch.UNKNOWN)
-    written = _doubted(checked) | (multi == Switch.UNKNOWN)
+    written = _is_doubtful(checked) | (multi == Switch.UNKNOWN)
     return np.asarray(np.where(targets.nearest_turn, nearest, written))
 
 
@@ -250,7 +252,7 @@ def _from_other_branch(
     """Tell which of some visits are reached from another branch than theirs, (n,)."""
     edge, source = _edges(visits, plan, rows)
     other = arm.branch(plan.q[source]) != targets.slot[edge]
-    return _seen(len(visits), edge[other])
+    return _mark_rows(len(visits), edge[other])
 
 
 def _other_turn(visits: Visits, targets: Targets, plan: Plan, arm: Arm) -> Bools:
@@ -259,7 +261,7 @@ def _other_turn(visits: Visits, targets: Targets, plan: Plan, arm: Arm) -> Bools
     turned = nearest_turns(plan.q[edge], plan.q[source])
     allowed = (turned >= arm.lower) & (turned <= arm.upper)
     other = allowed & (np.abs(turned - plan.q[edge]) > OTHER_TURN)
-    far = _seen(len(visits), edge[other.any(axis=1)])
+    far = _mark_rows(len(visits), edge[other.any(axis=1)])
     return np.where(targets.nearest_turn, on_other_turns(plan.q, targets.turns), far)
 
 
@@ -271,7 +273,7 @@ def _edges(visits: Visits, plan: Plan, rows: Bools) -> tuple[Ints, Ints]:
     return edge[known], visits.pred[known]
 
 
-def _seen(n: int, rows: Ints) -> Bools:
+def _mark_rows(n: int, rows: Ints) -> Bools:
     """Tell which of n rows are listed, (n,)."""
     found = np.zeros(n, dtype=bool)
     found[rows] = True
@@ -309,7 +311,7 @@ def _followers(visits: Visits, doubtful: Bools, sure: Bools) -> tuple[Bools, Boo
 # The ends are the same, the way between is not: where it may be off by more than a
 # joint's play, a joint may arrive from another side, and the target is left alone.
 # On arcs on which the tool turns little the targets are corrected, and joints that may
-# arrive from another side are not known (`motion.curves`).
+# arrive from another side are not known (`motion.spline_moves`).
 #
 # Euler angles in proportion turn the tool at w = a' z + e' y(a) + r' z(a, e), and |w'|
 # <= turn^2 / sin(e), so that it is off by at most turn^2 / (8 sin(e)), and by no more
@@ -337,7 +339,9 @@ def mark_orientation_interpolation(
     unknown = Reason(Code.ORIENTATION_LAW, terms.law_unknown)
     reasons.mark(cartesian & (kind == law.UNKNOWN), unknown)
     arc = targets.move == Motion.CIRCULAR
-    reasons.mark(arc & targets.wrist_joint, _said(terms, terms.arc, law.WRIST_JOINTS))
+    reasons.mark(
+        arc & targets.wrist_joint, _name_law(terms, terms.arc, law.WRIST_JOINTS)
+    )
     for rows, text, said in (
         (arc, terms.arc, law.ALONG_PATH),
         (cartesian, terms.angles, law.EULER_ANGLES),
@@ -346,10 +350,10 @@ def mark_orientation_interpolation(
         rows = rows & (kind == said)
         if rows.any():
             off = _may_be_off(visits, targets, plan, rows)
-            reasons.mark(off, _said(terms, text, said))
+            reasons.mark(off, _name_law(terms, text, said))
 
 
-def _said(terms: Terms, text: str, law: OrientationLaw) -> Reason:
+def _name_law(terms: Terms, text: str, law: OrientationLaw) -> Reason:
     """Name a law in a reason, where the language has a name for it."""
     name = terms.laws[law] if law < len(terms.laws) else law.name
     return Reason(Code.ORIENTATION_LAW, text.format(name))
@@ -427,7 +431,7 @@ def mark_arcs(targets: Targets, plan: Plan, reasons: Reasons) -> None:
         reasons.mark(_among(arcs.visit[rows], len(targets)), reason)
 
 
-def strayed(targets: Targets, plan: Plan, shift: Floats, step: float) -> Bools:
+def find_strayed(targets: Targets, plan: Plan, shift: Floats, step: float) -> Bools:
     """Tell which targets move so that an arc at them becomes quite another one, (n,).
 
     It does where the path between its points moves more than twice as far as they do:

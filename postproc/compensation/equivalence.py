@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats, Interned, Ints, chunks
-from postproc.language.shapes import numbered_in_order
+from postproc.language.templates import number_in_order
 from postproc.language.visits import Visits
 
 SAME = 1e-6  # [mm] and [deg]: what adding constants to numbers may round off
@@ -69,8 +69,8 @@ def _same_literals(v: Visits, w: Visits, clones: Mapping[int, str]) -> bool:
     names, own = Interned([""]), np.zeros(len(v), dtype=np.int64)
     own[[*clones]] = names.of([*clones.values()])
     has = np.flatnonzero(v.literal >= 0)
-    old, _ = numbered_in_order(v.literal[has] * len(names) + own[has])
-    return np.array_equal(old, numbered_in_order(w.literal[has])[0])
+    old, _ = number_in_order(v.literal[has] * len(names) + own[has])
+    return np.array_equal(old, number_in_order(w.literal[has])[0])
 
 
 def _other_number(v: Visits, w: Visits, edited: Ints, values: Floats) -> str:

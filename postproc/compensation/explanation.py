@@ -11,17 +11,17 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints, Signs, columns_of, data_frame
 from postproc.compensation.compensate import compensate_files
-from postproc.compensation.in_time import InTime
-from postproc.compensation.options import AS_USUAL, Options
+from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import (
-    Planned,
-    Reading,
+    ParsedProgram,
+    PlannedProgram,
     assuming,
     plan_visits,
     read_program,
 )
 from postproc.compensation.program_files import NO_PAGES, ProgramFiles, program_files
+from postproc.compensation.timing_comparison import InTime
 from postproc.diagnostics import Reason
 from postproc.exceptions import ProgramError
 from postproc.language.visits import (
@@ -29,7 +29,7 @@ from postproc.language.visits import (
     START,
     Diagnostic,
     Visits,
-    told_once,
+    deduplicate,
 )
 from postproc.model.model import Model, as_model
 from postproc.robot.cell import Cell, as_cell
@@ -79,9 +79,9 @@ class Explanation:
     diagnostics: tuple[Diagnostic, ...] = ()
 
     @classmethod
-    def of_plan(cls, reading: Reading, planned: Planned) -> Self:
+    def of_plan(cls, reading: ParsedProgram, planned: PlannedProgram) -> Self:
         """Explain a plan."""
-        visits, told = reading.visits, told_once(reading.diagnostics)
+        visits, told = reading.visits, deduplicate(reading.diagnostics)
         plan, every = planned.plan, planned.reasons.all
         reasons = [every[k] for k in planned.reasons.index.tolist()]
         direction = plan.direction.astype(np.int8)
@@ -121,7 +121,7 @@ class Explanation:
         columns: dict[str, object] = {
             "line": [self.line_of(i) for i in rows],
             "target": [v.names[k] for k in v.name.tolist()],
-            "from": [self.reached_from(i) for i in rows],
+            "from": [self.name_origins(i) for i in rows],
             **columns_of([f"q{k}_deg" for k in range(1, 7)], np.rad2deg(self.q)),
             **columns_of([f"lambda{k}" for k in range(1, 7)], self.direction),
         }
@@ -142,7 +142,7 @@ class Explanation:
         known = np.isfinite(self.q).all(axis=1)
         return f"{len(self.visits)} visits, {int((~known).sum())} of them not planned"
 
-    def reached_from(self, i: int) -> str:
+    def name_origins(self, i: int) -> str:
         """Name the lines that visit i is reached from."""
         names = {START: "start", ELSEWHERE: "unknown"}
         before = self.visits.predecessors(i)
@@ -154,7 +154,7 @@ class Explanation:
         v = self.visits
         return f"{f'{v.files[v.file[i]]}:' if v.file[i] else word}{v.line[i]}"
 
-    def chosen(self, line: int | None) -> Ints:
+    def choose_visits(self, line: int | None) -> Ints:
         """Choose the visits to show: those whose move or literal is on a line."""
         v = self.visits
         if line is None:
@@ -185,7 +185,7 @@ def explain(
     name: str = "program.pdl",
     variables: bytes | str | Path | None = None,
     pages: Mapping[str, bytes] = NO_PAGES,
-    options: Options = AS_USUAL,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Explanation:
     """Say of every target where the arm comes from, and why it moves.
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.compensation.program import Reading, read_program
+from postproc.compensation.program import ParsedProgram, read_program
 from postproc.diagnostics import Code
 from postproc.language.visits import Diagnostic, Visits
 from postproc.robot.cell import Cell
@@ -15,7 +15,7 @@ from postproc.robot.cell import Cell
 CAUSES = (Code.MOTION_UNKNOWN, Code.UNKNOWN_ROUTINE)
 
 
-def read_with_cause(files: Mapping[str, bytes], cell: Cell) -> Reading:
+def read_with_cause(files: Mapping[str, bytes], cell: Cell) -> ParsedProgram:
     """Read a program, and say first where it is first not known.
 
     Args:
@@ -31,7 +31,7 @@ def read_with_cause(files: Mapping[str, bytes], cell: Cell) -> Reading:
 
 
 def first_cause(
-    files: Mapping[str, bytes], cell: Cell, reading: Reading
+    files: Mapping[str, bytes], cell: Cell, reading: ParsedProgram
 ) -> tuple[Diagnostic, ...]:
     """Say where a program is first not known, and how many targets that leaves.
 
@@ -46,7 +46,9 @@ def first_cause(
     if not causes or not reading.visits.reason.any():
         return ()
     free = replace(cell, motionless=("*",))
-    freed = _known(read_program(files, free).visits) - _known(reading.visits)
+    freed = _count_known(read_program(files, free).visits) - _count_known(
+        reading.visits
+    )
     if freed <= 0:
         return ()
     first, total = causes[0], int((reading.visits.literal >= 0).sum())
@@ -58,6 +60,6 @@ def first_cause(
     return (Diagnostic(first.file, first.line, Code.FIRST_CAUSE, text),)
 
 
-def _known(visits: Visits) -> int:
+def _count_known(visits: Visits) -> int:
     """Count the targets that nothing unknown leaves."""
     return int(np.sum((visits.literal >= 0) & (visits.reason == 0)))

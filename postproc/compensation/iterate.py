@@ -14,39 +14,44 @@ from postproc.arrays import (
     any_in_rows,
     largest_in_rows,
     spans,
-    taken,
+    take_rows,
 )
 from postproc.compensation.arc_angles import ArcAngles
-from postproc.compensation.command import (
+from postproc.compensation.consensus import (
+    NO_GLIMPSES,
+    Glimpses,
+    Look,
+    RoundLog,
+    Snapshot,
+    Step,
+    lead_of,
+)
+from postproc.compensation.decisions import (
+    Proposal,
+    Round,
+    limit_violations,
+    with_origins,
+)
+from postproc.compensation.inverse_model import (
     Commands,
     solve_again,
     solve_visits,
     std_errors,
 )
-from postproc.compensation.decide import Proposal, Round, swings, with_origins
-from postproc.compensation.options import Clock, Setting
-from postproc.compensation.program import Planned, Reading
+from postproc.compensation.options import Clock, Job
+from postproc.compensation.program import ParsedProgram, PlannedProgram
 from postproc.compensation.rewrite import read_back
-from postproc.compensation.rounds import (
-    NO_GLIMPSES,
-    Glimpse,
-    Glimpses,
-    Look,
-    Step,
-    Trail,
-    lead_of,
-)
-from postproc.compensation.targets import moved_targets
-from postproc.language.rewrite import edits as number_edits
+from postproc.compensation.targets import move_targets
+from postproc.language.number_edits import edits as number_edits
 from postproc.language.source import Replacements
 from postproc.language.visits import Visits
-from postproc.motion.departure import Departure, departure, path_departure
+from postproc.motion.deviation import JointDeviation, departure, path_departure
+from postproc.motion.joint_path import NOWHERE, StartState, trace
 from postproc.motion.planner import Plan
 from postproc.motion.replan import Reached, Replanned, replan, replan_all
 from postproc.motion.targets import Targets
-from postproc.motion.trace import NOWHERE, StartState, trace
 from postproc.robot.cell import Cell
-from postproc.robot.direction import Sides
+from postproc.robot.direction import FlankState
 from postproc.robot.pose import has_unknown
 from postproc.robot.state import States
 
@@ -107,7 +112,7 @@ CLOSE = 5e-6  # [m] how well rounded fly points are hit
 
 
 @dataclass(frozen=True)
-class Iterate:
+class SolverState:
     """What n targets are corrected for in a round.
 
     Attributes:
@@ -121,13 +126,15 @@ class Iterate:
     """
 
     solved: Commands
-    departure: Departure
+    departure: JointDeviation
     bent: Floats
     held: Bools
     swung: Bools
     settled: Bools
 
-    def turned(self, proposal: Proposal, side: Floats, most: float) -> Bools:
+    def find_flank_changes(
+        self, proposal: Proposal, side: Floats, most: float
+    ) -> Bools:
         """Tell which corrected targets are reached from other sides than these, (n,).
 
         Args:
@@ -153,13 +160,13 @@ class Iteration:
         part: They are a window of a program.
     """
 
-    reading: Reading
-    planned: Planned
+    reading: ParsedProgram
+    planned: PlannedProgram
     states: States
-    setting: Setting
+    setting: Job
     part: bool
 
-    def first_aim(self) -> Iterate:
+    def first_aim(self) -> SolverState:
         """Correct for the sides that were planned, or are meant."""
         setting, none = self.setting, np.zeros(len(self.states), dtype=bool)
         aims, states, meant = self.reading.aims, self.states, none
@@ -172,20 +179,20 @@ class Iteration:
                 setting.model, setting.cell, self.planned, states,
                 setting.options.orientation,
             )  # fmt: skip
-            departed = self.departed(solved, np.arange(len(self.states)))
+            departed = self.measure_deviation(solved, np.arange(len(self.states)))
         bent = np.zeros_like(self.planned.plan.aside)
-        return Iterate(solved, departed, bent, none, none, meant)
+        return SolverState(solved, departed, bent, none, none, meant)
 
-    def departed(self, solved: Commands, rows: Ints) -> Departure:
+    def measure_deviation(self, solved: Commands, rows: Ints) -> JointDeviation:
         """Say how far commands lead the arm from where it was, k visits."""
         plan, setting = self.planned.plan, self.setting
-        tool = taken(plan.tool, rows)[:, :3, 3]
+        tool = take_rows(plan.tool, rows)[:, :3, 3]
         arm, old, new = setting.cell.arm, plan.q[rows], solved.q[rows]
         return departure(arm, old, new, tool, setting.offset)
 
     def next_aim(
-        self, current: Iterate, moved: Bools, found: Floats, search: SecantSearch
-    ) -> Iterate:
+        self, current: SolverState, moved: Bools, found: Floats, search: SecantSearch
+    ) -> SolverState:
         """Correct some targets for other sides, by those that were found."""
         setting = self.setting
         with setting.clock("solve"):
@@ -196,26 +203,28 @@ class Iteration:
                 states, setting.options.orientation,
             )  # fmt: skip
             rows = np.flatnonzero(moved)
-            departed = current.departure.with_rows(rows, self.departed(solved, rows))
+            departed = current.departure.with_rows(
+                rows, self.measure_deviation(solved, rows)
+            )
         return replace(current, solved=solved, departure=departed)
 
-    def propose(self, current: Iterate) -> tuple[Proposal, Floats]:
+    def propose(self, current: SolverState) -> tuple[Proposal, Floats]:
         """Decide on numbers; return too where the path is to pass its targets."""
         with self.setting.clock("decide"):
             plan = self.planned.plan
-            aside = passing_after(plan, self.wanted(current)) + current.bent
+            aside = passing_after(plan, self.find_wanted_shifts(current)) + current.bent
             given = self.reading, self.planned, current.solved, current.departure
             left = current.held, current.swung
             return Round(*given, aside, *left, self.setting).propose(), aside
 
-    def wanted(self, current: Iterate) -> Floats:
+    def find_wanted_shifts(self, current: SolverState) -> Floats:
         """Say what the path should move by at every target, (n, 3) [m]."""
         before = self.planned.plan.tcp[:, :3, 3]
         wanted = np.nan_to_num(current.solved.command[:, :3, 3] - before)
         wanted[current.held | current.swung] = 0.0
         return wanted
 
-    def missed(
+    def measure_misses(
         self, proposal: Proposal, aside: Floats, meant: Floats
     ) -> tuple[Floats, Bools]:
         """Say by what targets miss theirs, (n, 3) [m], and where by too much, (n,).
@@ -237,7 +246,9 @@ class Iteration:
                     missed[first:end] = 0.0
         return missed, far
 
-    def swung(self, proposal: Proposal, found: Converged | None) -> Bools:
+    def find_limit_violations(
+        self, proposal: Proposal, found: Converged | None
+    ) -> Bools:
         """Tell which targets must stay for the ways to or from them, (n,).
 
         Raises:
@@ -248,7 +259,7 @@ class Iteration:
         if found is None:
             return np.zeros(n, dtype=bool)
         limits, targets = self.setting.cell.limits, self.planned.targets
-        far = np.any([*swings(limits, found.moved).values()], axis=0)
+        far = np.any([*limit_violations(limits, found.moved).values()], axis=0)
         rows = np.flatnonzero(far)
         sources = _sources(targets, rows)
         begins = _sources(targets, sources[targets.via[sources]])  # of arcs
@@ -298,7 +309,7 @@ class Replanner:
         self._begin = begin
         self._last: Replanned | None = None
 
-    def after(self, values: Floats, lead: Sides) -> Replanned:
+    def after(self, values: Floats, lead: FlankState) -> Replanned:
         """Find where the program leads with other numbers.
 
         Args:
@@ -308,9 +319,9 @@ class Replanner:
         new = replace(self._visits, values=values)
         old = self._visits.values
         moved = any_in_rows((values != old) & ~(np.isnan(values) & np.isnan(old)))
-        moved |= ArcAngles.of(new).touched(moved)
+        moved |= ArcAngles.of(new).find_moved(moved)
         rows = np.flatnonzero(moved)
-        targets = moved_targets(self._targets, new, self._cell, rows)
+        targets = move_targets(self._targets, new, self._cell, rows)
         arm, last = self._cell.arm, self._last
         if last is None:
             self._last = replan_all(arm, targets, self._begin, lead)
@@ -329,7 +340,7 @@ CORNERS = 3  # rounds for what is curved there
 
 
 @dataclass(frozen=True)
-class Lead:
+class Boundary:
     """How a window goes on from the one before.
 
     Attributes:
@@ -341,7 +352,7 @@ class Lead:
     looks: Glimpses = NO_GLIMPSES
 
 
-FROM_START = Lead()
+FROM_START = Boundary()
 
 
 class NotAloneError(Exception):
@@ -366,16 +377,16 @@ class Converged:
     proposal: Proposal
     edits: tuple[Replacements, ...]
     reached: Reached
-    moved: Departure
+    moved: JointDeviation
 
 
 def iterate(
-    reading: Reading,
-    planned: Planned,
+    reading: ParsedProgram,
+    planned: PlannedProgram,
     states: States,
-    setting: Setting,
-    lead: Lead = FROM_START,
-    trail: Trail | None = None,
+    setting: Job,
+    lead: Boundary = FROM_START,
+    trail: RoundLog | None = None,
 ) -> Converged:
     """Correct and plan again, until the sides are those corrected for.
 
@@ -405,7 +416,7 @@ def iterate(
         NotAloneError: What comes of a window cannot be told from it alone.
     """
     iteration = Iteration(reading, planned, states, setting, trail is not None)
-    trail = Trail() if trail is None else trail
+    trail = RoundLog() if trail is None else trail
     replanner = Replanner(reading.visits, planned.targets, setting.cell, lead.begin)
     course = _Course(iteration, replanner, lead, trail)
     search, current = SecantSearch(), iteration.first_aim()
@@ -413,12 +424,12 @@ def iterate(
         proposal, meant = iteration.propose(current)
         looked = course.look((number, False), current, proposal)
         most = SAME if number < ROUNDS else OTHER
-        moved = current.turned(proposal, looked.side, most)
-        missed, far = iteration.missed(proposal, looked.aside, meant)
+        moved = current.find_flank_changes(proposal, looked.side, most)
+        missed, far = iteration.measure_misses(proposal, looked.aside, meant)
         step = trail.take(moved, missed, far & (number < CORNERS))
         if step == Step.READ_BACK:
             found, flipped = _read_back(course, current, proposal, number)
-            swung = iteration.swung(proposal, found)
+            swung = iteration.find_limit_violations(proposal, found)
             if found is not None and not swung.any():
                 return found
             held, swung = current.held | flipped, current.swung | swung
@@ -444,10 +455,10 @@ class _Course:
 
     iteration: Iteration
     replanner: Replanner
-    lead: Lead
-    trail: Trail
+    lead: Boundary
+    trail: RoundLog
 
-    def look(self, look: Look, current: Iterate, proposal: Proposal) -> Replanned:
+    def look(self, look: Look, current: SolverState, proposal: Proposal) -> Replanned:
         """Find where a proposal leads."""
         values = proposal.decisions.corrected
         with self.iteration.setting.clock("plan again"):
@@ -457,10 +468,10 @@ class _Course:
         return found
 
 
-def _glimpse(current: Iterate, proposal: Proposal, found: Replanned) -> Glimpse:
+def _glimpse(current: SolverState, proposal: Proposal, found: Replanned) -> Snapshot:
     """Put together what windows must agree on at their cuts."""
     decided = proposal.decisions
-    return Glimpse(
+    return Snapshot(
         values=decided.corrected,
         status=decided.status,
         why=decided.why,
@@ -480,7 +491,7 @@ def _glimpse(current: Iterate, proposal: Proposal, found: Replanned) -> Glimpse:
 
 
 def _read_back(
-    course: _Course, current: Iterate, proposal: Proposal, number: int
+    course: _Course, current: SolverState, proposal: Proposal, number: int
 ) -> tuple[Converged | None, Bools]:
     """Write the numbers, and look at them as they will be read.
 
@@ -494,7 +505,7 @@ def _read_back(
     setting = iteration.setting
     edits, proposal = write_and_read_back(iteration.reading, proposal, setting.clock)
     last = course.look((number, True), current, proposal)
-    flipped = current.turned(proposal, last.side, OTHER)
+    flipped = current.find_flank_changes(proposal, last.side, OTHER)
     if flipped.any():
         if len(iteration.reading.begins) > 1:
             raise NotConcatenableError
@@ -506,11 +517,13 @@ def _read_back(
     decided = replace(proposal.decisions, std_error=std_error)
     proposal = replace(proposal, decisions=decided)
     with setting.clock("verify"):
-        moved = _departed(iteration, last.targets, course.lead.begin)
+        moved = _measure_deviation(iteration, last.targets, course.lead.begin)
     return Converged(proposal, edits, last.reached, moved), flipped
 
 
-def _departed(iteration: Iteration, targets: Targets, begin: StartState) -> Departure:
+def _measure_deviation(
+    iteration: Iteration, targets: Targets, begin: StartState
+) -> JointDeviation:
     """Trace all ways to targets as they are written, and compare them with the plan."""
     setting, plan = iteration.setting, iteration.planned.plan
     arm, tool, offset = setting.cell.arm, plan.tool[:, :3, 3], setting.offset
@@ -519,7 +532,7 @@ def _departed(iteration: Iteration, targets: Targets, begin: StartState) -> Depa
 
 
 def write_and_read_back(
-    reading: Reading, proposal: Proposal, clock: Clock
+    reading: ParsedProgram, proposal: Proposal, clock: Clock
 ) -> tuple[tuple[Replacements, ...], Proposal]:
     """Write the numbers; return the edits, and the proposal as it will be read."""
     with clock("rewrite"):

@@ -92,7 +92,7 @@ class Options:
         shared = "mean" if self.shared_points == "clone" else self.shared_points
         return replace(self, shared_points=shared)
 
-    def told(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, object]:
         """Return them for a record: what is rarely asked for only if it is."""
         said = asdict(self)
         del said["explained"], said["timing"]  # they change no output
@@ -113,14 +113,14 @@ class Options:
 
 
 IN_TIME = 5_000  # visits
-AS_USUAL = Options()
+DEFAULT_OPTIONS = Options()
 
 # Seconds spent in every stage.
 
 Progress = Callable[[str], None]
 
 
-def silent(stage: str) -> None:
+def no_progress(stage: str) -> None:
     """Tell nobody."""
 
 
@@ -147,7 +147,7 @@ class Clock:
 
 
 @dataclass(frozen=True)
-class Setting:
+class Job:
     """What a program is compensated with.
 
     Attributes:
@@ -168,7 +168,7 @@ class Setting:
         """Take what is not given from the cell."""
         object.__setattr__(self, "options", self.options.within(self.cell))
 
-    def timed_by(self, clock: Clock) -> Setting:
+    def with_clock(self, clock: Clock) -> Job:
         """Return the same with another clock."""
         return replace(self, clock=clock)
 
@@ -180,7 +180,7 @@ class Setting:
     @cached_property
     def gap(self) -> Floats:
         """Half the fitted gap between the flanks of every joint, (6,) [rad]."""
-        from postproc.model.play import half_gap
+        from postproc.model.backlash_width import half_gap
 
         return half_gap(self.model, self.cell.arm)
 

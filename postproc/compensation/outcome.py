@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats, Indices, Ints, Signs, columns_of, data_frame
-from postproc.compensation.record import (
+from postproc.compensation.sidecar import (
     LeftLine,
     Sidecar,
     file_sha256,
@@ -40,7 +40,7 @@ from postproc.robot.pose import MM
 if TYPE_CHECKING:  # it loads all of the planning, which a record does not want
     from postproc.arrays import DataFrame
     from postproc.compensation.arrivals import ArrivalStates
-    from postproc.compensation.in_time import InTime
+    from postproc.compensation.timing_comparison import InTime
     from postproc.verify.opinion import Opinion
 
 # What came of a program: every visit with its status, and the exit code.
@@ -171,14 +171,14 @@ class Outcome:
         own = [n for n in (variables_of(self.program), self.program) if n in names]
         files: dict[Path, Content] = {}
         for name in reversed([name for name in names if name not in own]):
-            files |= self.recorded({name: names[name]}, names[name])
-        files |= self.recorded({n: names[n] for n in own}, names[self.program])
+            files |= self.name_files({name: names[name]}, names[name])
+        files |= self.name_files({n: names[n] for n in own}, names[self.program])
         make_folder(Path(folder))
         check_places(files, self.inputs)
         write_all(files)
         return list(files)
 
-    def recorded(self, places: Mapping[str, Path], main: Path) -> dict[Path, Content]:
+    def name_files(self, places: Mapping[str, Path], main: Path) -> dict[Path, Content]:
         """Name the files of one program, behind the record that undoes them.
 
         Args:
@@ -186,7 +186,7 @@ class Outcome:
             main: The place beside which the record lies; none lies beside a pipe.
         """
         names = {name: place.name for name, place in places.items()}
-        record = self.record.renamed(names).to_json()
+        record = self.record.rename_files(names).to_json()
         files = {place: self.outputs[name] for name, place in places.items()}
         return {**({} if is_stream(main) else {sidecar_path(main): record}), **files}
 
@@ -254,19 +254,19 @@ class Outcome:
             )
         return line
 
-    def left_rows(self) -> list[int]:
+    def list_uncorrected_rows(self) -> list[int]:
         """Return the visits that kept their value although they hold a target."""
         left = (Status.CONFLICT, Status.RUNTIME, Status.REJECTED)
         rows: list[int] = np.flatnonzero(np.isin(self.decisions.status, left)).tolist()
         return rows
 
-    def left_alone(self) -> list[str]:
+    def list_uncorrected(self) -> list[str]:
         """List every visit that kept its value although it holds a target."""
         d, v = self.decisions, self.visits
         return [
             f"{v.files[v.file[i]]}:{v.line[i]}: {Status(d.status[i]).name.lower()}: "
             f"{d.reasons[d.why[i]]}"
-            for i in self.left_rows()
+            for i in self.list_uncorrected_rows()
         ]
 
 
@@ -366,7 +366,7 @@ class LineOutcomes:
             if len(line)
             else size,
             counts={s.name.lower(): int((status == s).sum()) for s in Status},
-            mixed=_mixed(status[order], first),
+            mixed=_count_mixed(status[order], first),
         )
 
 
@@ -383,7 +383,7 @@ def _told_reasons(told: Mapping[str, Any]) -> tuple[Reason, ...]:
     return tuple(map(Reason.named, codes, texts))
 
 
-def _mixed(status: Ints, first: Ints) -> dict[int, dict[str, int]]:
+def _count_mixed(status: Ints, first: Ints) -> dict[int, dict[str, int]]:
     """Count the visits of lines that have several statuses.
 
     Args:
@@ -435,7 +435,7 @@ def tell_arrivals(
         files: Names of the files that are written.
     """
     v, d = visits, decisions
-    file, line = _written_lines(v, files)
+    file, line = _lines_of_visits(v, files)
     size = np.linalg.norm(d.correction, axis=1) / MM
     told = {}
     for name in files:
@@ -456,7 +456,7 @@ def tell_arrivals(
     return told
 
 
-def _written_lines(v: Visits, files: Sequence[str]) -> tuple[Ints, Ints]:
+def _lines_of_visits(v: Visits, files: Sequence[str]) -> tuple[Ints, Ints]:
     """Return file and line that tell of every visit: of its numbers, or its move."""
     has = v.literal >= 0
     literal = np.where(has, v.literal, 0)
@@ -469,7 +469,7 @@ def _written_lines(v: Visits, files: Sequence[str]) -> tuple[Ints, Ints]:
     return file, line
 
 
-def corrected_directions(visits: Visits, record: Sidecar) -> Floats | None:
+def directions_of_record(visits: Visits, record: Sidecar) -> Floats | None:
     """Return the directions that visits were corrected for, as the record tells them.
 
     Args:
@@ -481,7 +481,7 @@ def corrected_directions(visits: Visits, record: Sidecar) -> Floats | None:
         of clones, or of an older version.
     """
     files = [name for name in record.files if name in visits.files]
-    file, line = _written_lines(visits, files)
+    file, line = _lines_of_visits(visits, files)
     out = np.full((len(visits), 6), np.nan)
     for name in files:
         told = record.files[name].targets
@@ -494,7 +494,7 @@ def corrected_directions(visits: Visits, record: Sidecar) -> Floats | None:
     return out
 
 
-def left_elsewhere(
+def list_uncorrected_elsewhere(
     visits: Visits,
     decisions: Decisions,
     files: Sequence[str],
@@ -536,7 +536,9 @@ def _of_finding(code: Code) -> Reason:
     return Reason(code, str(code))
 
 
-def with_left(told: Mapping[str, Any], left: Sequence[LeftLine]) -> dict[str, Any]:
+def add_uncorrected(
+    told: Mapping[str, Any], left: Sequence[LeftLine]
+) -> dict[str, Any]:
     """Add lines that were left to what `tell_arrivals` says of their file."""
     whys = list(dict.fromkeys(why for _, _, why in left))
     known = list(told.get("reasons", ()))
@@ -574,7 +576,10 @@ def read_arrivals(
         return {}
     told = {}
     for original, output in pairs:
-        mine, left = record.files.get(output.name), record.left_in(output.name)
+        mine, left = (
+            record.files.get(output.name),
+            record.list_uncorrected_in(output.name),
+        )
         if (mine is None or not mine.targets) and not left:
             continue
         before, after = file_sha256(original), file_sha256(output)
@@ -583,7 +588,9 @@ def read_arrivals(
             source, result = mine.source_sha256, mine.output_sha256
         if (before, after) == (source, result):
             targets = mine.targets if mine is not None else {}
-            told[original.name] = _read(with_left(targets, left) if left else targets)
+            told[original.name] = _read(
+                add_uncorrected(targets, left) if left else targets
+            )
     return {name: arrivals for name, arrivals in told.items() if arrivals is not None}
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from stat import S_ISREG
 
 from postproc import _native
-from postproc.compensation.record import sidecar_path
+from postproc.compensation.sidecar import sidecar_path
 from postproc.files import (
     KRL_PROGRAMS,
     base_name,
@@ -40,7 +40,7 @@ _MAIN = re.compile(
 _OUTSIDE = re.compile(r"[/\\:\0]|^\.*$")  # folders, drives, ``..``
 
 
-def named_programs(text: bytes) -> tuple[dict[str, int], dict[str, int]]:
+def find_named_programs(text: bytes) -> tuple[dict[str, int], dict[str, int]]:
     r"""Find the programs that a program names.
 
     Args:
@@ -98,15 +98,15 @@ def of_one_arm(program: int, page: int) -> bool:
 
 
 def names_in(path: Path) -> tuple[dict[str, int], dict[str, int]]:
-    """Find the programs that a file names (`named_programs`), none if unreadable.
+    """Find the programs that a file names (`find_named_programs`), none if unreadable.
 
     The module with the main routine of a task names all modules beside it.
     """
     text = _read(path, -1)
     if data_list_of(path.name):
-        return _named_by_source(path.name, text), {}
+        return _name_sources(path.name, text), {}
     if not is_module(path.name):
-        return ({}, {}) if is_data_list(path.name) else named_programs(text)
+        return ({}, {}) if is_data_list(path.name) else find_named_programs(text)
     found = _MAIN.search(text)
     if found is None:
         return {}, {}
@@ -120,7 +120,7 @@ _CALLED = re.compile(  # a routine of KRL, alone on its line or by an interrupt
 )
 
 
-def _named_by_source(name: str, text: bytes) -> dict[str, int]:
+def _name_sources(name: str, text: bytes) -> dict[str, int]:
     """Name the data list of a source, and those sources that it may call."""
     found = {program_key(data_list_of(name)): 1}
     for call in _CALLED.finditer(text):

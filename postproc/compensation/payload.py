@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import Visits
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
@@ -39,14 +39,14 @@ def payload_of(
     return mass, centre
 
 
-def surveyed_loads(model: Model, cell: Cell) -> tuple[float, float]:
+def range_of_loads(model: Model, cell: Cell) -> tuple[float, float]:
     """Return the least and the largest load that is surveyed [kg], NaN if unknown."""
     return model.ranges.payload or (cell.payload_mass, cell.payload_mass)
 
 
 def beyond_survey(model: Model, cell: Cell, states: States) -> Bools:
     """Return where the load lies outside of what was surveyed, (n,)."""
-    low, high = surveyed_loads(model, cell)
+    low, high = range_of_loads(model, cell)
     load = np.broadcast_to(states.payload, (len(states),))
     margin = np.maximum(MARGIN, SHARE * load)
     found: Bools = (load < low - margin) | (load > high + margin)
@@ -55,7 +55,7 @@ def beyond_survey(model: Model, cell: Cell, states: States) -> Bools:
 
 def with_surveyed_load(model: Model, cell: Cell, states: States) -> States:
     """Return states whose loads are the nearest that were surveyed."""
-    low, high = surveyed_loads(model, cell)
+    low, high = range_of_loads(model, cell)
     near = np.clip(states.payload, low, high)
     return replace(states, payload=np.where(np.isnan(near), states.payload, near))
 
@@ -87,8 +87,8 @@ def load_error(model: Model, cell: Cell, states: States) -> Floats:
 
 def _usual_yield(cell: Cell, here: States, near: States) -> Floats:
     """Return how far soft joints may yield to a change of the load, (n, 3) [m]."""
-    batch = Batch(cell.arm, here)
-    torque = batch.loads.payload - Batch(cell.arm, near).loads.payload
+    batch = ArmStates(cell.arm, here)
+    torque = batch.loads.payload - ArmStates(cell.arm, near).loads.payload
     moved = batch.jacobian * (USUAL_SOFTNESS * torque)[:, None, :]
     return np.asarray(np.linalg.norm(moved, axis=2))
 
@@ -99,7 +99,7 @@ def load_reasons(model: Model, cell: Cell, states: States) -> dict[str, Bools]:
     error = np.linalg.norm(load_error(model, cell, states), axis=1) / MM
     if "payload" in model.bent:
         error[beyond_survey(model, cell, states)] = np.inf
-    low, high = surveyed_loads(model, cell)
+    low, high = range_of_loads(model, cell)
     text = (
         f"the load is outside of the surveyed {low:g} to {high:g} kg and adds more "
         f"than {most:g} mm to the standard error. Survey with such a load, or "

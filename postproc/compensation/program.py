@@ -19,23 +19,23 @@ from postproc.compensation.eligibility import (
 from postproc.compensation.options import Options
 from postproc.compensation.payload import payload_of
 from postproc.compensation.targets import targets_from_visits, with_tracks
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.languages import language_of
-from postproc.language.rewrite import Skeleton
+from postproc.language.number_edits import Skeleton
 from postproc.language.source import Edit, Source, source_from_bytes
 from postproc.language.visits import Diagnostic, Visits
+from postproc.model.backlash_width import play_of_model
 from postproc.model.model import Model
-from postproc.model.play import measured_play
+from postproc.motion.joint_path import NOWHERE, StartState
 from postproc.motion.planner import Plan, plan
 from postproc.motion.targets import Targets
-from postproc.motion.trace import NOWHERE, StartState
 from postproc.robot.cell import Cell
 from postproc.robot.direction import UNLED, Arrivals
 from postproc.robot.state import States, make_states
 
 
 @dataclass(frozen=True)
-class Reading:
+class ParsedProgram:
     """A program as the language understands it, or several side by side.
 
     Attributes:
@@ -79,7 +79,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedProgram:
     """A program as the controller would run it.
 
     Attributes:
@@ -99,7 +99,7 @@ class Planned:
     shift_variance: Floats
     doubtful: Bools
 
-    def wanted(self, rows: Ints) -> Floats:
+    def reference_poses(self, rows: Ints) -> Floats:
         """Return the TCP poses that should be reached at visits, (k, 4, 4) [m]."""
         poses = self.plan.tcp[rows]
         poses[:, :3, 3] += self.shift[rows]
@@ -144,11 +144,11 @@ def start_of(cell: Cell) -> Start:
 
 def with_measured_play(cell: Cell, model: Model) -> Cell:
     """Let directions be told by the gaps that the model found, not by a guess."""
-    arm = replace(cell.arm, play=measured_play(model, cell.arm))
+    arm = replace(cell.arm, play=play_of_model(model, cell.arm))
     return replace(cell, arm=arm)
 
 
-def prepared(cell: Cell, model: Model, options: Options) -> Cell:
+def prepare_cell(cell: Cell, model: Model, options: Options) -> Cell:
     """Let a cell know the model's play, and whether routines are assumed to move."""
     return with_measured_play(assuming(cell, options), model)
 
@@ -164,7 +164,7 @@ def read_program(
     files: Mapping[str, bytes],
     cell: Cell,
     known: Sequence[Any] = (),
-) -> Reading:
+) -> ParsedProgram:
     """Parse a program and resolve its visits.
 
     Args:
@@ -179,7 +179,7 @@ def read_program(
     sources = [source_from_bytes(name, data) for name, data in files.items()]
     language = language_of(sources[0].name)
     found = language.read(sources, start_of(cell), known)
-    return Reading(
+    return ParsedProgram(
         found.texts,
         with_tracks(found.visits, cell),
         found.diagnostics,
@@ -196,7 +196,7 @@ def plan_visits(
     begin: StartState = NOWHERE,
     lead: Arrivals = UNLED,
     doubtful: bool = False,
-) -> Planned:
+) -> PlannedProgram:
     """Plan every move of a program, with the time that it takes or without.
 
     Args:
@@ -216,7 +216,7 @@ def plan_visits(
     mark_orientation_interpolation(visits, targets, planned, reasons)
     mark_arcs(targets, planned, reasons)
     none = np.zeros((len(visits), 3))
-    return Planned(targets, planned, reasons, none, none, on)
+    return PlannedProgram(targets, planned, reasons, none, none, on)
 
 
 def states_of(

@@ -18,7 +18,7 @@ from postproc.compensation.pages import (
     program_arm,
     read_head,
 )
-from postproc.compensation.record import sidecar_path
+from postproc.compensation.sidecar import sidecar_path
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.files import (
@@ -88,7 +88,7 @@ def find_pages(program: Path) -> Pages:
     outputs = _is_output(program)
     programs = {program_key(p.name): p for p in files if _is_page(p, outputs)}
     programs |= {main: program}
-    named = {base: _named(path, main) for base, path in programs.items()}
+    named = {base: _list_named(path, main) for base, path in programs.items()}
     arms = {base: program_arm(read_head(path)) for base, path in programs.items()}
     apart = dict.fromkeys(values, "it has a variable file of its own")
     for base, arm in arms.items():
@@ -99,7 +99,7 @@ def find_pages(program: Path) -> Pages:
         for base, others in named.items()
     }
     pages = group_pages(alone).get(main, ())
-    notes += _left_out(programs, named, (main, *pages), apart)
+    notes += _list_omitted(programs, named, (main, *pages), apart)
     return Pages(tuple(programs[page] for page in pages), tuple(notes), reads)
 
 
@@ -113,7 +113,7 @@ def archive_notes(program: Path, cell: Cell) -> tuple[Diagnostic, ...]:
     notes: list[Diagnostic] = []
     if not is_program(program.name):
         return ()
-    arms = language_of(program.name).placed_arms(program)
+    arms = language_of(program.name).list_placed_arms(program)
     for name, pose in arms[cell.arm_number - 1 : cell.arm_number]:
         apart = np.abs(pose - cell.base.pose)
         if apart[:3, 3].max() > SAME_PLACE or apart[:3, :3].max() > SAME_TURN:
@@ -146,12 +146,12 @@ def _is_output(program: Path) -> bool:
     return read_stamp(read_head(program)) is not None or sidecar_path(program).is_file()
 
 
-def _named(path: Path, main: str) -> dict[str, int]:
+def _list_named(path: Path, main: str) -> dict[str, int]:
     """Return the programs that a program names, but for the main one, and the line."""
     return {name: line for name, line in names_in(path)[0].items() if name != main}
 
 
-def _left_out(
+def _list_omitted(
     programs: Mapping[str, Path],
     named: Mapping[str, Mapping[str, int]],
     followed: Sequence[str],
@@ -254,7 +254,7 @@ class ProgramFiles:
         """All bytes by name: the program first, its variable file last."""
         return name_files(self.name, self.source, self.variables, self.pages)
 
-    def told_of(self, cell: Cell) -> tuple[Diagnostic, ...]:
+    def report_omissions(self, cell: Cell) -> tuple[Diagnostic, ...]:
         """Say what is not followed, and what the program's backup knows of the arm."""
         if self.path is None:
             return self.notes

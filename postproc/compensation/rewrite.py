@@ -9,16 +9,16 @@ import numpy as np
 
 from postproc import __version__
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.decide import swings
+from postproc.compensation.decisions import limit_violations
 from postproc.compensation.equivalence import equivalent
-from postproc.compensation.parallel import in_background
-from postproc.compensation.program import Reading
-from postproc.compensation.record import FileRecord, Sidecar, block_checksums, sha256
-from postproc.compensation.shifts import shifted_values
+from postproc.compensation.program import ParsedProgram
+from postproc.compensation.shifts import shift_values
+from postproc.compensation.sidecar import FileRecord, Sidecar, block_checksums, sha256
+from postproc.compensation.workers import in_background
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
-from postproc.language.rewrite import Skeleton, difference
-from postproc.language.rewrite import edits as number_edits
+from postproc.language.number_edits import Skeleton, difference
+from postproc.language.number_edits import edits as number_edits
 from postproc.language.source import (
     UTF8_MARK,
     Edit,
@@ -30,7 +30,7 @@ from postproc.language.source import (
 )
 from postproc.language.stamp import stamp_line, stamp_place, stamp_span, strip_stamp
 from postproc.language.visits import Literals, Visits
-from postproc.motion.departure import Departure
+from postproc.motion.deviation import JointDeviation
 from postproc.robot.cell import LimitSection
 
 # The files that a compensation writes, and the record that undoes them.
@@ -62,7 +62,7 @@ class Output:
 
     def sidecar(
         self,
-        reading: Reading,
+        reading: ParsedProgram,
         model: str,
         options: Mapping[str, object],
         arrivals: Mapping[str, Mapping[str, object]],
@@ -87,7 +87,7 @@ class Output:
 
 
 def write_numbers(
-    reading: Reading, literals: Ints, values: Floats, model: str
+    reading: ParsedProgram, literals: Ints, values: Floats, model: str
 ) -> Output:
     """Write new numbers into a program's files.
 
@@ -106,7 +106,7 @@ def write_numbers(
 
 
 def write_edits(
-    reading: Reading, edits: tuple[Replacements, ...], model: str
+    reading: ParsedProgram, edits: tuple[Replacements, ...], model: str
 ) -> Output:
     """Make edits of numbers, file by file; as `write_numbers`."""
     nothing = not any(edits) and not any(reading.cloned)
@@ -124,7 +124,7 @@ def write_edits(
 
 
 def all_edits(
-    reading: Reading, edits: Sequence[Replacements]
+    reading: ParsedProgram, edits: Sequence[Replacements]
 ) -> Iterator[tuple[Source, Replacements]]:
     """Go through the files as they were given, with all that is changed in them."""
     for (source, cloned), own in zip(reading.originals, edits, strict=True):
@@ -141,7 +141,7 @@ def record(
     """Record how an output differs from its source, in the output's offsets."""
     stamped = Replacements.of([Edit(stamp, b"")])
     length = stamp.end - stamp.start
-    undone = Replacements.joined([stamped, edits.undone(source.data, length)])
+    undone = Replacements.join([stamped, edits.invert(source.data, length)])
     checksums = block_checksums(output)
     return FileRecord(sha256(source.data), sha256(output), checksums, undone, targets)
 
@@ -161,7 +161,7 @@ def read_back(visits: Visits, edited: Ints, edits: Sequence[Replacements]) -> Fl
         edits: The edits of their numbers, file by file.
     """
     values = np.array(visits.values)
-    new, changed = edited_numbers(visits.literals, edited, edits)
+    new, changed = read_edited(visits.literals, edited, edits)
     plain = visits.shift < 0
     rows, at = _among(visits.literal, edited, plain)
     values[rows] = np.where(changed[at], new[at], values[rows])
@@ -169,10 +169,10 @@ def read_back(visits: Visits, edited: Ints, edits: Sequence[Replacements]) -> Fl
     moved[at] = values[rows] - visits.values[rows]
     rows, at = _among(visits.follows, edited, plain)
     values[rows] += moved[at]
-    return shifted_values(visits, edited, np.where(changed, new, np.nan), values)
+    return shift_values(visits, edited, np.where(changed, new, np.nan), values)
 
 
-def edited_numbers(
+def read_edited(
     literals: Literals, edited: Ints, edits: Sequence[Replacements]
 ) -> tuple[Floats, Bools]:
     """Read the new numbers of some literals, (m, w), and tell which there are.
@@ -215,8 +215,8 @@ class VerificationError(PostprocError):
 
 
 def check_output(
-    before: Reading,
-    after: Reading,
+    before: ParsedProgram,
+    after: ParsedProgram,
     output: Output,
     edited: Ints,
     values: Floats,
@@ -240,7 +240,7 @@ def check_output(
         raise VerificationError(problem)
 
 
-def _in_texts(before: Reading, after: Reading, output: Output) -> str:
+def _in_texts(before: ParsedProgram, after: ParsedProgram, output: Output) -> str:
     """Say where the texts differ otherwise than by the edits, nothing if nowhere."""
     for old, new, edits in zip(before.texts, after.texts, output.edits, strict=True):
         name = old.source.name
@@ -261,7 +261,7 @@ def _in_text(old: Skeleton, new: Skeleton, edits: Replacements, stamped: bool) -
 # Our own output, planned again: the same motion, to the limits of the cell.
 
 
-def check_motion(visits: Visits, moved: Departure, limits: LimitSection) -> None:
+def check_motion(visits: Visits, moved: JointDeviation, limits: LimitSection) -> None:
     """Check that the arm moves as it did, but for what the cell's limits allow.
 
     Args:
@@ -273,7 +273,7 @@ def check_motion(visits: Visits, moved: Departure, limits: LimitSection) -> None
         VerificationError: A joint, the elbow or the wrist centre would swing too far,
             or the arm would stand on another branch.
     """
-    for text, far in swings(limits, moved).items():
+    for text, far in limit_violations(limits, moved).items():
         for row in np.flatnonzero(far)[:1].tolist():
             raise VerificationError(
                 f"{visits.files[visits.file[row]]}:{visits.line[row]}: {text} on the "

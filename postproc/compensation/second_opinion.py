@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.outcome import corrected_directions
+from postproc.compensation.outcome import directions_of_record
 from postproc.compensation.payload import payload_of
 from postproc.compensation.program import read_program
-from postproc.compensation.record import Sidecar
+from postproc.compensation.sidecar import Sidecar
 from postproc.compensation.targets import targets_from_visits
 from postproc.language.visits import Visits
 from postproc.motion.planner import plan
@@ -46,7 +46,7 @@ def second_opinion(
     require()
     before = _claim("source", read_program(source, cell).visits, cell)
     after = _claim("output", read_program(output, cell).visits, cell)
-    after = _corrected_for(after, before.visits, record)
+    after = _take_directions(after, before.visits, record)
     return judge(next(iter(source)), facts_of(cell), before, after, allowance)
 
 
@@ -107,12 +107,12 @@ def _torque(cell: Cell, q: Floats, load: Floats) -> Floats:
     return cell.arm.gravity_torque(q, load[:, 0], load[:, 1:])
 
 
-def _corrected_for(output: Claim, source: Visits, record: Sidecar) -> Claim:
+def _take_directions(output: Claim, source: Visits, record: Sidecar) -> Claim:
     """Take the directions that the record tells, where points were put on no way.
 
     They are those of the corrected program, so that the correction has not turned them.
     """
-    told = corrected_directions(source, record)
+    told = directions_of_record(source, record)
     if len(output) != len(source):
         return replace(output, own=np.empty(0, dtype=np.int64))
     if told is None:

@@ -87,12 +87,12 @@ def absorb(
     """
     shifts = visits.shifted
     new = origins(shifts, points.literal[chosen], points.values[chosen])
-    needed, off = shifts.needed(new, numbers[shifts.rows])
+    needed, off = shifts.find_shift(new, numbers[shifts.rows])
     own = shifts.literal >= 0
     rows, numbers = shifts.rows[own], np.array(numbers)
     stay = {
         TURNS: ~(off * LEVER_MM <= agree_mm),
-        FLAGS: _other_flags(shifts, shifts.carried(new, needed), numbers),
+        FLAGS: _other_flags(shifts, shifts.carry(new, needed), numbers),
     }
     numbers[rows] = 0.0
     numbers[rows, :NUMBERS] = needed[own]
@@ -127,7 +127,7 @@ def _changes(rows: Ints, moved: Floats, change: Floats) -> Floats:
     return out
 
 
-def shifted_values(
+def shift_values(
     visits: Visits, literals: Ints, values: Floats, numbers: Floats, own: bool = True
 ) -> Floats:
     """Give the numbers of all visits once points and shifts are written, (n, w).
@@ -150,5 +150,5 @@ def shifted_values(
     by[mine] = np.where(np.isnan(written), by[mine], written)
     moved = mine | (new != shifts.origin).any(axis=1)
     out = np.array(numbers)
-    out[shifts.rows[moved]] = shifts.carried(new, by)[moved]
+    out[shifts.rows[moved]] = shifts.carry(new, by)[moved]
     return out

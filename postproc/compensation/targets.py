@@ -51,7 +51,7 @@ def rounding_of(visits: Visits) -> tuple[Ints, Floats, Floats]:
     return rounding, np.maximum(distance, 0.0), np.clip(overlap, 0.0, 1.0)
 
 
-def rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
+def report_rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
     """Say once how far the path passes rounded fly points, and what was assumed.
 
     Args:
@@ -62,7 +62,7 @@ def rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
     if len(rows) == 0:
         return []
     found = [_note(visits, int(rows[0]), Code.FLY_ASSUMED, text)
-             for text in [_assumed(visits, rows)] if text]  # fmt: skip
+             for text in [_list_assumptions(visits, rows)] if text]  # fmt: skip
     far = rows[away[rows] > FAR]
     if len(far):
         worst = int(far[np.argmax(away[far])])
@@ -92,7 +92,7 @@ def unknown_blends(visits: Visits, corrected: Bools) -> list[Diagnostic]:
     return [_note(visits, int(found[0]), Code.FLY_UNKNOWN, text)]
 
 
-def _assumed(visits: Visits, rows: Ints) -> str:
+def _list_assumptions(visits: Visits, rows: Ints) -> str:
     """List what fly points take for granted."""
     cartesian = visits.blend[rows] == Blend.ZONE
     overlap = ~cartesian | (visits.motion[rows] == Motion.JOINT)
@@ -173,9 +173,9 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     outside = _auxiliary(visits, cell, reasons)
     _explain(visits, values, poses, reasons)
     lost = (outside | visits.tool_remote) & (kind != TargetKind.JOINTS)
-    lost |= _unplaced(kind, tcp, joints, frames)
+    lost |= _find_unplaced(kind, tcp, joints, frames)
     lost |= place_ends(visits, tcp, reasons)
-    lost |= _unnamed(visits, cell, reasons)
+    lost |= _mark_unnamed(visits, cell, reasons)
     slot, turns = visits.dialect.flags(visits.config, visits.configs, values)
     branch = np.where(visits.config_given & poses, slot, -1), turns
     places = np.where(lost, TargetKind.UNKNOWN, kind), tcp, joints
@@ -237,7 +237,7 @@ UNNAMED = Reason(
 )
 
 
-def _unnamed(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
+def _mark_unnamed(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
     """Mark joint moves to poses of arms whose branches no controller's flags name."""
     poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
     rows = poses & (visits.motion == Motion.JOINT) & (cell.arm.file.opw is None)
@@ -245,7 +245,7 @@ def _unnamed(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
     return np.asarray(rows)
 
 
-def _unplaced(kind: Ints, tcp: Floats, joints: Floats, frames: Frames) -> Bools:
+def _find_unplaced(kind: Ints, tcp: Floats, joints: Floats, frames: Frames) -> Bools:
     """Tell which targets miss a number or the tool that they need, (n,)."""
     placed = np.isin(kind, PLACED)
     in_joints = np.isin(kind, (TargetKind.JOINTS, TargetKind.JOINT_STEP))
@@ -255,7 +255,7 @@ def _unplaced(kind: Ints, tcp: Floats, joints: Floats, frames: Frames) -> Bools:
     return unknown | (in_joints & np.isnan(joints).any(axis=1))
 
 
-def moved_targets(targets: Targets, visits: Visits, cell: Cell, rows: Ints) -> Targets:
+def move_targets(targets: Targets, visits: Visits, cell: Cell, rows: Ints) -> Targets:
     """Express some visits anew, whose numbers have changed, and nothing else.
 
     Args:
@@ -266,12 +266,12 @@ def moved_targets(targets: Targets, visits: Visits, cell: Cell, rows: Ints) -> T
     """
     user, values = _user_frames(visits, rows), _values(visits, cell, rows)
     _, tcp, joints = _places(visits, user, values, rows)
-    found = targets.moved_to(rows, tcp, joints)
+    found = targets.move_to(rows, tcp, joints)
     arcs = ArcAngles.of(visits)
     arcs = arcs.among(np.isin(arcs.end, rows))
     if len(arcs) == 0:
         return found
-    return found.moved_to(arcs.end, arcs.ends(found.tcp), found.joints[arcs.end])
+    return found.move_to(arcs.end, arcs.ends(found.tcp), found.joints[arcs.end])
 
 
 def _frames(visits: Visits) -> Frames:

@@ -39,7 +39,7 @@ def line_parser(name: str, start: str) -> lark.Lark:
     """Return the LALR parser of a grammar, its tables from an earlier run if kept."""
     text = grammar(name)
     key = key_of(text, start, repr(_OPTIONS), lark.__version__, sys.version)
-    data = kept(key)
+    data = read_kept(key)
     if data is not None:
         with suppress(Exception):  # whatever is wrong with it, it can be made
             return lark.Lark.load(BytesIO(data))
@@ -82,7 +82,7 @@ def key_of(*parts: str) -> str:
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 
-def kept(key: str) -> bytes | None:
+def read_kept(key: str) -> bytes | None:
     """Return what was kept under a key; None where nothing whole of ours is there."""
     place = folder()
     if place is None:

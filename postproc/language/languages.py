@@ -7,7 +7,7 @@ from functools import cache
 from importlib import import_module
 
 from postproc.files import KRL_DATA, KRL_PROGRAMS, KRL_SUBMITS, MODULES
-from postproc.language.interface import Language
+from postproc.language.language import Language
 
 # Languages by the suffixes of their files; one is loaded when its first file is read.
 _PLACES = {
@@ -32,7 +32,7 @@ def language_of(file: str) -> Language:
     'KRL'
     """
     suffix = os.path.splitext(file)[1].lower()
-    return _loaded(_PLACES.get(suffix, _PLACES[_USUAL]))
+    return _load(_PLACES.get(suffix, _PLACES[_USUAL]))
 
 
 def language_of_text(text: bytes) -> Language:
@@ -43,11 +43,11 @@ def language_of_text(text: bytes) -> Language:
 
 def languages() -> tuple[Language, ...]:
     """Return all languages."""
-    return tuple(_loaded(place) for place in dict.fromkeys(_PLACES.values()))
+    return tuple(_load(place) for place in dict.fromkeys(_PLACES.values()))
 
 
 @cache
-def _loaded(place: str) -> Language:
+def _load(place: str) -> Language:
     module, _, name = place.partition(":")
     made: Language = getattr(import_module(module), name)()
     return made

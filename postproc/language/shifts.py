@@ -9,7 +9,7 @@ from enum import IntEnum
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.language.dialect import Dialect
+from postproc.language.pose_encoding import Dialect
 from postproc.robot.pose import MM, inverse, rotation_vector
 
 ANGLES = slice(3, 6)  # of the six numbers of a shift
@@ -59,7 +59,7 @@ class Shift:
         by = frames_of(np.array([inner.numbers]), dialect)[0]
         match inner.kind:
             case ShiftKind.AXES:
-                left = _moved_by(by[:3, 3]) @ left
+                left = _translation(by[:3, 3]) @ left
             case ShiftKind.OWN:
                 right = right @ by
             case ShiftKind.FRAME:
@@ -78,7 +78,7 @@ def _flat(pose: Floats) -> Pose:
     return tuple(pose.ravel().tolist())
 
 
-def _moved_by(place: Floats) -> Floats:
+def _translation(place: Floats) -> Floats:
     """Return the pose that only moves, (4, 4)."""
     out = np.eye(4)
     out[:3, 3] = place
@@ -149,7 +149,7 @@ class Shifts:
         """Return the number of shifted targets."""
         return len(self.rows)
 
-    def carried(self, origin: Floats, numbers: Floats) -> Floats:
+    def carry(self, origin: Floats, numbers: Floats) -> Floats:
         """Return the numbers of the targets, (k, w).
 
         Args:
@@ -157,18 +157,18 @@ class Shifts:
             numbers: Numbers of the shifts, (k, 6).
         """
         own, by = self.dialect.poses(origin), frames_of(numbers, self.dialect)
-        pose = self._linked(self.left @ own @ self.right, by)
+        pose = self._link(self.left @ own @ self.right, by)
         turn = pose[:, :3, :3] @ np.swapaxes(own[:, :3, :3], 1, 2)
         turned = np.abs(turn - np.eye(3)).max(axis=(1, 2), initial=0.0) > NO_TURN
         out = np.array(origin)
-        out[turned] = self.dialect.turned(out[turned], turn[turned])
+        out[turned] = self.dialect.rotate(out[turned], turn[turned])
         out[:, :3] = pose[:, :3, 3] / MM
         free = np.flatnonzero(~self.flagged)
         for flag in self.dialect.flag_columns:
             out[free, flag] = self.values[free, flag]
         return out
 
-    def _linked(self, inner: Floats, by: Floats) -> Floats:
+    def _link(self, inner: Floats, by: Floats) -> Floats:
         """Link points as they are shifted by others with frames, (k, 4, 4) each."""
         out = np.where((self.kind == ShiftKind.OWN)[:, None, None], inner @ by, inner)
         out = np.where((self.kind == ShiftKind.FRAME)[:, None, None], by @ inner, out)
@@ -176,7 +176,7 @@ class Shifts:
         out[axes, :3, 3] += by[axes, :3, 3]
         return np.asarray(out)
 
-    def needed(self, origin: Floats, wanted: Floats) -> tuple[Floats, Floats]:
+    def find_shift(self, origin: Floats, wanted: Floats) -> tuple[Floats, Floats]:
         """Find the numbers that lead from points to targets.
 
         Angles are written anew only where all three stand there and the target is to
@@ -192,7 +192,7 @@ class Shifts:
         """
         inner = self.left @ self.dialect.poses(origin) @ self.right
         to, numbers = self.dialect.poses(wanted), np.array(self.numbers)
-        off = self._turned_off(inner, to, numbers)
+        off = self._measure_turn(inner, to, numbers)
         rows = (off > TURNED) & self.turns & (self.kind != ShiftKind.AXES)
         rotation = np.where(
             (self.kind == ShiftKind.OWN)[:, None, None],
@@ -201,7 +201,7 @@ class Shifts:
         written = numbers[rows, ANGLES]
         numbers[rows, ANGLES] = self.dialect.shift_angles(rotation, written)
         numbers[:, :3] = self._way(inner, to, numbers) / MM
-        return numbers, self._turned_off(inner, to, numbers)
+        return numbers, self._measure_turn(inner, to, numbers)
 
     def _way(self, inner: Floats, to: Floats, numbers: Floats) -> Floats:
         """Return how far targets are shifted, along the axes of each, (k, 3) [m]."""
@@ -213,8 +213,8 @@ class Shifts:
         way = np.where(kind == ShiftKind.OWN, own, end - start)
         return np.asarray(np.where(kind == ShiftKind.FRAME, frame, way))
 
-    def _turned_off(self, inner: Floats, to: Floats, numbers: Floats) -> Floats:
+    def _measure_turn(self, inner: Floats, to: Floats, numbers: Floats) -> Floats:
         """Return what targets are turned otherwise than they should, (k,) [rad]."""
-        got = self._linked(inner, frames_of(numbers, self.dialect))[:, :3, :3]
+        got = self._link(inner, frames_of(numbers, self.dialect))[:, :3, :3]
         off = to[:, :3, :3] @ np.swapaxes(got, 1, 2)
         return np.asarray(np.linalg.norm(rotation_vector(off), axis=1))

@@ -60,7 +60,7 @@ class Replacements(Sequence[Edit]):
             raise ValueError("edits overlap or are not in ascending order")
 
     @classmethod
-    def joined(cls, parts: Sequence[Replacements]) -> Replacements:
+    def join(cls, parts: Sequence[Replacements]) -> Replacements:
         """Put edits one after the other."""
         last = max((int(p.end[-1]) for p in parts if len(p)), default=0)
         none = np.empty(0, dtype=np.int32 if last <= LAST else np.int64)
@@ -71,10 +71,10 @@ class Replacements(Sequence[Edit]):
         )
 
     @classmethod
-    def merged(cls, parts: Sequence[Replacements]) -> Replacements:
+    def merge(cls, parts: Sequence[Replacements]) -> Replacements:
         """Put edits together whatever their order."""
         if all(a.before(b) for a, b in pairwise(part for part in parts if len(part))):
-            return cls.joined(parts)
+            return cls.join(parts)
         start = np.concatenate([part.start for part in parts])
         end = np.concatenate([part.end for part in parts])
         new = np.concatenate([part.new for part in parts])
@@ -125,7 +125,7 @@ class Replacements(Sequence[Edit]):
         """
         return _native.weave(data, *self._columns())
 
-    def made(self, data: bytes, found: bytes, behind: int = 0) -> bool:
+    def reproduces(self, data: bytes, found: bytes, behind: int = 0) -> bool:
         """Tell whether a text is what comes of these edits of another, to the byte.
 
         Args:
@@ -145,7 +145,7 @@ class Replacements(Sequence[Edit]):
         start, end = (np.ascontiguousarray(c, np.int32) for c in (self.start, self.end))
         return start, end, as_bytes(self.new)
 
-    def undone(self, data: bytes, after: int = 0) -> Replacements:
+    def invert(self, data: bytes, after: int = 0) -> Replacements:
         """Return the edits of the result that give the text back.
 
         Args:
@@ -396,7 +396,7 @@ class CloneError(PostprocError):
     """A variable cannot be cloned safely; the text says why."""
 
 
-def inserted_after(source: Source, line: int, text: str) -> Edit:
+def insert_after(source: Source, line: int, text: str) -> Edit:
     """Insert a line (or several) behind another, with the line ending that it has.
 
     Raises:

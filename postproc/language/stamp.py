@@ -92,7 +92,7 @@ def _header_end(data: bytes) -> int:
 
 def read_stamp(data: bytes) -> Stamp | None:
     """Return the stamp on line 1 or behind a file header, None where there is none."""
-    found = _found(data)
+    found = _find_stamp(data)
     if found is None:
         return None
     return Stamp(
@@ -124,11 +124,11 @@ def strip_stamp(data: bytes) -> bytes:
 
 def stamp_span(data: bytes) -> Span:
     """Return where the stamp line stands; nothing at 0 where there is none."""
-    found = _found(data)
+    found = _find_stamp(data)
     return Span(*found.span()) if found else Span(0, 0)
 
 
-def _found(data: bytes) -> re.Match[bytes] | None:
+def _find_stamp(data: bytes) -> re.Match[bytes] | None:
     """Find the stamp behind the line of a module or the file header, or on line 1."""
     places = stamp_place(data), _header_end(data), 0
     found = (_STAMP.match(data, place) for place in places)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Indices, Ints, chunks, narrow, read_only
 from postproc.diagnostics import Code, Reason
-from postproc.language.dialect import Dialect
+from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import ANGLES, Shift, Shifts
 
 START = -1  # predecessor: wherever the arm stands when the program starts
@@ -122,7 +122,7 @@ class NumberPlaces:
     def of(cls, start: Indices, end: Indices) -> Self:
         """Take byte offsets, (m, w) each, -1 where a component is no number."""
         rows = chunks(max(len(start), 1))
-        return cls.joined([cls._of(start[k], end[k]) for k in rows])
+        return cls.join([cls._of(start[k], end[k]) for k in rows])
 
     @classmethod
     def _of(cls, start: Indices, end: Indices) -> Self:
@@ -134,7 +134,7 @@ class NumberPlaces:
         )
 
     @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
+    def join(cls, parts: Sequence[Self]) -> Self:
         """Put places one after the other."""
         columns = ([vars(part)[f.name] for part in parts] for f in fields(cls))
         return cls(*map(np.concatenate, columns))
@@ -401,7 +401,7 @@ class Diagnostic:
         return f"{self.file}:{self.line}: {self.code}: {self.message}"
 
 
-def told_once(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+def deduplicate(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Join findings that say the same of the same line, and say how often.
 
     A line that is reached several times, in a routine or a loop, gives one for every

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.pose import cross
 
 Motion = Literal["turn", "shift"]
@@ -56,7 +56,7 @@ class Carrier(NamedTuple):
         how = "turns about" if self.motion == "turn" else "shifts along"
         return f"{of} {how} the {AXES[self.axis]} of its frame"
 
-    def moved(self, batch: Batch) -> Floats:
+    def move(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position by the motion, (n, 3) [m/rad] or [1]."""
         if self.part == "joint":
             return np.asarray(batch.jacobian[:, :, self.link - 1])
@@ -66,13 +66,13 @@ class Carrier(NamedTuple):
         moved: Floats = cross(axis, batch.walk.tcp - self._origin(batch))
         return moved
 
-    def turned(self, batch: Batch) -> Floats | None:
+    def turn(self, batch: ArmStates) -> Floats | None:
         """Differentiate the tool's rotation by the motion, (n, 3), None without."""
         if self.part == "joint":
             return np.asarray(batch.angular[:, :, self.link - 1])
         return self._axis(batch) if self.motion == "turn" else None
 
-    def _axis(self, batch: Batch) -> Floats:
+    def _axis(self, batch: ArmStates) -> Floats:
         """Return the axis in the base frame, (n, 3)."""
         w, k = batch.walk, self.link - 1
         if self.part == "tool":
@@ -82,7 +82,7 @@ class Carrier(NamedTuple):
         x, z = w.link[:, k - 1], w.turn[:, k]
         return np.asarray((x, cross(z, x), z)[self.axis])
 
-    def _origin(self, batch: Batch) -> Floats:
+    def _origin(self, batch: ArmStates) -> Floats:
         """Return a point on the axis, (n, 3) [m]."""
         w = batch.walk
         if self.part == "tool":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.state import States
 
 JOINT_KINDS = (
@@ -23,7 +23,7 @@ CARRYING = 0.02  # of the largest torque: a joint that carries less cannot yield
 LEAST = {"temperature": 1.0, "payload": 1.0, "speed": 0.05}  # [K], [kg], [m/s]
 
 
-def covariate(batch: Batch, name: str) -> Floats:
+def covariate(batch: ArmStates, name: str) -> Floats:
     """Look up a covariate by its name, (n,), NaN where it is not known.
 
     Names are ``joint 5`` (its angle [rad]), ``drive 5`` (that of its coupled drive
@@ -68,7 +68,7 @@ def covariate(batch: Batch, name: str) -> Floats:
     raise ValueError(f"there is no covariate {name!r}")
 
 
-def by_weight(batch: Batch, name: str) -> Floats | None:
+def by_weight(batch: ArmStates, name: str) -> Floats | None:
     """Return a load per unit of the links' first moments, None of what is no load.
 
     Returns:
@@ -117,14 +117,14 @@ def varies_enough(states: States, kind: str) -> bool:
     return len(known) > 0 and float(np.ptp(known)) > LEAST[kind]
 
 
-def carrying(batch: Batch) -> tuple[int, ...]:
+def carrying(batch: ArmStates) -> tuple[int, ...]:
     """List the joints, 1 to 6, that carry weight worth the name."""
     torque = np.abs(batch.loads.gravity + batch.loads.payload).max(axis=0)
     enough = torque > CARRYING * float(torque.max(initial=0.0))
     return tuple(int(j) + 1 for j in np.flatnonzero(enough & (torque > 0)))
 
 
-def loops(batch: Batch, joint: int) -> Floats:
+def loops(batch: ArmStates, joint: int) -> Floats:
     """Measure the way of a joint (from 0) between its last two reversals, (n,) [rad].
 
     It follows from this visit and the one before it in the visit order; NaN where that
@@ -148,7 +148,7 @@ def loops(batch: Batch, joint: int) -> Floats:
     return out
 
 
-def sides_before(batch: Batch, joint: int) -> Floats:
+def sides_before(batch: ArmStates, joint: int) -> Floats:
     """Return the direction of a joint (from 0) at the visit before, NaN if missing."""
     s = batch.states
     order = np.argsort(s.order, kind="stable")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats
-from postproc.model.combination import Combination
-from postproc.model.kinematics import Batch
+from postproc.model.effect_sum import Combination
+from postproc.model.kinematics import ArmStates
 from postproc.model.variance import parameter_variance
 
 
@@ -25,7 +25,7 @@ class Doubt:
     effects: Combination
     covariance: Floats
 
-    def kept(self, own: Bools) -> Doubt:
+    def get_settings(self, own: Bools) -> Doubt:
         """Return it for a model of some of the parameters, (p,)."""
         both = np.append(own, np.ones(len(self.effects.parameters), dtype=bool))
         return Doubt(self.effects, self.covariance[np.ix_(both, both)])
@@ -41,11 +41,11 @@ class Doubt:
             self.effects, np.where(known, self.covariance[np.ix_(at, at)], 0.0)
         )
 
-    def scaled(self, factor: float) -> Doubt:
+    def rescale(self, factor: float) -> Doubt:
         """Multiply the covariance by a factor."""
         return Doubt(self.effects, factor * self.covariance)
 
-    def variance(self, own: Combination, at: Batch) -> Floats:
+    def variance(self, own: Combination, at: ArmStates) -> Floats:
         """Variance of the error, (n, 3) [m^2].
 
         Args:

@@ -67,7 +67,7 @@ class Walk:
     tcp: Floats
 
 
-def _turned(a: Floats, b: Floats, cos: Floats | float, sin: Floats | float) -> tuple:  # type: ignore[type-arg]
+def _turn_axes(a: Floats, b: Floats, cos: Floats | float, sin: Floats | float) -> tuple:  # type: ignore[type-arg]
     """Turn the orthogonal axes a towards b by an angle, about a x b."""
     return cos * a + sin * b, cos * b - sin * a
 
@@ -79,7 +79,7 @@ def _base(deviation: Deviation) -> tuple[Floats, Floats]:
         i, j = (k + 1) % 3, (k + 2) % 3
         angle = deviation.base[3 + k]
         about[k] = axes[:, k]
-        axes[:, i], axes[:, j] = _turned(
+        axes[:, i], axes[:, j] = _turn_axes(
             axes[:, i].copy(), axes[:, j].copy(), np.cos(angle), np.sin(angle)
         )
     return axes, about
@@ -91,7 +91,7 @@ def base_of(deviation: Deviation) -> Floats:
     return np.concatenate([axes.T, about, deviation.base[None, :3]])
 
 
-def deviated(dh: DH, deviation: Deviation) -> DH:
+def deviate(dh: DH, deviation: Deviation) -> DH:
     """Return the real parameters, but for base, tool and Hayati's rotations."""
     da, dd, dalpha, dtheta, _ = deviation.link.T
     return replace(
@@ -119,12 +119,12 @@ def walk(dh: DH, q: Floats, tool: Floats, deviation: Deviation = NOMINAL) -> Wal
         da, dd, dalpha, _, beta = deviation.link[i]
         alpha = dh.alpha[i] + dalpha
         turn[i], pivot[i] = z, p
-        x, y = _turned(x, y, cos[i], sin[i])
+        x, y = _turn_axes(x, y, cos[i], sin[i])
         p = p + (dh.d[i] + dd) * z + (dh.a[i] + da) * x
-        y, z = _turned(y, z, np.cos(alpha), np.sin(alpha))
+        y, z = _turn_axes(y, z, np.cos(alpha), np.sin(alpha))
         link[i], corner[i], bend[i] = x, p, y
         if beta != 0.0:
-            z, x = _turned(z, x, np.cos(beta), np.sin(beta))
+            z, x = _turn_axes(z, x, np.cos(beta), np.sin(beta))
     flange, (tx, ty, tz) = np.stack([x, y, z]), (tool + deviation.tool).T
     tcp = p + (x * tx + y * ty + z * tz)
     point = np.array(deviation.base[:3])
@@ -144,8 +144,8 @@ def tcp(dh: DH, q: Floats, tool: Floats, deviation: Deviation = NOMINAL) -> Floa
         deviation: Deviations of the placements.
     """
     axes, _ = _base(deviation)
-    real, beta = deviated(dh, deviation), deviation.link[:, 4]
-    placed = real.placed(q, tool + deviation.tool, beta)
+    real, beta = deviate(dh, deviation), deviation.link[:, 4]
+    placed = real.place(q, tool + deviation.tool, beta)
     moved: Floats = placed @ axes.T + deviation.base[:3]
     return moved
 
@@ -217,7 +217,7 @@ class Loads:
 
 
 @dataclass(eq=False)
-class Batch:
+class ArmStates:
     """States of an arm, with what effects need of its kinematics.
 
     Attributes:
@@ -242,16 +242,16 @@ class Batch:
         """Return the number of states."""
         return len(self.states)
 
-    def moved(self, deviation: Deviation, shift: Floats | None) -> Batch:
+    def move(self, deviation: Deviation, shift: Floats | None) -> ArmStates:
         """Return the same states with the kinematics taken at a deviated arm."""
-        return self._beside(Batch(self.arm, self.states, deviation, shift))
+        return self._beside(ArmStates(self.arm, self.states, deviation, shift))
 
-    def arriving(self, direction: Floats) -> Batch:
+    def arriving(self, direction: Floats) -> ArmStates:
         """Return the same poses reached from other sides, (n, 6)."""
         states = self.states.with_(direction=direction)
-        return self._beside(Batch(self.arm, states, self.deviation, self.shift))
+        return self._beside(ArmStates(self.arm, states, self.deviation, self.shift))
 
-    def _beside(self, batch: Batch) -> Batch:
+    def _beside(self, batch: ArmStates) -> ArmStates:
         """Share what depends on the nominal poses alone."""
         batch.loads, batch.known = self.loads, self.known
         return batch
@@ -285,10 +285,10 @@ class Batch:
             return self.walk.tcp
         return tcp(self.arm.dh, self.angles, self.states.tool, self.deviation)
 
-    def __getitem__(self, rows: NDArray[np.int64]) -> Batch:
+    def __getitem__(self, rows: NDArray[np.int64]) -> ArmStates:
         """Return some of the states, with the kinematics taken at the same arm."""
         shift = None if self.shift is None else self.shift[rows]
-        return Batch(self.arm, self.states[rows], self.deviation, shift)
+        return ArmStates(self.arm, self.states[rows], self.deviation, shift)
 
     @cached_property
     def jacobian(self) -> Floats:

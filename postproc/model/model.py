@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, all_in_rows, any_in_rows, chunks, in_chunks
+from postproc.arrays import Bools, Floats, all_in_rows, any_in_rows, chunks, map_chunks
 from postproc.exceptions import ModelError
 from postproc.files import write_all
-from postproc.model.combination import Combination
 from postproc.model.doubt import Doubt
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import restore
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model_file import (
     FORMAT,
     DoubtSection,
@@ -26,15 +26,15 @@ from postproc.model.model_file import (
     ModelFile,
     RegistrationSection,
     content_id,
-    packed,
+    pack_symmetric,
     parse_model_file,
     read_model_file,
     square_of,
 )
 from postproc.model.noise import Noise
 from postproc.model.provenance import Provenance
-from postproc.model.ranges import Ranges
 from postproc.model.registration import Registration
+from postproc.model.validity import Ranges
 from postproc.model.variance import (
     beyond_variance,
     moment_variance,
@@ -184,7 +184,7 @@ class Model:
     def in_motion(self) -> dict[str, str]:
         """What the newest measured path says of joints ("1" to "6") in motion.
 
-        Empty where none was measured; see `compensation.paths.flanks` for verdicts.
+        Empty where none was measured; see `paths.backlash_steps` for verdicts.
         """
         told = (r["in_motion"] for r in reversed(self.history) if "in_motion" in r)
         return dict(next(told, {}))
@@ -204,7 +204,7 @@ class Model:
     def bent(self) -> frozenset[str]:
         """Covariates that drive compensated effects by laws that are no lines."""
         used = self.compensable()[0].effects
-        return frozenset(name for e in used for name in e.bent_by())
+        return frozenset(name for e in used for name in e.list_nonlinear_drivers())
 
     def compensable(self) -> tuple[Combination, Floats, Floats]:
         """Return the effects that may be compensated, their values and covariance."""
@@ -237,8 +237,8 @@ class Model:
     def error(self, arm: Arm, states: States) -> Floats:
         """Predict the error without its uncertainty, (n, 3) [m]."""
         effects, values, _ = self.compensable()
-        parts = in_chunks(
-            lambda rows: effects.error(Batch(arm, states[rows]), values),
+        parts = map_chunks(
+            lambda rows: effects.error(ArmStates(arm, states[rows]), values),
             len(states),
             CHUNK,
         )
@@ -252,8 +252,8 @@ class Model:
     def shares(self, arm: Arm, states: States) -> Floats:
         """Split the error into the shares of the effects, (n, k, 3) [m], base frame."""
         effects, values, _ = self.compensable()
-        parts = in_chunks(
-            lambda rows: effects.shares(Batch(arm, states[rows]), values),
+        parts = map_chunks(
+            lambda rows: effects.shares(ArmStates(arm, states[rows]), values),
             len(states),
             CHUNK,
         )
@@ -269,7 +269,7 @@ class Model:
         """Tell what free forms have in the predicted errors, and how sure that is."""
         if not self.free_forms:
             return FreePart((), np.zeros((len(states), 3)), np.zeros((len(states), 3)))
-        parts = in_chunks(
+        parts = map_chunks(
             lambda rows: self._free_part(arm, states[rows]), len(states), CHUNK
         )
         nothing = (np.zeros((0, 3)), np.zeros((0, 3)))
@@ -280,7 +280,7 @@ class Model:
         """Evaluate free forms alone: errors and standard errors, (n, 3) [m] each."""
         effects, values, covariance = self.compensable()
         free, own = effects.free
-        batch = Batch(arm, states)
+        batch = ArmStates(arm, states)
         at = effects.at(batch, values)
         prior_std = self.prior_std[self.effects.where(*COMPENSATED)][own]
         variance = side_variance(free, at, values[own])
@@ -288,9 +288,9 @@ class Model:
         variance += parameter_variance(free, at, covariance[np.ix_(own, own)])
         return free.error(batch, values[own]), np.sqrt(np.maximum(variance, 0.0))
 
-    def measured_error(self, arm: Arm, states: States) -> Floats:
+    def predict_measured(self, arm: Arm, states: States) -> Floats:
         """Predict what the survey's set-up would measure, (n, 3) [m]."""
-        return self.effects.error(Batch(arm, states), self.values)
+        return self.effects.error(ArmStates(arm, states), self.values)
 
     def predict(self, arm: Arm, states: States) -> Prediction:
         """Predict the error that may be compensated, and how sure it is.
@@ -304,14 +304,14 @@ class Model:
             arrival[rows] = model[rows] + self.noise.arrival_variance(at.jacobian)
         model, arrival = (np.sqrt(np.maximum(v, 0.0)) for v in (model, arrival))
         outside = self.ranges.outside(states, self.needs, self.bent)
-        unsure = _on_flanks(states) & any_in_rows(model > self._sure_up_to)
+        unsure = _on_flanks(states) & any_in_rows(model > self._certain_up_to)
         if unsure.any():
             outside[UNSURE] = unsure
         return Prediction(self.error(arm, states), model, arrival, outside)
 
     def std_error(self, arm: Arm, states: States) -> Floats:
         """Standard error of the predicted error, (n, 3) [m], as `predict` gives it."""
-        parts = in_chunks(
+        parts = map_chunks(
             lambda rows: self._variance(arm, states[rows])[0], len(states), CHUNK
         )
         variance = np.concatenate([np.zeros((0, 3)), *parts])
@@ -324,7 +324,7 @@ class Model:
         """
         out = np.full((len(states), 3), np.nan)
         rows = np.flatnonzero(_on_flanks(states))
-        if len(rows) and np.isfinite(self._sure_up_to):
+        if len(rows) and np.isfinite(self._certain_up_to):
             out[rows] = self.std_error(arm, states[rows])
         return out
 
@@ -337,24 +337,24 @@ class Model:
         Args:
             std_on_flanks: Of the states, (n, 3) [m], see above.
         """
-        return any_in_rows(std_on_flanks > self._sure_up_to)
+        return any_in_rows(std_on_flanks > self._certain_up_to)
 
     @property
-    def _sure_up_to(self) -> float:
+    def _certain_up_to(self) -> float:
         """Standard error per axis up to which the survey vouches for it [m]."""
         return 3 * (self.statistics.get(WORST_STD, np.inf) * MM)
 
-    def _variance(self, arm: Arm, states: States) -> tuple[Floats, Batch]:
+    def _variance(self, arm: Arm, states: States) -> tuple[Floats, ArmStates]:
         """Variance of the error, (n, 3) [m^2], and the kinematics that it is of."""
         effects, values, covariance = self.compensable()
-        at = effects.at(Batch(arm, states), values)
-        variance = self.untold_variance(effects, at, values)
+        at = effects.at(ArmStates(arm, states), values)
+        variance = self.unmodelled_variance(effects, at, values)
         if len(covariance):
             variance += parameter_variance(effects, at, covariance)
         return variance, at
 
-    def untold_variance(
-        self, effects: Combination, at: Batch, values: Floats
+    def unmodelled_variance(
+        self, effects: Combination, at: ArmStates, values: Floats
     ) -> Floats:
         """Variance that the parameters' covariance does not hold, (n, 3) [m^2].
 
@@ -382,7 +382,7 @@ class Model:
         assert self.doubt is not None
         if effects is self.effects:
             return self.doubt
-        return self.doubt.kept(self.effects.where(*COMPENSATED))
+        return self.doubt.get_settings(self.effects.where(*COMPENSATED))
 
     def without_clock(self, known: Collection[str]) -> Model:
         """Return it for rows of an unknown moment: what passes with time at its mean.
@@ -399,7 +399,7 @@ class Model:
         All effects count, those of the set-up too: what nobody can know of base and
         probe apart is known of their sum, which is what is read.
         """
-        parts = in_chunks(
+        parts = map_chunks(
             lambda rows: self._read(arm, states[rows]), len(states), CHUNK
         )
         nothing = PredictedReading(np.zeros((0, 3)), np.zeros((0, 3)))
@@ -408,15 +408,15 @@ class Model:
 
     def _read(self, arm: Arm, states: States) -> PredictedReading:
         """Predict some readings."""
-        batch = Batch(arm, states)
+        batch = ArmStates(arm, states)
         at = self.effects.at(batch, self.values)
-        known = self.untold_variance(self.effects, at, self.values)
+        known = self.unmodelled_variance(self.effects, at, self.values)
         if len(self.covariance):
             known = known + parameter_variance(self.effects, at, self.covariance)
         error = self.effects.error_at(at, batch, self.values)
         return PredictedReading(error, self.reading_std(at, known))
 
-    def reading_std(self, at: Batch, known: Floats) -> Floats:
+    def reading_std(self, at: ArmStates, known: Floats) -> Floats:
         """Standard deviation of one row, the mean of its readings, (n, 3) [m].
 
         Args:
@@ -447,8 +447,8 @@ class Model:
         if apart > TILTED:
             raise ModelError(
                 path,
-                f"was fitted with weight along {_listed(self.weight)} in the base "
-                f"frame of the arm, {apart:.0f} deg from {_listed(arm.weight)} as the "
+                f"was fitted with weight along {_format(self.weight)} in the base "
+                f"frame of the arm, {apart:.0f} deg from {_format(arm.weight)} as the "
                 "cell has it",
                 "Correct mounting under [robot], or [base], of the cell; an arm that "
                 "was mounted in another way needs a survey of its own",
@@ -465,7 +465,7 @@ class Model:
             "arm": {"name": self.arm_name, "id": self.arm_id},
             "data_sha256": self.data_sha256,
             "rows": self.rows,
-            "effects": _listed_effects(self.effects),
+            "effects": _list_effects(self.effects),
             "parameters": [
                 {
                     "name": name,
@@ -478,7 +478,7 @@ class Model:
                     zip(self.effects.names, self.effects.parameters, strict=True)
                 )
             ],
-            "covariance": packed(self.covariance),
+            "covariance": pack_symmetric(self.covariance),
             "spread": list(self.spread),
             "noise": asdict(self.noise),
             "ranges": asdict(self.ranges),
@@ -502,8 +502,8 @@ class Model:
             data["provenance"] = asdict(self.provenance)
         if self.doubt is not None:
             data["doubt"] = {
-                "effects": _listed_effects(self.doubt.effects),
-                "covariance": packed(self.doubt.covariance),
+                "effects": _list_effects(self.doubt.effects),
+                "covariance": pack_symmetric(self.doubt.covariance),
             }
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
@@ -620,7 +620,7 @@ def _doubt_of(path: Path, section: DoubtSection, count: int) -> Doubt:
     return Doubt(effects, square_of(np.array(section.covariance), size))
 
 
-def _listed_effects(effects: Combination) -> list[dict[str, Any]]:
+def _list_effects(effects: Combination) -> list[dict[str, Any]]:
     """Write effects as a file holds them."""
     return [{"name": e.name, "settings": e.settings()} for e in effects.effects]
 
@@ -636,7 +636,7 @@ def _degrees_between(a: Floats, b: Floats) -> float:
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
 
 
-def _listed(direction: Direction | Floats) -> str:
+def _format(direction: Direction | Floats) -> str:
     """Write a direction.
 
     >>> _listed((0.0, -0.0, -1.0))

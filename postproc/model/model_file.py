@@ -73,7 +73,7 @@ class NoiseSection(ModelSection):
 
 
 class RangesSection(ModelSection):
-    """The ranges of `postproc.model.ranges.Ranges`."""
+    """The ranges of `postproc.model.validity.Ranges`."""
 
     lower: tuple[float, ...] = Field(min_length=6, max_length=6)
     upper: tuple[float, ...] = Field(min_length=6, max_length=6)
@@ -267,7 +267,7 @@ def parse_model_file(path: Path, raw: bytes) -> ModelFile:
     return file
 
 
-def packed(square: Floats) -> list[float]:
+def pack_symmetric(square: Floats) -> list[float]:
     """Pack a symmetric matrix as its upper triangle, row by row."""
     upper: list[float] = square[np.triu_indices(len(square))].tolist()
     return upper

@@ -45,18 +45,18 @@ class Noise:
 
     def arrival_variance(self, jacobian: Floats) -> Floats:
         """Variance per axis of one arrival, (n, 3) [m^2]."""
-        return _seen_through(jacobian, self.joint, self.stop)
+        return _propagate_angle(jacobian, self.joint, self.stop)
 
     def pose_variance(self, jacobian: Floats) -> Floats:
         """Variance per axis of a pose that was not measured, (n, 3) [m^2]."""
-        return _seen_through(jacobian, self.pose_joint, self.pose)
+        return _propagate_angle(jacobian, self.pose_joint, self.pose)
 
     def rounding_variance(self, q: Floats, jacobian: Floats) -> Floats:
         """Variance per axis of rows with joint angles q (n, 6) [rad], (n, 3) [m^2]."""
         rounding = self.rounding if self.rounding and angle_step(q) else 0.0
-        return _seen_through(jacobian, rounding, 0.0)
+        return _propagate_angle(jacobian, rounding, 0.0)
 
-    def scaled(self, factor: float) -> Noise:
+    def rescale(self, factor: float) -> Noise:
         """Multiply the scatter of stops and poses, rounding aside, by a factor."""
         return replace(
             self, joint=factor * self.joint, stop=factor * self.stop,
@@ -81,7 +81,7 @@ def angle_step(q: Floats) -> float:
     return 0.0
 
 
-def _seen_through(jacobian: Floats, joint: float, shift: float) -> Floats:
+def _propagate_angle(jacobian: Floats, joint: float, shift: float) -> Floats:
     """Variance per axis of joint angles and of a shift, (n, 3) [m^2]."""
     square: Floats = np.einsum("nij,nij->ni", jacobian, jacobian)
     return joint**2 * square + shift**2

@@ -40,11 +40,11 @@ class Splines:
         """Return them at some of the places."""
         return Splines(self.first[rows], self.weight[rows])
 
-    def faded(self, by: Floats) -> Splines:
+    def fade(self, by: Floats) -> Splines:
         """Multiply all of them by a number at every place, (n,)."""
         return replace(self, weight=self.weight * by[:, None])
 
-    def mixed(self, mix: Floats) -> Floats:
+    def combine(self, mix: Floats) -> Floats:
         """Sum them times mix, (points,) or (points, k): (n,) or (n, k)."""
         total = np.zeros((len(self.first), *mix.shape[1:]))
         for k in range(ORDER + 1):

@@ -6,15 +6,17 @@ import numpy as np
 
 from postproc import _native
 from postproc.arrays import Floats, any_in_rows
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects.effect import JointEffect
 from postproc.model.effects.geometry import Geometry
-from postproc.model.kinematics import Batch, base_of, deviated
+from postproc.model.kinematics import ArmStates, base_of, deviate
 
 NONE = np.empty(0, dtype=np.int64)
 
 
-def parameter_variance(effects: Combination, at: Batch, covariance: Floats) -> Floats:
+def parameter_variance(
+    effects: Combination, at: ArmStates, covariance: Floats
+) -> Floats:
     """Variance that uncertain parameters give, (n, 3) [m^2].
 
     Args:
@@ -32,7 +34,9 @@ def parameter_variance(effects: Combination, at: Batch, covariance: Floats) -> F
     return np.asarray(summed.reshape(3, -1).T)
 
 
-def _variance_by_joints(effects: Combination, at: Batch, covariance: Floats) -> Floats:
+def _variance_by_joints(
+    effects: Combination, at: ArmStates, covariance: Floats
+) -> Floats:
     """Do it for one geometry and joint effects, whose columns are the Jacobian's."""
     parts = list(zip(effects.effects, effects.slices, strict=True))
     ((geometry, first),) = [(e, s) for e, s in parts if isinstance(e, Geometry)]
@@ -46,7 +50,7 @@ def _variance_by_joints(effects: Combination, at: Batch, covariance: Floats) -> 
     basis = np.ascontiguousarray(np.concatenate(given, axis=1)[:, by_joint])
     tool = at.states.tool + at.deviation.tool
     return _native.variance(
-        deviated(at.arm.dh, at.deviation).packed(at.deviation.link[:, 4]),
+        deviate(at.arm.dh, at.deviation).pack(at.deviation.link[:, 4]),
         base_of(at.deviation),
         (np.ascontiguousarray(at.angles), np.ascontiguousarray(tool)),
         (geometry.base, geometry.links, True),
@@ -55,7 +59,7 @@ def _variance_by_joints(effects: Combination, at: Batch, covariance: Floats) -> 
     )
 
 
-def side_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
+def side_variance(effects: Combination, at: ArmStates, values: Floats) -> Floats:
     """Variance that unknown directions give, (n, 3) [m^2]."""
     unknown = 1.0 - np.clip(at.states.direction, -1.0, 1.0) ** 2
     out = np.zeros((len(at), 3))
@@ -66,7 +70,7 @@ def side_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
     return out
 
 
-def beyond_variance(effects: Combination, at: Batch, prior_std: Floats) -> Floats:
+def beyond_variance(effects: Combination, at: ArmStates, prior_std: Floats) -> Floats:
     """Variance that free forms may have beyond the surveyed ranges, (n, 3) [m^2].
 
     Args:
@@ -82,7 +86,7 @@ def beyond_variance(effects: Combination, at: Batch, prior_std: Floats) -> Float
     return out
 
 
-def moment_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
+def moment_variance(effects: Combination, at: ArmStates, values: Floats) -> Floats:
     """Variance that an unknown moment of the survey gives, (n, 3) [m^2]."""
     out = np.zeros((len(at), 3))
     for effect, part in zip(effects.effects, effects.slices, strict=True):
@@ -92,7 +96,7 @@ def moment_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
     return out
 
 
-def unknown_variance(effects: Combination, at: Batch) -> Floats:
+def unknown_variance(effects: Combination, at: ArmStates) -> Floats:
     """Variance that what no row of the survey shows gives, (n, 3) [m^2]."""
     out = np.zeros((len(at), 3))
     for effect in effects.effects:

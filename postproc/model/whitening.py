@@ -25,7 +25,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.noise import Noise, groups_of, poses_of, tracker_shape
 from postproc.robot.state import States
 
@@ -228,7 +228,7 @@ class Whitener:
     @classmethod
     def build(
         cls,
-        batch: Batch,
+        batch: ArmStates,
         position: Floats,
         origin: tuple[float, float, float] | None,
         extra: Floats | None = None,
@@ -301,17 +301,17 @@ class Whitener:
         scale: Floats = np.sqrt(weight[:, None] / v)
         logs = np.where(used[:, None], np.log(v), 0.0)
         log_det, parts = self.readings.log_noise(noise.tracker), []
-        for block in self.correlated(noise):
+        for block in self.find_correlated(noise):
             V = block.covariance(noise, self.own_variance(noise))
             log_det += _log_det(V, used[block.rows]) - float(logs[block.rows].sum())
             inflated = V + _inflation(v[block.rows], weight[block.rows])
-            root = _inverse_root(_masked(inflated, used[block.rows]))
+            root = _inverse_root(_mask_rows(inflated, used[block.rows]))
             there = np.repeat(used[block.rows], 3, axis=1)
             parts.append((block.rows, root * (there[:, :, None] & there[:, None])))
             scale[block.rows] = 1.0
         return Whitening(scale, RowBlocks(tuple(parts)), log_det + float(logs.sum()))
 
-    def correlated(self, noise: Noise) -> tuple[PoseBlock, ...]:
+    def find_correlated(self, noise: Noise) -> tuple[PoseBlock, ...]:
         """Return the poses whose rows must be taken together."""
         shared = noise.pose_joint**2 * self.joint + noise.pose**2
         if float(shared.mean()) > NO_POSE * float(self.variance(noise).mean()):
@@ -334,10 +334,10 @@ class Whitener:
         """
         alone: Floats = np.sqrt((rotated**2 / self.variance(noise)).sum(axis=1))
         out = np.array(alone)
-        for block in self.correlated(noise):
+        for block in self.find_correlated(noise):
             V = block.covariance(noise, self.own_variance(noise))
             used = weight[block.rows] > 0
-            off = _given_others(V, rotated[block.rows], used)
+            off = _condition_on_others(V, rotated[block.rows], used)
             worst = (alone[block.rows] * used).max(axis=1, keepdims=True)
             asked = ~used | (alone[block.rows] >= worst)
             out[block.rows] = np.where(
@@ -389,7 +389,7 @@ def _inflation(v: Floats, weight: Floats) -> Floats:
     return out
 
 
-def _masked(V: Floats, used: Bools) -> Floats:
+def _mask_rows(V: Floats, used: Bools) -> Floats:
     """Take rows out of covariances: they have unit variance, and no other row's.
 
     Args:
@@ -413,10 +413,10 @@ def _inverse_root(V: Floats) -> Floats:
 
 def _log_det(V: Floats, used: Bools) -> float:
     """Sum log determinants of covariances of the rows that are used."""
-    return float(np.linalg.slogdet(_masked(V, used))[1].sum())
+    return float(np.linalg.slogdet(_mask_rows(V, used))[1].sum())
 
 
-def _given_others(V: Floats, rotated: Floats, used: Bools) -> Floats:
+def _condition_on_others(V: Floats, rotated: Floats, used: Bools) -> Floats:
     """Measure rows against what the other used rows of their pose make likely.
 
     Args:
@@ -439,7 +439,7 @@ def _given_others(V: Floats, rotated: Floats, used: Bools) -> Floats:
 def _distances_of(V: Floats, rotated: Floats, asked: Bools) -> Floats:
     """Measure each of some rows against the others of them, (groups, m)."""
     count, m = asked.shape
-    P = np.linalg.inv(_masked(V, asked))
+    P = np.linalg.inv(_mask_rows(V, asked))
     kept = rotated.reshape(count, -1) * np.repeat(asked, 3, axis=1)
     pulled = np.einsum("gij,gj->gi", P, kept).reshape(count, m, 3)
     k = np.arange(m)

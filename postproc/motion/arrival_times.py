@@ -54,7 +54,7 @@ class Trajectory:
     begins: Bools
     visit: Ints
 
-    def sampled(self, step: float) -> tuple[Floats, Ints]:
+    def sample(self, step: float) -> tuple[Floats, Ints]:
         """Sample the runs at least so often, up to the end of each interval.
 
         Between waypoints each joint goes on a cubic that does not turn there (Fritsch

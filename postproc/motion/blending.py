@@ -16,11 +16,11 @@ from postproc.arrays import (
     few_rows,
     floats,
 )
+from postproc.motion.joint_path import Trace
 from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly, Targets
-from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
-from postproc.robot.play import Edges
+from postproc.robot.backlash_operator import Edges
 from postproc.robot.trajectory import Motion
 
 # Which fly points are rounded, and how much of the neighbouring moves that takes.
@@ -229,17 +229,17 @@ class Corners:
 
 def corners(arm: Arm, targets: Targets, traced: Trace) -> Corners:
     """Find all corners and where the path passes them."""
-    return _passed(arm, targets, traced, zones(arm, targets, traced))
+    return _pass_corners(arm, targets, traced, zones(arm, targets, traced))
 
 
-def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
+def _pass_corners(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
     """Find where the path passes some corners, and keep to their tolerances."""
     tool = targets.tool.take(found.visit, axis=0)[:, :3, 3]
     point = _tcp(traced.flange.take(found.visit, axis=0), tool)
     within = targets.rounding[found.visit] == Fly.WITHIN
     wanted = np.where(within, targets.fly_distance[found.visit], np.inf)
     before, behind, nearest, q, aside, bend = _native.passed(
-        arm.dh.packed(), traced.edges, traced.q, found, floats(tool), point, wanted,
+        arm.dh.pack(), traced.edges, traced.q, found, floats(tool), point, wanted,
     )  # fmt: skip
     found = replace(found, before=before, behind=behind)
     return Corners(found, nearest, q, aside, bend)
@@ -297,7 +297,7 @@ def blend(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Trac
     pieces = _pieces(traced, found)
     if not timed:
         pieces.count[:, _one_way(arm, traced, found)] = ONE_SAMPLE
-    edges, share = _resampled(traced, found, pieces)
+    edges, share = _resample(traced, found, pieces)
     pull = _pull(targets, traced, found)
     return replace(traced, q=q, aside=aside, edges=edges, share=share, pull=pull)
 
@@ -352,7 +352,7 @@ def _pieces(traced: Trace, found: Corners) -> _Pieces:
     return _Pieces(corner, begin, end, count)
 
 
-def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, Floats]:
+def _resample(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, Floats]:
     """Sample all edges anew; return them and their samples' share of the way."""
     touched = np.asarray((pieces.corner >= 0).any(axis=0))
     start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])

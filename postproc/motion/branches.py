@@ -120,7 +120,7 @@ def nearest_turns(q: Floats, near: Floats) -> Floats:
     return turned
 
 
-def unwrapped(q: Floats) -> Floats:
+def unwrap_samples(q: Floats) -> Floats:
     """Put samples (k, 6) [rad] on the turns that continue the first one.
 
     By whole turns from where they are given: it does not matter where one begins.
@@ -145,7 +145,7 @@ def nearest_slots(branches: Floats, near: Floats) -> Ints:
 
 
 @dataclass(frozen=True)
-class Followed:
+class JointPath:
     """A path in joint space.
 
     Attributes:
@@ -160,7 +160,7 @@ class Followed:
     reached: bool
 
 
-def follow(begin: Floats, ways: Branched, slot: int = -1) -> Followed:
+def follow(begin: Floats, ways: Branched, slot: int = -1) -> JointPath:
     """Follow the branch and the turns that continue a motion.
 
     Args:
@@ -179,15 +179,15 @@ def follow(begin: Floats, ways: Branched, slot: int = -1) -> Followed:
         if fresh:
             slot, ahead = nearest_slot(ways.all(done), last), FEW
             if slot < 0:
-                return Followed(q[:done], slots[:done], False)
+                return JointPath(q[:done], slots[:done], False)
         path = np.vstack([last, ways.on(slot, done, ahead)])
         step = np.abs(np.diff(path, axis=0))
         if not (step < np.pi).all():
-            path = unwrapped(path)
+            path = unwrap_samples(path)
             step = np.abs(np.diff(path, axis=0))
         step = largest_in_rows(step)
         if fresh and step[0] > LOST:
-            return Followed(q[:done], slots[:done], True)
+            return JointPath(q[:done], slots[:done], True)
         # The first step is the shortest there is; go on to the next suspicious one.
         good = ~(step > SUSPICIOUS) & ~np.isnan(step)
         good[0] |= fresh
@@ -196,7 +196,7 @@ def follow(begin: Floats, ways: Branched, slot: int = -1) -> Followed:
         slots[done : done + count] = slot
         done, last = done + count, path[count]
         slot, ahead = (slot if good.all() else -1), MORE * ahead
-    return Followed(q, slots, True)
+    return JointPath(q, slots, True)
 
 
 # Lines whose wrist axes are interpolated instead of the orientation (WRIST_JNT).

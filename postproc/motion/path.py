@@ -145,7 +145,7 @@ def _turn(begin: Floats, end: Floats) -> Floats:
     return rotation_vector(R) if len(R) else np.empty((0, 3))
 
 
-def joined(parts: list[Segments]) -> Segments:
+def join_segments(parts: list[Segments]) -> Segments:
     """Put segments one after the other."""
     names = [f.name for f in fields(Segments)]
     return Segments(
@@ -245,7 +245,7 @@ class _Ends:
         found = _lines(self.targets, flange, self.source[edge], self.visit[edge])
         if (self.begins >= 0).any():
             on_arc, arc = self._arcs(flange)
-            found, edge = joined([found, arc]), np.append(edge, on_arc)
+            found, edge = join_segments([found, arc]), np.append(edge, on_arc)
         return edge, found
 
     def samples(self, edge: Ints, segments: Segments) -> Samples:
@@ -308,7 +308,7 @@ class _Ends:
         picked = Segments(
             *(getattr(after, name)[used] for name in Segments.__dataclass_fields__)
         )
-        return np.append(first, second), joined([to, picked])
+        return np.append(first, second), join_segments([to, picked])
 
 
 def _lines(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Segments:

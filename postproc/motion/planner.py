@@ -10,14 +10,14 @@ from postproc.arrays import Bools, Floats, Ints, read_only
 from postproc.diagnostics import Reason
 from postproc.motion.arrival_times import ArrivalTimes, no_time
 from postproc.motion.blending import blend
-from postproc.motion.curves import arrivals_on_curves
+from postproc.motion.joint_path import NOWHERE, StartState, Trace, trace
 from postproc.motion.path import BlendCoupling
-from postproc.motion.replan import planned_points, where_passed
+from postproc.motion.replan import points_of_plan, where_passed
+from postproc.motion.spline_moves import arrivals_on_curves
 from postproc.motion.targets import CODE, REASONS, WRIST, Targets
-from postproc.motion.trace import NOWHERE, StartState, Trace, trace
 from postproc.robot.arm import Arm
+from postproc.robot.backlash_operator import PlayState
 from postproc.robot.direction import UNLED, Arrivals, arrivals
-from postproc.robot.play import PlayState
 
 
 @dataclass(frozen=True)
@@ -108,9 +108,9 @@ def plan(
     traced = blend(arm, targets, exact, timed)
     arrived = arrivals(arm, traced.q, traced.driven, lead)
     arrived = arrivals_on_curves(arm, targets, traced.q, arrived)
-    clock = _timed(arm, targets, traced) if timed else no_time(len(targets))
+    clock = _time_moves(arm, targets, traced) if timed else no_time(len(targets))
     tool = targets.tool
-    tcp = where_passed(arm, planned_points(exact), traced.q) @ tool
+    tcp = where_passed(arm, points_of_plan(exact), traced.q) @ tool
     return Plan(
         traced.q, tcp, traced.aside, tool, arrived.direction, arrived.side,
         arrived.travel, clock.speed, clock.time, traced.slot,
@@ -119,7 +119,7 @@ def plan(
     )  # fmt: skip
 
 
-def _timed(arm: Arm, targets: Targets, traced: Trace) -> ArrivalTimes:
+def _time_moves(arm: Arm, targets: Targets, traced: Trace) -> ArrivalTimes:
     """Time all moves, with what only timed runs load."""
     from postproc.motion.timing import tell_time
 

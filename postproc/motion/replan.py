@@ -8,12 +8,12 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, all_in_rows, any_in_rows, spans
 from postproc.motion.blending import blend
-from postproc.motion.curves import sides_on_curves
+from postproc.motion.joint_path import NOWHERE, FixedTargets, StartState, Trace, trace
+from postproc.motion.spline_moves import sides_on_curves
 from postproc.motion.targets import TargetKind, Targets
-from postproc.motion.trace import NOWHERE, Known, StartState, Trace, trace
 from postproc.robot.arm import Arm
-from postproc.robot.direction import NO_SIDES, Passages, Sides, passages, sides
-from postproc.robot.play import Clamps
+from postproc.robot.backlash_operator import PlayOperator
+from postproc.robot.direction import NO_SIDES, FlankState, Passages, passages, sides
 
 # Where moved targets lead the arm: joint angles and sides, without a time law.
 
@@ -72,7 +72,7 @@ class Replanned:
     aside: Floats
     slot: Ints
     passages: Passages
-    sides: Sides
+    sides: FlankState
     begin: StartState = NOWHERE
 
     @property
@@ -89,7 +89,7 @@ class Replanned:
 
 
 def replan_all(
-    arm: Arm, targets: Targets, begin: StartState = NOWHERE, lead: Sides = NO_SIDES
+    arm: Arm, targets: Targets, begin: StartState = NOWHERE, lead: FlankState = NO_SIDES
 ) -> Replanned:
     """Find joint angles and sides only.
 
@@ -107,12 +107,12 @@ def replan_all(
     found = sides(arm, traced.q, ways, lead)
     found = sides_on_curves(arm, targets, traced.q, found)
     return Replanned(
-        arm, targets, planned_points(exact), traced.q, traced.aside, exact.slot, ways,
+        arm, targets, points_of_plan(exact), traced.q, traced.aside, exact.slot, ways,
         found, begin,
     )  # fmt: skip
 
 
-def planned_points(traced: Trace) -> PlannedPoints:
+def points_of_plan(traced: Trace) -> PlannedPoints:
     """Return the targets of a trace."""
     return PlannedPoints(traced.q, traced.flange)
 
@@ -178,7 +178,7 @@ def replan(
     before: Replanned,
     targets: Targets,
     moved: Bools,
-    lead: Sides = NO_SIDES,
+    lead: FlankState = NO_SIDES,
 ) -> Replanned:
     """Find where targets lead of which only some have moved.
 
@@ -199,7 +199,7 @@ def replan(
     if part is None:
         return replan_all(arm, targets, before.begin, lead)
     begins = part.rows[part.seeds]
-    known = Known(
+    known = FixedTargets(
         np.flatnonzero(part.seeds), before.exact.q[begins],
         before.exact.flange[begins], before.slot[begins],
     )  # fmt: skip
@@ -212,16 +212,16 @@ def replan(
     traced = blend(arm, part.targets, exact, timed=False)
     slot = np.array(before.slot)
     slot[part.rows[part.kept]] = exact.slot[part.kept]
-    passed = _patched(before.passed, part, traced.q)
+    passed = _patch_rows(before.passed, part, traced.q)
     at_targets = PlannedPoints(
-        _patched(before.exact.q, part, exact.q),
-        _patched(before.exact.flange, part, exact.flange),
+        _patch_rows(before.exact.q, part, exact.q),
+        _patch_rows(before.exact.flange, part, exact.flange),
     )
     now = passages(arm, traced.q, traced.driven)
-    ways = _spliced(before.passages, part, now)
+    ways = _splice_edges(before.passages, part, now)
     found = sides(arm, passed, ways, lead)
     return Replanned(
-        arm, targets, at_targets, passed, _patched(before.aside, part, traced.aside),
+        arm, targets, at_targets, passed, _patch_rows(before.aside, part, traced.aside),
         slot, ways, sides_on_curves(arm, targets, passed, found), before.begin,
     )  # fmt: skip
 
@@ -231,7 +231,7 @@ def _part(targets: Targets, moved: Bools, begun: bool) -> _Part | None:
     n, first = len(targets), targets.pred_start
     begins = np.array(targets.from_nowhere)
     begins[:1] &= not begun
-    touched = _touched(targets, moved)
+    touched = _add_touched(targets, moved)
     inside, kept = _with_arcs(targets, _near(touched, TRACED)), _near(touched, CHANGED)
     if not inside.any() or np.count_nonzero(inside) > MOST * n:
         return None
@@ -254,7 +254,7 @@ def _part(targets: Targets, moved: Bools, begun: bool) -> _Part | None:
     )  # fmt: skip
 
 
-def _touched(targets: Targets, moved: Bools) -> Bools:
+def _add_touched(targets: Targets, moved: Bools) -> Bools:
     """Add the targets whose edges change with others: steps, and both parts of arcs."""
     touched = np.array(moved)
     via = np.flatnonzero(targets.via)
@@ -288,14 +288,14 @@ def _near(rows: Bools, distance: int) -> Bools:
     return out
 
 
-def _patched(before: Floats, part: _Part, now: Floats) -> Floats:
+def _patch_rows(before: Floats, part: _Part, now: Floats) -> Floats:
     """Put new rows in, of targets whose passing may change."""
     out = np.array(before)
     out[part.rows[part.kept]] = now[part.kept]
     return out
 
 
-def _spliced(before: Passages, part: _Part, now: Passages) -> Passages:
+def _splice_edges(before: Passages, part: _Part, now: Passages) -> Passages:
     """Put new edges in: those between targets whose passing may change."""
     last_kept = np.append(False, part.kept[:-1]) & ~part.seeds
     alone = part.targets.from_nowhere
@@ -306,7 +306,7 @@ def _spliced(before: Passages, part: _Part, now: Passages) -> Passages:
     source[edge] = np.where(found >= 0, part.rows[np.maximum(found, 0)], found)
     lo, hi = np.array(before.clamps.lo), np.array(before.clamps.hi)
     lo[edge], hi[edge] = now.clamps.lo[new], now.clamps.hi[new]
-    return Passages(before.first, source, Clamps(lo, hi))
+    return Passages(before.first, source, PlayOperator(lo, hi))
 
 
 def _edges_of(first: Ints, rows: Ints) -> Ints:

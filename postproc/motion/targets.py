@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, read_only, slim, taken
+from postproc.arrays import Bools, Floats, Ints, read_only, slim, take_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 
 
@@ -118,7 +118,9 @@ class Targets:
             pred_start: As in the class, (m + 1,).
             pred: Their predecessors, counted among the rows.
         """
-        own = {f.name: taken(getattr(self, f.name), rows) for f in fields(self)[:-2]}
+        own = {
+            f.name: take_rows(getattr(self, f.name), rows) for f in fields(self)[:-2]
+        }
         return Targets(**own, pred_start=pred_start, pred=pred)
 
     @cached_property
@@ -139,7 +141,7 @@ class Targets:
         out[1:] &= ways[:-1] == 1
         return out
 
-    def moved_to(self, rows: Ints, tcp: Floats, joints: Floats) -> Targets:
+    def move_to(self, rows: Ints, tcp: Floats, joints: Floats) -> Targets:
         """Return a copy of which some targets lie elsewhere.
 
         Args:
@@ -149,7 +151,7 @@ class Targets:
         """
         poses, angles = np.array(self.tcp), self.joints
         poses[rows] = tcp
-        if not np.array_equal(joints, taken(angles, rows), equal_nan=True):
+        if not np.array_equal(joints, take_rows(angles, rows), equal_nan=True):
             angles = np.array(angles)
             angles[rows] = joints
         moved = replace(self, tcp=poses, joints=angles)

@@ -9,9 +9,9 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.exceptions import PlanError
 from postproc.motion.arrival_times import ArrivalTimes, Trajectory
+from postproc.motion.joint_path import Trace
 from postproc.motion.ruckig import JointMoves
 from postproc.motion.targets import Targets
-from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
 from postproc.robot.trajectory import Motion
 
@@ -108,14 +108,18 @@ def waypoints(
     share[curved] = traced.share[sample]
     step = np.diff(q, axis=0, prepend=q[:1]) / arm.velocity
     ds = np.where(nth > 0, np.linalg.norm(step, axis=1), 0.0)
-    least = np.where(nth > 0, _programmed(targets, traced, edge)[visit] * share, 0)
+    least = np.where(
+        nth > 0, _compute_programmed(targets, traced, edge)[visit] * share, 0
+    )
     override = np.ones(len(first))
     inside = np.flatnonzero(run_of >= 0)
     np.minimum.at(override, run_of[inside], targets.override[inside])
     at = np.where(run_of >= 0, start[1:] - 1, -1)
     parts = _parts(ds, visit, curved & (targets.move[visit] == Motion.JOINT))
     run = run_of[visit]
-    kept = _thinned(*_divided(parts, q, ds, least, override[run], run, at))
+    kept = _thin_waypoints(
+        *_divide_intervals(parts, q, ds, least, override[run], run, at)
+    )
     return _fine_ends(arm, kept)
 
 
@@ -131,7 +135,7 @@ def _parts(ds: Floats, visit: Ints, rounded: Bools) -> Ints:
     return np.maximum(np.ceil(JOINT_INTERVALS * share - EVEN), 1).astype(np.int64)
 
 
-def _divided(
+def _divide_intervals(
     parts: Ints, q: Floats, ds: Floats, least: Floats, override: Floats, run: Ints,
     at: Ints,
 ) -> tuple[Floats, Floats, Floats, Floats, Ints, Ints]:  # fmt: skip
@@ -169,7 +173,7 @@ def _fine_ends(arm: Arm, points: Waypoints) -> Waypoints:
     own = np.repeat(row, parts)
     end = np.cumsum(parts)
     nth = np.arange(len(own)) - end[own] + parts[own]
-    u, since = (_graded(n, parts[own], first[own]) for n in (nth + 1, nth))
+    u, since = (_grade(n, parts[own], first[own]) for n in (nth + 1, nth))
     before = np.maximum(own - 1, 0)
     q = points.q[before] + u[:, None] * (points.q[own] - points.q[before])
     q += (u * (u - 1))[:, None] * bend[own]
@@ -180,7 +184,7 @@ def _fine_ends(arm: Arm, points: Waypoints) -> Waypoints:
     return Waypoints(q, ds, least, points.override[own], begins[own], at)
 
 
-def _graded(nth: Ints, parts: Ints, first: Bools) -> Floats:
+def _grade(nth: Ints, parts: Ints, first: Bools) -> Floats:
     """Say where an interval is cut: by squares, the finest where the arm stands."""
     u = nth / parts
     return np.where(parts == 1, u, np.where(first, u**2, 1 - (1 - u) ** 2))
@@ -211,7 +215,7 @@ def _runs_of(n: int, first: Ints, end: Ints) -> Ints:
     return run_of
 
 
-def _thinned(
+def _thin_waypoints(
     q: Floats, ds: Floats, least: Floats, override: Floats, run: Ints, at: Ints
 ) -> Waypoints:
     """Drop waypoints where nothing moves, and runs that are nothing else."""
@@ -227,7 +231,7 @@ def _thinned(
     return Waypoints(q[keep], ds[keep], least[keep], override[keep], begins[keep], at)
 
 
-def _programmed(targets: Targets, traced: Trace, edge: Ints) -> Floats:
+def _compute_programmed(targets: Targets, traced: Trace, edge: Ints) -> Floats:
     """Time each move takes at its programmed TCP speed, (n,) [s], 0 without one."""
     line = traced.length[edge] / targets.linear_speed
     turn = traced.turning[edge] / targets.rotary_speed
@@ -258,7 +262,7 @@ def tell_time(arm: Arm, targets: Targets, traced: Trace) -> ArrivalTimes:
     untimed = np.zeros(n, dtype=bool)
     untimed[inside] = law.failed[at]
     visit = _visits(points)
-    used = law.used(arm, points, visit, n)
+    used = law.read_joints(arm, points, visit, n)
     moves = JointMoves(arm)
     for v in first[lone].tolist():
         begin, override = traced.q[source[v]], float(targets.override[v])
@@ -333,7 +337,7 @@ class _Laws:
     fastest: Floats
     failed: Bools
 
-    def used(
+    def read_joints(
         self, arm: Arm, points: Waypoints, visit: Ints, n: int
     ) -> tuple[Floats, Floats, Floats]:
         """Return what `ArrivalTimes` says of the joints, given each waypoint's move."""
@@ -355,7 +359,7 @@ def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
     if k == 0:
         none, joints = np.zeros(0), np.zeros((0, 6))
         return _Laws(none, none, joints, joints, none, none > 0)
-    from postproc.motion.time_law import time_laws  # it brings solvers along
+    from postproc.motion.topp import time_laws  # it brings solvers along
 
     s, limit, override = np.cumsum(points.ds), points.limit(), points.override
     law = time_laws(arm, points.q, s, limit, points.begins)

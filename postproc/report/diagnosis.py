@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from postproc.calibration.diagnosis.investigate import REMAINS
 from postproc.calibration.diagnosis.result import Diagnosis
-from postproc.calibration.diagnosis.trace import REMAINS
 from postproc.calibration.report import DirectionReport
 from postproc.files import schema
 from postproc.model.effects.effect import PART_MOTION
 from postproc.model.model import Model, load_model
 from postproc.model.statistics import ErrorStatistics
-from postproc.report.terminal import Column, folded, table_text
+from postproc.report.terminal import Column, fold_cells, table_text
 
 LIKELIEST = 8  # wrong directions that are listed
 ADDED = "added"
@@ -70,7 +70,7 @@ def tell(found: Diagnosis) -> str:
         if f.settings.get("form") == "time" and not f.settings.get("told")
     ]
     if found.verdict == "unexplained":
-        lines += _unexplained(found)
+        lines += _describe_unexplained(found)
     if found.verdict == "noise":
         lines += [f"not excluded: {what}" for what in found.not_excluded]
     if found.verdict != "unexplained" and found.after.mean_mm > (
@@ -147,7 +147,7 @@ def _spread(spread: ErrorStatistics) -> str:
     )
 
 
-def _unexplained(found: Diagnosis) -> list[str]:
+def _describe_unexplained(found: Diagnosis) -> list[str]:
     """Say what shows the structure, and where it lives."""
     curves = [f for f in found.findings if f.nameless]
     lines = [
@@ -176,15 +176,15 @@ def history_text(model_path: Path) -> str:
     """
     model = load_model(model_path)
     if not model.history:
-        row = (model.id, "fitted", _named(model), "", "", str(model.rows), "")
-        return table_text(HISTORY, folded(HISTORY, [row], ADDED)) + _origin(model)
+        row = (model.id, "fitted", _list_effects(model), "", "", str(model.rows), "")
+        return table_text(HISTORY, fold_cells(HISTORY, [row], ADDED)) + _origin(model)
     first = str(model.history[0].get("parent", ""))
     made = [*(str(r.get("parent", "")) for r in model.history[1:]), model.id]
     steps = [
         _step(name, record) for name, record in zip(made, model.history, strict=True)
     ]
     rows = [(first, "given", "", "", "", "", ""), *steps]
-    return table_text(HISTORY, folded(HISTORY, rows, ADDED)) + _origin(model)
+    return table_text(HISTORY, fold_cells(HISTORY, rows, ADDED)) + _origin(model)
 
 
 def _origin(model: Model) -> str:
@@ -196,17 +196,17 @@ def _step(name: str, record: Mapping[str, Any]) -> tuple[str, ...]:
     """Write one step of the history: the model that was made, and from what."""
     return (
         name, str(record["verdict"]),
-        "; ".join(_added(a) for a in record["added"]) or "nothing",
+        "; ".join(_describe_addition(a) for a in record["added"]) or "nothing",
         f"{record['before']['mean_mm']:.4f}", f"{record['after']['mean_mm']:.4f}",
         str(record["n_held_out"]), str(record["data_sha256"])[:12],
     )  # fmt: skip
 
 
-def _named(model: Model) -> str:
+def _list_effects(model: Model) -> str:
     return ", ".join(e.name for e in model.effects.effects)
 
 
-def _added(entry: dict[str, object]) -> str:
+def _describe_addition(entry: dict[str, object]) -> str:
     """Write one added effect of the history."""
     where = f" of joint {entry['joint']}" if entry.get("joint") else ""
     by = f" by {entry['source']}" if entry.get("source") else ""

@@ -21,18 +21,18 @@ from postproc.compensation.outcome import (
     Status,
     read_arrivals,
 )
-from postproc.compensation.parallel import in_background
+from postproc.compensation.workers import in_background
 from postproc.files import (
     NamedText,
     find_data_list,
     find_variables,
     holds_values,
     is_variables,
-    named_text,
+    open_text,
     read_input,
 )
 from postproc.language.languages import language_of
-from postproc.language.scan import BLANKS, mask_of, scan_lines
+from postproc.language.lexer import BLANKS, mask_of, scan_lines
 from postproc.language.stamp import read_stamp, stamp_span, strip_stamp
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ class DiffRows(Sequence[DiffRow]):
         nan, no = np.full(k, np.nan), np.zeros(k, dtype=bool)
         return cls(file, line, targets, np.arange(k), ints, none, none, nan, no)
 
-    def with_told(self, told: LineOutcomes | None) -> DiffRows:
+    def with_record(self, told: LineOutcomes | None) -> DiffRows:
         """Add what a record says."""
         if told is None:
             return self
@@ -159,7 +159,7 @@ class DiffRows(Sequence[DiffRow]):
         )
 
 
-def joined_rows(file: str, parts: Sequence[DiffRows]) -> DiffRows:
+def join_rows(file: str, parts: Sequence[DiffRows]) -> DiffRows:
     """Put rows of one file one after the other, before a record tells of them."""
     if not parts:
         return DiffRows.bare(file, np.empty(0, dtype=np.int64), ())
@@ -198,7 +198,7 @@ _LED = re.compile(r"\s*(?:ELSE\s*:|CASE\s*\(|WHEN\b|[A-Za-z_]\w*\s*::)", re.I)
 _AS_BLANKS = bytes(32 if chr(c) in BLANKS else c for c in range(256))
 
 
-def changed_rows(
+def describe_changes(
     file: str, before: TextLines, after: TextLines, lead: int = 0
 ) -> DiffRows:
     """Describe those of equally many lines that differ.
@@ -253,7 +253,7 @@ def _targets(
     for k, line in _pairs(lead, lines):
         begin = before[line][: max(int(begins[k]), 0)]
         if begin not in known:
-            known[begin] = _told_by(begin.translate(_AS_BLANKS).decode("latin-1"))
+            known[begin] = _name_owner(begin.translate(_AS_BLANKS).decode("latin-1"))
         told.append(known[begin] if begins[k] >= 0 else "")
     names = Interned[str]()
     code = [-1 if t is None else names[t] for t in told]
@@ -264,7 +264,7 @@ def _targets(
     return list(names), index
 
 
-def _told_by(begin: str) -> str | None:
+def _name_owner(begin: str) -> str | None:
     """Name what numbers belong to by what is before the first, None if not told."""
     if _LED.match(begin):
         return None
@@ -411,32 +411,32 @@ def compare_files(first: Path | NamedText, second: Path | NamedText) -> Compared
     original, compensated = Path(first.name), Path(second.name)
     if isinstance(first, Path) and isinstance(second, Path):
         original, compensated = first, second
-    rows = joined_rows(original.name, list(_rows(original.name, before, after)))
+    rows = join_rows(original.name, list(_rows(original.name, before, after)))
     if is_named_by_file(original.name):
-        rows = _named_by_language(original.name, rows, before)
+        rows = _name_rows(original.name, rows, before)
     return Compared(original, compensated, before, rows, stamped)
 
 
 def _rows(file: str, before: TextLines, after: TextLines) -> Iterator[DiffRows]:
     """Describe the lines that differ, in order."""
     if len(before) == len(after):
-        yield changed_rows(file, before, after)
+        yield describe_changes(file, before, after)
         return
-    inserted = _inserted(file, after)
+    inserted = _find_inserted(file, after)
     if len(inserted):
         yield from _beside_points(file, before, after, inserted)
         return
     matcher = SequenceMatcher(None, before.shapes(), after.shapes(), autojunk=False)
     for kind, a0, a1, b0, b1 in matcher.get_opcodes():
         if kind == "equal":
-            yield changed_rows(file, before.part(a0, a1), after.part(b0, b1), a0)
+            yield describe_changes(file, before.part(a0, a1), after.part(b0, b1), a0)
             continue
         gone = np.arange(a0 + 1, a1 + 1)
         yield _text_rows(file, gone, "- ", before[a0:a1])
         yield _text_rows(file, np.zeros(b1 - b0, dtype=int), "+ ", after[b0:b1])
 
 
-def _inserted(file: str, lines: TextLines) -> Ints:
+def _find_inserted(file: str, lines: TextLines) -> Ints:
     """Find the lines that are points on the ways of moves, from 0, (k,)."""
     language = language_of(file)
     return np.flatnonzero([language.is_inserted(line) for line in lines])
@@ -456,13 +456,17 @@ def _beside_points(
     done = 0
     for at in np.unique(place).tolist():
         if len(others) == len(before):
-            yield changed_rows(file, before.part(done, at), others.part(done, at), done)
+            yield describe_changes(
+                file, before.part(done, at), others.part(done, at), done
+            )
         done = at
         texts = [after[k] for k in inserted[place == at].tolist()]
         yield _text_rows(file, np.zeros(len(texts), dtype=int), "+ ", texts)
     if len(others) == len(before):
         rest = len(before)
-        yield changed_rows(file, before.part(done, rest), others.part(done, rest), done)
+        yield describe_changes(
+            file, before.part(done, rest), others.part(done, rest), done
+        )
 
 
 def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> DiffRows:
@@ -471,7 +475,7 @@ def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> Dif
     return replace(DiffRows.bare(file, lines, [""] * len(lines)), texts=told)
 
 
-def _named_by_language(file: str, rows: DiffRows, lines: Sequence[bytes]) -> DiffRows:
+def _name_rows(file: str, rows: DiffRows, lines: Sequence[bytes]) -> DiffRows:
     """Name rows as the language of their file does; joint angles are no distance."""
     own = (rows.targets[k] for k in rows.target.tolist())
     language, numbers = language_of(file), rows.line.tolist()
@@ -542,11 +546,11 @@ class Difference:
 
     def summary(self) -> str:
         """Say in one line what differs, and what came of the targets."""
-        said = self._said() if self else "the targets are the same"
+        said = self._summarise() if self else "the targets are the same"
         counts = ", ".join(f"{n} {status}" for status, n in self.counts.items() if n)
         return f"{said}; visits: {counts}" if counts else said
 
-    def _said(self) -> str:
+    def _summarise(self) -> str:
         """Count the rows and their sizes."""
         sizes = np.concatenate([r.change_mm[r.has_change] for r in self.differing])
         texts = sum(len(r.texts) for r in self.differing)
@@ -573,7 +577,7 @@ def diff(
     Raises:
         ProgramError: A file cannot be read.
     """
-    first, second = named_text(original, name), named_text(compensated, name)
+    first, second = open_text(original, name), open_text(compensated, name)
     if isinstance(first, NamedText) or isinstance(second, NamedText):
         only = compare_files(first, second)
         return Difference((only.rows,), only.stamped)
@@ -585,16 +589,18 @@ def diff(
     files = [compare_files(*pair) for pair in pairs]
     told = ask()
     found = [(f, told.get(f.original.name)) for f in files]
-    rows = tuple(f.rows.with_told(own) for f, own in found)
-    left = tuple(_left(f, own) for f, own in found if own is not None)
+    rows = tuple(f.rows.with_record(own) for f, own in found)
+    left = tuple(_list_uncorrected(f, own) for f, own in found if own is not None)
     return Difference(rows, files[0].stamped, left, _counts(told))
 
 
-def _left(file: Compared, told: LineOutcomes) -> DiffRows:
+def _list_uncorrected(file: Compared, told: LineOutcomes) -> DiffRows:
     """List the targets that were left alone."""
     alone = told.line[np.isin(told.status, LEFT_ALONE)]
     lines = alone[~np.isin(alone, file.rows.line)]
-    return DiffRows.bare(file.original.name, lines, file.targets(lines)).with_told(told)
+    return DiffRows.bare(file.original.name, lines, file.targets(lines)).with_record(
+        told
+    )
 
 
 def _counts(told: Mapping[str, LineOutcomes]) -> dict[str, int]:

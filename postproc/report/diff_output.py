@@ -15,8 +15,8 @@ from postproc.arrays import (
     Floats,
     Ints,
     chunks,
-    fixed,
-    named,
+    format_fixed,
+    format_texts,
     shortest,
     text_of,
     whole,
@@ -98,12 +98,12 @@ def _objects(rows: DiffRows, some: slice, single: Sequence[int]) -> bytes:
     columns = {
         "file": Cells(json.dumps(rows.file).encode()),
         "line": whole(rows.line[some]),
-        "target": named(rows.targets, rows.target[some], json.dumps),
+        "target": format_texts(rows.targets, rows.target[some], json.dumps),
         "original": _number_list(rows, rows.original, some),
         "compensated": _number_list(rows, rows.compensated, some),
         "change_mm": shortest(sizes),
         "text": Cells(b'""'),
-        **_told(rows, some),
+        **_write_record_columns(rows, some),
         "visits": Cells(b"{}"),
     }
     cells, lead = [], ",\n  {"
@@ -120,7 +120,7 @@ def _object(row: DiffRow) -> bytes:
     return (",\n  " + told.replace("\n", "\n  ")).encode("ascii")
 
 
-def _told(rows: DiffRows, some: slice) -> dict[str, Cells]:
+def _write_record_columns(rows: DiffRows, some: slice) -> dict[str, Cells]:
     """Write what a record says of some rows."""
     told = rows.told
     none = {key: b'""' for key in ("status", "code", "reason")}
@@ -128,11 +128,15 @@ def _told(rows: DiffRows, some: slice) -> dict[str, Cells]:
     if told is None or not len(told.line):
         return {key: Cells(text) for key, text in none.items()}
     entry = rows.entry[some]
-    signs = named(SIGN_NUMBERS, told.direction[entry] + 1, str)
+    signs = format_texts(SIGN_NUMBERS, told.direction[entry] + 1, str)
     columns = {
-        "status": named(STATUSES, told.status[entry], json.dumps),
-        "code": named([r.name for r in told.reasons], told.why[entry], json.dumps),
-        "reason": named([r.text for r in told.reasons], told.why[entry], json.dumps),
+        "status": format_texts(STATUSES, told.status[entry], json.dumps),
+        "code": format_texts(
+            [r.name for r in told.reasons], told.why[entry], json.dumps
+        ),
+        "reason": format_texts(
+            [r.text for r in told.reasons], told.why[entry], json.dumps
+        ),
         "direction": signs.within(*LIST),
         "correction_mm": shortest(told.correction_mm[entry]),
     }
@@ -146,7 +150,7 @@ def _number_list(rows: DiffRows, values: Floats, some: slice) -> Cells:
     """Write the numbers of some rows as lists."""
     first = rows.first[some.start : some.stop + 1]
     cells = shortest(values[first[0] : first[-1]]).within(*LIST)
-    return cells.ragged(first - first[0]).unless(np.diff(first) == 0, b"[]")
+    return cells.group_rows(first - first[0]).unless(np.diff(first) == 0, b"[]")
 
 
 # The listing of `diff`: a row a line, then what was left alone, then a summary.
@@ -202,7 +206,7 @@ class _Writer:
     ) -> Block:
         """Write some rows."""
         cells = [*_place(rows, some), *_number_changes(rows, some)]
-        cells += [self._size(rows, some), *self._told(rows, some)]
+        cells += [self._size(rows, some), *self._write_outcome_columns(rows, some)]
         texts = {row - some.start: self._texts(rows.row(row)) for row in single}
         return Block(
             some.stop - some.start,
@@ -217,35 +221,42 @@ class _Writer:
             entry = rows.entry[some]
             size = np.where(entry < 0, size, rows.told.correction_mm[entry])
             has = has | (entry >= 0)
-        return fixed(size, 3).unless(~has, b"")
+        return format_fixed(size, 3).unless(~has, b"")
 
-    def _told(self, rows: DiffRows, some: slice) -> list[Cells]:
+    def _write_outcome_columns(self, rows: DiffRows, some: slice) -> list[Cells]:
         """Say how the targets are reached, and what came of them."""
         told = rows.told
         if told is None or not len(told.line):
             return [Cells()] * 2
         entry = rows.entry[some]
-        signs = named(SIGN_ARROWS, told.direction[entry] + 1, str)
+        signs = format_texts(SIGN_ARROWS, told.direction[entry] + 1, str)
         what = told.status[entry] * len(told.reasons) + told.why[entry]
-        said = [_said(s, why.text) for s in STATUSES for why in told.reasons]
-        both = signs, named(said, what, self._painted)
+        said = [
+            _describe_outcome(s, why.text) for s in STATUSES for why in told.reasons
+        ]
+        both = signs, format_texts(said, what, self._paint)
         return [cells.unless(entry < 0, b"") for cells in both]
 
-    def _painted(self, status: str) -> str:
+    def _paint(self, status: str) -> str:
         return paint(status, status_colour(status)) if self.coloured else status
 
     def _texts(self, row: DiffRow) -> list[str]:
         """Write a row by itself."""
         size = row.correction_mm if self.told and row.status else row.change_mm
-        old, new = _written(row)
+        old, new = _write_change(row)
         length = "" if size is None else f"{size:.3f}"
         place = [row.file, str(row.line or ""), row.target]
         cells = [*place, old, "->" if new else "", new, length]
-        told = [arrows(row.direction), _said(row.status, row.reason, row.visits)]
+        told = [
+            arrows(row.direction),
+            _describe_outcome(row.status, row.reason, row.visits),
+        ]
         return [*cells, *told] if self.told else cells
 
 
-def _said(status: str, why: str, visits: Mapping[str, int] | None = None) -> str:
+def _describe_outcome(
+    status: str, why: str, visits: Mapping[str, int] | None = None
+) -> str:
     """Say what came of a target, and of the others on its line."""
     others = ", ".join(f"{n} {name}" for name, n in (visits or {}).items())
     if others:
@@ -256,7 +267,7 @@ def _said(status: str, why: str, visits: Mapping[str, int] | None = None) -> str
 def _place(rows: DiffRows, some: slice) -> list[Cells]:
     """Say where rows stand."""
     line = rows.line[some]
-    names = named(rows.targets, rows.target[some], str)
+    names = format_texts(rows.targets, rows.target[some], str)
     file = Cells(rows.file.encode(errors="replace"))
     return [file, whole(line).unless(line == 0, b""), names]
 
@@ -269,14 +280,14 @@ def _number_changes(rows: DiffRows, some: slice) -> list[Cells]:
     moved = old != new
     first = np.append(0, np.cumsum(moved))[first - first[0]]
     both = [
-        fixed(values[moved], DECIMALS).within(b"", b", ", b"").ragged(first)
+        format_fixed(values[moved], DECIMALS).within(b"", b", ", b"").group_rows(first)
         for values in (old, new)
     ]
     arrow = Cells().within(b"->", b"", b"").unless(np.diff(first) == 0, b"")
     return [both[0], arrow, both[1]]
 
 
-def _written(row: DiffRow) -> tuple[str, str]:
+def _write_change(row: DiffRow) -> tuple[str, str]:
     """Write the numbers that changed, or the text."""
     if row.text or not row.original:
         return row.text, ""

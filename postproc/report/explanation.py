@@ -42,7 +42,7 @@ def explanation_json(found: Explanation, line: int | None = None) -> str:
     Raises:
         ProgramError: There is no target on the line asked for.
     """
-    chosen = found.chosen(line)
+    chosen = found.choose_visits(line)
     if found.outcome is not None:
         told = target_rows(found.outcome, chosen)
     else:
@@ -50,8 +50,8 @@ def explanation_json(found: Explanation, line: int | None = None) -> str:
     rows = [
         {
             **row,
-            "from": found.reached_from(i),
-            "travel_deg": _known_deg(found.travel[i]),
+            "from": found.name_origins(i),
+            "travel_deg": _degrees_or_none(found.travel[i]),
         }
         for i, row in zip(chosen.tolist(), told, strict=True)
     ]
@@ -64,7 +64,7 @@ def _plan_row(found: Explanation, i: int) -> dict[str, object]:
     return {
         "line": int(v.line[i]),
         "name": v.names[v.name[i]] or None,
-        "q_deg": _known_deg(found.q[i]),
+        "q_deg": _degrees_or_none(found.q[i]),
         "lambda": [int(s) for s in found.direction[i]],
         "code": found.reasons[i].name,
         "reason": found.reasons[i].text,
@@ -79,7 +79,7 @@ def print_explanation(found: Explanation, line: int | None = None) -> None:
     Raises:
         ProgramError: There is no target on the line asked for.
     """
-    rows = found.chosen(line)
+    rows = found.choose_visits(line)
     cells = (_cells(found, i) for i in rows.tolist())
     columns: Sequence[Column] = PLANNED if found.outcome is None else COLUMNS
     if found.in_time is not None:
@@ -114,7 +114,7 @@ def _print_shares(
     rows.append(_share_cells(WHOLE, shares.sum(axis=0)))
     if told.free_forms:
         rows += map(_share_cells, PART, free)
-    place = f"{found.line_of(i, 'line ')} from {_few(found.reached_from(i))}:"
+    place = f"{found.line_of(i, 'line ')} from {_few(found.name_origins(i))}:"
     print(f"\n{printable(place)}")
     print_table(SHARES, rows)
 
@@ -124,20 +124,20 @@ def _cells(found: Explanation, i: int) -> list[str]:
     v = found.visits
     name = v.names[v.name[i]] or ("VIA" if v.via[i] else "inline")
     sides = arrows(found.direction[i])
-    angles = " ".join(_told(q, 8, 3) for q in np.rad2deg(found.q[i]))
-    cells = [found.line_of(i), name, _few(found.reached_from(i)), angles, sides]
+    angles = " ".join(_format_number(q, 8, 3) for q in np.rad2deg(found.q[i]))
+    cells = [found.line_of(i), name, _few(found.name_origins(i)), angles, sides]
     if found.outcome is None:
         return [*cells, found.reasons[i].text]
     d = found.outcome.decisions
-    moved = " ".join(_told(c, 7, 3) for c in d.correction[i] / MM)
-    sure = " ".join(_told(s, 5, 3) for s in d.std_error[i] / MM)
+    moved = " ".join(_format_number(c, 7, 3) for c in d.correction[i] / MM)
+    sure = " ".join(_format_number(s, 5, 3) for s in d.std_error[i] / MM)
     status = Status(d.status[i]).name.lower()
     why = d.reasons[d.why[i]].text
     said = f"{status}: {why}" if why else status
-    return [*cells, moved, sure, *_timed(found, i), said]
+    return [*cells, moved, sure, *_write_speed(found, i), said]
 
 
-def _timed(found: Explanation, i: int) -> list[str]:
+def _write_speed(found: Explanation, i: int) -> list[str]:
     """Write how fast visit i is passed, and how well the way there is kept to."""
     told = found.in_time
     if told is None:
@@ -145,7 +145,7 @@ def _timed(found: Explanation, i: int) -> list[str]:
     speed = float(told.after.clock.speed[told.own[i]]) / MM
     at = np.flatnonzero(told.paths.visit == i)
     sizes = [f"{size:.3f}" for size in (told.paths.after.sizes[at] / MM).tolist()]
-    return [_told(speed, 7, 1), *(sizes or [""])]
+    return [_format_number(speed, 7, 1), *(sizes or [""])]
 
 
 def _few(places: str) -> str:
@@ -160,12 +160,12 @@ def _few(places: str) -> str:
     return f"{', '.join(listed[: FEW - 1])} and {len(listed) - FEW + 1} more"
 
 
-def _told(value: float, width: int, digits: int) -> str:
+def _format_number(value: float, width: int, digits: int) -> str:
     """Write a number; a dash where it is not known."""
     return f"{value:{width}.{digits}f}" if np.isfinite(value) else "-".rjust(width)
 
 
-def _known_deg(values: Floats) -> list[float | None]:
+def _degrees_or_none(values: Floats) -> list[float | None]:
     """Round angles [rad] to degrees; what is not known becomes None."""
     degrees = np.rad2deg(values).tolist()
     return [round(v, 5) if np.isfinite(v) else None for v in degrees]
@@ -175,4 +175,4 @@ def _share_cells(name: str, share: Floats) -> list[str]:
     """Write a share (3,) [mm] as the cells of a table row."""
     size = float(np.linalg.norm(share))
     rounded = [round(v, 4) + 0.0 for v in (size, *share.tolist())]  # no -0.0
-    return [name, *(_told(v, 7, 4) for v in rounded)]
+    return [name, *(_format_number(v, 7, 4) for v in rounded)]

@@ -10,7 +10,7 @@ from postproc.language.visits import Diagnostic, line_ranges
 FEW = 3  # places that a line names
 
 
-def listed(found: Iterable[Diagnostic], every: bool = False) -> list[str]:
+def list_findings(found: Iterable[Diagnostic], every: bool = False) -> list[str]:
     """Write findings as lines, those that say the same as one with its first places.
 
     Args:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.calibration.baselines import VOLUME_DEG, Comparison
 from postproc.calibration.fit import Calibration
-from postproc.calibration.published import VOLUME_DEG, Comparison
 from postproc.calibration.report import FitReport, Found
 from postproc.files import schema, write_all
 from postproc.report.diagnosis import tell_directions
@@ -154,21 +154,21 @@ def _tell_rest(report: FitReport) -> list[str]:
     rest = [f for f in found if f not in shown]
     if rest:
         size = float(np.sqrt(sum(f.size_mm**2 for f in rest)))
-        names = _counted(f.effect for f in rest)
+        names = _count_names(f.effect for f in rest)
         lines.append(f"smaller or without evidence, {size:.3f} mm together: {names}")
     if report.unseen:
-        names = _grouped(u.name for u in report.unseen)
+        names = _group_names(u.name for u in report.unseen)
         count = len(report.unseen)
         lines.append(f"not determined, left at the prior, {count} directions: {names}")
     if report.correlated:
-        names = _counted(a.partition(".")[0] for a, _, _ in report.correlated)
+        names = _count_names(a.partition(".")[0] for a, _, _ in report.correlated)
         lines.append(f"hardly told apart, {len(report.correlated)} pairs: {names}")
     if lines:
         lines.append("all parameters, directions and rows: --all")
     return lines
 
 
-def _counted(names: Iterable[str]) -> str:
+def _count_names(names: Iterable[str]) -> str:
     """Count names, the most frequent first.
 
     >>> _counted(["a", "b", "b"])
@@ -177,7 +177,7 @@ def _counted(names: Iterable[str]) -> str:
     return ", ".join(f"{name} {n}" for name, n in Counter(names).most_common())
 
 
-def _grouped(names: Iterable[str]) -> str:
+def _group_names(names: Iterable[str]) -> str:
     """Name parameters by their effects; where there are more than a few, count them.
 
     >>> _grouped(["geometry.a2", "backlash.b1", "geometry.d2"])

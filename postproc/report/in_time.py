@@ -8,13 +8,13 @@ from dataclasses import asdict
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.in_time import InTime
-from postproc.compensation.paths.accuracy import Deviations, PathAccuracy
-from postproc.compensation.paths.corners import RoundOff
-from postproc.compensation.paths.points import Insertions
+from postproc.compensation.paths.corner_error import RoundOff
+from postproc.compensation.paths.insertion_report import Insertions
+from postproc.compensation.paths.path_error import Deviations, PathAccuracy
+from postproc.compensation.timing_comparison import InTime
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
-from postproc.motion.cycle import ProgramCycle
+from postproc.motion.cycle_time import ProgramCycle
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -22,7 +22,7 @@ CURVES = 200  # moves whose curve is told: those that leave their path the most
 POINTS = 40  # of a curve
 
 
-def told_in_time(told: InTime, visits: Visits) -> dict[str, object]:
+def describe_timing(told: InTime, visits: Visits) -> dict[str, object]:
     """Describe how a program runs, and how it keeps to its paths."""
     return {
         "timing": _timing(told, visits),
@@ -39,7 +39,7 @@ def told_in_time(told: InTime, visits: Visits) -> dict[str, object]:
 def _timing(told: InTime, visits: Visits) -> dict[str, object]:
     """Describe the cycle, what it uses of the joints, and where it is slowed down."""
     pair = {"before": told.before, "after": told.after}
-    slowed = told.after.slowed
+    slowed = told.after.slow_moves
     share = told.after.clock.allowed[slowed].tolist()
     lines = visits.line[told.source(slowed)]
 

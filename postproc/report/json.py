@@ -14,8 +14,8 @@ from postproc.arrays import (
     Floats,
     Ints,
     chunks,
-    fixed,
-    named,
+    format_fixed,
+    format_texts,
     shortest,
     text_of,
     whole,
@@ -52,7 +52,7 @@ def report_pieces(outcome: Outcome) -> Iterator[bytes]:
         **(
             {}
             if outcome.opinion is None
-            else {"second_opinion": outcome.opinion.told()}
+            else {"second_opinion": outcome.opinion.to_dict()}
         ),
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
         "stages_s": dict(outcome.stages),
@@ -64,9 +64,9 @@ def in_time_of(outcome: Outcome) -> dict[str, object]:
     """Describe the program in time, and its paths; nothing where nobody asked."""
     if outcome.in_time is None:
         return {}
-    from postproc.report.in_time import told_in_time  # many files, where it is timed
+    from postproc.report.in_time import describe_timing  # many files, where it is timed
 
-    return told_in_time(outcome.in_time, outcome.visits)
+    return describe_timing(outcome.in_time, outcome.visits)
 
 
 def target_rows(outcome: Outcome, rows: Ints) -> Iterator[dict[str, object]]:
@@ -90,35 +90,43 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
     move = np.where(v.via[rows], len(Motion), v.motion[rows])
     placed, turned = len(outcome.position) > 0, len(d.turn) > 0
     degrees = (
-        {"correction_deg": [_rounded(np.rad2deg(d.turn[rows]), 6)]} if turned else {}
+        {"correction_deg": [_format_rows(np.rad2deg(d.turn[rows]), 6)]}
+        if turned
+        else {}
     )
-    position = _rounded(outcome.position[rows] / MM, 4) if placed else Cells(b"[]")
+    position = _format_rows(outcome.position[rows] / MM, 4) if placed else Cells(b"[]")
     return {
         "line": [whole(v.line[rows])],
-        "file": [named(v.files, v.file[rows], json.dumps)],
+        "file": [format_texts(v.files, v.file[rows], json.dumps)],
         "literal": _literals(outcome, rows),
-        "name": [named(v.names, v.name[rows], _quoted)],
-        "move": [named([*(m.name for m in Motion), "VIA"], move, json.dumps)],
-        "q_deg": [_rounded(np.rad2deg(d.q[rows]), 5)],
-        "lambda": [named(SIGNS, d.direction[rows].astype(np.int64) + 1, str).listed()],
-        "side": [_rounded(d.side[rows], 3)],
-        "status": [named([s.name.lower() for s in Status], d.status[rows], json.dumps)],
-        "code": [named([r.name for r in d.reasons], d.why[rows], json.dumps)],
-        "reason": [named([r.text for r in d.reasons], d.why[rows], json.dumps)],
+        "name": [format_texts(v.names, v.name[rows], _quote)],
+        "move": [format_texts([*(m.name for m in Motion), "VIA"], move, json.dumps)],
+        "q_deg": [_format_rows(np.rad2deg(d.q[rows]), 5)],
+        "lambda": [
+            format_texts(
+                SIGNS, d.direction[rows].astype(np.int64) + 1, str
+            ).bracket_rows()
+        ],
+        "side": [_format_rows(d.side[rows], 3)],
+        "status": [
+            format_texts([s.name.lower() for s in Status], d.status[rows], json.dumps)
+        ],
+        "code": [format_texts([r.name for r in d.reasons], d.why[rows], json.dumps)],
+        "reason": [format_texts([r.text for r in d.reasons], d.why[rows], json.dumps)],
         "original": [_as_written(v, v.values, rows)],
         "corrected": [_as_written(v, d.corrected, rows)],
         "position_mm": [position],
-        "correction_mm": [_rounded(d.correction[rows] / MM, 5)],
+        "correction_mm": [_format_rows(d.correction[rows] / MM, 5)],
         **degrees,
         "step_mm": [_steps(outcome, rows)],
-        "std_error_mm": [_rounded(d.std_error[rows] / MM, 5)],
+        "std_error_mm": [_format_rows(d.std_error[rows] / MM, 5)],
         **({} if told is None else {"share_mm": _shares(told, rows)}),
         **({} if told is None else _free(told, rows)),
         **_speed(outcome, rows),
     }
 
 
-def _quoted(name: str) -> str:
+def _quote(name: str) -> str:
     """Write a name as JSON, null where there is none."""
     return encode_basestring_ascii(name) if name else "null"
 
@@ -128,14 +136,16 @@ def _speed(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
     told = outcome.in_time
     if told is None:
         return {}
-    return {"speed_mm_s": [fixed(told.after.clock.speed[told.own[rows]] / MM, 3)]}
+    return {
+        "speed_mm_s": [format_fixed(told.after.clock.speed[told.own[rows]] / MM, 3)]
+    }
 
 
 def _steps(outcome: Outcome, rows: Ints) -> Cells:
     """Write how far the correction moves from the fly point before, null without."""
     before, correction = outcome.visits.run_mates[rows], outcome.decisions.correction
     step = np.linalg.norm(correction[rows] - correction[before], axis=1) / MM
-    return fixed(np.where(before < 0, np.nan, step), 5)
+    return format_fixed(np.where(before < 0, np.nan, step), 5)
 
 
 def _shares(arrivals: ArrivalStates, rows: Ints) -> list[Cells]:
@@ -144,7 +154,7 @@ def _shares(arrivals: ArrivalStates, rows: Ints) -> list[Cells]:
     parts = []
     for number, name in enumerate(arrivals.effects):
         lead = f"{', ' if number else '{'}{json.dumps(name)}: "
-        parts.append(fixed(sizes[:, number], 5).behind(lead.encode()))
+        parts.append(format_fixed(sizes[:, number], 5).behind(lead.encode()))
     return [*parts, Cells(b"}" if parts else b"{}")]
 
 
@@ -154,8 +164,8 @@ def _free(arrivals: ArrivalStates, rows: Ints) -> dict[str, list[Cells]]:
         return {}
     error, std = np.moveaxis(arrivals.free(rows) / MM, 1, 0)
     return {
-        "nonparametric_mm": [_rounded(error, 5)],
-        "nonparametric_std_mm": [_rounded(std, 5)],
+        "nonparametric_mm": [_format_rows(error, 5)],
+        "nonparametric_std_mm": [_format_rows(std, 5)],
     }
 
 
@@ -168,7 +178,7 @@ def _literals(outcome: Outcome, rows: Ints) -> list[Cells]:
         return [Cells(b"null")]
     none = literal < 0
     literal[none] = literal[has[0]]
-    files = named(v.files, v.literals.file[literal], json.dumps)
+    files = format_texts(v.files, v.literals.file[literal], json.dumps)
     lines = whole(v.literals.line[literal])
     return [
         files.within(b'{"file": ', b"", b', "line": ').unless(none, b"null"),
@@ -176,9 +186,9 @@ def _literals(outcome: Outcome, rows: Ints) -> list[Cells]:
     ]
 
 
-def _rounded(values: Floats, decimals: int) -> Cells:
+def _format_rows(values: Floats, decimals: int) -> Cells:
     """Write rows of numbers (k, p) for a person; what is not known becomes null."""
-    return fixed(values, decimals).listed()
+    return format_fixed(values, decimals).bracket_rows()
 
 
 def _as_written(visits: Visits, values: Floats, rows: Ints) -> Cells:
@@ -186,7 +196,7 @@ def _as_written(visits: Visits, values: Floats, rows: Ints) -> Cells:
     values, none = values[rows], visits.literal[rows] < 0
     if values.shape[1] > JOINTS:
         values[visits.target[rows] == Meaning.JOINTS, JOINTS:] = np.nan
-    return shortest(values, 9).listed().unless(none, b"[]")
+    return shortest(values, 9).bracket_rows().unless(none, b"[]")
 
 
 def finite(value: object) -> object:

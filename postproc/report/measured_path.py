@@ -50,7 +50,7 @@ def _of_lag(lag: ServoLag) -> str:
     >>> _of_lag(ServoLag(1e-5, 1e-4, 12))
     'servos lag by less than 14.5 ms, as far as the bends of 12 moves tell'
     """
-    if lag.is_told:
+    if lag.is_certain:
         error = lag.error / (2.0 * lag.seconds)
         return (
             f"servos lag by {1e3 * lag.seconds:.1f} ms (+- {1e3 * error:.1f}), by how "

@@ -11,10 +11,10 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from postproc.arrays import Floats
+from postproc.calibration.baselines import Comparison
+from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.diagnose import Extension
-from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.result import Profile, periodogram, profile
-from postproc.calibration.published import Comparison
 from postproc.exceptions import OutputError
 from postproc.files import write_all
 from postproc.robot.pose import MM

@@ -27,7 +27,7 @@ from rich.progress import (
 from rich.text import Text
 
 from postproc import _native
-from postproc.arrays import Cells, named
+from postproc.arrays import Cells, format_texts
 from postproc.exceptions import printable
 
 # Tables: aligned, row by row, never held whole.
@@ -78,7 +78,7 @@ class Block:
             if coloured or not "".join(row).isprintable()
         }
         each = np.arange(len(rows))
-        cells = [named(texts, each, str) for texts in zip(*rows, strict=True)]
+        cells = [format_texts(texts, each, str) for texts in zip(*rows, strict=True)]
         return cls(len(rows), cells, single)
 
 
@@ -128,7 +128,7 @@ def print_blocks(
     titles = [c.title for c in columns]
     left = [c.justify == "left" for c in columns]
     layout = _Layout(left, [shown.get(t) for t in titles])
-    widths = layout.measured(titles, first)
+    widths = layout.measure_widths(titles, first)
     bold = [(lambda _: "bold") if coloured else None for _ in titles]
     print(_Layout(left, bold).line(titles, widths), file=out)
     for block in chain(first, given):
@@ -152,7 +152,7 @@ def table_text(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> str:
     return out.getvalue().removesuffix("\n")
 
 
-def folded(
+def fold_cells(
     columns: Sequence[Column], rows: Sequence[Sequence[str]], title: str
 ) -> list[Sequence[str]]:
     """Fold the cells of a column at words, so that rows are `PLAIN_WIDTH` wide at most.
@@ -214,7 +214,9 @@ class _Layout:
     left: Sequence[bool]
     colours: Sequence[Callable[[str], str] | None]
 
-    def measured(self, titles: Sequence[str], blocks: Sequence[Block]) -> list[int]:
+    def measure_widths(
+        self, titles: Sequence[str], blocks: Sequence[Block]
+    ) -> list[int]:
         """Return the widths that titles and the first rows ask for."""
         widths, most = [*map(len, titles)], MEASURED
         widths[-1] *= not self.left[-1]

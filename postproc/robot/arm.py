@@ -43,7 +43,7 @@ class DH:
         theta: Floats = self.offset + self.sense * (q @ self.mix.T)
         return theta
 
-    def packed(self, beta: Floats | None = None) -> Floats:
+    def pack(self, beta: Floats | None = None) -> Floats:
         """Return what the core knows of the chain, (12, 6).
 
         Args:
@@ -55,13 +55,13 @@ class DH:
 
     def frames(self, q: Floats) -> Floats:
         """Place the link frames 0 (base) to 6 (flange): (n, 6) -> (n, 7, 4, 4)."""
-        return _native.frames(self.packed(), floats(q)).reshape(len(q), 7, 4, 4)
+        return _native.frames(self.pack(), floats(q)).reshape(len(q), 7, 4, 4)
 
     def flange(self, q: Floats) -> Floats:
         """Place the flange for angles (n, 6) [rad]: (n, 4, 4) [m]."""
-        return _native.flange(self.packed(), floats(q))
+        return _native.flange(self.pack(), floats(q))
 
-    def placed(self, q: Floats, point: Floats, beta: Floats | None = None) -> Floats:
+    def place(self, q: Floats, point: Floats, beta: Floats | None = None) -> Floats:
         """Express points of the flange frame in the base frame, (n, 3) [m].
 
         Going back along the chain, T_i = Rot_z(theta) Trans(a, 0, d) Rot_x(alpha)
@@ -73,7 +73,7 @@ class DH:
             beta: Hayati's rotations of the links, (6,) [rad].
         """
         points = np.array(point, float, ndmin=2, order="C")
-        return _native.placed(self.packed(beta), floats(q), points)
+        return _native.placed(self.pack(beta), floats(q), points)
 
 
 # The arm: forward kinematics, Jacobians, gravity torque, inverse kinematics.
@@ -122,9 +122,9 @@ class Arm:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel between processes as the arm file: compiled parts cannot."""
-        return _mounted_arm, (self.file, self.weight)
+        return _build_mounted, (self.file, self.weight)
 
-    def mounted(self, weight: Floats) -> Arm:
+    def mount(self, weight: Floats) -> Arm:
         """Return the arm with weight that pulls in another direction.
 
         Args:
@@ -197,7 +197,7 @@ class Arm:
         """The inverse kinematics: by a closed form where the arm file holds one."""
         opw, limits = self.file.opw, (self.lower, self.upper)
         if opw is None:
-            return Inverse(NumericForm(self.dh.packed()), np.eye(6), *limits)
+            return Inverse(NumericForm(self.dh.pack()), np.eye(6), *limits)
         return Inverse(ClosedForm(opw), self.dh.mix, *limits)
 
     def link_frames(self, q: Floats) -> Floats:
@@ -215,7 +215,7 @@ class Arm:
             q: Joint angles, (n, 6) [rad].
             tool: TCP in the flange frame, (n, 3) [m].
         """
-        return self.dh.placed(q, tool)
+        return self.dh.place(q, tool)
 
     def landmarks(self, q: Floats, tool: Floats) -> Floats:
         """Place elbow, wrist centre and TCP: (n, 3, 3) [m], base frame.
@@ -227,7 +227,7 @@ class Arm:
             q: Joint angles, (n, 6) [rad].
             tool: TCP in the flange frame, (n, 3) [m].
         """
-        return _native.landmarks(self.dh.packed(), floats(q), floats(tool))
+        return _native.landmarks(self.dh.pack(), floats(q), floats(tool))
 
     def joint_axes(self, q: Floats) -> tuple[Floats, Floats]:
         """Give every joint's rotation axis and a point on it.
@@ -247,7 +247,7 @@ class Arm:
             tool: TCP in the flange frame, (3,) or (n, 3) [m].
         """
         points = floats(np.broadcast_to(tool, (len(q), 3)))
-        by_joint = _native.jacobian(self.dh.packed(), floats(q), points)
+        by_joint = _native.jacobian(self.dh.pack(), floats(q), points)
         return np.ascontiguousarray(np.swapaxes(by_joint, 1, 2))
 
     def gravity_torque(
@@ -289,7 +289,7 @@ class Arm:
             both = self.moments(q, payload, payload_com)
             own, carried = (np.einsum("njc,njc->nj", z, moment) for moment in both)
             return self._to_controller(own), self._to_controller(carried)
-        packed = self.dh.packed()
+        packed = self.dh.pack()
         own, carried = _native.torque(packed, floats(q), floats(self._links), load)
         return -GRAVITY * own, -GRAVITY * carried
 
@@ -543,9 +543,9 @@ def arm_of_text(path: Path, text: str) -> Arm:
     return build_arm(parse_toml(path, text.encode(), ArmFile, ArmError))
 
 
-def _mounted_arm(file: ArmFile, weight: Floats) -> Arm:
+def _build_mounted(file: ArmFile, weight: Floats) -> Arm:
     """Build an arm with weight that pulls in a direction, (3,)."""
-    return build_arm(file).mounted(weight)
+    return build_arm(file).mount(weight)
 
 
 def build_arm(file: ArmFile) -> Arm:

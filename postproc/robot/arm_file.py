@@ -297,11 +297,11 @@ def arm_path(name: str, beside: Path | None = None) -> Path:
     path = Path(name) if beside is None else beside / name
     if path.is_file():
         return path
-    known = ", ".join(shipped_arms())
+    known = ", ".join(list_shipped_arms())
     raise ArmError(name, "no such arm", f"Shipped arms: {known}; or give a path")
 
 
-def shipped_arms() -> list[str]:
+def list_shipped_arms() -> list[str]:
     """Name the arms that come with the package.
 
     >>> "nj220-2.7" in shipped_arms()

@@ -438,7 +438,7 @@ class Cell:
         return tuple(said or ())
 
     @property
-    def levelled(self) -> bool:
+    def is_levelled(self) -> bool:
         """Whether z of the tracker's own frame points up."""
         return self.file.survey is not None and self.file.survey.levelled
 
@@ -546,7 +546,7 @@ def _beside(folder: Path, section: MeasurementSection) -> MeasurementSection:
 
 def _cell_of(path: Path, file: CellFile) -> Cell:
     """Make a cell of what its file says."""
-    arm = load_arm(file.robot.arm, beside=path.parent).mounted(_weight(file))
+    arm = load_arm(file.robot.arm, beside=path.parent).mount(_weight(file))
     payload, tracker = file.payload, file.tracker
     return Cell(
         path=path,
@@ -578,8 +578,8 @@ def _cell_of(path: Path, file: CellFile) -> Cell:
         constant=_patterns(file.variables.constant),
         frame_tables={k.lower(): v for k, v in file.frames.routines.items()},
         taught=frozenset(name.lower() for name in file.taught),
-        taught_frames=_taught_frames(file),
-        taught_sides=_taught_sides(file),
+        taught_frames=_collect_taught_frames(file),
+        taught_sides=_collect_taught_sides(file),
     )
 
 
@@ -598,7 +598,7 @@ def _patterns(said: object) -> tuple[str, ...]:
     return tuple(map(str.lower, said)) if isinstance(said, list) else ()
 
 
-def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Floats | None]:
+def _collect_taught_frames(file: CellFile) -> dict[tuple[float, ...], Floats | None]:
     """Collect the taught frames of the cell and of its tables."""
     return {
         frame.record(): np.deg2rad(frame.taught_deg) if frame.taught_deg else None
@@ -607,7 +607,7 @@ def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Floats | None]:
     }
 
 
-def _taught_sides(file: CellFile) -> dict[tuple[float, ...], Floats]:
+def _collect_taught_sides(file: CellFile) -> dict[tuple[float, ...], Floats]:
     """Collect from which sides the joints arrived at the points of taught frames."""
     return {
         frame.record(): np.array(frame.taught_direction, dtype=float)

@@ -18,11 +18,11 @@ import numpy as np
 from postproc import _native
 from postproc.arrays import Bools, Floats, Ints
 from postproc.robot.arm import Arm
-from postproc.robot.play import (
+from postproc.robot.backlash_operator import (
     NOTHING,
-    Clamps,
     Edges,
     LastReversal,
+    PlayOperator,
     PlayState,
     VisitChains,
     chains_of,
@@ -72,7 +72,7 @@ UNLED = Arrivals(_NONE, _NONE, _NONE, NOTHING)
 
 
 @dataclass(frozen=True)
-class Sides:
+class FlankState:
     """Where every joint lies in its play, without the travel.
 
     Attributes:
@@ -81,18 +81,18 @@ class Sides:
     """
 
     side: Floats
-    play: Clamps
+    play: PlayOperator
 
     def __len__(self) -> int:
         """Return the number of visits."""
         return len(self.side)
 
-    def __getitem__(self, rows: slice) -> Sides:
+    def __getitem__(self, rows: slice) -> FlankState:
         """Return some of them."""
-        return Sides(self.side[rows], self.play[rows])
+        return FlankState(self.side[rows], self.play[rows])
 
 
-NO_SIDES = Sides(_NONE, NOTHING.play)
+NO_SIDES = FlankState(_NONE, NOTHING.play)
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Passages:
 
     first: Ints
     source: Ints
-    clamps: Clamps
+    clamps: PlayOperator
 
     def behind(self, visit: int) -> Passages:
         """Return those from a visit on, by which alone they are reached."""
@@ -164,7 +164,7 @@ def _one_after_another(a: Arrivals, b: Arrivals) -> Arrivals:
         np.concatenate([a.side, b.side]),
         np.concatenate([a.travel, b.travel]),
         PlayState(
-            Clamps(*(np.concatenate([getattr(x, k) for x in play])
+            PlayOperator(*(np.concatenate([getattr(x, k) for x in play])
                      for k in ("lo", "hi"))),
             LastReversal(*(np.concatenate([getattr(x, k) for x in turned])
                            for k in ("side", "angle", "z"))),
@@ -216,7 +216,9 @@ def passages(arm: Arm, q: Floats, edges: Edges) -> Passages:
     return Passages(edges.first, edges.source, ways.clamps(half_width(arm)))
 
 
-def sides(arm: Arm, q: Floats, passed: Passages, lead: Sides = NO_SIDES) -> Sides:
+def sides(
+    arm: Arm, q: Floats, passed: Passages, lead: FlankState = NO_SIDES
+) -> FlankState:
     """Return the sides of `arrivals` alone, from what passing the edges does."""
     if len(lead) == 0:
         return _sides(arm, q, passed, NOTHING.play)
@@ -226,21 +228,23 @@ def sides(arm: Arm, q: Floats, passed: Passages, lead: Sides = NO_SIDES) -> Side
         np.concatenate([getattr(part.play, k) for part in (lead[:last], after)])
         for k in ("lo", "hi")
     )
-    return Sides(np.concatenate([lead.side[:last], after.side]), Clamps(lo, hi))
+    return FlankState(
+        np.concatenate([lead.side[:last], after.side]), PlayOperator(lo, hi)
+    )
 
 
-def _sides(arm: Arm, q: Floats, passed: Passages, before: Clamps) -> Sides:
+def _sides(arm: Arm, q: Floats, passed: Passages, before: PlayOperator) -> FlankState:
     """Do as `sides`, knowing the state of the play at the first visit."""
     if len(q) == 0:
         return NO_SIDES
     chains = chains_of(q, arm.coupling, passed.first, passed.source)
     half = half_width(arm)
     z = _states(chains, passed.clamps, half, before)
-    return Sides(_side(chains.angles, z, half), z)
+    return FlankState(_side(chains.angles, z, half), z)
 
 
 def sides_along(
-    arm: Arm, q: Floats, begins: Bools, play: Clamps, half: Floats
+    arm: Arm, q: Floats, begins: Bools, play: PlayOperator, half: Floats
 ) -> tuple[Floats, Floats]:
     """Place every joint in its play along some ways, however wide it is there.
 
@@ -276,12 +280,14 @@ def half_width(arm: Arm) -> Floats:
     return np.asarray(WIDTH_IN_PLAYS / 2 * arm.play)
 
 
-def _side(angles: Floats, z: Clamps, half: Floats) -> Floats:
+def _side(angles: Floats, z: PlayOperator, half: Floats) -> Floats:
     """Place every joint in its play, (n, 6)."""
     return _native.side(angles, z, half)
 
 
-def _states(chains: VisitChains, own: Clamps, half: Floats, before: Clamps) -> Clamps:
+def _states(
+    chains: VisitChains, own: PlayOperator, half: Floats, before: PlayOperator
+) -> PlayOperator:
     """Find what is known of the play's state at every visit, as intervals (n, 6).
 
     The intervals at the heads only grow and their ends come from a finite set, so that
@@ -293,4 +299,4 @@ def _states(chains: VisitChains, own: Clamps, half: Floats, before: Clamps) -> C
         half: Half of the width of the play, (6,) [rad].
         before: What is known at the first visit.
     """
-    return Clamps(*_native.states(chains, own, half, before))
+    return PlayOperator(*_native.states(chains, own, half, before))

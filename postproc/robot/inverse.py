@@ -93,7 +93,7 @@ class NumericForm:
     """
 
     def __init__(self, packed: Floats) -> None:
-        """Take the chain, see `DH.packed`."""
+        """Take the chain, see `DH.pack`."""
         self._packed = packed
 
     def branches(self, flange: Floats) -> Floats:

@@ -13,7 +13,7 @@ from postproc.exceptions import ArmError
 from postproc.robot.arm import Arm, arm_of_text
 from postproc.robot.denavit_hartenberg import PARALLEL, DhParameters, dh_parameters
 from postproc.robot.pose import MM
-from postproc.robot.urdf import MOVING, UrdfChain, turned
+from postproc.robot.urdf import MOVING, UrdfChain, rotate_about
 from postproc.robot.urdf_links import links_text
 
 # What the chain is: lengths and zeros of an ortho-parallel basis with a wrist.
@@ -155,7 +155,7 @@ def _length(vector: Floats) -> float:
 
 def _turn(axis: Floats, angle: float) -> Floats:
     """Rotate about a unit vector, (3, 3)."""
-    return turned(axis, np.array([angle]))[0, :3, :3]
+    return rotate_about(axis, np.array([angle]))[0, :3, :3]
 
 
 def _basis(here: _Geometry, centre: Floats) -> Shape:
@@ -262,10 +262,10 @@ def arm_text(chain: UrdfChain, repeatability_mm: float, name: str | None = None)
     """
     obstacle = None
     try:
-        parts = _closed_form_parts(shape_of(chain))
+        parts = _write_closed_form(shape_of(chain))
     except NoClosedFormError as exc:
         obstacle, parts = exc, _numeric_parts(dh_of(chain))
-    text = _written(chain, parts, repeatability_mm, name or chain.name)
+    text = _fill_arm_file(chain, parts, repeatability_mm, name or chain.name)
     arm = arm_of_text(chain.path, text)
     if obstacle is not None:
         _check_mobility(arm, obstacle)
@@ -273,7 +273,7 @@ def arm_text(chain: UrdfChain, repeatability_mm: float, name: str | None = None)
     return text + links_text(chain.weights, arm)
 
 
-def closed_form_obstacle(chain: UrdfChain) -> str:
+def find_closed_form_obstacle(chain: UrdfChain) -> str:
     """Say why the arm file of a chain has no closed form; "" where it has one.
 
     Raises:
@@ -328,19 +328,19 @@ NUMERIC = """\
 DH_ZERO = (0.0, -90.0, -90.0, 0.0, 0.0, 180.0)  # [deg] D-H angles of the upright arm
 
 
-def _written(
+def _fill_arm_file(
     chain: UrdfChain, parts: dict[str, str], repeatability_mm: float, name: str
 ) -> str:
     """Fill in the arm file."""
     return TEMPLATE.format(
-        robot=_quoted(chain.name), file=_quoted(chain.path.name),
-        base=_quoted(chain.base), tip=_quoted(chain.tip),
-        name=_quoted(name), repeatability=_number(repeatability_mm),
+        robot=_quote(chain.name), file=_quote(chain.path.name),
+        base=_quote(chain.base), tip=_quote(chain.tip),
+        name=_quote(name), repeatability=_number(repeatability_mm),
         **parts, **_joint_parts(chain),
     )  # fmt: skip
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     r"""Write a basic string of TOML; what is no character becomes a question mark.
 
     >>> _quoted('a "\x7f')
@@ -350,7 +350,7 @@ def _quoted(text: str) -> str:
     return json.dumps(valid, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _closed_form_parts(shape: Shape) -> dict[str, str]:
+def _write_closed_form(shape: Shape) -> dict[str, str]:
     """Write the closed form and its standard D-H parameters."""
     a = np.array([shape.a1, shape.c2, -shape.a2, 0.0, 0.0, 0.0])
     d = np.array([shape.c1, shape.b, 0.0, shape.c3, 0.0, shape.c4])
@@ -371,19 +371,19 @@ def _closed_form_parts(shape: Shape) -> dict[str, str]:
 def _numeric_parts(dh: DhParameters) -> dict[str, str]:
     """Write standard D-H parameters alone, to more digits where these are needed."""
     alpha, offset = (
-        180.0 - (180.0 - _rounded(np.rad2deg(angles))) % 360.0
+        180.0 - (180.0 - _round_values(np.rad2deg(angles))) % 360.0
         for angles in (dh.alpha, dh.offset)
     )
     lists = {"a": dh.a / MM, "d": dh.d / MM, "alpha": alpha, "offset": offset}
     return {
-        **{key: str((_rounded(v) + 0.0).tolist()) for key, v in lists.items()},
+        **{key: str((_round_values(v) + 0.0).tolist()) for key, v in lists.items()},
         "sense": str([round(float(s)) for s in dh.sense]),
         "parallelogram": PARALLELOGRAM if abs(np.sin(dh.alpha[1])) < NEARLY else "",
         "closed_form": NUMERIC,
     }
 
 
-def _rounded(values: Floats) -> Floats:
+def _round_values(values: Floats) -> Floats:
     """Round to 1e-9 what is so round, and the rest to 1e-12.
 
     >>> _rounded(np.array([163.94100000000003, 100.0 / 3.0])).tolist()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, read_only, taken
+from postproc.arrays import Floats, read_only, take_rows
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,8 @@ class States:
     ) -> States:
         """Return the states of the given rows."""
         return replace(
-            self, **{f.name: taken(getattr(self, f.name), rows) for f in fields(self)}
+            self,
+            **{f.name: take_rows(getattr(self, f.name), rows) for f in fields(self)},
         )
 
     def across(self, vectors: Floats) -> Floats:

@@ -193,7 +193,7 @@ class UrdfChain:
         for joint in self.joints:
             out = out @ joint.origin
             if joint.kind in MOVING:
-                out = out @ turned(joint.axis, next(angles))
+                out = out @ rotate_about(joint.axis, next(angles))
         return out
 
 
@@ -382,11 +382,11 @@ def _rotation(roll: float, pitch: float, yaw: float) -> Floats:
     """Return Rot_z(yaw) Rot_y(pitch) Rot_x(roll), (4, 4)."""
     out = np.eye(4)
     for axis, angle in ((2, yaw), (1, pitch), (0, roll)):
-        out = out @ turned(np.eye(3)[axis], np.array([angle]))[0]
+        out = out @ rotate_about(np.eye(3)[axis], np.array([angle]))[0]
     return out
 
 
-def turned(axis: Floats, angle: Floats) -> Floats:
+def rotate_about(axis: Floats, angle: Floats) -> Floats:
     """Rotate about a unit vector by angles (n,) [rad], (n, 4, 4) (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

@@ -74,12 +74,12 @@ def links_text(weights: Sequence[Weight], arm: Arm) -> str:
     rows = []
     for frame, m, moment in zip(frames, mass, first, strict=True):
         place = moment / m - frame[:3, 3] if m else np.zeros(3)
-        rows.append(_listed(frame[:3, :3].T @ place / MM, 3))
+        rows.append(_format_numbers(frame[:3, :3].T @ place / MM, 3))
     com = ",\n".join(f"    [{row}]" for row in rows)
-    return TEMPLATE.format(mass=_listed(mass, 6), com=com, spread=SPREAD)
+    return TEMPLATE.format(mass=_format_numbers(mass, 6), com=com, spread=SPREAD)
 
 
-def _listed(values: Floats, digits: int) -> str:
+def _format_numbers(values: Floats, digits: int) -> str:
     """Write numbers, without a sign of zero."""
     return ", ".join(repr(round(float(v), digits) + 0.0) for v in values)
 

@@ -161,7 +161,7 @@ class Gears:
         q: Floats = np.linalg.solve(self.coupling, angles.T).T.astype(float)
         return np.asarray(self.gap * self.wave(q))
 
-    def shown(self, arrivals: VirtualArrivals) -> Floats:
+    def show_sides(self, arrivals: VirtualArrivals) -> Floats:
         """Return the sides that the links show, (n, 6) from -1 to 1."""
         if self.kind is GearKind.ELASTIC:
             return np.asarray(np.sin(np.pi / 2 * arrivals.flank))
@@ -173,7 +173,7 @@ class Gears:
             return np.where(pushed, -np.sign(torque), arrivals.flank)
         return arrivals.flank
 
-    def braked(self, state: GearState, rate: Floats) -> GearState:
+    def brake(self, state: GearState, rate: Floats) -> GearState:
         """Return the state behind braking from joint speeds (6,) [rad/s]."""
         if self.kind is not GearKind.INERTIA:
             return state
@@ -333,12 +333,12 @@ class VirtualArm:
             arrivals: Commanded joints and all they depend on.
             joint_noise: Added to the joints, (n, 6) [rad].
         """
-        arrivals = replace(arrivals, side=self.gears.shown(arrivals))
+        arrivals = replace(arrivals, side=self.gears.show_sides(arrivals))
         angles = arrivals.q + total(self.laws, Where.JOINTS, arrivals) + joint_noise
         growth = total(self.laws, Where.LENGTHS, arrivals)
         base = self.as_built.base + total(self.laws, Where.BASE, arrivals)
         mount = self.as_built.mount + total(self.laws, Where.TOOL, arrivals)
-        chain = self.as_built.chain.bent(growth)
+        chain = self.as_built.chain.grow(growth)
         flange = chain.flange(angles, self._twists(arrivals))
         return np.asarray(
             small_motion(base) @ flange @ small_motion(mount) @ arrivals.tool
@@ -354,7 +354,7 @@ class VirtualArm:
         """Return the true error, actual minus nominal TCP, (n, 3), without noise."""
         return self.tcp(arrivals) - self.nominal_tcp(arrivals)
 
-    def seen(self, arrivals: VirtualArrivals, tcp: Floats) -> Floats:
+    def simulate_readings(self, arrivals: VirtualArrivals, tcp: Floats) -> Floats:
         """Return what a tracker whose stand moves would read at TCPs (n, 3)."""
         motion = small_motion(total(self.laws, Where.TRACKER, arrivals))
         turned = np.einsum("nij,nj->ni", motion[:, :3, :3], tcp)
@@ -371,7 +371,7 @@ class VirtualArm:
             rng: Random numbers of this campaign.
         """
         joints = rng.normal(size=arrivals.q.shape) * self.joint_noise
-        readings = self.seen(arrivals, self.tcp(arrivals, joints))
+        readings = self.simulate_readings(arrivals, self.tcp(arrivals, joints))
         span = np.linalg.norm(readings - tracker, axis=1)
         sigma = self.tracker_noise[0] + self.tracker_noise[1] * span
         return np.asarray(readings + rng.normal(size=readings.shape) * sigma[:, None])

@@ -74,7 +74,7 @@ def joints_of_pose(
         found[:, TURNING] = turned[:, TURNING]
     else:
         found = _on_turns(found, config or "")
-    usable = found[_allowed(chain, found)]
+    usable = found[_is_allowed(chain, found)]
     if not len(usable):
         raise PlanError("no joint angles within range reach this pose")
     away = np.abs(usable - near).max(axis=1)
@@ -100,10 +100,10 @@ def joints_along(chain: Chain, flanges: Floats, start: Floats) -> Floats:
     branches = [branch]
     if abs(np.sin(chain.dh_angles(start)[4])) < SINGULAR:
         branches.append(branch ^ WRIST)
-    tracks = [_unwrapped(solve_branch(chain, flanges, b), start) for b in branches]
+    tracks = [_unwrap(solve_branch(chain, flanges, b), start) for b in branches]
     jumps = [np.abs(np.diff(track, axis=0)).max() for track in tracks]
     track = tracks[int(np.argmin(np.nan_to_num(jumps, nan=np.inf)))]
-    if not np.all(_allowed(chain, track[1:])):
+    if not np.all(_is_allowed(chain, track[1:])):
         raise PlanError("the path leaves the reach or the joint range of the arm")
     return np.asarray(track[1:])
 
@@ -113,7 +113,7 @@ def flange_of(target: Floats, tool: Floats, base: Floats, uframe: Floats) -> Flo
     return np.asarray(undo(base) @ uframe @ target @ undo(tool))
 
 
-def _unwrapped(track: Floats, start: Floats) -> Floats:
+def _unwrap(track: Floats, start: Floats) -> Floats:
     return np.unwrap(np.vstack([start, track]), axis=0)
 
 
@@ -128,7 +128,7 @@ def _into_range(chain: Chain, q: Floats) -> Floats:
     return out
 
 
-def _allowed(chain: Chain, q: Floats) -> NDArray[np.bool_]:
+def _is_allowed(chain: Chain, q: Floats) -> NDArray[np.bool_]:
     slack = 1e-9
     inside = (q >= chain.lower - slack) & (q <= chain.upper + slack)
     return np.asarray(inside.all(axis=1))
@@ -212,12 +212,12 @@ def arc(start: Floats, via: Floats, end: Floats) -> tuple[Floats, Floats]:
     first = _angle(start[:3, 3] - centre, via[:3, 3] - centre, normal)
     whole = _angle(start[:3, 3] - centre, end[:3, 3] - centre, normal)
     return (
-        _turned(start, via, centre, normal * first),
-        _turned(via, end, centre, normal * (whole - first)),
+        _sample_circle(start, via, centre, normal * first),
+        _sample_circle(via, end, centre, normal * (whole - first)),
     )
 
 
-def _turned(start: Floats, end: Floats, centre: Floats, sweep: Floats) -> Floats:
+def _sample_circle(start: Floats, end: Floats, centre: Floats, sweep: Floats) -> Floats:
     """Sample a piece of a circle that sweeps a rotation vector about its centre."""
     turn = logarithm(start[:3, :3].T @ end[:3, :3])
     radius = start[:3, 3] - centre
@@ -489,11 +489,11 @@ def _goal_joints(
 ) -> Floats:
     kind, values = Meaning(visits.target[i]), visits.values[i]
     if kind is Meaning.JOINTS:
-        return _known(np.radians(values[:6]))
+        return _check_known(np.radians(values[:6]))
     if kind is Meaning.BY:
-        return here + _known(np.radians(values[:6]))
+        return here + _check_known(np.radians(values[:6]))
     if kind is Meaning.PARTIAL_JOINTS:
-        return _filled(np.radians(values[:6]), here)
+        return _fill(np.radians(values[:6]), here)
     if kind in (Meaning.HOME, Meaning.CALIBRATION):
         return _place_of(setup, kind)
     config = None
@@ -515,33 +515,33 @@ def _goal_pose(
         return np.asarray(setup.chain.flange(joints[None])[0] @ tool)
     present = setup.chain.flange(here[None])[0] @ tool
     if kind in (Meaning.POSE, Meaning.NEAR, Meaning.FOR):
-        target = pose_of_numbers(_known(values))
+        target = pose_of_numbers(_check_known(values))
         if kind is Meaning.NEAR:
             target = target @ _shift(0.0, 0.0, -visits.distance_mm[i])
         goal = flange_of(target, tool, frames.base, frames.uframe) @ tool
         distance = visits.distance_mm[i] * 1e-3
         return goal if kind is not Meaning.FOR else _towards(present, goal, distance)
     if kind is Meaning.AWAY:
-        return np.asarray(present @ _shift(0.0, 0.0, -_known(values[:1])[0]))
+        return np.asarray(present @ _shift(0.0, 0.0, -_check_known(values[:1])[0]))
     if kind is Meaning.RELATIVE_TOOL:
-        return np.asarray(present @ _shift(*_known(values[:3])))
+        return np.asarray(present @ _shift(*_check_known(values[:3])))
     if kind is Meaning.PARTIAL_POSE:
         user = undo(frames.base) @ frames.uframe
         goal = undo(user) @ present
-        xyz = _filled(values[:3] * 1e-3, goal[:3, 3])
+        xyz = _fill(values[:3] * 1e-3, goal[:3, 3])
         return np.asarray(user @ pose(goal[:3, :3], xyz))
     if kind in (Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME):
         axes = _axes(kind, frames)
-        return _moved(present, axes @ _known(values[:3]) * 1e-3, np.zeros(3))
+        return _move(present, axes @ _check_known(values[:3]) * 1e-3, np.zeros(3))
     if kind is Meaning.ABOUT:
-        axes = _axes(Meaning(int(_known(values[4:5])[0])), frames, present)
-        axis = axes @ _known(values[:3])
-        turn = axis / np.linalg.norm(axis) * np.radians(_known(values[3:4])[0])
-        return _moved(present, np.zeros(3), turn)
+        axes = _axes(Meaning(int(_check_known(values[4:5])[0])), frames, present)
+        axis = axes @ _check_known(values[:3])
+        turn = axis / np.linalg.norm(axis) * np.radians(_check_known(values[3:4])[0])
+        return _move(present, np.zeros(3), turn)
     raise PlanError("the program does not tell where this move goes")
 
 
-def _filled(values: Floats, before: Floats) -> Floats:
+def _fill(values: Floats, before: Floats) -> Floats:
     """Return the values, and what was before where one is not written."""
     return np.asarray(np.where(np.isnan(values), before, values))
 
@@ -555,7 +555,7 @@ def _axes(kind: Meaning, frames: MoveFrames, present: Floats | None = None) -> F
     return np.eye(3)
 
 
-def _moved(present: Floats, shift: Floats, turn: Floats) -> Floats:
+def _move(present: Floats, shift: Floats, turn: Floats) -> Floats:
     return pose(exponential(turn) @ present[:3, :3], present[:3, 3] + shift)
 
 
@@ -563,7 +563,7 @@ def _shift(x: float, y: float, z: float) -> Floats:
     return pose(np.eye(3), np.array([x, y, z]) * 1e-3)
 
 
-def _known(values: Floats) -> Floats:
+def _check_known(values: Floats) -> Floats:
     """Return the values.
 
     Raises:
@@ -650,7 +650,9 @@ def round_corner(
     second = progress(ways[1], shares[1] * MOMENTS**2)
     point = ways[0].joints[-1]
     if in_space:
-        added = _added(*(chain.flange(q) @ tool for q in (first, second, point[None])))
+        added = _add_motion(
+            *(chain.flange(q) @ tool for q in (first, second, point[None]))
+        )
         joints = joints_along(chain, added @ undo(tool), first[0])
     else:
         joints = first + second - point
@@ -670,7 +672,7 @@ def progress(way: Way, part: Floats) -> Floats:
     return np.stack([np.interp(part, marks, q) for q in way.joints.T], axis=1)
 
 
-def _added(first: Floats, second: Floats, point: Floats) -> Floats:
+def _add_motion(first: Floats, second: Floats, point: Floats) -> Floats:
     """Add the motion from the point to the second poses to the first poses."""
     turn = first[:, :3, :3] @ np.swapaxes(point[:, :3, :3], 1, 2) @ second[:, :3, :3]
     return pose(turn, first[:, :3, 3] + second[:, :3, 3] - point[:, :3, 3])
@@ -725,7 +727,7 @@ def shares(
     if min(lengths) < NO_WAY:
         return 0.0, 0.0
     zone = 0.5 * min(lengths)
-    distance = _given(visits.zone_mm[i], USUAL_DISTANCE) * 1e-3
+    distance = _value_or_usual(visits.zone_mm[i], USUAL_DISTANCE) * 1e-3
     if trajectory == ZoneRule.WITHIN:
         # The parabola's vertex is half as far from the point as the middle of its ends.
         turn = np.linalg.norm(_heading(ways[1], 0) - _heading(ways[0], -1))
@@ -739,7 +741,7 @@ def _overlapping(
 ) -> tuple[float, float]:
     """Brake the first move and start the second at the same time."""
     percent = np.clip(
-        _given(visits.overlap_percent[moves[0]], USUAL_PERCENT), 0.0, 100.0
+        _value_or_usual(visits.overlap_percent[moves[0]], USUAL_PERCENT), 0.0, 100.0
     )
     pushes, times = [], []
     for move, way in zip(moves, ways, strict=True):
@@ -760,7 +762,7 @@ def _heading(way: Way, end: int) -> Floats:
     return np.asarray(step / max(float(np.linalg.norm(step)), NO_WAY))
 
 
-def _given(value: float, usual: float) -> float:
+def _value_or_usual(value: float, usual: float) -> float:
     return usual if np.isnan(value) else float(value)
 
 
@@ -821,7 +823,7 @@ def plan_drives(
             drives.append(replace(drive, way=way, path=way.joints))
         except PlanError as error:
             drives.append(replace(drive, why=str(error)))
-    return _rounded(setup, visits, poses, drives)
+    return _round_fly_points(setup, visits, poses, drives)
 
 
 def _predecessor(visits: Visits, i: int) -> int:
@@ -842,7 +844,7 @@ def _first_joints(
         return start
 
 
-def _rounded(
+def _round_fly_points(
     setup: VirtualCell, visits: Visits, poses: Floats, drives: list[Drive]
 ) -> list[Drive]:
     """Round the fly points that have one way in and one way out."""
@@ -857,7 +859,7 @@ def _rounded(
             if corner is not None:
                 corners[i] = corner
     return [
-        replace(d, path=_joined(d.way, corners.get(d.came_from), corners.get(i)))
+        replace(d, path=_join_pieces(d.way, corners.get(d.came_from), corners.get(i)))
         if d.came_from in corners or i in corners
         else d
         for i, d in enumerate(drives)
@@ -884,7 +886,7 @@ def _corner(
         return None
 
 
-def _joined(way: Way, begin: Corner | None, end: Corner | None) -> Floats:
+def _join_pieces(way: Way, begin: Corner | None, end: Corner | None) -> Floats:
     """Put together what a corner leaves of a way, (m, 6)."""
     marks = np.linspace(0.0, 1.0, len(way.joints))
     inside = np.ones(len(marks), dtype=bool)

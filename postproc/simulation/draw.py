@@ -171,13 +171,13 @@ class _Planter:
         draw = Draw(rng, self.body, item.joint, self.rows, self.tracker)
         if item.name == "backlash":
             law = backlash(draw)
-            return self.sized(law, item.peak_mm or self.peak_mm(law))
+            return self.scale_to_peak(law, item.peak_mm or self.peak_mm(law))
         kind = kind_of(item.name)
-        law = kind.draw(draw).scaled(SMALL, 0.0)
+        law = kind.draw(draw).rescale(SMALL, 0.0)
         usual = np.exp(rng.uniform(np.log(kind.low_mm), np.log(kind.high_mm)))
-        return self.sized(law, item.peak_mm or float(usual))
+        return self.scale_to_peak(law, item.peak_mm or float(usual))
 
-    def sized(self, law: Law, peak_mm: float) -> Law:
+    def scale_to_peak(self, law: Law, peak_mm: float) -> Law:
         """Scale a law to a peak displacement.
 
         Raises:
@@ -190,13 +190,13 @@ class _Planter:
                     f"effect '{law.effect}' on joint {law.joints} does not move this "
                     "TCP. Choose another joint or a tool that stands off the axis"
                 )
-            law = law.scaled(peak_mm / peak, peak_mm)
+            law = law.rescale(peak_mm / peak, peak_mm)
         return law
 
     def peak_mm(self, law: Law) -> float:
         """Return the largest displacement of the TCP over the reference [mm]."""
         arm = replace(self.perfect, laws=(law,))
-        moved = arm.seen(self.reference, arm.tcp(self.reference))
+        moved = arm.simulate_readings(self.reference, arm.tcp(self.reference))
         away = moved - arm.nominal_tcp(self.reference)
         return float(np.linalg.norm(away, axis=1).max() * 1e3)
 

@@ -50,7 +50,7 @@ class Chain:
     parallelogram: bool = False
 
     @property
-    def _turned_back(self) -> float:
+    def _rod_angle(self) -> float:
         """D-H angle of joint 3 that the rod takes back per radian of joint 2."""
         facing = 1.0 if np.cos(self.alpha[1]) > 0 else -1.0
         return float(facing * self.sense[1]) if self.parallelogram else 0.0
@@ -59,14 +59,14 @@ class Chain:
         """Convert controller angles (n, 6) to D-H angles (n, 6) [rad]."""
         theta = np.asarray(self.offset + self.sense * (q + self.shift))
         if self.parallelogram:
-            theta[:, 2] -= self._turned_back * q[:, 1]
+            theta[:, 2] -= self._rod_angle * q[:, 1]
         return theta
 
     def controller_angles(self, theta: Floats) -> Floats:
         """Convert D-H angles (n, 6) to controller angles (n, 6) [rad]."""
         q = np.asarray((theta - self.offset) / self.sense - self.shift)
         if self.parallelogram:
-            q[:, 2] += self._turned_back * q[:, 1] / self.sense[2]
+            q[:, 2] += self._rod_angle * q[:, 1] / self.sense[2]
         return q
 
     def by_joints(self, by_angles: Floats) -> Floats:
@@ -78,7 +78,7 @@ class Chain:
         senses = self.sense[: by_angles.shape[1]]
         out = np.asarray(np.moveaxis(by_angles, 1, -1) * senses)
         if self.parallelogram:
-            out[..., 1] -= self._turned_back * by_angles[:, 2]
+            out[..., 1] -= self._rod_angle * by_angles[:, 2]
         return np.moveaxis(out, -1, 1)
 
     @cached_property
@@ -136,7 +136,7 @@ class Chain:
             placed = placed @ moved[:, i] @ links[:, i]
         return placed
 
-    def bent(self, growth: Floats) -> Chain:
+    def grow(self, growth: Floats) -> Chain:
         """Return a chain whose lengths grew by the relative amounts (n, 6)."""
         return replace(self, a=self.a * (1 + growth), d=self.d * (1 + growth))
 

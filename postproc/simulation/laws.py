@@ -71,7 +71,7 @@ class Law:
         """Return the change (n, 6) that the law makes on each arrival."""
         return np.asarray(self.scale * self.shape(arrivals))
 
-    def scaled(self, factor: float, peak_mm: float) -> Law:
+    def rescale(self, factor: float, peak_mm: float) -> Law:
         """Return the law with another size."""
         return replace(self, scale=self.scale * factor, peak_mm=peak_mm)
 
@@ -292,7 +292,7 @@ def coupling(draw: Draw) -> Law:
     return Law("coupling", Where.JOINTS, (joint,), source, {}, shape)
 
 
-def worn_spot(draw: Draw) -> Law:
+def draw_worn_spot(draw: Draw) -> Law:
     """Worn teeth at one place: a bump a few degrees wide in one joint's error."""
     joint, sign = draw.pick(range(1, 7)), draw.sign()
     low, high = WORKING_RANGE[joint - 1]
@@ -591,7 +591,7 @@ USUAL_CELL = 0.05, 0.5  # [mm]
 def cell(draw: Draw, text: str) -> Law:
     """A link, the base or the tool moves a little by what the text says."""
     asked = PlantedMotion.parse(text)
-    drive = asked.drawn(draw.rng, draw.body, reference_arrivals(draw.rows))
+    drive = asked.draw(draw.rng, draw.body, reference_arrivals(draw.rows))
     place, link = asked.place, asked.link
 
     def shape(arrivals: VirtualArrivals) -> Floats:
@@ -646,7 +646,7 @@ KINDS = {
     "elastic_flank": LawKind(elastic_flank, 0.03, 0.15),
     "azimuth": LawKind(azimuth, 0.03, 0.1),
     "refraction": LawKind(refraction, 0.03, 0.1),
-    "worn_spot": LawKind(worn_spot, 0.05, 0.5),
+    "worn_spot": LawKind(draw_worn_spot, 0.05, 0.5),
     "joint_product": LawKind(joint_product, 0.05, 0.3),
     "hysteresis": LawKind(hysteresis, 0.05, 0.3),
 }

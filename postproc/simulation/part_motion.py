@@ -97,7 +97,7 @@ class PlantedMotion:
         """Number of the link, from 1; 0 for the base and the tool."""
         return int(self.body[4:]) if self.body.startswith("link") else 0
 
-    def drawn(
+    def draw(
         self, rng: np.random.Generator, body: LinkMasses, reference: VirtualArrivals
     ) -> Drive:
         """Draw what its law leaves open, a phase or a place, and give its size.

@@ -157,7 +157,7 @@ def gears_along(arm: VirtualArm, run: DrivenMove, q: Floats) -> dict[str, Floats
     states = [run.gears, *follow(arm.gears, run.gears, q[1:])]
     brakes = np.linspace(0.0, run.lasted, len(q)) > run.lasted - BRAKES
     for k in np.flatnonzero(brakes & bool(run.rate.any())).tolist():
-        states[k] = arm.gears.braked(states[k], run.rate)
+        states[k] = arm.gears.brake(states[k], run.rate)
     names = ("side", "flank", "travel", "loop")
     return {name: np.array([getattr(s, name) for s in states]) for name in names}
 
@@ -206,7 +206,7 @@ def _go(
     gears = move(arm.gears, place.gears, drive.path)
     return _ProgramPlace(
         joints=drive.path[-1],
-        gears=arm.gears.braked(gears, rate),
+        gears=arm.gears.brake(gears, rate),
         speed=max(drive.way.length / lasted, 1e-6),
         lasted=lasted + SETTLE,
         rate=rate,

@@ -91,7 +91,7 @@ def compare_times(
     lines = [(p.apart, p.last) for p in kinds["line"]]
     arcs = [(p.apart, p.last) for p in kinds["arc"]]
     outside = [(p.outside, p.last) for p in kinds["fly"]]
-    lost = _lost(claim, ways, found)
+    lost = _count_lost(claim, ways, found)
     named = claim.label
     return [
         worst_of(f"{named}: time of JOINT moves", "s", MOVE_S, claim, moves, {}),
@@ -159,7 +159,7 @@ def _passage(
     return Passage(tuple(chain), float(ours), theirs, least)
 
 
-def _lost(
+def _count_lost(
     claim: Claim, ways: Mapping[int, MadeWay], found: Sequence[Passage]
 ) -> dict[str, int]:
     """Count stops whose passage is not compared, and why."""

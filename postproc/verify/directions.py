@@ -58,7 +58,7 @@ class DriveTrain:
         coupling = np.array(facts.file.joints.drive_coupling or np.eye(6))
         return cls(_limits(facts.file), facts.play, coupling)
 
-    def timed(self, ways: Sequence[MadeWay], joint: bool) -> TimedRun | None:
+    def time_run(self, ways: Sequence[MadeWay], joint: bool) -> TimedRun | None:
         """Find the time law of a run; without limits it has none, but goes its way."""
         q = np.concatenate([ways[0].q[:1], *(way.q[1:] for way in ways)])
         if not len(self.limits):
@@ -179,7 +179,7 @@ def runs_in_time(
     for run in runs:
         joint = bool(claim.visits.motion[run[0]] == Motion.JOINT)
         late = monotonic() > until
-        timed = None if late else train.timed([ways[i] for i in run], joint)
+        timed = None if late else train.time_run([ways[i] for i in run], joint)
         if timed is not None:
             found[run[0]] = timed
     return found
@@ -202,7 +202,7 @@ def arrivals(
         q = np.vstack([timed[first].q, ways[last].q[-1:]])
         start = PlayMemory.at(ways[first].q[0] @ train.coupling.T)
         before = found.get(int(claim.visits.before[first]), start)
-        found[last] = before.passed(q @ train.coupling.T, train.play)
+        found[last] = before.pass_angles(q @ train.coupling.T, train.play)
     return found
 
 

@@ -37,11 +37,11 @@ def load() -> None:
         PostprocError: One is not installed or cannot be loaded; it names the command.
     """
     require()
-    if problem := broken():
+    if problem := explain_missing():
         raise PostprocError(problem)
 
 
-def broken() -> str:
+def explain_missing() -> str:
     """Return why one of them cannot be loaded, or "".
 
     A library of another build fails by an error of any kind, and another package of

@@ -90,26 +90,26 @@ def _joints(v: Visits, facts: ArmFacts) -> Floats:
     return out
 
 
-def written_branches(v: Visits) -> Ints:
+def branches_of_flags(v: Visits) -> Ints:
     """Return the branches 4 W + 2 S + E that flags of JOINT moves name, (n,), or -1.
 
     On a line the flags may be overruled, and so may those that nothing checks.
     """
     slot, _ = v.dialect.flags(v.config, v.configs, v.values)
-    return np.where(_checked(v), slot, -1)
+    return np.where(_find_checked(v), slot, -1)
 
 
-def written_turns(v: Visits) -> Floats:
+def turns_of_flags(v: Visits) -> Floats:
     """Return the turns of axes 4, 6 and 3 that such flags name, (n, 3), or NaN.
 
     An angle is within half a turn of them.
     """
     _, turns = v.dialect.flags(v.config, v.configs, v.values)
-    named = _checked(v) & ~v.nearest_turn
+    named = _find_checked(v) & ~v.nearest_turn
     return np.where(named[:, None], turns, np.nan)
 
 
-def _checked(v: Visits) -> Bools:
+def _find_checked(v: Visits) -> Bools:
     """Tell where flags hold, (n,)."""
     checked = ~np.isin(v.care, (Switch.OFF, Switch.UNKNOWN)).any(axis=1)
     asked = v.config_given & np.isin(v.target, POSES) & (v.motion == Motion.JOINT)

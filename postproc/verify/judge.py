@@ -19,7 +19,7 @@ from postproc.verify.opinion import (
 from postproc.verify.pinocchio_arm import PinocchioArm
 from postproc.verify.positions import (
     LoadedArms,
-    confirmed,
+    confirm_angles,
     judge_branches,
     judge_motion,
     judge_positions,
@@ -52,7 +52,7 @@ def judge(
     for claim in (output, source):  # what was written counts, where time is short
         goals = goals_of(claim, facts)
         at = posture_of(arm, claim.q, begun + allowance.positions)
-        found = judge_positions(claim, goals, at, _loaded(facts, claim))
+        found = judge_positions(claim, goals, at, _build_loads(facts, claim))
         rows[:0] = [*found, *judge_branches(claim, facts.file, at)]
         postures.append(at)
     if len(output.own) == len(source):
@@ -60,14 +60,16 @@ def judge(
     else:
         rows += motion_not_judged(source, facts)
     goals = goals_of(output, facts)
-    maker = WayMaker(arm, output.visits, goals, confirmed(output, goals, postures[0]))
+    maker = WayMaker(
+        arm, output.visits, goals, confirm_angles(output, goals, postures[0])
+    )
     placed = monotonic()
     rows += judge_directions(output, maker, facts, placed + allowance.ways)
     ended = monotonic()
     return Opinion(program, tuple(rows), ended - begun, ended - placed)
 
 
-def _loaded(facts: ArmFacts, claim: Claim) -> LoadedArms:
+def _build_loads(facts: ArmFacts, claim: Claim) -> LoadedArms:
     """Build the arm with every load that it carries."""
     loads = np.unique(claim.payload, axis=0)
     return {tuple(load.tolist()): PinocchioArm.build(facts, load) for load in loads}

@@ -173,7 +173,7 @@ class Opinion:
         return compared, compared + sum(sum(row.skipped.values()) for row in own)
 
     @classmethod
-    def joined(cls, name: str, opinions: Sequence[Opinion]) -> Self:
+    def join(cls, name: str, opinions: Sequence[Opinion]) -> Self:
         """Put the tables of several programs into one."""
         found: dict[str, OpinionRow] = {}
         for row in (row for opinion in opinions for row in opinion.rows):
@@ -191,7 +191,7 @@ class Opinion:
         rows = tuple(OpinionRow(**row) for row in told["rows"])
         return cls(str(told["program"]), rows, float(told["seconds"]))
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
         rows = [asdict(row) for row in self.rows]
         told = {"program": self.program, "agrees": self.agrees}

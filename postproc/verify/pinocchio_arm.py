@@ -54,7 +54,7 @@ class PinocchioArm:
         self._pin.framesForwardKinematics(self._model, self._data, self._mix @ q)
         return np.array(self._data.oMf[self._flange].homogeneous)
 
-    def placed(self, q: Floats) -> tuple[Floats, Floats, Floats]:
+    def place(self, q: Floats) -> tuple[Floats, Floats, Floats]:
         """Place the arm for joint angles (6,) [rad].
 
         Returns:
@@ -221,7 +221,7 @@ class PinocchioUrdf:
         """Length of all links, stretched [m]."""
         return float(sum(np.linalg.norm(place.translation) for place in self._places()))
 
-    def turned_from(self, other: PinocchioUrdf) -> float:
+    def measure_turn(self, other: PinocchioUrdf) -> float:
         """Return by what angle the frames of joints stand otherwise, in all [rad]."""
         pairs = zip(self._places(), other._places(), strict=True)
         return float(sum(

@@ -40,7 +40,7 @@ class PlayMemory:
         """Know nothing of how the drives came to angles (6,)."""
         return cls(np.zeros(6), drive, drive, drive, drive)
 
-    def passed(self, drive: Floats, play: Floats) -> PlayMemory:
+    def pass_angles(self, drive: Floats, play: Floats) -> PlayMemory:
         """Pass angles, (k, 6) [rad], one after the other."""
         side, high, low, turned = self.side, self.high, self.low, self.turned
         for x in drive:

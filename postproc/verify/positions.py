@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.robot.arm_file import ArmFile
-from postproc.verify.goals import WrittenGoals, written_branches, written_turns
+from postproc.verify.goals import WrittenGoals, branches_of_flags, turns_of_flags
 from postproc.verify.opinion import ArmFacts, Claim, OpinionRow, compare, worst_of
 from postproc.verify.pinocchio_arm import PinocchioArm
 
@@ -62,7 +62,7 @@ def posture_of(arm: PinocchioArm, q: Floats, until: float = np.inf) -> Posture:
         if k % OFTEN == 0 and monotonic() > until:
             late[rows[k:]] = True
             break
-        flange[i], points[i, :6], J[i] = arm.placed(q[i])
+        flange[i], points[i, :6], J[i] = arm.place(q[i])
     points[:, 6] = flange[:, :3, 3]
     singular = np.full(n, np.nan)
     done = rows[~late[rows]]
@@ -93,7 +93,7 @@ def misses(
     return place, turn, np.abs(claim.q - goals.joints).max(axis=1)
 
 
-def confirmed(claim: Claim, goals: WrittenGoals, at: Posture) -> Floats:
+def confirm_angles(claim: Claim, goals: WrittenGoals, at: Posture) -> Floats:
     """Return the joint angles that are where the text says, (n, 6), NaN elsewhere."""
     place, turn, joints = misses(claim, goals, at)
     there = (place / MM <= POSITION_MM) & (turn <= TURN_RAD) | (joints <= JOINT_RAD)
@@ -145,7 +145,7 @@ def judge_branches(claim: Claim, file: ArmFile, at: Posture) -> list[OpinionRow]
         what, lost = f"{claim.label}: branch, planner", {NO_FORM: len(claim)}
         return [*rows, worst_of(what, "", 0.0, claim, [], lost)]
     bits, sure = branch_bits(at, file)
-    written = written_branches(claim.visits)
+    written = branches_of_flags(claim.visits)
     for what, slot in (("planner", claim.slot), ("flags", written)):
         named = (slot[:, None] >> np.array([2, 1, 0])) & 1
         other = ((bits != named) & sure).any(axis=1).astype(float)
@@ -157,7 +157,7 @@ def judge_branches(claim: Claim, file: ArmFile, at: Posture) -> list[OpinionRow]
 
 def _turns(claim: Claim, at: Posture) -> OpinionRow:
     """Say how far angles are from the turns that flags of JOINT moves name."""
-    turns = written_turns(claim.visits)
+    turns = turns_of_flags(claim.visits)
     beyond = np.abs(claim.q[:, TURNING] - 2 * np.pi * turns) - np.pi
     unnamed = np.asarray(np.isnan(turns).all(axis=1))
     off = np.where(np.isnan(turns), 0.0, np.maximum(beyond, 0.0)).max(axis=1)

@@ -111,25 +111,29 @@ def judge_urdf(
         PostprocError: Pinocchio cannot read the URDF.
     """
     begun = monotonic()
-    q, stated, whole = drawn(claim.file, count), chain.read(False), chain.read(True)
-    rounded = stated.turned_from(whole)
-    rows = _placed("flange", whole, claim, q, 0.0)
+    q, stated, whole = (
+        draw_angles(claim.file, count),
+        chain.read(False),
+        chain.read(True),
+    )
+    rounded = stated.measure_turn(whole)
+    rows = _compare_flanges("flange", whole, claim, q, 0.0)
     if rounded > SAME:
         text = "flange, angles of the URDF as rounded"
-        rows += _placed(text, stated, claim, q, rounded)
+        rows += _compare_flanges(text, stated, claim, q, rounded)
     rows.append(_limits(whole, claim.file))
     if claim.file.links is not None:
         rows += _weights(whole, claim, q)
     return Opinion(name, tuple(rows), monotonic() - begun)
 
 
-def drawn(file: ArmFile, count: int) -> Floats:
+def draw_angles(file: ArmFile, count: int) -> Floats:
     """Draw joint angles within the limits of an arm file, (n, 6) [rad]."""
     low, high = np.deg2rad(file.joints.lower_deg), np.deg2rad(file.joints.upper_deg)
     return np.random.default_rng(count).uniform(low, high, (count, 6))
 
 
-def _placed(
+def _compare_flanges(
     what: str, theirs: PinocchioUrdf, claim: ArmClaim, q: Floats, rounded: float
 ) -> list[OpinionRow]:
     """Compare where flanges are; rounded angles may turn and move them so far."""

@@ -96,7 +96,7 @@ class WayMaker:
         course = _ToolCourse(points, start, end, tool, float(turn))
         v = self.visits
         least = course.least(float(v.lin_spd[i]), float(v.rot_spd[i]))
-        return replace(self._followed(begin, course), least=least)
+        return replace(self._follow(begin, course), least=least)
 
     def _end(self, i: int) -> Floats:
         """Return the TCP at the end of a way, (4, 4)."""
@@ -123,7 +123,7 @@ class WayMaker:
         a, b, c = (T[:3, 3] for T in three)
         return _part_of_circle(a, b, c, first=via)
 
-    def _followed(self, begin: Floats, course: _ToolCourse) -> MadeWay:
+    def _follow(self, begin: Floats, course: _ToolCourse) -> MadeWay:
         """Go along by Jacobian steps, sample by sample."""
         steps = course.steps()
         out, q, undo = [begin], begin, np.linalg.inv(course.tool)

@@ -10,10 +10,10 @@ import sys
 import pytest
 
 from postproc.batch.plan import make_plan
-from postproc.batch.run import Order, batch, check_room, default_log, locked
+from postproc.batch.run import BatchOptions, batch, check_room, default_log, lock_folder
 from postproc.batch.workers import LocalPool
-from postproc.compensation.options import AS_USUAL
-from postproc.compensation.record import restore_file
+from postproc.compensation.options import DEFAULT_OPTIONS
+from postproc.compensation.sidecar import restore_file
 from postproc.exceptions import CellError, DiskFullError, OutputError, PostprocError
 from postproc.language.stamp import read_stamp
 from tests.inline import InlinePool
@@ -25,7 +25,7 @@ SUFFIX = ".postproc.json"
 @pytest.fixture
 def plan(job_folder):
     return make_plan(
-        None, job_folder / "cell.toml", job_folder / "model.json", AS_USUAL
+        None, job_folder / "cell.toml", job_folder / "model.json", DEFAULT_OPTIONS
     )
 
 
@@ -35,7 +35,7 @@ def run(tmp_path, plan):
 
     def go(resume=False, jobs=0, source=None, target=None, plan=plan):
         source, target = source or tmp_path / "src", target or tmp_path / "dst"
-        order = Order(source, target, plan, default_log(target), resume)
+        order = BatchOptions(source, target, plan, default_log(target), resume)
         made = []
 
         def gather(plan):
@@ -134,18 +134,25 @@ def test_resume_redoes_all_with_another_cell_model_or_option(tmp_path, run, job_
     text = (job_folder / "cell.toml").read_text()
     cell, model = tmp_path / "cell.toml", job_folder / "model.json"
     cell.write_text(text + "\n")  # the same cell in another place: nothing to do
-    assert not run(resume=True, plan=make_plan(None, cell, model, AS_USUAL)).tasks
+    assert not run(
+        resume=True, plan=make_plan(None, cell, model, DEFAULT_OPTIONS)
+    ).tasks
     cell.write_text(text + "[limits]\ncorrection_mm = 4.0\n")
-    assert len(run(resume=True, plan=make_plan(None, cell, model, AS_USUAL)).tasks) == 2
+    assert (
+        len(run(resume=True, plan=make_plan(None, cell, model, DEFAULT_OPTIONS)).tasks)
+        == 2
+    )
 
 
 def test_resume_redoes_all_with_another_release(tmp_path, run, job_folder, monkeypatch):
     grow(tmp_path / "src", 2, 1)
     run()
     files = (job_folder / "cell.toml", job_folder / "model.json")
-    assert not run(resume=True, plan=make_plan(None, *files, AS_USUAL)).tasks
+    assert not run(resume=True, plan=make_plan(None, *files, DEFAULT_OPTIONS)).tasks
     monkeypatch.setattr("postproc.batch.plan.__version__", "99.0.0")
-    assert len(run(resume=True, plan=make_plan(None, *files, AS_USUAL)).tasks) == 2
+    assert (
+        len(run(resume=True, plan=make_plan(None, *files, DEFAULT_OPTIONS)).tasks) == 2
+    )
 
 
 def test_resume_survives_a_torn_or_foreign_log(tmp_path, run):
@@ -251,7 +258,7 @@ def test_a_plan_serves_many_arms(tmp_path, run, job_folder):
         f'[[rule]]\npattern = "line001/**"\nmodel = "{model}"\n'
         f'cell = "{(job_folder / "cell.toml").as_posix()}"\n'
     )
-    made = make_plan(file, None, None, AS_USUAL)
+    made = make_plan(file, None, None, DEFAULT_OPTIONS)
     summary = run(plan=made)
     assert {(t.unit.program[:7], t.unit.setup) for t in summary.tasks} == {
         ("line000", 0),
@@ -277,14 +284,14 @@ def test_a_plan_maps_arms_to_cells_and_models(tmp_path, run, job_folder):
     rule = '[[rule]]\npattern = "**"\narm = {}\ncell = "r{}.toml"\nmodel = "{}"\n'
     file = tmp_path / "batch.toml"
     file.write_text(rule.format(2, 2, model) + rule.format(1, 1, model))
-    summary = run(plan=make_plan(file, None, None, AS_USUAL))
+    summary = run(plan=make_plan(file, None, None, DEFAULT_OPTIONS))
     assert {(t.unit.program, t.unit.pages, t.unit.setup) for t in summary.tasks} == {
         ("a.pdl", (), 0), ("b.pdl", (), 1), ("c.pdl", (), 1),
     }  # fmt: skip
     assert summary.exit_code == 0 and len(contents(tmp_path / "dst")) == 6
     file.write_text(rule.format(1, 2, model))
     with pytest.raises(CellError, match=r"r2\.toml: is of arm 2.*of arm 1.*arm_number"):
-        make_plan(file, None, None, AS_USUAL)
+        make_plan(file, None, None, DEFAULT_OPTIONS)
 
 
 def test_a_program_of_another_arm_is_absent(tmp_path, run):
@@ -301,14 +308,14 @@ def test_a_bad_plan_is_refused(tmp_path, job_folder):
     file = tmp_path / "batch.toml"
     file.write_text('[[rule]]\npattern = "*"\ncell = "c"\nmodel = "m"\nrobot = "r1"\n')
     with pytest.raises(CellError, match="unknown key"):
-        make_plan(file, None, None, AS_USUAL)
+        make_plan(file, None, None, DEFAULT_OPTIONS)
     with pytest.raises(PostprocError, match="--plan"):
-        make_plan(None, job_folder / "cell.toml", None, AS_USUAL)
+        make_plan(None, job_folder / "cell.toml", None, DEFAULT_OPTIONS)
 
 
 def test_one_run_at_a_time(tmp_path, run):
     grow(tmp_path / "src", 1, 1)
-    with locked(tmp_path / "dst"), pytest.raises(OutputError, match="another run"):
+    with lock_folder(tmp_path / "dst"), pytest.raises(OutputError, match="another run"):
         run()
     assert run().exit_code == 0
 
@@ -348,7 +355,7 @@ class _Killing:
 
 class _KillingSetup:
     digest = "x"
-    options = AS_USUAL
+    options = DEFAULT_OPTIONS
     model = None
 
     @property

@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 
 from postproc.batch.check import check, check_tree
 from postproc.batch.plan import make_plan
-from postproc.batch.run import Order, batch, default_log
+from postproc.batch.run import BatchOptions, batch, default_log
 from postproc.cli.commands import app
-from postproc.compensation.options import AS_USUAL
+from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.outcome import Status
 from postproc.exceptions import ProgramError
 from postproc.files import TEMPORARY
@@ -38,10 +38,10 @@ def trees(tmp_path, job_folder):
     (source / "spot.lsv").write_bytes(VALUES)
     (source / "spot.cod").write_bytes(b"compiled")
     plan = make_plan(
-        None, job_folder / "cell.toml", job_folder / "model.json", AS_USUAL
+        None, job_folder / "cell.toml", job_folder / "model.json", DEFAULT_OPTIONS
     )
     target = tmp_path / "dst"
-    order = Order(source, target, plan, default_log(target), False)
+    order = BatchOptions(source, target, plan, default_log(target), False)
     assert batch(order, lambda plan: InlinePool(plan.setups)).exit_code == 0
     (target / "spot.cod").unlink()
     return source, target, plan.setups[0].model.id
@@ -87,7 +87,7 @@ def test_targets_left_alone_are_found_and_may_be_accepted(trees):
     found = check(target)
     assert codes(found) == {("spot.lsv", "left-alone")}
     assert "1 visits were left alone, lines 2 of" in found.findings[0].message
-    assert found.exit_code == 1 and found.accepting_left().exit_code == 0
+    assert found.exit_code == 1 and found.allow_uncorrected().exit_code == 0
     command = ["check", str(target)]
     assert CliRunner().invoke(app, command).exit_code == 1
     assert CliRunner().invoke(app, [*command, "--allow-uncorrected"]).exit_code == 0

@@ -14,8 +14,8 @@ import pytest
 
 from postproc.batch.cluster import ClusterPool
 from postproc.batch.plan import make_plan
-from postproc.batch.run import Order, batch, default_log
-from postproc.compensation.options import AS_USUAL
+from postproc.batch.run import BatchOptions, batch, default_log
+from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.exceptions import PostprocError
 from tests.batch.dask_cluster import SCHEDULER, WORKER, Cluster, free_port
 from tests.conftest import ROOT
@@ -41,12 +41,12 @@ def test_same_bytes_as_here_although_a_worker_is_killed(
     pages(source / "pages", 2, 2)
     (source / "bad.pdl").write_bytes(b"\0")
     plan = make_plan(
-        None, job_folder / "cell.toml", job_folder / "model.json", AS_USUAL
+        None, job_folder / "cell.toml", job_folder / "model.json", DEFAULT_OPTIONS
     )
 
     def order(name):
         target = tmp_path / name
-        return Order(source, target, plan, default_log(target), False)
+        return BatchOptions(source, target, plan, default_log(target), False)
 
     class Wounded(ClusterPool):
         """Kills a worker that is at work, once."""

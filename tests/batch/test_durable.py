@@ -13,9 +13,9 @@ import time
 import pytest
 
 from postproc.batch.plan import make_plan
-from postproc.batch.run import default_log, locked
+from postproc.batch.run import default_log, lock_folder
 from postproc.batch.workers import LocalPool
-from postproc.compensation.options import AS_USUAL
+from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.exceptions import OutputError
 from postproc.files import TEMPORARY
 from tests.chaos import Plant, build, chaos, descendants, gone
@@ -99,7 +99,7 @@ def test_a_run_that_cannot_stop_in_order_is_ended(tmp_path):
 
 def test_closed_workers_leave_no_thread_behind(plant):
     # The interpreter would close its pipe a second time on its way out.
-    plan = make_plan(None, plant.cell, plant.model, AS_USUAL)
+    plan = make_plan(None, plant.cell, plant.model, DEFAULT_OPTIONS)
     before = set(threading.enumerate())
     pool = LocalPool(plan.setups, 2)
     for _ in range(5):
@@ -145,7 +145,7 @@ def test_a_read_only_target_is_said(plant):
 
 def test_a_read_only_target_is_told_before_any_work(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda place, mode: mode != os.W_OK)
-    with pytest.raises(OutputError, match="read-only"), locked(tmp_path / "dst"):
+    with pytest.raises(OutputError, match="read-only"), lock_folder(tmp_path / "dst"):
         raise AssertionError("held")
 
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from postproc.compensation.command import solve
 from postproc.compensation.compensate import compensate
+from postproc.compensation.inverse_model import solve
 from postproc.compensation.program import plan_visits, read_program, states_of
 from postproc.language.grammars import line_parser
-from postproc.language.lines import read_lines
+from postproc.language.logical_lines import read_lines
 from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
 from postproc.model.model import Model, load_model

@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from postproc.cli.jobs import Destination
-from postproc.compensation import parallel
+from postproc.cli.job_files import Destination
+from postproc.compensation import workers
 from postproc.compensation.compensate import compensate
 from postproc.compensation.program_files import ProgramFiles
 from postproc.model.model import load_model
@@ -38,7 +38,7 @@ def measure(kind: str, n: int, cell: Path, model: Path) -> dict[str, float]:
         given = ProgramFiles.open(place)
         loaded, fitted = load_cell(cell), load_model(model)
         read = time.perf_counter() - start
-        crowd = parallel.available()  # as the command line does
+        crowd = workers.available()  # as the command line does
         outcome = compensate(given, loaded, fitted, processes=crowd)
         pipeline = time.perf_counter() - start
         begin = time.perf_counter()

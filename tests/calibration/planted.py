@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.calibration.design import DesignMatrix, JointColumns
-from postproc.calibration.diagnosis.library import Projection
-from postproc.calibration.diagnosis.refit import revise
+from postproc.calibration.design_matrix import DesignMatrix, JointColumns
+from postproc.calibration.diagnosis.candidates import Projection
+from postproc.calibration.diagnosis.model_update import revise
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.exceptions import PostprocError
 from postproc.model.effects import BASE_EFFECTS, propose
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.direction import arrivals_of_rows
@@ -77,7 +77,7 @@ class Campaign:
         if any(p.name in REVISED for p in self.planted):
             return self.revised()
         effects = propose(BASE_EFFECTS, self.declared, self.states)
-        batch = Batch(self.declared, self.states)
+        batch = ArmStates(self.declared, self.states)
         return fit_effects(batch, self.position, effects, tuple(TRACKER))
 
     def revised(self) -> Fit:
@@ -87,7 +87,7 @@ class Campaign:
         old = survey(clean, seed + 500_000, rows)
         position = clean.measure(old, TRACKER, stream(seed, "before"))
         model = base_model(measurements(states_of(old), position, "old"), self.declared)
-        batch = Batch(self.declared, self.states)
+        batch = ArmStates(self.declared, self.states)
         fresh = measurements(self.states, self.position, "fresh")
         origin = (float(TRACKER[0]), float(TRACKER[1]), float(TRACKER[2]))
         return revise(fresh, model, batch, origin)[0]
@@ -193,7 +193,9 @@ def states_of(a: VirtualArrivals) -> States:
 
 def seen_error(arm: VirtualArm, arrivals: VirtualArrivals) -> np.ndarray:
     """What a perfect tracker on a stand that may move would read, less the nominal."""
-    return arm.seen(arrivals, arm.tcp(arrivals)) - arm.nominal_tcp(arrivals)
+    return arm.simulate_readings(arrivals, arm.tcp(arrivals)) - arm.nominal_tcp(
+        arrivals
+    )
 
 
 def displacement(
@@ -259,7 +261,7 @@ def _clean_fit(clean: VirtualArm, seed: int, arrivals: VirtualArrivals) -> Fit:
     """Fit the base model to the arm without undeclared effects."""
     position = clean.measure(arrivals, TRACKER, stream(seed, "tracker"))
     effects = propose(BASE_EFFECTS, ARM, states_of(arrivals))
-    batch = Batch(ARM, states_of(arrivals))
+    batch = ArmStates(ARM, states_of(arrivals))
     return fit_effects(batch, position, effects, tuple(TRACKER))
 
 

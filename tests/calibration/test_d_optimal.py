@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from postproc.calibration.survey import Gain, choose, gain_d, gain_i
+from postproc.calibration.pose_design import Gain, choose, gain_d, gain_i
 
 RNG = np.random.default_rng(0)
 X = RNG.standard_normal((14, 3, 5)) * [3.0, 2.0, 1.0, 0.5, 0.2]

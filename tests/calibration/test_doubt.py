@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from postproc.calibration.doubt import Alternative, _apart, doubt_of
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.evidence import posterior
 from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, beside
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.model.effects.compliance import Compliance
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.state import States
 from tests.calibration.simulator import NJ, random_arm
 from tests.campaign_files import FLOOR, Setup, write_cell
@@ -138,7 +138,7 @@ def test_weight_along_a_direction_is_a_mix_of_the_axes() -> None:
     states, along = fitted.batch.states, np.array([0.6, 0.0, -0.8])
     axes = Compliance.along_axes(fitted.batch)
     mix = Alternative.of(axes[0], along=along).way
-    tilted = Batch(NJ.mounted(along), states).loads
+    tilted = ArmStates(NJ.mount(along), states).loads
     turned = np.concatenate([e.basis(fitted.batch) for e in axes], axis=1) @ mix
     own = (tilted.gravity + tilted.payload)[:, np.array(axes[0].joints) - 1]
     np.testing.assert_allclose(turned, own, rtol=1e-9, atol=1e-6)

@@ -126,7 +126,7 @@ def test_parameters_left_to_their_prior_are_integrated_over() -> None:
     aside = np.arange(X.shape[1]) % 3 == 0
     u = np.array([0.3, -0.4])[: group.max() + 1]
     whole = posterior(normal, group, u)
-    rest = normal.left_to_prior(aside, np.exp(u)[group[aside]])
+    rest = normal.marginalise(aside, np.exp(u)[group[aside]])
     part = posterior(rest, group[~aside], u)
     assert np.isclose(part.log_evidence, whole.log_evidence, rtol=1e-10)
     assert np.allclose(part.mean, whole.mean[~aside])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.calibration.expected_noise import expected_noise, repeated_approaches
+from postproc.calibration.expected_noise import count_repeats, expect_noise
 from postproc.calibration.regression import Fit
 from postproc.calibration.stops import pool_readings
 from postproc.calibration.validation import FitTask
@@ -34,7 +34,7 @@ def fit_of(
 
 
 def std_of_pose(fitted: Fit) -> float:
-    noise = expected_noise(fitted)
+    noise = expect_noise(fitted)
     variance = noise.pose_variance(fitted.design.jacobian)
     return float(np.sqrt(variance.mean()))
 
@@ -56,7 +56,7 @@ def test_an_error_that_all_visits_share_is_one_of_the_pose(
 
 def test_what_one_approach_alone_has_is_no_larger_than_what_both_share() -> None:
     fitted = fit_of(1, 2, pose=4e-5)
-    assert repeated_approaches(fitted.batch.states) == 0
+    assert count_repeats(fitted.batch.states) == 0
     noise = fitted.noise
     own = float(noise.pose_variance(fitted.design.jacobian).mean())
     assert 3e-5 < own**0.5 < std_of_pose(fitted) <= 1.001 * (2.0 * own) ** 0.5
@@ -76,4 +76,4 @@ def test_rounding_that_exceeds_its_limit_by_chance_is_no_error_of_poses(
     fitted = fit_of(rounds, sides, decimals, shift=1e-5)
     step = np.deg2rad(10.0**-decimals) / 12.0**0.5
     assert std_of_pose(fitted) == 0.0
-    assert expected_noise(fitted).rounding <= 1.001 * step
+    assert expect_noise(fitted).rounding <= 1.001 * step

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.fit import fit
 from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.report import FitReport, find, report_fit
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.calibration.survey_files import read_measurements
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.model.effects import BASE_EFFECTS
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import load_model
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.fit import tell_fit
@@ -253,7 +253,7 @@ def test_what_physics_forbids_is_marked(tmp_path: Path) -> None:
     """A joint that rises under its load has no negative stiffness."""
     rng = np.random.default_rng(5)
     states = random_states(300, rng)
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     torque = batch.loads.gravity[:, 1]
     told = {}
     for sign in (1.0, -1.0):
@@ -272,7 +272,7 @@ def test_what_physics_forbids_is_marked(tmp_path: Path) -> None:
 def test_sizes_and_evidence_are_those_of_what_was_planted() -> None:
     rng = np.random.default_rng(6)
     states = random_states(300, rng)
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     gap = 1.5e-4 * states.direction[:, 2, None] * batch.jacobian[:, :, 2]
     noise = 2e-5 * rng.standard_normal((300, 3))
     survey = survey_of(states, batch.walk.tcp + gap + noise)

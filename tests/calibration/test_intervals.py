@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from postproc.calibration.effect_selection import fit_survey
 from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.registration import predict_registered
-from postproc.calibration.selection import fit_survey
 from postproc.calibration.stops import pool_readings
 from postproc.model.effects import BASE_EFFECTS
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell
 from tests.calibration.simulator import NJ, random_arm, random_states, survey_of
@@ -52,7 +52,7 @@ def held(model: Model, rows: Measurements) -> float:
         states = model.registration.on_probes(states)
         position = model.registration.to_base(position)
     told = model.reading(NJ, states)
-    off = position - Batch(NJ, states).walk.tcp - told.error
+    off = position - ArmStates(NJ, states).walk.tcp - told.error
     return float((np.abs(off) < 1.96 * told.std).mean())
 
 
@@ -82,7 +82,7 @@ def test_a_drift_of_the_tracker_is_part_of_a_reading(cell: Cell) -> None:
     assert "tracker_drift" in {e.name for e in found.model.effects.effects}
     assert 0.92 < held(found.model, rows[~every]) < 0.98
     alone = found.model.error(NJ, rows[~every].states)
-    off = rows[~every].position - Batch(NJ, rows[~every].states).walk.tcp - alone
+    off = rows[~every].position - ArmStates(NJ, rows[~every].states).walk.tcp - alone
     std = found.model.reading(NJ, rows[~every].states).std
     assert (np.abs(off) < 1.96 * std).mean() < 0.9
 
@@ -93,7 +93,7 @@ def test_another_registration_takes_nothing_but_itself(cell: Cell) -> None:
     moved = (later.position - [1.0, 4.0, 0.0]) @ TURN.T
     placed, told = predict_registered(model, NJ, later.states, moved)
     states = placed.on_probes(later.states)
-    off = placed.to_base(moved) - Batch(NJ, states).walk.tcp - told.error
+    off = placed.to_base(moved) - ArmStates(NJ, states).walk.tcp - told.error
     share = float((np.abs(off) < 1.96 * told.std).mean())
     assert 0.935 < share < 0.965
     assert told.std.mean() < 6e-5  # of a reading, not of where nobody can know

@@ -9,14 +9,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from postproc.calibration.effect_selection import model_of
 from postproc.calibration.fit import into_base_frame
 from postproc.calibration.measurements import Measurements
-from postproc.calibration.plausibility import check_against, check_survey
 from postproc.calibration.regression import fit_effects
-from postproc.calibration.selection import model_of
+from postproc.calibration.survey_checks import check_against, check_survey
 from postproc.exceptions import MeasurementError
 from postproc.model.effects import propose
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from tests.calibration.simulator import (
     NJ,
@@ -46,7 +46,7 @@ def our_arm() -> Simulated:
 def our_model() -> Model:
     survey = measured(1, 200)
     effects = propose(("geometry", "backlash"), NJ, survey.states)
-    fitted = fit_effects(Batch(NJ, survey.states), survey.position, effects)
+    fitted = fit_effects(ArmStates(NJ, survey.states), survey.position, effects)
     return model_of(fitted, survey)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.calibration.measurements import concatenate, read_survey_file
-from postproc.calibration.plausibility import check_survey
+from postproc.calibration.survey_checks import check_survey
 from postproc.exceptions import MeasurementError
 from tests.calibration.simulator import NJ, PLATE, TOOL, random_states
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.fit import into_base_frame
 from postproc.calibration.measurements import Measurements, read_survey_file
-from postproc.calibration.plausibility import check_orientations
-from postproc.calibration.report import weighed_down
-from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.report import list_downweighted
+from postproc.calibration.survey_checks import check_orientations
 from postproc.exceptions import MeasurementError
 from postproc.model.effects import BASE_EFFECTS
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from tests.calibration.simulator import (
     NJ,
@@ -51,7 +51,7 @@ def gap(arm: Simulated, model: Model, longer: float) -> tuple[np.ndarray, np.nda
     held = random_states(150, np.random.default_rng(9), TOOL[None] + [0, 0, longer])
     true = arm.tcp(held.q, held.direction, held.tool)
     p = model.predict(NJ, held)
-    return true - Batch(NJ, held).walk.tcp - p.error, p.std_model
+    return true - ArmStates(NJ, held).walk.tcp - p.error, p.std_model
 
 
 def rms(errors: list[np.ndarray]) -> float:
@@ -98,7 +98,7 @@ def test_a_wrong_orientation_is_listed_and_its_position_kept() -> None:
     fit = fit_survey(survey, NJ, BASE_EFFECTS, None)
     assert fit.turns is not None and fit.rows.weight[7] == 1
     assert np.flatnonzero(fit.turns.weight < 1).tolist() == [7]
-    listed = weighed_down(fit, survey)
+    listed = list_downweighted(fit, survey)
     assert [row.id for row in listed] == ["8"]
     assert listed[0].why.startswith("orientation dropped: off by ")
     assert rms([gap(arm, model_of(fit, survey), 0.1)[0]]) < 4e-5

@@ -3,17 +3,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.calibration.diagnosis.trace import trace
+from postproc.calibration.diagnosis.investigate import trace
 from postproc.calibration.orientations import _without, judge, student_weights
 from postproc.calibration.regression import fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.simulation import Planted, stream, virtual_arm
 from tests.calibration.planted import ARM, BASE, TRACKER, states_of, survey
 from tests.calibration.simulator import NJ, random_states
 
 STATES = random_states(300, np.random.default_rng(0))
-J = Batch(NJ, STATES).jacobian
+J = ArmStates(NJ, STATES).jacobian
 NOISE = 3e-5
 
 
@@ -91,7 +91,10 @@ def test_a_worn_spot_survives_beside_a_broken_beam() -> None:
     position[broken] += np.array([1e-3, -1e-3, 1e-3])
     states = states_of(arrivals)
     base = fit_effects(
-        Batch(ARM, states), position, propose(BASE_EFFECTS, ARM, states), tuple(TRACKER)
+        ArmStates(ARM, states),
+        position,
+        propose(BASE_EFFECTS, ARM, states),
+        tuple(TRACKER),
     )
     found = trace(base, seed=0).search
     assert found.additions[0].candidate.family.effect == "joint_map"

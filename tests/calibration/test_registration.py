@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.fit import into_base_frame
 from postproc.calibration.measurements import read_points, read_survey_file
 from postproc.calibration.registration import register
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.calibration.tables import TableFormat, read_column_map
 from postproc.exceptions import MeasurementError
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import BASE_EFFECTS
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import load_arm
 from tests.calibration.simulator import NJ, PLATE, random_arm, random_states, survey_of
 
@@ -29,7 +29,7 @@ def pose() -> tuple[np.ndarray, np.ndarray]:
 def test_tracker_and_probe_are_found_exactly_on_a_perfect_arm() -> None:
     states = random_states(60, np.random.default_rng(0), PLATE)
     R, t = pose()
-    position = (Batch(NJ, states).walk.tcp - t) @ R  # tracker = R^T (base - t)
+    position = (ArmStates(NJ, states).walk.tcp - t) @ R  # tracker = R^T (base - t)
     blind = states.with_(tool=np.zeros((60, 3)))
     found = register(NJ, blind, position, Combination(()), np.zeros(0))
     np.testing.assert_allclose(found.base_from_tracker[:3, :3], R, atol=1e-7)
@@ -54,7 +54,7 @@ def test_an_arm_is_calibrated_in_the_tracker_s_frame() -> None:
     # Distances do not depend on the frame: they must be the true ones.
     held = random_states(100, rng, placed.probes)
     true = arm.tcp(held.q, held.direction, np.tile(states.tool[0], (100, 1)))
-    batch = Batch(NJ, held)
+    batch = ArmStates(NJ, held)
     ours = batch.walk.tcp + fit.combination.error(batch, fit.values)
     gap = np.linalg.norm(np.diff(true, axis=0), axis=1)
     gap -= np.linalg.norm(np.diff(ours, axis=0), axis=1)
@@ -73,7 +73,7 @@ def test_an_arm_is_calibrated_in_the_tracker_s_frame() -> None:
 def test_mistakes_are_named(spoil, match: str) -> None:  # type: ignore[no-untyped-def]
     states = random_states(80, np.random.default_rng(2))
     R, t = pose()
-    q, position = spoil(states.q, (Batch(NJ, states).walk.tcp - t) @ R)
+    q, position = spoil(states.q, (ArmStates(NJ, states).walk.tcp - t) @ R)
     survey = survey_of(states.with_(q=np.array(q)), position)
     with pytest.raises(MeasurementError, match=match):
         into_base_frame(survey, NJ)
@@ -138,7 +138,7 @@ def test_a_real_arm_is_calibrated_from_tracker_data() -> None:
     }.items():
         fit = fit_survey(survey, arm, effects, placed.tracker, ("registration",))
         tool = np.tile(placed.probes[0], (len(test), 1))
-        batch = Batch(arm, series.states[test].with_(tool=tool))
+        batch = ArmStates(arm, series.states[test].with_(tool=tool))
         gap = placed.to_base(series.position[test]) - batch.walk.tcp
         gap -= fit.combination.error(batch, fit.values)
         left[name] = np.linalg.norm(gap, axis=1).mean()

@@ -10,12 +10,12 @@ import pytest
 from scipy.linalg import qr
 
 from postproc.calibration import regression
+from postproc.calibration.effect_selection import fit_survey
 from postproc.calibration.regression import Fit, fit_effects
-from postproc.calibration.selection import fit_survey
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.geometry import Geometry
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.state import States
 from tests.calibration.simulator import (
     NJ,
@@ -31,7 +31,7 @@ SEEDS = range(6)
 
 def true_error(arm: Simulated, states: States) -> np.ndarray:
     truth = arm.tcp(states.q, states.direction, states.tool)
-    return truth - Batch(NJ, states).walk.tcp
+    return truth - ArmStates(NJ, states).walk.tcp
 
 
 @cache
@@ -50,17 +50,17 @@ def case(seed: int) -> tuple[Simulated, States, np.ndarray, Fit]:
 
 def informed(states: States, measured: np.ndarray, held: States) -> np.ndarray:
     """Least squares with exactly the effects that the arm has, iterated."""
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     geometry = Geometry.propose(NJ, states)
     values = np.zeros(len(geometry.parameters()))
 
-    def waves(b: Batch) -> np.ndarray:
+    def waves(b: ArmStates) -> np.ndarray:
         s = b.states.direction
         phi = [s, s * np.sin(b.states.q), s * np.cos(b.states.q)]
         return np.concatenate([b.jacobian * f[:, None, :] for f in phi], axis=2)
 
     for _ in range(4):
-        at = batch.moved(geometry.deviation(values), None)
+        at = batch.move(geometry.deviation(values), None)
         X = np.concatenate([geometry.columns(at), waves(at)], axis=2)
         y = measured - at.walk.tcp
         flat = X.reshape(-1, X.shape[2])
@@ -70,8 +70,8 @@ def informed(states: States, measured: np.ndarray, held: States) -> np.ndarray:
         step[keep] = np.linalg.lstsq(flat[:, keep], y.reshape(-1))[0]
         values = values + step[: len(values)]
         profile = step[len(values) :]
-    nominal = Batch(NJ, held)
-    at = nominal.moved(geometry.deviation(values), None)
+    nominal = ArmStates(NJ, held)
+    at = nominal.move(geometry.deviation(values), None)
     return at.walk.tcp + waves(at) @ profile - nominal.walk.tcp
 
 
@@ -81,7 +81,7 @@ def test_the_true_error_left_is_near_that_of_the_informed_fit() -> None:
         arm, states, measured, fit = case(seed)
         held = random_states(500, np.random.default_rng(100 + seed), PLATE)
         truth = true_error(arm, held)
-        predicted = fit.combination.error(Batch(NJ, held), fit.values)
+        predicted = fit.combination.error(ArmStates(NJ, held), fit.values)
         ours.append(np.linalg.norm(truth - predicted, axis=1).mean())
         best = informed(states, measured, held)
         theirs.append(np.linalg.norm(truth - best, axis=1).mean())
@@ -94,7 +94,7 @@ def test_intervals_cover_the_true_errors() -> None:
     for seed in SEEDS:
         arm, _, _, fit = case(seed)
         held = random_states(300, np.random.default_rng(200 + seed), PLATE)
-        batch = Batch(NJ, held)
+        batch = ArmStates(NJ, held)
         gap = true_error(arm, held) - fit.combination.error(batch, fit.values)
         X = fit.combination.columns(fit.combination.at(batch, fit.values))
         std = np.sqrt(np.einsum("nip,nip->ni", X @ fit.covariance, X))
@@ -124,7 +124,9 @@ def test_gross_outliers_are_dropped_and_nothing_else() -> None:
     assert set(bad) <= set(np.flatnonzero(fit.rows.weight < 0.5))
     assert (fit.rows.weight < 1).sum() <= 15
     held = random_states(300, rng)
-    left = true_error(arm, held) - fit.combination.error(Batch(NJ, held), fit.values)
+    left = true_error(arm, held) - fit.combination.error(
+        ArmStates(NJ, held), fit.values
+    )
     assert np.linalg.norm(left, axis=1).mean() < 2e-5
 
 
@@ -134,7 +136,7 @@ def test_a_worn_spot_is_no_outlier() -> None:
     states = random_states(400, rng)
     measured, _ = arm.measure(states, rng)
     bump = 3e-4 * np.exp(-0.5 * ((states.q[:, 1] - 0.2) / 0.08) ** 2)
-    measured = measured + Batch(NJ, states).jacobian[:, :, 1] * bump[:, None]
+    measured = measured + ArmStates(NJ, states).jacobian[:, :, 1] * bump[:, None]
     fit = fit_survey(survey_of(states, measured), NJ, BASE_EFFECTS, None)
     worn = np.abs(states.q[:, 1] - 0.2) < 0.08
     assert worn.sum() > 10
@@ -193,7 +195,7 @@ def test_parameters_that_do_not_show_stay_at_their_prior() -> None:
 def test_an_empty_combination_predicts_nothing() -> None:
     states = random_states(5, np.random.default_rng(0))
     nothing = Combination(())
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     assert nothing.columns(batch).shape == (5, 3, 0)
     assert np.abs(nothing.error(batch, np.zeros(0))).max() == 0
 

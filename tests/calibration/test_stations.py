@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from postproc.calibration.fit import fit_measurements, into_base_frame
 from postproc.calibration.measurements import Measurements, concatenate
-from postproc.calibration.plausibility import check_stops
-from postproc.calibration.references import ReferenceRows
+from postproc.calibration.monuments import ReferenceRows
+from postproc.calibration.survey_checks import check_stops
 from postproc.exceptions import MeasurementError
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.station_shift import StationShift
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import load_model
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import (
@@ -66,7 +66,7 @@ def files(
 def off(found, check: Measurements) -> float:  # type: ignore[no-untyped-def]
     """Return the mean true error that a model leaves [mm]."""
     predicted = found.model.error(NJ, check.states)
-    left = check.position - Batch(NJ, check.states).walk.tcp - predicted
+    left = check.position - ArmStates(NJ, check.states).walk.tcp - predicted
     return float(np.linalg.norm(left, axis=1).mean() * 1e3)
 
 
@@ -76,7 +76,7 @@ def readings_off(found, survey: Measurements) -> float:  # type: ignore[no-untyp
     states = placed.on_probes(survey.states)
     read = found.model.reading(NJ, states).error
     left = placed.to_base(survey.position, states.station)
-    left = left - Batch(NJ, states).walk.tcp - read
+    left = left - ArmStates(NJ, states).walk.tcp - read
     return float(np.linalg.norm(left, axis=1).mean() * 1e3)
 
 
@@ -153,7 +153,7 @@ def test_columns_of_a_station_are_those_of_its_rows() -> None:
     states = random_states(6, np.random.default_rng(0), PLATE).with_(
         station=np.array([0, 0, 1, 1, 2, 2])
     )
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     for effect, first in (
         (Placement.propose(NJ, states), 0),
         (StationShift.propose(NJ, states), 1),
@@ -174,13 +174,13 @@ def never_turned(n: int, rng: np.random.Generator, free: bool = False):  # type:
     q = random_states(n, rng).q.copy()
     q[:, 3:5] = 0.0, -0.5
     states = random_states(n, rng).with_(q=q.copy())
-    flange = Batch(NJ, states).walk.flange
+    flange = ArmStates(NJ, states).walk.flange
     turn = flange[0] if not free else None
     for k in range(n):
 
         def gap(wrist: np.ndarray, k: int = k) -> np.ndarray:
             joints = np.r_[q[k, :3], wrist]
-            R = Batch(NJ, states[:1].with_(q=joints[None])).walk.flange[0]
+            R = ArmStates(NJ, states[:1].with_(q=joints[None])).walk.flange[0]
             return (R[:, 2] - flange[0][:, 2]) if turn is None else (R - turn).ravel()
 
         q[k, 3:] = least_squares(gap, q[k, 3:]).x
@@ -235,7 +235,7 @@ def test_readings_with_the_tool_turned_otherwise_are_as_unsure_as_the_probe(  # 
         assert placed is not None
         states = placed.on_probes(rows.states)
         read = model.reading(NJ, states)
-        at = placed.to_base(rows.position) - Batch(NJ, states).walk.tcp
+        at = placed.to_base(rows.position) - ArmStates(NJ, states).walk.tcp
         held = np.abs(at - read.error) < 1.96 * read.std
         return float(held.mean()), float(read.std.mean())
 

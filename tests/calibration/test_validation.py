@@ -11,11 +11,11 @@ from postproc.calibration.cross_validation import (
     HeldOutRows,
     PairedErrors,
     choose,
-    held_out_linearly,
     parts_of,
+    predict_held_out_linearly,
     summarise,
 )
-from postproc.calibration.expected_noise import expected_noise
+from postproc.calibration.expected_noise import expect_noise
 from postproc.calibration.fit import fit_measurements
 from postproc.calibration.validation import ASKED, FitTask, Rung
 from postproc.robot.cell import load_cell
@@ -94,7 +94,7 @@ def test_parts_predicted_linearly_are_near_to_fits_without_them() -> None:
     task = FitTask(survey, CELL.arm, PLAIN, None)
     fitted = task.fit()
     part = parts_of(np.arange(80), 0)
-    linear = held_out_linearly(fitted, part)
+    linear = predict_held_out_linearly(fitted, part)
     exact = task.errors(Rung(ASKED, PLAIN), part, np.ones(80, dtype=bool))
     gap = np.linalg.norm(linear.error - exact.error, axis=1)
     assert np.median(gap) < 0.15 * np.median(np.linalg.norm(exact.error, axis=1))
@@ -139,7 +139,7 @@ def test_rounded_angles_are_no_error_of_other_poses() -> None:
     fitted = FitTask(survey, CELL.arm, ("geometry", "backlash_profile"), None).fit()
     step = np.deg2rad(0.01) / np.sqrt(12.0)
     assert fitted.noise.pose_joint == pytest.approx(step, rel=0.2)
-    expected = expected_noise(fitted)
+    expected = expect_noise(fitted)
     assert expected.pose_joint < 0.7 * step
     assert expected.rounding == pytest.approx(step, rel=0.2)
 

@@ -16,7 +16,7 @@ from postproc.calibration.measurements import (
 from postproc.exceptions import MeasurementError
 from postproc.model.effects.thermal import Thermal
 from postproc.model.effects.tracker_drift import TrackerDrift
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from tests.calibration.simulator import NJ, TOOL, random_states
 
 N = 40
@@ -162,9 +162,9 @@ def test_a_drift_without_a_clock_is_its_mean_with_its_spread() -> None:
     drift = TrackerDrift(0.0, 1000.0, "time")
     p = np.array([q.scale for q in drift.parameters()]) * rng.standard_normal(18)
     lost = drift.without_clock(["order"])
-    at = Batch(NJ, states)
+    at = ArmStates(NJ, states)
     moments = [
-        drift.displacement(Batch(NJ, states.with_(time=np.full(5, t))), p)
+        drift.displacement(ArmStates(NJ, states.with_(time=np.full(5, t))), p)
         for t in np.linspace(0.0, 1000.0, 101)
     ]
     np.testing.assert_allclose(lost.displacement(at, p), np.mean(moments, axis=0))
@@ -173,7 +173,7 @@ def test_a_drift_without_a_clock_is_its_mean_with_its_spread() -> None:
     np.testing.assert_allclose(spread, np.var(moments, axis=0))
     assert drift.without_clock(["time"]) is drift
     assert drift.moment_variance(at, p) is None
-    unknown = Batch(NJ, states.with_(time=np.full(5, np.nan)))
+    unknown = ArmStates(NJ, states.with_(time=np.full(5, np.nan)))
     np.testing.assert_allclose(drift.displacement(unknown, p), np.mean(moments, axis=0))
 
 
@@ -182,14 +182,14 @@ def test_a_drift_after_the_survey_is_that_of_its_end() -> None:
     states = random_states(3, np.random.default_rng(0))
     p = np.array([q.scale for q in drift.parameters()])
     late = [states.with_(order=np.full(3, o)) for o in (100.0, 1e9)]
-    moved = [drift.displacement(Batch(NJ, s), p) for s in late]
+    moved = [drift.displacement(ArmStates(NJ, s), p) for s in late]
     np.testing.assert_allclose(*moved)
 
 
 def test_a_warm_up_of_the_survey_is_its_mean_and_the_arms_stays() -> None:
     warming = Thermal(form="time", clock="order", time_constant=10.0, level=0.3)
     lost = warming.without_clock(["time"])
-    at = Batch(NJ, random_states(4, np.random.default_rng(0)))
+    at = ArmStates(NJ, random_states(4, np.random.default_rng(0)))
     p = np.full(len(warming.parameters()), 1e-4)
     assert np.abs(lost.displacement(at, p)).max() == 0.0
     spread = lost.moment_variance(at, p)

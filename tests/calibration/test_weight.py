@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.calibration.diagnosis.trace import trace
-from postproc.calibration.selection import fit_best
-from postproc.model.kinematics import Batch
+from postproc.calibration.diagnosis.investigate import trace
+from postproc.calibration.effect_selection import fit_best
+from postproc.model.kinematics import ArmStates
 from postproc.simulation import Planted, stream, virtual_arm
 from tests.calibration.planted import (
     ARM,
@@ -29,14 +29,14 @@ def left(seed: int, pulls: tuple[float, ...], *planted: Planted):
     arm = virtual_arm(seed, every, rows=250, tracker=TRACKER, gravity=9.80665 * weight)
     rows, other = (survey(arm, s, 250) for s in (seed, seed + 1))
     position = arm.measure(rows, TRACKER, stream(seed, "tracker"))
-    mounted = ARM.mounted(weight)
+    mounted = ARM.mount(weight)
     fitted = fit_best(mounted, states_of(rows), position, tuple(TRACKER))
     own = fitted.combination
     names = {
         (e.name, j) for e in own.effects if e.name in BY_WEIGHT
         for j in {p.joint for p in e.parameters()}
     }  # fmt: skip
-    error = own.error(Batch(mounted, states_of(other)), fitted.values)
+    error = own.error(ArmStates(mounted, states_of(other)), fitted.values)
     off = np.linalg.norm(arm.error(other) - error, axis=1)
     return names, float(off.mean() * 1e3)
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from postproc.calibration.effect_selection import fit_best
 from postproc.calibration.fit import fit_measurements
 from postproc.calibration.regression import NEARLY, fit_effects
-from postproc.calibration.selection import fit_best
 from postproc.calibration.weight_direction import direction_warning, level_warning
 from postproc.model.effects import BASE_EFFECTS, propose
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.registration import Registration
 from postproc.robot.cell import load_cell
 from postproc.simulation import Planted, sample_survey, stream, virtual_arm
@@ -31,9 +31,9 @@ def survey(seed, pulls, *planted):
 
 def base_fit(states, position, stated):
     """Fit geometry and backlash, weight pulling where the cell says."""
-    arm = ARM.mounted(np.array(stated, dtype=float))
+    arm = ARM.mount(np.array(stated, dtype=float))
     effects = propose(BASE_EFFECTS, arm, states)
-    batch, place = Batch(arm, states), tuple(TRACKER)
+    batch, place = ArmStates(arm, states), tuple(TRACKER)
     return fit_effects(batch, position, effects, place, until=NEARLY)
 
 

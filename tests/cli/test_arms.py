@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from postproc.robot.arm import load_arm
-from postproc.robot.arm_file import shipped_arms
+from postproc.robot.arm_file import list_shipped_arms
 from postproc.robot.pose import record_from_pose
 from tests.robot.urdfs import NJ130_SERIAL, URDFS, urdf_text
 from tests.written import cli
 
 
-@pytest.mark.parametrize("name", sorted(set(shipped_arms()) - {"ur10"}))
+@pytest.mark.parametrize("name", sorted(set(list_shipped_arms()) - {"ur10"}))
 def test_a_program_is_planned_with_every_arm(tmp_path, name):
     """Joint and linear moves to poses of known joint angles lead to these."""
     arm = load_arm(name)
@@ -45,7 +45,7 @@ def urdf(tmp_path):
 def test_all_shipped_arms_are_listed_with_their_reach():
     found = cli("arm", "list")
     rows = {line.split()[0]: line.split()[1:] for line in found.stdout.splitlines()}
-    assert found.exit_code == 0 and set(rows) - {"arm"} == set(shipped_arms())
+    assert found.exit_code == 0 and set(rows) - {"arm"} == set(list_shipped_arms())
     assert rows["irb4600-60-2.05"] == ["2051", "0.06", "closed", "form"]
     assert rows["ur10"] == ["0.1", "numeric"]
 

@@ -10,7 +10,7 @@ import pytest
 
 from postproc.files import SCHEMAS
 from postproc.model.model import load_model
-from tests.compensation.paths.test_accuracy import job
+from tests.compensation.paths.test_path_error import job
 from tests.conftest import SEED
 from tests.written import cli
 

@@ -9,7 +9,7 @@ import pytest
 
 from postproc.compensation import program as planning
 from postproc.diagnostics import Code
-from postproc.model.combination import INTERACTION
+from postproc.model.effect_sum import INTERACTION
 from tests.written import FIRST, NEXT, POSE, cli, program
 
 LOOPED = (

@@ -102,7 +102,7 @@ def test_help_loads_nothing_heavy():
 
 def test_compensating_loads_nothing_that_it_may_not_need():
     code = (
-        "import sys, postproc.cli.jobs, postproc.cli.common\n"
+        "import sys, postproc.cli.job_files, postproc.cli.common\n"
         "import postproc.language.pdl2.language\n"
         "ours = ('batch.plan', 'compensation.in_time', 'motion.timing',\n"
         "    'compensation.paths.correction', 'language.pdl2.clones',\n"

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.compensation.compensate import compensate
-from postproc.compensation.options import AS_USUAL
-from postproc.compensation.program import plan_visits, prepared, read_program
-from postproc.language.krl.dialect import abc_from_rotation
+from postproc.compensation.options import DEFAULT_OPTIONS
+from postproc.compensation.program import plan_visits, prepare_cell, read_program
+from postproc.language.krl.pose_encoding import abc_from_rotation
 from postproc.model.model import Model
 from postproc.robot.arm import load_arm
 from tests.calibration.simulator import random_arm, random_states, survey_of
@@ -83,7 +83,7 @@ def points(text: bytes) -> np.ndarray:
 def plans(source: bytes, cell, model):
     """Compensate a program; return the outcome and both plans."""
     done = compensate(source, cell, model, name="job.src")
-    ready = prepared(cell, model, AS_USUAL)
+    ready = prepare_cell(cell, model, DEFAULT_OPTIONS)
     both = [
         plan_visits(read_program({"job.src": text}, ready).visits, ready).plan
         for text in (source, done.outputs["job.src"])

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.options import AS_USUAL, Options
+from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
@@ -49,10 +49,10 @@ class Shop:
 
     cell: Cell
     model: Model
-    options: Options = AS_USUAL
+    options: Options = DEFAULT_OPTIONS
 
     @classmethod
-    def of(cls, cell: Cell, model: Model, options: Options = AS_USUAL) -> Shop:
+    def of(cls, cell: Cell, model: Model, options: Options = DEFAULT_OPTIONS) -> Shop:
         """Let the cell run programs of every language."""
         cell = any_controller(cell)
         robot = cell.file.robot.model_copy(update={"absolute_accuracy": False})

@@ -13,7 +13,7 @@ from postproc.compensation.arc_angles import (
     NO_END,
     NO_START,
     TILTED,
-    written_points,
+    points_to_write,
 )
 from postproc.compensation.continuity import ANGLED
 from postproc.compensation.outcome import Status
@@ -166,7 +166,7 @@ def test_a_similarity_keeps_the_angle():
         b = before[1, 0] - centre  # the third point lies behind the one on the way
         to_via = np.rad2deg(np.arctan2(np.cross(a, b) @ normal, a @ b)) % 360.0
         third = circle(*before[:, 0], (to_via + 360.0) / 2)[None]
-        via, end = written_points(before, after, third)
+        via, end = points_to_write(before, after, third)
         found = circle(after[0, 0], via[0], end[0], np.rad2deg(angle))
         assert np.allclose(found, after[2, 0], atol=1e-9)
         assert np.linalg.norm(via[0] - after[1, 0]) < 0.05

@@ -8,7 +8,7 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.eligibility import STRANDED
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
-from postproc.compensation.windows import cut_points
+from postproc.compensation.windowing import cut_points
 
 START = (300.0, 100.0, 200.0)
 

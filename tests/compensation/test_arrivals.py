@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from postproc.compensation import outcome as outcome_module
-from postproc.compensation import windows as cuts
+from postproc.compensation import windowing as cuts
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
-from postproc.model.combination import INTERACTION
+from postproc.model.effect_sum import INTERACTION
 from postproc.report.json import report_text, target_rows
 from postproc.robot.pose import MM
 from tests.bench import made

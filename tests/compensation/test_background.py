@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from postproc.compensation.parallel import in_background
+from postproc.compensation.workers import in_background
 from postproc.exceptions import PostprocError
 from tests.bench.made import milling
 

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from postproc.compensation.clones import give_own_points
-from postproc.compensation.decide import Proposal
+from postproc.compensation.decisions import Proposal
 from postproc.compensation.outcome import Decisions, Status
-from postproc.compensation.program import Reading, read_program
+from postproc.compensation.program import ParsedProgram, read_program
 from postproc.diagnostics import NO_REASON
 from tests.language.pdl2.executed import Generated
 from tests.language.pdl2.generator import Generator
@@ -44,7 +44,7 @@ def made_with(seed: int, exact: bool) -> Generated:
     return Sharing(random.Random(seed), exact).program()
 
 
-def all_disagree(reading: Reading, seed: int) -> Proposal:
+def all_disagree(reading: ParsedProgram, seed: int) -> Proposal:
     """Let every arrival ask for a change of its own."""
     visits, rng = reading.visits, np.random.default_rng(seed)
     usable = (visits.reason == 0) & (visits.literal >= 0)

@@ -13,7 +13,7 @@ from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
-from postproc.compensation.record import FileRecord, restore
+from postproc.compensation.sidecar import FileRecord, restore
 from postproc.exceptions import CellError, ModelError, ProgramError
 from postproc.report.json import report_text
 from postproc.robot.cell import load_cell

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.program import read_program
-from postproc.compensation.windows import concatenate, first_visits
+from postproc.compensation.windowing import concatenate, first_visits
 from postproc.language.visits import Visits
 from tests.bench.made import spot
 from tests.generated.landing import program

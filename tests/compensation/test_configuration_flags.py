@@ -7,9 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.compensation.eligibility import overruled
-from postproc.compensation.notes import overruled_strings
-from postproc.compensation.program import Planned, Reading, plan_visits, read_program
+from postproc.compensation.eligibility import find_overruled
+from postproc.compensation.findings import list_overruled_strings
+from postproc.compensation.program import (
+    ParsedProgram,
+    PlannedProgram,
+    plan_visits,
+    read_program,
+)
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import record_from_pose
 
@@ -30,13 +35,13 @@ def pos(cell: Cell, joints: list[float], config: str) -> str:
     return f"POS({numbers}, '{config}')"
 
 
-def planned(cell: Cell, *lines: str) -> tuple[Reading, Planned]:
+def planned(cell: Cell, *lines: str) -> tuple[ParsedProgram, PlannedProgram]:
     text = "\n".join(["PROGRAM job", "VAR x : BOOLEAN", "BEGIN", *lines, "END job"])
     reading = read_program({"job.pdl": text.encode()}, cell)
     return reading, plan_visits(reading.visits, cell)
 
 
-def whys(found: Planned, n: int) -> list[str]:
+def whys(found: PlannedProgram, n: int) -> list[str]:
     return [found.reasons[i].text for i in range(n)]
 
 
@@ -56,8 +61,8 @@ def test_a_line_to_another_branch(cell: Cell, said: str, why: str, noted: int) -
     assert found.reasons[1].text.startswith(why) and bool(why) == bool(
         found.reasons[1].text
     )
-    rows = overruled(found.targets, found.plan).unchecked(reading.visits)
-    notes = overruled_strings(reading.visits, rows)
+    rows = find_overruled(found.targets, found.plan).find_unchecked(reading.visits)
+    notes = list_overruled_strings(reading.visits, rows)
     assert len(notes) == noted
 
 

@@ -15,10 +15,10 @@ from postproc.compensation.continuity import (
     on_path,
     path_correction,
 )
-from postproc.compensation.notes import flank_steps
+from postproc.compensation.findings import flank_steps
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
-from postproc.model.ranges import MARGIN
+from postproc.model.validity import MARGIN
 from postproc.robot.arm import load_arm
 from tests.compensation.test_arcs import START, job, point, whys
 
@@ -99,7 +99,7 @@ def test_nothing_is_left_lonely_along_a_path(job_cell):
     path = corrections(job_cell, 1.0, [1.0] * 5 + [0.05] * 2)
     left = np.zeros(7, dtype=bool)
     left[2] = True
-    bent = path.bent(left, ~left)
+    bent = path.find_bent(left, ~left)
     assert bent.tolist() == [True, True, False, True, True, False, False]
 
 
@@ -109,7 +109,7 @@ def test_a_long_path_is_gone_along_once():
     path = PathCorrection(before, np.ones((n, 3)), np.full(n, 1e-4), np.zeros(n))
     left = np.zeros(n, dtype=bool)
     left[n // 2] = True
-    assert path.bent(left, ~left).sum() == n - 1
+    assert path.find_bent(left, ~left).sum() == n - 1
 
 
 def surveyed_up_to(model, q1):

@@ -7,7 +7,7 @@ import pytest
 from postproc.compensation.compensate import compensate
 from postproc.exceptions import CellError
 from postproc.robot.arm_file import arm_path as find_arm
-from postproc.robot.arm_file import read_arm_file, shipped_arms
+from postproc.robot.arm_file import list_shipped_arms, read_arm_file
 from postproc.robot.cell import load_cell
 from postproc.robot.machine_data import TEMPLATE
 from tests.cli.test_languages import NAMES
@@ -62,7 +62,7 @@ def test_an_arm_without_a_controller_gets_one_note(bench_cell, bench_model, tmp_
 
 
 def test_shipped_arms_and_machine_data_name_a_controller():
-    for name in shipped_arms():
+    for name in list_shipped_arms():
         assert read_arm_file(find_arm(name)).controller, name
     assert 'controller = "kuka"' in TEMPLATE
 

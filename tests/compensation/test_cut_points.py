@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from postproc.compensation import windows as cuts
-from postproc.compensation.windows import (
+from postproc.compensation import windowing as cuts
+from postproc.compensation.windowing import (
     SHARED,
     Window,
     cut_points,
@@ -17,7 +17,7 @@ from postproc.compensation.windows import (
     window,
     windows,
 )
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes

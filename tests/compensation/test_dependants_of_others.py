@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensation.decide import with_dependants, with_origins
+from postproc.compensation.decisions import with_dependants, with_origins
 from postproc.compensation.program import plan_visits, read_program
 from tests.written import FIRST, program
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.decide import guard_size, guard_solutions
+from postproc.compensation.decisions import guard_size, guard_solutions
 from postproc.compensation.eligibility import Reasons
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import LimitSection

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.decide import WITH_BEGIN, WITH_POINT
+from postproc.compensation.decisions import WITH_BEGIN, WITH_POINT
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import plan_visits, read_program

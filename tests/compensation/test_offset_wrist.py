@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.compensation.compensate import compensate
-from postproc.compensation.options import AS_USUAL
+from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.outcome import Status
-from postproc.compensation.program import plan_visits, prepared, read_program
+from postproc.compensation.program import plan_visits, prepare_cell, read_program
 from postproc.compensation.targets import UNNAMED
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import load_cell
@@ -74,7 +74,7 @@ def test_targets_land_where_they_should(cell, truth, model):
     decided = done.decisions
     safe = decided.status == Status.CORRECTED
     assert safe.mean() > 0.9
-    ready = prepared(cell, model, AS_USUAL)
+    ready = prepare_cell(cell, model, DEFAULT_OPTIONS)
     wanted, made = (
         plan_visits(read_program({"job.pdl": text}, ready).visits, ready).plan
         for text in (source, done.outputs["job.pdl"])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from postproc.cli.simulate import setup_of
-from postproc.compensation.command import turn, turn_std
 from postproc.compensation.compensate import compensate
+from postproc.compensation.inverse_model import turn, turn_std
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
@@ -71,7 +71,9 @@ def test_orientations_land_too_and_positions_no_worse(job_cell, job_model, files
             files["job.pdl"], job_cell, job_model, name="job.pdl",
             variables=files.get("job.lsv"), options=options,
         )  # fmt: skip
-        assert (done.decisions.status == Status.CORRECTED).all(), done.left_alone()
+        assert (done.decisions.status == Status.CORRECTED).all(), (
+            done.list_uncorrected()
+        )
         executed = read_program({**files, **done.outputs}, job_cell).visits
         found[options] = errors(job_cell, asked, executed)
     place, full = found[Options()], found[FULL]
@@ -131,7 +133,7 @@ def test_a_correction_that_turns_too_far_is_guarded(job_cell, job_model):
     cell = replace(job_cell, limits=limits)
     done = compensate(inline()["job.pdl"], cell, job_model, options=FULL)
     assert (done.decisions.status == Status.REJECTED).all()
-    assert "correction_deg = 0.001" in done.left_alone()[0]
+    assert "correction_deg = 0.001" in done.list_uncorrected()[0]
 
 
 def test_the_standard_error_of_the_rotation_covers_it(job_cell, job_model):

@@ -79,7 +79,7 @@ def test_a_point_of_another_arm_keeps_its_numbers(run, set_, move, declared):
     ]
     assert changed == [OURS]
     assert outcome.exit_code == 1
-    assert any("arm 2" in why for why in outcome.left_alone())
+    assert any("arm 2" in why for why in outcome.list_uncorrected())
     one = replace_arms(declared)
     assert run(OURS, set_, move, declared=one).exit_code == 0
 
@@ -98,7 +98,7 @@ def test_a_point_of_another_arm_in_the_variable_file(run):
             values=values.replace(b"{}", arm),
         )
         assert outcome.exit_code == 1 and "job.lsv" not in outcome.outputs
-        assert "arm 2" in outcome.left_alone()[0]
+        assert "arm 2" in outcome.list_uncorrected()[0]
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_moves_without_an_arm_after_the_default_arm_is_another(run, set_, attrib
     outcome = run(*given, attributes=attributes)
     assert statuses(outcome) == ["CORRECTED", "RUNTIME", "RUNTIME"]
     assert outcome.exit_code == 1
-    assert all("_ARM" in line for line in outcome.left_alone())
+    assert all("_ARM" in line for line in outcome.list_uncorrected())
     back = run(*given, "$DFT_ARM := 1", "$PROG_ARM := 1", OURS, LAST)
     assert statuses(back)[-1] == "CORRECTED"
 
@@ -148,4 +148,4 @@ def test_a_page_of_another_arm_is_left_and_listed(run):
     page = f"PROGRAM page PROG_ARM = 2\nBEGIN\nMOVE JOINT TO {NEXT}\nEND page\n"
     outcome = run(OURS, "CALL page", LAST, pages={"page.pdl": page.encode()})
     assert outcome.exit_code == 1 and "page.pdl" not in outcome.outputs
-    assert "PROG_ARM" in outcome.left_alone()[0]
+    assert "PROG_ARM" in outcome.list_uncorrected()[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from postproc.compensation.pages import names_in
-from postproc.compensation.record import sidecar_path
+from postproc.compensation.sidecar import sidecar_path
 from postproc.language.source import Source
 from postproc.language.stamp import stamp_line
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensation.decide import with_dependants
-from postproc.compensation.options import AS_USUAL
+from postproc.compensation.decisions import with_dependants
+from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.outcome import Status
-from postproc.compensation.program import plan_visits, prepared, read_program
-from postproc.compensation.windows import cut_points
+from postproc.compensation.program import plan_visits, prepare_cell, read_program
+from postproc.compensation.windowing import cut_points
 from postproc.language.krl.moves import PARTIAL
 from postproc.motion.targets import AMBIGUOUS, CODE, NO_TARGET
 from postproc.robot.cell import load_cell
@@ -139,7 +139,7 @@ def test_what_moves_along_is_foretold(cell, model):
     a = places(1, 33)[0]
     lines = ["$BASE={X 10,Y 20,Z 30,A 40,B 10,C -20}", f"LIN {frame(a)}"]
     lines += ["LIN {Z 700}", "LIN {X 900,Y 300}", "LIN {X 850,Y 250,Z 650}"]
-    ready = prepared(cell, model, AS_USUAL)
+    ready = prepare_cell(cell, model, DEFAULT_OPTIONS)
     visits = read_program({"job.src": job(*lines)}, ready).visits
     before, values = plan_visits(visits, ready), np.array(visits.values)
     values[2, :3] += [0.5, -0.3, 0.8]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from postproc.compensation.pages import named_programs
+from postproc.compensation.pages import find_named_programs
 from postproc.compensation.program import read_program
 from postproc.compensation.program_files import find_pages
 from postproc.exceptions import ProgramError
@@ -140,4 +140,4 @@ def test_pages_that_are_named_far_behind_the_declarations_are_followed(tmp_path)
 
 def test_the_programs_that_a_text_names():
     text = b"IMPORT 'a'\rIMPORT 'x'\r\nCALL b\ncall b -- call c\nMOVE recall\n CALL d"
-    assert named_programs(text) == ({"a": 1, "b": 2, "d": 5}, {})
+    assert find_named_programs(text) == ({"a": 1, "b": 2, "d": 5}, {})

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensation import windows
+from postproc.compensation import windowing
+from postproc.compensation.micro_batch import Given, compensate_batch
 from postproc.compensation.options import Options
-from postproc.compensation.record import restore
-from postproc.compensation.together import Given, compensate_batch
+from postproc.compensation.sidecar import restore
 from postproc.exceptions import ProgramError
 from tests.compensation.shift_jobs import (
     AGREED_MM,
@@ -297,5 +297,5 @@ def test_a_long_program_in_windows_comes_out_as_one(shop, monkeypatch):
     text = rapid(shop, lines)
     whole = shop.compensate({"m.mod": text}).outputs
     for name, value in (("LEAST", 20), ("HALO", 8), ("BAND", 4), ("RUN_UP", 20)):
-        monkeypatch.setattr(windows, name, value)
+        monkeypatch.setattr(windowing, name, value)
     assert shop.compensate({"m.mod": text}).outputs == whole

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from postproc.compensation.equivalence import equivalent
-from postproc.compensation.program import Reading, read_program
+from postproc.compensation.program import ParsedProgram, read_program
 from postproc.compensation.rewrite import read_back, write_numbers
 from postproc.robot.cell import Cell
 from tests.language.pdl2.reachable import reachable
 
 
-def changed(reading: Reading, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def changed(reading: ParsedProgram, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Draw new numbers for some literals that may be edited."""
     rng, visits = np.random.default_rng(seed), reading.visits
     used = np.unique(visits.literal[visits.literal >= 0])

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from postproc.compensation.record import (
+from postproc.compensation.sidecar import (
     FileRecord,
     Sidecar,
     block_checksums,

@@ -10,7 +10,7 @@ import pytest
 
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
-from postproc.compensation.record import FileRecord, restore
+from postproc.compensation.sidecar import FileRecord, restore
 from postproc.exceptions import PostprocError
 from postproc.robot.cell import load_cell
 from tests.fuzz.originals import case_programs

@@ -8,8 +8,8 @@ import pytest
 from postproc.compensation.clones import (
     MoveSlot,
     SlotArrivals,
-    connected,
     group_arrivals,
+    unite_overlapping,
 )
 
 LIMIT = 0.5
@@ -76,7 +76,7 @@ def test_all_that_agree_share() -> None:
 def test_overlapping_sets_are_united() -> None:
     rng = np.random.default_rng(0)
     sets = [frozenset(rng.integers(0, 60, 2).tolist()) for _ in range(40)]
-    found = connected(sets)
+    found = unite_overlapping(sets)
     assert frozenset().union(*found) == frozenset().union(*sets)
     assert all(a is b or a.isdisjoint(b) for a in found for b in found)
     assert all(any(s <= whole for whole in found) for s in sets)

@@ -179,7 +179,9 @@ END s
 def test_an_axis_1_that_would_swing_by_94_degrees_is_left(job_cell, everywhere) -> None:
     done = compensate(SHOULDER.encode(), job_cell, everywhere, name="s.pdl")
     assert done.exit_code == 1
-    assert "axis 1" in done.left_alone()[0] or "branch" in done.left_alone()[0]
+    assert (
+        "axis 1" in done.list_uncorrected()[0] or "branch" in done.list_uncorrected()[0]
+    )
 
 
 @pytest.mark.parametrize(
@@ -200,12 +202,12 @@ def test_output_that_no_guard_held_back_is_refused(
     job_cell, everywhere, monkeypatch
 ) -> None:
     """A defect of ours: the check of what was written does not trust the guards."""
-    from postproc.compensation import decide
+    from postproc.compensation import decisions
 
-    monkeypatch.setattr(decide, "guard_motion", lambda *given: None)
+    monkeypatch.setattr(decisions, "guard_motion", lambda *given: None)
     monkeypatch.setattr(
         iterate.Iteration,
-        "swung",
+        "find_limit_violations",
         lambda self, proposal, found: np.zeros(len(self.states), dtype=bool),
     )
     cell = replace(

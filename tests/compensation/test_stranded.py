@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.eligibility import STRANDED
-from postproc.compensation.program import Planned, plan_visits, read_program
+from postproc.compensation.program import PlannedProgram, plan_visits, read_program
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import record_from_pose
 
@@ -37,12 +37,12 @@ def pos(cell: Cell) -> Callable[..., str]:
     return written
 
 
-def planned(cell: Cell, *lines: str) -> Planned:
+def planned(cell: Cell, *lines: str) -> PlannedProgram:
     text = "\n".join(["PROGRAM job", "BEGIN", START, *lines, "END job"])
     return plan_visits(read_program({"job.pdl": text.encode()}, cell).visits, cell)
 
 
-def stranded(found: Planned) -> list[bool]:
+def stranded(found: PlannedProgram) -> list[bool]:
     return [found.reasons[i] == STRANDED for i in range(len(found.plan))]
 
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from postproc.compensation.targets import targets_from_visits, with_tracks
-from postproc.language.pdl2.dialect import configurations
+from postproc.language.pdl2.pose_encoding import configurations
 from postproc.language.visits import Meaning
 from postproc.motion.targets import TargetKind
 from postproc.robot.cell import Cell, load_cell

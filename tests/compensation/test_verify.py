@@ -9,7 +9,7 @@ import pytest
 
 from postproc import cli as command_line
 from postproc.compensation import rewrite
-from postproc.compensation.program import Reading, read_program
+from postproc.compensation.program import ParsedProgram, read_program
 from postproc.compensation.rewrite import (
     Output,
     VerificationError,
@@ -25,7 +25,7 @@ from tests.written import FIRST, POSE, program
 def window(request, monkeypatch):
     """Check as many rows at a time."""
     monkeypatch.setattr("postproc.compensation.equivalence.ROWS", request.param)
-    monkeypatch.setattr("postproc.language.rewrite.AT_ONCE", request.param)
+    monkeypatch.setattr("postproc.language.number_edits.AT_ONCE", request.param)
 
 
 SHIFTED = (
@@ -35,7 +35,7 @@ SHIFTED = (
 )
 
 
-def written(cell: Cell) -> tuple[Reading, Output, np.ndarray]:
+def written(cell: Cell) -> tuple[ParsedProgram, Output, np.ndarray]:
     """Write 1 mm more into the x of every pose."""
     reading = read_program({"job.pdl": program(FIRST, POSE, *SHIFTED)}, cell)
     rows = np.flatnonzero(~reading.visits.literals.joints)
@@ -46,7 +46,9 @@ def written(cell: Cell) -> tuple[Reading, Output, np.ndarray]:
     return reading, write_numbers(reading, rows, values, "0" * 16), rows
 
 
-def check(reading: Reading, after: Reading, output: Output, rows: np.ndarray) -> None:
+def check(
+    reading: ParsedProgram, after: ParsedProgram, output: Output, rows: np.ndarray
+) -> None:
     """Check an output that should be read as it was written."""
     values = read_back(reading.visits, rows, output.edits)
     check_output(reading, after, output, rows, values)

@@ -12,7 +12,7 @@ from postproc.compensation.rewrite import (
     read_back,
     write_numbers,
 )
-from postproc.language.rewrite import Skeleton, difference
+from postproc.language.number_edits import Skeleton, difference
 from postproc.language.source import NumberSpans, Replacements, Source, apply
 from postproc.robot.cell import load_cell
 from tests.bench.__main__ import CELL

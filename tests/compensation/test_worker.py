@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.compensation import parallel
-from postproc.compensation.parallel import available, in_worker
+from postproc.compensation import workers
+from postproc.compensation.workers import available, in_worker
 from postproc.exceptions import PostprocError, ProgramError
 
 PATIENCE = 20.0  # [s] until a process must be gone or be there
 
 SCRIPT = """
 import os, sys, time
-from postproc.compensation.parallel import in_worker
+from postproc.compensation.workers import in_worker
 
 def work():
     print("never flushed", end="")
@@ -212,7 +212,7 @@ def test_without_room_for_a_process_the_work_is_done_here(monkeypatch) -> None:
 def test_processes_worth_using(monkeypatch) -> None:
     own = len(os.sched_getaffinity(0))
     assert available() == own
-    monkeypatch.setattr(parallel, "parent_process", object)  # a worker of others
+    monkeypatch.setattr(workers, "parent_process", object)  # a worker of others
     assert available() == 1
     monkeypatch.undo()
     monkeypatch.setattr(sys, "platform", "darwin")

@@ -13,8 +13,8 @@ import numpy as np
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.program import read_program
-from postproc.compensation.record import FileRecord, Sidecar, restore
 from postproc.compensation.rewrite import check_output, read_back, write_numbers
+from postproc.compensation.sidecar import FileRecord, Sidecar, restore
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Visits
 from postproc.model.model import Model

@@ -7,10 +7,10 @@ import contextlib
 import numpy as np
 
 from postproc.exceptions import PostprocError
-from postproc.language.lines import Lines, read_lines
+from postproc.language.logical_lines import Lines, read_lines
+from postproc.language.number_edits import difference
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.rewrite import difference
 from postproc.language.source import Replacements, Source, apply, source_from_bytes
 
 

@@ -30,8 +30,8 @@ from postproc.batch.tree import scan
 from postproc.batch.workers import outcomes_of
 from postproc.calibration.fit import fit
 from postproc.cli.simulate import setup_of
-from postproc.compensation.decide import HOLDS_NONE
-from postproc.compensation.options import AS_USUAL, Options
+from postproc.compensation.decisions import HOLDS_NONE
+from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.program import read_program
 from postproc.exceptions import PostprocError
@@ -185,7 +185,7 @@ def counted(folder: Path) -> list[Place]:
 
 
 def count(
-    folder: Path, cell: Path | None = None, options: Options = AS_USUAL
+    folder: Path, cell: Path | None = None, options: Options = DEFAULT_OPTIONS
 ) -> JobCount:
     """Compensate a job, and say of every counted line why it is not corrected.
 
@@ -216,7 +216,7 @@ def count(
 
 
 def compensated(
-    folder: Path, cell: Path, options: Options = AS_USUAL
+    folder: Path, cell: Path, options: Options = DEFAULT_OPTIONS
 ) -> Iterator[tuple[Unit, Outcome | Exception]]:
     """Yield the programs of a job, grouped as `batch` does, and what came of each."""
     arm = load_cell(cell).arm.name
@@ -288,7 +288,7 @@ class Misses:
     before: Floats
 
 
-def landed(folder: Path, options: Options = AS_USUAL) -> Misses:
+def landed(folder: Path, options: Options = DEFAULT_OPTIONS) -> Misses:
     """Let the virtual arm that was surveyed run what is written for a job."""
     found = Misses(*(np.empty(0),) * 3)
     cell_file = cell_of(folder)

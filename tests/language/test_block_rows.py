@@ -2,7 +2,7 @@
 
 import pytest
 
-from postproc.language.lines import read_lines
+from postproc.language.logical_lines import read_lines
 from postproc.language.source import source_from_bytes
 
 

@@ -71,4 +71,4 @@ def test_a_million_edits_are_applied_as_one(data):
     out = apply(text, many)
     assert list(many) == sorted(edits, key=lambda edit: edit.span)
     assert out == apply(text, edits)
-    assert apply(b"stamp" + out, many.undone(text, 5)) == b"stamp" + text
+    assert apply(b"stamp" + out, many.invert(text, 5)) == b"stamp" + text

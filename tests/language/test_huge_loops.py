@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.rapid.language import Rapid
 from postproc.language.source import Source
 from tests.golden.rapid_cases import go, module

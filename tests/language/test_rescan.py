@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from postproc.exceptions import ProgramError
-from postproc.language.lines import read_lines, reread_lines
-from postproc.language.scan import rescan_lines, scan_lines
+from postproc.language.lexer import rescan_lines, scan_lines
+from postproc.language.logical_lines import read_lines, reread_lines
 from postproc.language.source import Source
 from tests.language.test_masking import TEXT
 

@@ -129,9 +129,9 @@ def test_edits_from_several_places_are_merged_in_order() -> None:
         [edits(4), edits(0, 2)],
         [edits(2, 4), nothing, edits(0)],
     ):
-        assert list(Replacements.merged(parts)) == list(edits(0, 2, 4))
+        assert list(Replacements.merge(parts)) == list(edits(0, 2, 4))
     with pytest.raises(ValueError, match="overlap"):
-        Replacements.merged([edits(4), edits(4)])
+        Replacements.merge([edits(4), edits(4)])
 
 
 @given(
@@ -145,9 +145,9 @@ def test_many_edits_do_what_single_edits_do(data, wanted) -> None:
     found = list(map(Edit, spans, new))
     many, result = Replacements.of(found), apply(data, found)
     assert apply(data, many) == result
-    assert many.made(data, result) and many.made(data, b"stamp" + result, 5)
+    assert many.reproduces(data, result) and many.reproduces(data, b"stamp" + result, 5)
     for other in (result + b"x", b"x" + result, result[:-1], b""):
-        assert other == result or not many.made(data, other)
+        assert other == result or not many.reproduces(data, other)
 
 
 @given(st.lists(st.tuples(st.integers(0, 70_000), st.integers(1, 300)), max_size=60))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.model.carrier import Carrier, carrier, every_carrier
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.simulation import DEFAULT, Planted, virtual_arm
 from tests.calibration.planted import ARM, states_of, survey
 
@@ -28,7 +28,7 @@ def test_a_carrier_moves_the_tool_as_the_virtual_arm_does(moved: Carrier) -> Non
     arm = virtual_arm(1, [Planted(f"{cell_of(moved)} by speed constant", 0, SIZE)])
     arrivals = survey(perfect, 1, 12)
     true = arm.tcp(arrivals) - perfect.tcp(arrivals)
-    column = moved.moved(Batch(ARM, states_of(arrivals)))
+    column = moved.move(ArmStates(ARM, states_of(arrivals)))
     size = float((true * column).sum() / (column**2).sum())
     np.testing.assert_allclose(true, size * column, atol=2e-5 * np.abs(true).max())
 
@@ -47,8 +47,8 @@ def test_an_unknown_carrier_is_refused(text: str) -> None:
 
 def test_a_turn_turns_the_tool_and_a_shift_does_not() -> None:
     arrivals = survey(virtual_arm(1, DEFAULT), 1, 5)
-    batch = Batch(ARM, states_of(arrivals))
-    turned = carrier("link 4 turn y").turned(batch)
+    batch = ArmStates(ARM, states_of(arrivals))
+    turned = carrier("link 4 turn y").turn(batch)
     assert turned is not None
     np.testing.assert_allclose(np.linalg.norm(turned, axis=1), 1.0)
-    assert carrier("link 4 shift y").turned(batch) is None
+    assert carrier("link 4 shift y").turn(batch) is None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from postproc.model.effects.curve import BEYOND, END, Curve
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.state import States, make_states
 from tests.calibration.planted import ARM
 
@@ -20,8 +20,8 @@ def states(**given: np.ndarray) -> States:
     return make_states(np.zeros((ROWS, 6)), np.ones((ROWS, 6)), tool, **given)
 
 
-def batch(**given: np.ndarray) -> Batch:
-    return Batch(ARM, states(**given))
+def batch(**given: np.ndarray) -> ArmStates:
+    return ArmStates(ARM, states(**given))
 
 
 def test_a_curve_of_the_temperature_goes_on_as_a_straight_line() -> None:
@@ -47,7 +47,7 @@ def test_a_curve_of_an_angle_fades_where_nobody_has_been() -> None:
     curve = Curve("link 3 turn x", ("joint 2",), (-1.0,), (1.0,))
     here = states()
     there = replace(here, q=np.full((ROWS, 6), 1.3))
-    assert np.abs(curve.shape(Batch(ARM, there))).max() == 0.0
+    assert np.abs(curve.shape(ArmStates(ARM, there))).max() == 0.0
 
 
 def test_half_of_the_ways_lie_in_the_lower_half_of_a_curve() -> None:

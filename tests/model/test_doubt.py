@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibration.diagnosis.diagnose import _left_open
-from postproc.calibration.diagnosis.refit import only_arm
-from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.diagnosis.diagnose import _keep_open
+from postproc.calibration.diagnosis.model_update import only_arm
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.exceptions import ModelError
-from postproc.model.combination import Combination
 from postproc.model.doubt import Doubt
+from postproc.model.effect_sum import Combination
 from postproc.model.effects.compliance import Compliance
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, load_model
 from postproc.model.model_file import content_id
 from postproc.robot.state import States
@@ -30,7 +30,7 @@ def doubted() -> tuple[Model, States]:
     survey = survey_of(states, random_arm(rng).measure(states, rng)[0])
     names = ("geometry", "backlash", "base_shift")
     model = model_of(fit_survey(survey, NJ, names, None), survey)
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     effects = Combination((Compliance.on(batch), *Compliance.along_axes(batch)))
     size = len(model.values) + len(effects.parameters)
     scales = np.append(model.prior_std, effects.scales)
@@ -59,15 +59,18 @@ def test_the_variance_has_it_by_every_way(doubted: tuple[Model, States]) -> None
     assert model.doubt is not None
     for effects, values, doubt in (
         (model.effects, model.values, model.doubt),
-        (*model.compensable()[:2], model.doubt.kept(model.effects.where("arm"))),
+        (
+            *model.compensable()[:2],
+            model.doubt.get_settings(model.effects.where("arm")),
+        ),
     ):
-        at = effects.at(Batch(NJ, states), values)
+        at = effects.at(ArmStates(NJ, states), values)
         both = Combination((*effects.effects, *doubt.effects.effects)).columns(at)
         added = np.einsum("nip,pq,niq->ni", both, doubt.covariance, both)
         without = replace(model, doubt=None)
         np.testing.assert_allclose(
-            model.untold_variance(effects, at, values),
-            without.untold_variance(effects, at, values) + added,
+            model.unmodelled_variance(effects, at, values),
+            without.unmodelled_variance(effects, at, values) + added,
             rtol=1e-9,
         )
 
@@ -84,11 +87,13 @@ def test_an_extended_model_keeps_it_unless_it_was_found(
 ) -> None:
     model, states = doubted
     assert model.doubt is not None
-    kept, own = _left_open(model, only_arm(model)), model.effects.where("arm")
+    kept, own = _keep_open(model, only_arm(model)), model.effects.where("arm")
     assert kept is not None
-    np.testing.assert_array_equal(kept.covariance, model.doubt.kept(own).covariance)
-    yields = Combination((*model.effects.effects, Compliance.on(Batch(NJ, states))))
-    assert _left_open(model, replace(model, effects=yields)) is None
+    np.testing.assert_array_equal(
+        kept.covariance, model.doubt.get_settings(own).covariance
+    )
+    yields = Combination((*model.effects.effects, Compliance.on(ArmStates(NJ, states))))
+    assert _keep_open(model, replace(model, effects=yields)) is None
 
 
 def test_it_goes_by_the_names_of_parameters(doubted: tuple[Model, States]) -> None:

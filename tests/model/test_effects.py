@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import PostprocError
-from postproc.model.combination import Combination
 from postproc.model.covariate import DRIVERS
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import (
     BY_NAME,
     EFFECTS,
@@ -27,7 +27,7 @@ from postproc.model.effects.effect import (
     fade,
     fade_turns,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.variance import beyond_variance
 from tests.calibration.simulator import COUPLED, NJ, PLATE, covariates, random_states
 
@@ -74,7 +74,7 @@ def variants() -> list[Effect]:
 @pytest.mark.parametrize("effect", variants(), ids=lambda e: e.name)
 def test_columns_are_finite_differences_of_the_error(effect: Effect) -> None:
     one = Combination((effect,))
-    batch = Batch(NJ, STATES)
+    batch = ArmStates(NJ, STATES)
     rng = np.random.default_rng(1)
     at = rng.standard_normal(len(one.scales)) * one.scales
     columns = one.columns(one.at(batch, at))
@@ -102,10 +102,10 @@ def test_rotation_columns_are_what_other_points_of_the_tool_show(
     at = rng.standard_normal(len(one.scales)) * one.scales
     load = np.tile([0.0, 0.0, 0.1], (len(STATES), 1))
     states = STATES.with_(payload_com=load)
-    turns = one.rotation_columns(one.at(Batch(NJ, states), at))
+    turns = one.rotation_columns(one.at(ArmStates(NJ, states), at))
     for d in 0.2 * np.eye(3):
         other = states.with_(tool=states.tool + d)
-        here, there = (one.at(Batch(NJ, s), at) for s in (states, other))
+        here, there = (one.at(ArmStates(NJ, s), at) for s in (states, other))
         moved = one.columns(there) - one.columns(here)
         lever = (there.walk.tcp - here.walk.tcp)[:, :, None]
         gap = moved - np.cross(turns, lever, axis=1)
@@ -114,7 +114,7 @@ def test_rotation_columns_are_what_other_points_of_the_tool_show(
 
 def test_a_sum_of_effects_turns_the_tool_as_its_columns_say() -> None:
     names = ("geometry", "backlash", "compliance", "tracker_drift", "registration")
-    all_, batch = Combination(propose(names, NJ, STATES)), Batch(NJ, STATES)
+    all_, batch = Combination(propose(names, NJ, STATES)), ArmStates(NJ, STATES)
     at = np.random.default_rng(3).standard_normal(len(all_.scales)) * all_.scales
     columns = all_.rotation_columns(all_.at(batch, at))
     for k, scale in enumerate(all_.scales):
@@ -127,7 +127,7 @@ def test_a_sum_of_effects_turns_the_tool_as_its_columns_say() -> None:
 @pytest.mark.parametrize("form", ["bend", "stretch"])
 def test_refraction_seen_from_anywhere_differs_by_a_shift(form: str) -> None:
     """Size, and size times place, make the beam's error but for a constant."""
-    batch, place = Batch(NJ, STATES), (3.0, -2.0, 1.5)
+    batch, place = ArmStates(NJ, STATES), (3.0, -2.0, 1.5)
     told = BY_NAME["refraction"](place, form=form).columns(batch)[:, :, 0]
     anywhere = BY_NAME["refraction"](told=False, form=form).columns(batch)
     apart = anywhere @ np.array([1.0, *place]) - told
@@ -168,12 +168,12 @@ def test_origins_say_what_may_be_compensated() -> None:
 
 @pytest.mark.parametrize("kind", EFFECTS, ids=lambda kind: kind.name)
 def test_what_a_search_tries_of_an_effect_is_that_effect(kind: type[Effect]) -> None:
-    batch, shares = Batch(NJ, STATES), defaultdict[Family, float](float)
+    batch, shares = ArmStates(NJ, STATES), defaultdict[Family, float](float)
     for c in kind.candidates(batch):
         assert c.family.effect == kind.name
         assert {p.joint for p in c.effect.parameters()} == {c.family.joint}
         assert np.isfinite(c.driver(batch)).all()
-        finer = c.effect.refined(np.linspace(-1.0, 1.0, 9), batch)
+        finer = c.effect.refine(np.linspace(-1.0, 1.0, 9), batch)
         assert {type(e) for e in (c.effect, c.effect.plainer(), *finer)} == {kind}
         shares[c.family] += np.exp(c.log_prior)
     assert np.allclose(list(shares.values()), 1.0)
@@ -197,8 +197,8 @@ def test_free_forms_fade_outside_the_survey() -> None:
     far = STATES.with_(q=np.where(STATES.q > 0, high + 1.0, low - 1.0))
     for name in ("elm", "joint_map"):
         effect = propose([name], NJ, STATES)[0]
-        assert np.abs(effect.columns(Batch(NJ, STATES))).max() > 0
-        assert np.abs(effect.columns(Batch(NJ, far))).max() < 1e-6
+        assert np.abs(effect.columns(ArmStates(NJ, STATES))).max() > 0
+        assert np.abs(effect.columns(ArmStates(NJ, far))).max() < 1e-6
     x = np.linspace(-1, 2, 301)
     f = fade(x, np.array(0.0), np.array(1.0))
     assert (np.diff(f[x >= 0.5]) <= 0).all() and (f[(x >= 0) & (x <= 1)] == 1).all()
@@ -206,13 +206,13 @@ def test_free_forms_fade_outside_the_survey() -> None:
 
 def test_joint_errors_are_their_basis_times_the_parameters() -> None:
     for effect in (e for e in variants() if isinstance(e, JointEffect)):
-        batch, acts_on = Batch(NJ, STATES), effect.acts_on()
+        batch, acts_on = ArmStates(NJ, STATES), effect.acts_on()
         p = np.random.default_rng(4).standard_normal(len(acts_on))
         wanted = np.zeros((len(STATES), 6))
         for k, column in enumerate((effect.basis(batch) * p).T):
             wanted[:, acts_on[k]] += column
         assert np.allclose(effect.angles(batch, p), wanted, rtol=0, atol=1e-13)
-        none = Batch(NJ, STATES[:0])
+        none = ArmStates(NJ, STATES[:0])
         assert effect.basis(none).shape == (0, len(p))
         assert effect.angles(none, p).shape == (0, 6)
 
@@ -234,7 +234,7 @@ def test_a_profile_of_some_joints_is_its_harmonics_as_far_as_surveyed() -> None:
             inside[:, j] * np.sin(q[:, j]), inside[:, j] * np.cos(q[:, j]),
         )
     ]  # fmt: skip
-    basis = effect.basis(Batch(NJ, STATES))
+    basis = effect.basis(ArmStates(NJ, STATES))
     assert np.allclose(basis, np.stack(wanted, axis=1), rtol=0, atol=1e-14)
 
 
@@ -250,14 +250,14 @@ def test_an_angle_fades_as_its_nearest_turn_does() -> None:
 def test_what_is_known_once_serves_the_same_poses_alone() -> None:
     effect = BY_NAME["backlash_profile"].propose(NJ, STATES)
     one, p = Combination((effect,)), RNG.standard_normal(len(effect.parameters()))
-    batch = Batch(NJ, STATES)
+    batch = ArmStates(NJ, STATES)
     effect.angles(batch, p)
     for other in (
         batch.arriving(-STATES.direction),
-        batch.moved(one.deviation(p), one.shift(batch, p)),
+        batch.move(one.deviation(p), one.shift(batch, p)),
         batch[np.array([7, 3])],
     ):
-        fresh = effect.angles(Batch(NJ, other.states), p)
+        fresh = effect.angles(ArmStates(NJ, other.states), p)
         np.testing.assert_array_equal(effect.angles(other, p), fresh)
 
 
@@ -265,11 +265,11 @@ def test_a_spline_is_as_unsure_as_its_prior_where_it_has_ended() -> None:
     (effect,) = propose(["joint_spline"], NJ, STATES)
     prior = np.array([1e-4 if " 60.0 deg" in p.name else 5e-5
                       for p in effect.parameters()])  # fmt: skip
-    inside = effect.beyond(Batch(NJ, STATES), prior)
+    inside = effect.beyond(ArmStates(NJ, STATES), prior)
     assert inside is not None and not inside.any()
     q = STATES.q.copy()
     q[:, 1] = effect.upper[1] + 2.0
-    far = Batch(NJ, STATES.with_(q=q))
+    far = ArmStates(NJ, STATES.with_(q=q))
     found = effect.beyond(far, prior)
     assert found is not None
     np.testing.assert_allclose(found[:, 1], 5e-5**2)  # the long one goes on

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.model.effects.geometry import Geometry
-from postproc.model.kinematics import NOMINAL, Batch
+from postproc.model.kinematics import NOMINAL, ArmStates
 from tests.calibration.simulator import NJ, TOOL, Simulated, random_states
 
 
 def test_deviations_move_the_tool_as_an_independent_chain_does() -> None:
     rng = np.random.default_rng(3)
     states = random_states(20, rng)
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     geometry = Geometry(beta=(1, 2, 3, 4, 5, 6))
     names = [p.name for p in geometry.parameters()]
     p = 2e-3 * rng.standard_normal(len(names))
@@ -33,7 +33,7 @@ def test_deviations_move_the_tool_as_an_independent_chain_does() -> None:
     truth = real.tcp(states.q, still, states.tool)
     nominal = Simulated().tcp(states.q, still, states.tool)
     np.testing.assert_allclose(batch.walk.tcp, nominal, atol=1e-12)
-    moved = batch.moved(geometry.deviation(p), None)
+    moved = batch.move(geometry.deviation(p), None)
     np.testing.assert_allclose(moved.tcp, truth, atol=1e-12)
     np.testing.assert_allclose(moved.walk.tcp, truth, atol=1e-12)
     np.testing.assert_allclose(
@@ -43,7 +43,7 @@ def test_deviations_move_the_tool_as_an_independent_chain_does() -> None:
 
 def test_kinematics_agree_with_the_arm() -> None:
     states = random_states(30, np.random.default_rng(4))
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     J = NJ.jacobian(states.q, TOOL)
     np.testing.assert_allclose(batch.jacobian, J[:, :3], atol=1e-12)
     np.testing.assert_allclose(batch.angular, J[:, 3:], atol=1e-12)
@@ -55,7 +55,7 @@ def test_kinematics_agree_with_the_arm() -> None:
 def test_the_tcp_alone_is_that_of_the_walk() -> None:
     states = random_states(30, np.random.default_rng(5))
     shift = 1e-3 * np.random.default_rng(6).standard_normal((30, 6))
-    batch = Batch(NJ, states).moved(NOMINAL, shift)
+    batch = ArmStates(NJ, states).move(NOMINAL, shift)
     alone = batch.tcp
     assert "walk" not in vars(batch)
     np.testing.assert_allclose(alone, batch.walk.tcp, atol=1e-12)
@@ -72,7 +72,7 @@ def test_the_parameters_are_complete() -> None:
     for tools, rank in ((TOOL[None], 27), (PLATE, 30)):
         states = random_states(200, rng, tools)
         geometry = Geometry.propose(NJ, states)
-        X = geometry.columns(Batch(NJ, states)) * 1e-3
+        X = geometry.columns(ArmStates(NJ, states)) * 1e-3
         X = X.reshape(-1, X.shape[2])
         names = tuple(p.name for p in geometry.parameters())
         found = observe(X, names)

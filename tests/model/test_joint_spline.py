@@ -14,7 +14,7 @@ from postproc.model.effects.joint_spline import (
     SHORTEST,
     JointSpline,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.state import States, make_states
 from tests.calibration.simulator import NJ, random_arm, random_states
 
@@ -69,9 +69,9 @@ def test_it_repeats_with_every_turn_without_a_jump(span: float) -> None:
     p = np.random.default_rng(1).standard_normal(len(effect.parameters()))
     wide = np.linspace(-1.0, TURN - 1.0, 20001)
     there = states[np.zeros(len(wide), dtype=int)].with_(q=wide[:, None] * np.ones(6))
-    found = effect.angles(Batch(NJ, there), p)
+    found = effect.angles(ArmStates(NJ, there), p)
     for k in (-2, 1):
-        far = Batch(NJ, there.with_(q=there.q + k * TURN))
+        far = ArmStates(NJ, there.with_(q=there.q + k * TURN))
         np.testing.assert_allclose(effect.angles(far, p), found, atol=1e-9)
     steps = np.abs(np.diff(found, axis=0))
     assert steps.max() < 0.02 * np.ptp(found)
@@ -80,7 +80,7 @@ def test_it_repeats_with_every_turn_without_a_jump(span: float) -> None:
 
 def test_beyond_the_surveyed_range_the_long_length_alone_goes_on() -> None:
     effect, states = ranged(2.0)
-    far = Batch(NJ, states.with_(q=states.q + 2.4))
+    far = ArmStates(NJ, states.with_(q=states.q + 2.4))
     columns = effect.basis(far).any(axis=0)
     wide = [f" {np.rad2deg(LONG):.1f} deg " in p.name for p in effect.parameters()]
     assert np.array_equal(columns, wide)
@@ -90,8 +90,8 @@ def test_an_older_model_ends_where_its_survey_did() -> None:
     effect, states = ranged(2.0)
     old = JointSpline(effect.joints, effect.lower, effect.upper, effect.lengths)
     p = np.ones(len(old.parameters()))
-    assert old.angles(Batch(NJ, states), p).any()
-    assert not old.angles(Batch(NJ, states.with_(q=states.q + TURN)), p).any()
+    assert old.angles(ArmStates(NJ, states), p).any()
+    assert not old.angles(ArmStates(NJ, states.with_(q=states.q + TURN)), p).any()
 
 
 def test_what_is_fitted_on_one_turn_holds_on_the_next() -> None:
@@ -101,14 +101,14 @@ def test_what_is_fitted_on_one_turn_holds_on_the_next() -> None:
 
     def wave(at: States) -> np.ndarray:
         size = 3e-4 * np.sin(5.0 * at.q[:, [0]]) + 2e-4 * np.cos(7.0 * at.q[:, [0]])
-        moved: np.ndarray = Batch(NJ, at).jacobian[:, :, 0] * size
+        moved: np.ndarray = ArmStates(NJ, at).jacobian[:, :, 0] * size
         return moved
 
     effects = propose((*BASE_EFFECTS, "joint_spline"), NJ, states)
-    fit = fit_effects(Batch(NJ, states), measured + wave(states), effects)
+    fit = fit_effects(ArmStates(NJ, states), measured + wave(states), effects)
     q = states.q + np.array([TURN, 0.0, 0.0, 0.0, 0.0, 0.0])
     here, next_turn = (
-        fit.combination.error(Batch(NJ, at), fit.values)
+        fit.combination.error(ArmStates(NJ, at), fit.values)
         for at in (states, states.with_(q=q))
     )
     np.testing.assert_allclose(next_turn, here, atol=1e-9)

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.regression import fit_effects
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.exceptions import ModelError, OutputError
 from postproc.model.effects import BASE_EFFECTS, BY_NAME, propose
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, load_model, weight_of
 from postproc.model.model_file import content_id
 from postproc.model.provenance import Provenance
@@ -63,7 +63,7 @@ def test_free_forms_have_a_part_of_their_own() -> None:
     part = saved.free_part(NJ, states)
     effects, values, covariance = saved.compensable()
     free = np.array([n.split(".")[0] in saved.free_forms for n in effects.names])
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     alone = effects.error(batch, np.where(free, values, 0.0))
     np.testing.assert_allclose(part.error, alone, rtol=0, atol=1e-12)
     at = effects.columns(effects.at(batch, values))[:, :, free]
@@ -160,7 +160,7 @@ def test_files_that_do_not_hold_together_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_model_holds_for_the_mounting_that_it_was_fitted_in(tmp_path: Path) -> None:
-    path, wall = tmp_path / "m.json", NJ.mounted(np.array([1.0, 0.0, 0.0]))
+    path, wall = tmp_path / "m.json", NJ.mount(np.array([1.0, 0.0, 0.0]))
     model().save(path)
     assert "weight" not in json.loads(path.read_text())  # a floor is no news
     with pytest.raises(
@@ -171,7 +171,7 @@ def test_a_model_holds_for_the_mounting_that_it_was_fitted_in(tmp_path: Path) ->
     on_wall = load_model(path)
     assert on_wall.weight == (1.0, 0.0, 0.0)
     on_wall.check_arm(wall)
-    on_wall.check_arm(NJ.mounted(np.array([1.0, 0.0, 0.015])))  # less than 1 deg
+    on_wall.check_arm(NJ.mount(np.array([1.0, 0.0, 0.015])))  # less than 1 deg
     with pytest.raises(ModelError, match="mounting under"):
         on_wall.check_arm(NJ)
 
@@ -200,7 +200,7 @@ def test_repeatability_is_told_apart_from_the_model() -> None:
     p = model().predict(NJ, states)
     assert (p.std_arrival >= p.std_model).all()
     noise = model().noise
-    J = Batch(NJ, states).jacobian
+    J = ArmStates(NJ, states).jacobian
     extra = p.std_arrival**2 - p.std_model**2
     np.testing.assert_allclose(extra, noise.arrival_variance(J), rtol=0.05)
 
@@ -238,7 +238,7 @@ def test_a_tool_that_was_not_surveyed_costs_the_unseen_rotations() -> None:
         held = random_states(60, rng, TOOL[None] + np.array([0.0, 0.0, 0.1]))
         truth = arm.tcp(held.q, held.direction, held.tool)
         p = m.predict(NJ, held)
-        gap = truth - Batch(NJ, held).walk.tcp - p.error
+        gap = truth - ArmStates(NJ, held).walk.tcp - p.error
         inside.append(np.abs(gap) < 1.96 * p.std_model)
         assert np.median(p.std_model) > 2e-5  # far from the surveyed 5 um
     assert np.mean(inside) > 0.85  # 8 arms: their rotations are drawn once each
@@ -256,7 +256,7 @@ def test_three_points_transfer_to_another_tool() -> None:
         for shift, out in ((0.0, here), (0.1, there)):
             held = random_states(200, rng, PLATE + np.array([0, 0, shift]))
             truth = arm.tcp(held.q, held.direction, held.tool)
-            gap = truth - Batch(NJ, held).walk.tcp - m.error(NJ, held)
+            gap = truth - ArmStates(NJ, held).walk.tcp - m.error(NJ, held)
             out.append(np.linalg.norm(gap, axis=1).mean())
     assert np.mean(there) < 1.5 * np.mean(here)
 
@@ -268,21 +268,21 @@ def test_the_set_up_is_fitted_and_never_compensated() -> None:
     measured, _ = arm.measure(states, rng)
     drifting = measured + np.linspace(0.0, 4e-4, 300)[:, None] * [1.0, 0.5, 0.0]
     slipped = drifting.copy()
-    R = Batch(NJ, states).walk.flange
+    R = ArmStates(NJ, states).walk.flange
     slipped[:150] += 3e-4 * R[:150, :, 0]
     survey = survey_of(states, slipped)
     effects = propose((*BASE_EFFECTS, "tracker_drift"), NJ, states)
     slip = BY_NAME["tool_shift"](row=150.0)
-    fit = fit_effects(Batch(NJ, states), slipped, (*effects, slip))
+    fit = fit_effects(ArmStates(NJ, states), slipped, (*effects, slip))
     m = model_of(fit, survey)
     kept, _, _ = m.compensable()
     assert {e.name for e in kept.effects} == set(BASE_EFFECTS)
     # The survey is explained with them ..
-    left = slipped - Batch(NJ, states).walk.tcp - m.measured_error(NJ, states)
+    left = slipped - ArmStates(NJ, states).walk.tcp - m.predict_measured(NJ, states)
     assert np.linalg.norm(left, axis=1).mean() < 8e-5
     # .. and the arm is compensated without them.
     held = random_states(200, rng)
-    truth = arm.tcp(held.q, held.direction, held.tool) - Batch(NJ, held).walk.tcp
+    truth = arm.tcp(held.q, held.direction, held.tool) - ArmStates(NJ, held).walk.tcp
     assert np.linalg.norm(truth - m.error(NJ, held), axis=1).mean() < 4e-5
 
 

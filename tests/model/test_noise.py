@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from postproc.calibration.noise_estimate import estimate_noise
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.noise import Noise
 from postproc.model.whitening import Whitener
 from tests.calibration.simulator import NJ, random_states
 
 
 def test_the_rotated_variances_are_the_covariance() -> None:
-    batch = Batch(NJ, random_states(20, np.random.default_rng(0)))
+    batch = ArmStates(NJ, random_states(20, np.random.default_rng(0)))
     origin = (3.0, 1.0, 1.0)
     whitener = Whitener.build(batch, batch.walk.tcp, origin)
     noise = Noise(1.5, 2e-5, origin)
@@ -28,7 +28,7 @@ def test_the_rotated_variances_are_the_covariance() -> None:
 
 def test_components_are_estimated_from_squares() -> None:
     rng = np.random.default_rng(1)
-    batch = Batch(NJ, random_states(3000, rng))
+    batch = ArmStates(NJ, random_states(3000, rng))
     whitener = Whitener.build(batch, batch.walk.tcp, None)
     true = Noise(3.0, 2e-5)
     e = np.sqrt(whitener.variance(true)) * rng.standard_normal((3000, 3))
@@ -38,7 +38,7 @@ def test_components_are_estimated_from_squares() -> None:
 
 
 def test_rotation_keeps_lengths_and_columns() -> None:
-    batch = Batch(NJ, random_states(10, np.random.default_rng(2)))
+    batch = ArmStates(NJ, random_states(10, np.random.default_rng(2)))
     whitener = Whitener.build(batch, batch.walk.tcp, None)
     rows = np.random.default_rng(3).standard_normal((10, 3, 4))
     turned = whitener.rotate(rows)
@@ -50,7 +50,7 @@ def test_rotation_keeps_lengths_and_columns() -> None:
 
 def test_a_component_that_was_thought_absent_is_found_again() -> None:
     rng = np.random.default_rng(2)
-    batch = Batch(NJ, random_states(400, rng))
+    batch = ArmStates(NJ, random_states(400, rng))
     whitener = Whitener.build(batch, batch.walk.tcp, None)
     truth = Noise(2.0, 3e-5)
     squares = whitener.variance(truth) * rng.chisquare(1, (400, 3))
@@ -66,8 +66,8 @@ def test_what_was_read_in_motion_tells_nothing_along_it() -> None:
     heading = rng.standard_normal((30, 3))
     heading /= np.linalg.norm(heading, axis=1)[:, None]
     heading[::3] = np.nan
-    batch = Batch(NJ, states.with_(heading=heading))
-    still = Whitener.build(Batch(NJ, states), batch.walk.tcp, None)
+    batch = ArmStates(NJ, states.with_(heading=heading))
+    still = Whitener.build(ArmStates(NJ, states), batch.walk.tcp, None)
     whitener, noise = Whitener.build(batch, batch.walk.tcp, None), Noise(1.0, 2e-5)
     rows = rng.standard_normal((30, 3)) * 1e-4
     moved = rows + np.nan_to_num(heading) * rng.uniform(-1e-3, 1e-3, (30, 1))

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.calibration.design import DesignMatrix
+from postproc.calibration.design_matrix import DesignMatrix
 from postproc.calibration.noise_estimate import estimate_noise
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import propose
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.noise import Noise, angle_step, poses_of
 from postproc.model.whitening import RowBlocks, Whitener
 from postproc.robot.state import States
@@ -36,7 +36,7 @@ def visits(poses: int, rounds: int, nests: int, seed: int = 0) -> States:
 
 def covariance(states: States, noise: Noise) -> np.ndarray:
     """Write the covariance of all rows out, (3 n, 3 n), from its definition."""
-    J, n = Batch(NJ, states).jacobian, len(states)
+    J, n = ArmStates(NJ, states).jacobian, len(states)
     V = np.zeros((n, 3, n, 3))
     for i in range(n):
         V[i, :, i] += noise.tracker**2 * 1e-10 / states.readings[i] * np.eye(3)
@@ -55,7 +55,7 @@ def test_whitened_rows_have_the_covariance_of_the_definition(
     rounds: int, nests: int
 ) -> None:
     states = visits(7, rounds, nests)
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     whitener = Whitener.build(batch, batch.walk.tcp, None)
     by = whitener.whitening(NOISE, np.ones(len(states)))
     rows = np.eye(3 * len(states)).reshape(len(states), 3, -1)
@@ -67,7 +67,7 @@ def test_whitened_rows_have_the_covariance_of_the_definition(
 
 def test_a_row_that_is_dropped_is_as_if_it_were_not_there() -> None:
     states = visits(5, 2, 2)
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     weight = np.ones(len(states))
     weight[3] = 0.0
     whitener = Whitener.build(batch, batch.walk.tcp, None)
@@ -85,7 +85,7 @@ def test_a_row_that_is_dropped_is_as_if_it_were_not_there() -> None:
 def test_scatter_of_reading_stop_and_pose_is_told_apart() -> None:
     """Means of 12 campaigns of 150 poses lie within 5 % of what was drawn."""
     states = visits(150, 2, 2, seed=3).with_(readings=np.full(600, 3.0))
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     V = covariance(states, NOISE)
     root = np.linalg.cholesky(V + 1e-18 * np.eye(len(V)))
     rng, found = np.random.default_rng(5), []
@@ -93,7 +93,7 @@ def test_scatter_of_reading_stop_and_pose_is_told_apart() -> None:
         error = (root @ rng.standard_normal(len(V))).reshape(-1, 3)
         scatter = NOISE.tracker**2 * 1e-10 * rng.chisquare(6.0, len(states))
         known = states.with_(scatter=scatter)
-        whitener = Whitener.build(Batch(NJ, known), batch.walk.tcp, None)
+        whitener = Whitener.build(ArmStates(NJ, known), batch.walk.tcp, None)
         turned = whitener.rotate(error)
         products = [_products(turned, block.rows) for block in whitener.blocks]
         ones = np.ones(len(states))
@@ -112,7 +112,7 @@ def _products(turned: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 def test_components_that_rows_cannot_tell_apart_are_not_estimated() -> None:
     def estimated(states: States) -> tuple[str, ...]:
-        batch = Batch(NJ, states)
+        batch = ArmStates(NJ, states)
         return Whitener.build(batch, batch.walk.tcp, None).estimated
 
     assert estimated(visits(5, 1, 1)) == ("tracker", "joint")
@@ -124,11 +124,11 @@ def test_components_that_rows_cannot_tell_apart_are_not_estimated() -> None:
 def test_columns_of_rows_that_are_taken_at_once() -> None:
     """Every way to use the columns is that of the columns written out."""
     states = visits(40, 2, 2)
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     c = Combination(propose(("geometry", "backlash", "joint_spline"), NJ, states))
     whitener = Whitener.build(batch, batch.walk.tcp, None)
     by = whitener.whitening(NOISE, np.ones(len(states)))
-    plain = DesignMatrix.of(c, batch).turned(by.scale[:, :, None] * whitener.turn)
+    plain = DesignMatrix.of(c, batch).rotate(by.scale[:, :, None] * whitener.turn)
     design = replace(plain, blocks=by.blocks)
     p = len(c.parameters)
     X = design.dense().reshape(-1, p)
@@ -142,7 +142,7 @@ def test_columns_of_rows_that_are_taken_at_once() -> None:
     np.testing.assert_allclose(design.times(values).reshape(-1), X @ values, **close)
     np.testing.assert_allclose(design.moment(rows), X.T @ rows.reshape(-1), **close)
     np.testing.assert_allclose(design.gram(), X.T @ X, **close)
-    np.testing.assert_allclose(design.mixed(root), X @ root, **close)
+    np.testing.assert_allclose(design.combine(root), X @ root, **close)
     variance = np.einsum("rp,pq,rq->r", X, C, X)
     np.testing.assert_allclose(design.variance(C).reshape(-1), variance, **close)
 
@@ -158,7 +158,7 @@ def test_rows_of_a_pose_are_not_taken_apart() -> None:
 def test_a_bad_reading_is_seen_beside_the_others_of_its_pose() -> None:
     """An error of 0.2 mm hides in poses that scatter by more, but not at one stop."""
     states = visits(60, 1, 3)
-    batch = Batch(NJ, states)
+    batch = ArmStates(NJ, states)
     noise = Noise(1.0, 0.0, None, 3e-4)
     rng = np.random.default_rng(2)
     stop = 3e-4 * rng.standard_normal((60, 3))

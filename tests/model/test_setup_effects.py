@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.calibration.effect_selection import model_of
 from postproc.calibration.regression import fit_effects
-from postproc.calibration.selection import model_of
-from postproc.model.combination import Combination
+from postproc.model.effect_sum import Combination
 from postproc.model.effects import BASE_EFFECTS, BY_NAME, propose
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.step import EDGE
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.state import States
 from tests.calibration.simulator import (
     NJ,
@@ -41,7 +41,7 @@ def base_slips(states: States, tcp: np.ndarray) -> np.ndarray:
 
 def nest_slips(states: States, tcp: np.ndarray) -> np.ndarray:
     """The nest slips in the flange before row 120."""
-    R = Batch(NJ, states).walk.flange
+    R = ArmStates(NJ, states).walk.flange
     return np.where(BEFORE, -R @ np.array([2e-4, 0.0, 3e-4]), 0.0)
 
 
@@ -62,7 +62,7 @@ def test_it_is_fitted_and_the_arm_is_compensated_without_it(name: str) -> None:
     measured = measured + displace(states, tcp)
     effect: Effect = given or propose((name,), NJ, states)[0]
     chosen = (*propose(BASE_EFFECTS, NJ, states), effect)
-    fit = fit_effects(Batch(NJ, states), measured, chosen)
+    fit = fit_effects(ArmStates(NJ, states), measured, chosen)
     model = model_of(fit, survey_of(states, measured))
     # Fitted: nothing of it is left in the rows, and it is what was planted.
     assert np.linalg.norm(fit.residual, axis=1).mean() < 6e-5
@@ -75,7 +75,7 @@ def test_it_is_fitted_and_the_arm_is_compensated_without_it(name: str) -> None:
     alone = Combination(chosen[:-1]).error(fit.batch, np.delete(fit.values, own))
     np.testing.assert_allclose(model.error(NJ, states), alone, atol=1e-9)
     held = covariates(random_states(150, rng, PLATE), rng)
-    truth = arm.tcp(held.q, held.direction, held.tool) - Batch(NJ, held).walk.tcp
+    truth = arm.tcp(held.q, held.direction, held.tool) - ArmStates(NJ, held).walk.tcp
     assert np.linalg.norm(truth - model.error(NJ, held), axis=1).mean() < 4e-5
 
 
@@ -83,8 +83,8 @@ def test_it_is_fitted_and_the_arm_is_compensated_without_it(name: str) -> None:
 def test_a_step_is_shown_by_rows_on_both_sides(name: str) -> None:
     """What all rows but a few are off by was there before they were measured."""
     rng = np.random.default_rng(4)
-    batch = Batch(NJ, random_states(N, rng, PLATE))
+    batch = ArmStates(NJ, random_states(N, rng, PLATE))
     for row in (EDGE, N - EDGE):
-        tried = BY_NAME[name](row=float(row)).refined(np.linspace(-1, 1, 9), batch)
+        tried = BY_NAME[name](row=float(row)).refine(np.linspace(-1, 1, 9), batch)
         rows = [effect.row for effect in tried]
         assert len(rows) > 3 and min(rows) >= EDGE and max(rows) <= N - EDGE

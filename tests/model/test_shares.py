@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.model.combination import INTERACTION, Combination
+from postproc.model.effect_sum import INTERACTION, Combination
 from postproc.model.effects.effect import Effect
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from tests.calibration.simulator import NJ
 from tests.model.test_effects import STATES, variants
 
-BATCH = Batch(NJ, STATES)
+BATCH = ArmStates(NJ, STATES)
 ALL = tuple(e for e in variants() if e.belongs_to() != "setup")
 
 

@@ -12,24 +12,24 @@ from postproc.model.effects.base_tilt import BaseTilt
 from postproc.model.effects.bending import BENDING, Bending
 from postproc.model.effects.compliance import SCALE, YIELDING, Compliance
 from postproc.model.effects.load_backlash import LoadBacklash
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from tests.calibration.simulator import NJ, random_states
 
 STATES = random_states(60, np.random.default_rng(2))
-WALL = NJ.mounted(np.array([1.0, 0.0, 0.0]))
+WALL = NJ.mount(np.array([1.0, 0.0, 0.0]))
 BARE = replace(NJ, file=NJ.file.model_copy(update={"links": None}))
 
 
 def test_the_joints_that_weight_loads_may_yield() -> None:
-    floor, wall = (Compliance.on(Batch(arm, STATES)) for arm in (NJ, WALL))
+    floor, wall = (Compliance.on(ArmStates(arm, STATES)) for arm in (NJ, WALL))
     assert set(YIELDING) <= set(floor.joints) and 4 in floor.joints
     assert 1 not in floor.joints and 1 in wall.joints
-    unknown = Compliance.on(Batch(BARE, STATES))
+    unknown = Compliance.on(ArmStates(BARE, STATES))
     assert {2, 3, 4, 5} <= set(unknown.joints) and 1 not in unknown.joints
 
 
 def test_joints_that_carry_little_are_softer() -> None:
-    effect = Compliance.on(Batch(NJ, STATES))
+    effect = Compliance.on(ArmStates(NJ, STATES))
     soft = dict(zip(effect.joints, effect.softness, strict=True))
     assert soft[2] == pytest.approx(SCALE, rel=0.5) and soft[5] > 5 * soft[2]
     pieces = effect.pieces()
@@ -47,7 +47,7 @@ def test_model_files_of_older_releases_are_read() -> None:
 
 
 def test_bending_turns_the_tool_by_the_moment_across_the_joint() -> None:
-    batch = Batch(WALL, STATES)
+    batch = ArmStates(WALL, STATES)
     effect = Bending((4,), ((),), False, (SCALE,))
     moment, frames = batch.loads.bending[:, 3], WALL.link_frames(STATES.q)
     turns = effect.rotation_columns(batch)
@@ -58,7 +58,7 @@ def test_bending_turns_the_tool_by_the_moment_across_the_joint() -> None:
 
 
 def test_bending_and_compliance_share_the_moments_of_the_links() -> None:
-    batch = Batch(BARE, STATES)
+    batch = ArmStates(BARE, STATES)
     yields, bends = Compliance.on(batch), Bending.on(batch)
     own = dict(zip(yields.joints, yields.moments, strict=True))
     for joint, links in zip(bends.joints, bends.moments, strict=True):
@@ -67,7 +67,7 @@ def test_bending_and_compliance_share_the_moments_of_the_links() -> None:
 
 
 def test_a_base_on_a_wall_is_turned_about_all_axes() -> None:
-    batch = Batch(WALL, STATES)
+    batch = ArmStates(WALL, STATES)
     (plain, _) = (c.effect for c in BaseTilt.candidates(batch))
     names = [p.name for p in plain.parameters()]
     assert {"kx", "ky", "kz"} <= set(names)
@@ -79,7 +79,7 @@ def test_a_base_on_a_wall_is_turned_about_all_axes() -> None:
 
 
 def test_a_flank_that_weight_chooses_must_show_its_bend() -> None:
-    batch = Batch(NJ, STATES)
+    batch = ArmStates(NJ, STATES)
     torque = batch.loads.total[:, 1]
     largest = float(np.abs(torque).max())
     flank = LoadBacklash((2,), "gravity_side", 0.3 * largest)
@@ -89,5 +89,5 @@ def test_a_flank_that_weight_chooses_must_show_its_bend() -> None:
     one_way = batch[np.flatnonzero(torque > 0.6 * largest)]
     assert not replace(flank, t0=0.1 * largest).passes_bend(one_way)
     assert replace(straight, form="signed").passes_bend(one_way)
-    assert straight not in flank.refined(np.linspace(-1, 2, 9), batch)
-    assert all(law.passes_bend(batch) for law in flank.refined(np.arange(3.0), batch))
+    assert straight not in flank.refine(np.linspace(-1, 2, 9), batch)
+    assert all(law.passes_bend(batch) for law in flank.refine(np.arange(3.0), batch))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.motion.joint_path import trace
 from postproc.motion.path import arc_per_start
 from postproc.motion.replan import replan_all
 from postproc.motion.targets import ARC_END, CODE, TargetKind, Targets, make_targets
-from postproc.motion.trace import trace
 from postproc.robot.arm import Arm
 from postproc.robot.trajectory import Motion
 

@@ -9,10 +9,10 @@ import pytest
 
 from postproc.motion import blending
 from postproc.motion.blending import blend, corners
+from postproc.motion.joint_path import trace
 from postproc.motion.planner import plan
 from postproc.motion.replan import replan_all
 from postproc.motion.targets import Fly, TargetKind, Targets, make_targets
-from postproc.motion.trace import trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import arrivals
 from postproc.robot.trajectory import Motion

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from postproc.motion.path import STEP, TURN, arcs, joined, lines
+from postproc.motion.path import STEP, TURN, arcs, join_segments, lines
 
 points = arrays(float, (3, 3), elements=st.floats(-2.0, 2.0, allow_nan=False))
 
@@ -51,7 +51,7 @@ def test_arcs_lie_on_the_circle_and_pass_all_three_points(xyz: np.ndarray) -> No
     T = poses(xyz)
     to_via, to_end = arcs(T[:1], T[1:2], T[2:])
     assert to_via.valid[0] and to_end.valid[0]
-    both = joined([to_via, to_end])
+    both = join_segments([to_via, to_end])
     k = np.repeat([0, 1], 9)
     sampled = both.poses(k, np.tile(np.linspace(0, 1, 9), 2))
     centre = to_via.centre[0]

@@ -37,7 +37,7 @@ def shifted(targets: Targets, moved: np.ndarray, seed: int) -> Targets:
     pose = targets.kind[rows] == TargetKind.POSE
     tcp[pose, :3, 3] += rng.uniform(-SHIFT, SHIFT, (int(pose.sum()), 3))
     joints += rng.uniform(-SHIFT, SHIFT, joints.shape)
-    return targets.moved_to(rows, tcp, joints)
+    return targets.move_to(rows, tcp, joints)
 
 
 def test_columns_of_one_value_move_like_others(cell: Cell) -> None:
@@ -46,7 +46,7 @@ def test_columns_of_one_value_move_like_others(cell: Cell) -> None:
     slim = slim.slim()
     rows = np.array([2, 5])
     for joints in (np.full((2, 6), np.nan), np.ones((2, 6))):
-        moved, meant = (t.moved_to(rows, t.tcp[:2], joints) for t in (slim, full))
+        moved, meant = (t.move_to(rows, t.tcp[:2], joints) for t in (slim, full))
         for name, column in vars(meant).items():
             np.testing.assert_array_equal(getattr(moved, name), column, name)
     assert slim.joints.strides[0] == slim.tool.strides[0] == 0
@@ -195,5 +195,5 @@ def test_a_stretch_that_changes_its_branch_is_traced_anew(cell: Cell) -> None:
     joints[5] += 2 * np.pi * (-1 if joints[5] > 0 else 1)
     moved = np.zeros(len(targets), dtype=bool)
     moved[row] = True
-    new = jointed.moved_to(np.array([row]), targets.tcp[[row]], joints[None])
+    new = jointed.move_to(np.array([row]), targets.tcp[[row]], joints[None])
     assert_same(replan(cell.arm, course, new, moved), replan_all(cell.arm, new))

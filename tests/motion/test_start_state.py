@@ -9,13 +9,13 @@ import pytest
 
 from postproc.compensation.program import read_program
 from postproc.compensation.targets import targets_from_visits
-from postproc.compensation.windows import Window, cut_points
+from postproc.compensation.windowing import Window, cut_points
 from postproc.language.visits import Visits
+from postproc.motion.joint_path import NOWHERE, StartState
 from postproc.motion.planner import plan
 from postproc.motion.replan import Replanned, replan, replan_all
-from postproc.motion.trace import NOWHERE, StartState
 from postproc.robot.cell import Cell
-from postproc.robot.direction import NO_SIDES, UNLED, Sides
+from postproc.robot.direction import NO_SIDES, UNLED, FlankState
 from tests.bench import made
 from tests.motion.test_replan import arcs, cell, picked, shifted
 
@@ -99,9 +99,7 @@ def test_courses_go_on_and_are_looked_at_again(cell: Cell, source) -> None:
         mine = np.append(np.zeros(window.seeds, dtype=bool), moved[own])
         rows = np.flatnonzero(mine)
         there = rows + window.first - window.seeds
-        new = whole.moved_to(
-            rows, after.targets.tcp[there], after.targets.joints[there]
-        )
+        new = whole.move_to(rows, after.targets.tcp[there], after.targets.joints[there])
         before = replan_all(cell.arm, whole, begin, lead)
         course = replan(cell.arm, before, new, mine, lead)
         found, kept = course.reached, slice(window.seeds, None)
@@ -114,7 +112,7 @@ def test_courses_go_on_and_are_looked_at_again(cell: Cell, source) -> None:
         begin, lead = ended(course)
 
 
-def ended(course: Replanned) -> tuple[StartState, Sides]:
+def ended(course: Replanned) -> tuple[StartState, FlankState]:
     """Say how a course leaves the arm at its last target."""
     last = slice(len(course.slot) - 1, None)
     at = course.exact.q[last], course.exact.flange[last], course.slot[last]

@@ -7,9 +7,9 @@ import pytest
 
 from postproc.compensation.program import read_program
 from postproc.compensation.targets import targets_from_visits
-from postproc.motion import trace as module
+from postproc.motion import joint_path as module
+from postproc.motion.joint_path import Trace, trace
 from postproc.motion.targets import TargetKind, Targets, make_targets
-from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.cell import load_cell
 from postproc.robot.trajectory import Motion

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.robot.play import Clamps, VisitChains
+from postproc.robot.backlash_operator import PlayOperator, VisitChains
 
 
 def prefix(steps, begins=None):
@@ -14,21 +14,21 @@ def prefix(steps, begins=None):
     lo, hi = np.array(steps.lo), np.array(steps.hi)
     for i in range(1, len(lo)):
         if begins is None or not begins[i]:
-            before = Clamps(lo[i - 1], hi[i - 1]).then(Clamps(lo[i], hi[i]))
+            before = PlayOperator(lo[i - 1], hi[i - 1]).then(PlayOperator(lo[i], hi[i]))
             lo[i], hi[i] = before.lo, before.hi
-    return Clamps(lo, hi)
+    return PlayOperator(lo, hi)
 
 
 def clamps(values, start, half):
     """Compose the clamps of passing each edge."""
     ends = []
     for first, last in pairwise(start):
-        one = Clamps(np.full(6, -np.inf), np.full(6, np.inf))
+        one = PlayOperator(np.full(6, -np.inf), np.full(6, np.inf))
         for q in values[first:last]:
-            one = one.then(Clamps(q - half, q + half))
+            one = one.then(PlayOperator(q - half, q + half))
         ends.append(one)
     lo, hi = ([getattr(end, name) for end in ends] for name in ("lo", "hi"))
-    return Clamps(np.reshape(lo, (-1, 6)), np.reshape(hi, (-1, 6)))
+    return PlayOperator(np.reshape(lo, (-1, 6)), np.reshape(hi, (-1, 6)))
 
 
 def turning(behind, middle, ahead):
@@ -67,7 +67,7 @@ def refined(angles, source, values, start, uneven):
 def states(chains: VisitChains, own, half, before):
     """Find the hull of what may hold at every visit: sweeps until nothing changes."""
     n = len(chains.angles)
-    known: list[Clamps | None] = [None] * n
+    known: list[PlayOperator | None] = [None] * n
     changed = True
     while changed:
         changed = False
@@ -75,9 +75,9 @@ def states(chains: VisitChains, own, half, before):
             new = _arrived(chains, own, half, before, known, visit)
             if new is not None and not _same(known[visit], new):
                 known[visit], changed = new, True
-    unknown = [Clamps(q - half, q + half) for q in chains.angles]
+    unknown = [PlayOperator(q - half, q + half) for q in chains.angles]
     at = [k or u for k, u in zip(known, unknown, strict=True)]
-    return Clamps(np.array([c.lo for c in at]), np.array([c.hi for c in at]))
+    return PlayOperator(np.array([c.lo for c in at]), np.array([c.hi for c in at]))
 
 
 def _arrived(chains, own, half, before, known, visit):
@@ -87,14 +87,14 @@ def _arrived(chains, own, half, before, known, visit):
     for edge in range(chains.first[visit], chains.first[visit + 1]):
         if chains.source[edge] < 0:
             q = chains.angles[visit]
-            return Clamps(q - half, q + half)
+            return PlayOperator(q - half, q + half)
         state = known[chains.source[edge]]
         if state is not None:
             found.append(state.then(own[edge]))
     if not found:
         return None
     low = np.min([f.lo for f in found], axis=0)
-    return Clamps(low, np.max([f.hi for f in found], axis=0))
+    return PlayOperator(low, np.max([f.hi for f in found], axis=0))
 
 
 def _same(a, b):

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from postproc.report.diff import TextLines, changed_rows, diff, target_name
+from postproc.report.diff import TextLines, describe_changes, diff, target_name
 from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 
 
@@ -183,7 +183,7 @@ def lines_of(text: str) -> TextLines:
 def test_a_line_is_named_as_it_is_by_itself(line) -> None:
     before, after = [line.format(text) for text in ("1.5", "2.25")]
     texts = [lines_of("\n".join([text] * 2)) for text in (before, after)]
-    rows = list(changed_rows("a.pdl", *texts, 6))
+    rows = list(describe_changes("a.pdl", *texts, 6))
     assert [row.line for row in rows] == [7, 8]
     assert [row.target for row in rows] == [target_name(before)] * 2
     assert all(row.original != row.compensated for row in rows)
@@ -211,7 +211,7 @@ POS = "POS({0}, 2, 3, 4, 5, 6, '')"
 )
 def test_a_target_is_named_by_its_own_statement(line, name) -> None:
     before, after = [line.format(text) for text in ("1.5", "2.25")]
-    (row,) = changed_rows("a.pdl", *map(lines_of, (before, after)), 6)
+    (row,) = describe_changes("a.pdl", *map(lines_of, (before, after)), 6)
     assert row.target == target_name(before) == name
 
 

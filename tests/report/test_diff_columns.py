@@ -17,9 +17,9 @@ from postproc.report.diff import (
     DiffRow,
     DiffRows,
     TextLines,
-    changed_rows,
+    describe_changes,
     diff,
-    joined_rows,
+    join_rows,
 )
 from postproc.report.diff_output import difference_pieces, print_difference
 from tests.reference.text import mask_line, number_value
@@ -129,7 +129,7 @@ def same(rows: list[DiffRow], wanted: list[DiffRow]) -> bool:
 @pytest.mark.parametrize("seed", range(6))
 def test_rows_are_those_made_line_by_line(seed: int) -> None:
     before, after = texts(seed, 700)
-    found = changed_rows("a.pdl", as_lines(before), as_lines(after))
+    found = describe_changes("a.pdl", as_lines(before), as_lines(after))
     wanted = rows_of("a.pdl", before, after)
     assert len(wanted) > 300 and {bool(row.text) for row in wanted} == {True, False}
     assert same(list(found), wanted)
@@ -145,8 +145,8 @@ def test_listing_and_json_are_those_made_row_by_row(seed: int, told: bool) -> No
     record = told_of(np.random.default_rng(seed), n) if told else None
     parts, wanted = [], []
     for name, old, new in files[: 1 + seed % 2]:
-        rows = changed_rows(name, as_lines(old), as_lines(new))
-        parts.append(rows.with_told(record))
+        rows = describe_changes(name, as_lines(old), as_lines(new))
+        parts.append(rows.with_record(record))
         own = rows_of(name, old, new)
         wanted += [with_told(row, record) for row in own] if record else own
     counts = dict(record.counts) if record else {}
@@ -160,7 +160,7 @@ def test_listing_and_json_are_those_made_row_by_row(seed: int, told: bool) -> No
 def test_what_was_left_alone_is_in_the_json_too() -> None:
     told = told_of(np.random.default_rng(3), 90)
     left = DiffRows.bare("a.pdl", told.line[::2], ["MOVE TO"] * len(told.line[::2]))
-    found = Difference((), False, (left.with_told(told),), dict(told.counts))
+    found = Difference((), False, (left.with_record(told),), dict(told.counts))
     wanted = [
         with_told(DiffRow("a.pdl", line, "MOVE TO", (), (), None), told)
         for line in told.line[::2].tolist()
@@ -174,11 +174,11 @@ def test_rows_of_parts_are_those_of_all() -> None:
     old, new = as_lines(before), as_lines(after)
     cuts = [0, 1, 7, 200, 200, 400]
     parts = [
-        changed_rows("a.pdl", old.part(a, b), new.part(a, b), a)
+        describe_changes("a.pdl", old.part(a, b), new.part(a, b), a)
         for a, b in pairwise(cuts)
     ]
-    whole = changed_rows("a.pdl", old, new)
-    assert same(list(joined_rows("a.pdl", parts)), list(whole))
+    whole = describe_changes("a.pdl", old, new)
+    assert same(list(join_rows("a.pdl", parts)), list(whole))
 
 
 @pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.calibration.published import Comparison, MethodRow
+from postproc.calibration.baselines import Comparison, MethodRow
 from postproc.exceptions import OutputError
 from postproc.report.plots import plot_comparison
 

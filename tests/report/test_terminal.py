@@ -10,7 +10,7 @@ from postproc.exceptions import printable
 from postproc.report.terminal import (
     PLAIN_WIDTH,
     Column,
-    folded,
+    fold_cells,
     print_table,
     progress_bar,
     show_status,
@@ -58,7 +58,7 @@ def test_a_long_cell_is_folded_at_words_and_nothing_is_cut():
     columns = [Column("a", "left"), Column("added", "left"), Column("rows")]
     told = " ".join(["backlash"] * 50)
     rows = [["model", told, "12"], ["b", "", "7"]]
-    head, *lines = table_text(columns, folded(columns, rows, "added")).splitlines()
+    head, *lines = table_text(columns, fold_cells(columns, rows, "added")).splitlines()
     assert len(head) == len(lines[0]) == PLAIN_WIDTH
     assert " ".join(lines).split() == ["model", *told.split()[:20], "12",
                                        *told.split()[20:], "b", "7"]  # fmt: skip

@@ -113,7 +113,7 @@ WEIGHTS = pytest.mark.parametrize(
 
 @WEIGHTS
 def test_gravity_torque_is_the_energy_gradient(arm, q, weight):
-    arm = arm.mounted(np.array(weight, dtype=float))
+    arm = arm.mount(np.array(weight, dtype=float))
     q, com = q[:30], np.array([0.1, 0.0, 0.2])
     torque = arm.gravity_torque(q, 60.0, com)
     step = 1e-5
@@ -128,7 +128,7 @@ def test_gravity_torque_is_the_energy_gradient(arm, q, weight):
 
 @WEIGHTS
 def test_gravity_basis_spans_the_torque(arm, q, weight):
-    arm = arm.mounted(np.array(weight, dtype=float))
+    arm = arm.mount(np.array(weight, dtype=float))
     links = arm.file.links
     lumped = [
         value
@@ -150,7 +150,7 @@ def test_a_parallelogram_takes_part_of_the_torque(arm, q, weight):
 
 @WEIGHTS
 def test_moments_about_the_joints_are_the_torque(arm, q, weight):
-    arm = arm.mounted(np.array(weight, dtype=float))
+    arm = arm.mount(np.array(weight, dtype=float))
     q, com = q[:20], np.tile([0.1, 0.0, 0.2], (20, 1))
     axes, load = arm.joint_axes(q)[0], np.full(20, 30.0)
     for moment, torque in zip(
@@ -162,7 +162,7 @@ def test_moments_about_the_joints_are_the_torque(arm, q, weight):
 
 def test_a_rotated_base_turns_moments_and_leaves_torques(arm, q):
     """An arm on a wall: the world's weight, written in the base of the arm."""
-    wall = arm.mounted(np.array([2.0, 0.0, 0.0]))
+    wall = arm.mount(np.array([2.0, 0.0, 0.0]))
     assert not wall.stands and np.array_equal(wall.weight, [1.0, 0.0, 0.0])
     moment = wall.tilting_moment(q[:20], 0.0, 0.0)
     np.testing.assert_allclose(moment[:, 0], 0.0, atol=1e-9)
@@ -171,7 +171,7 @@ def test_a_rotated_base_turns_moments_and_leaves_torques(arm, q):
 
 
 def test_bending_moments_are_those_of_the_first_moments(arm, q):
-    links, wall = arm.file.links, arm.mounted(np.array([0.0, 1.0, 1.0]))
+    links, wall = arm.file.links, arm.mount(np.array([0.0, 1.0, 1.0]))
     mass, centre = np.array(links.mass_kg), np.array(links.com_mm) * 1e-3
     frames = wall.link_frames(q[:10])
     # All weight behind a link hangs at its origin too: D-H origins are fixed to links.
@@ -186,7 +186,7 @@ def test_bending_moments_are_those_of_the_first_moments(arm, q):
 
 
 def test_an_arm_keeps_its_mounting_between_processes(arm):
-    wall = pickle.loads(pickle.dumps(arm.mounted(np.array([1.0, 0.0, 0.0]))))
+    wall = pickle.loads(pickle.dumps(arm.mount(np.array([1.0, 0.0, 0.0]))))
     assert np.array_equal(wall.weight, [1.0, 0.0, 0.0]) and wall.id == arm.id
 
 

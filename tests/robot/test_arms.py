@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from postproc.robot.arm import load_arm
-from postproc.robot.arm_file import ARMS, shipped_arms
+from postproc.robot.arm_file import ARMS, list_shipped_arms
 from postproc.robot.inverse import wrap
 from tests.reference import urdf
 from tests.robot.urdfs import LIMITS, NJ130_SERIAL, URDFS
 
-CLOSED = sorted(set(shipped_arms()) - {"ur10"})  # its wrist is not spherical
+CLOSED = sorted(set(list_shipped_arms()) - {"ur10"})  # its wrist is not spherical
 OLDER = {"nj220-2.7", "ur10"}  # held by their published poses
 
 
@@ -20,7 +20,7 @@ def angles(arm, n=400):
 
 
 def test_every_arm_but_the_older_ones_has_a_chain_to_be_held_against():
-    assert set(shipped_arms()) == set(URDFS) | OLDER
+    assert set(list_shipped_arms()) == set(URDFS) | OLDER
 
 
 @pytest.mark.parametrize("name", URDFS)

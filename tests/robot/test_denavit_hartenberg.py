@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from postproc.exceptions import ArmError
 from postproc.robot.arm import Arm, load_arm
-from postproc.robot.ortho_parallel import arm_text, closed_form_obstacle
+from postproc.robot.ortho_parallel import arm_text, find_closed_form_obstacle
 from postproc.robot.urdf import read_chain
 from tests.robot import urdfs
 from tests.robot.urdfs import QUARTER, Row, turning, urdf_text
@@ -247,7 +247,7 @@ def test_an_arm_that_is_always_singular_is_refused(tmp_path):
 def test_it_is_fitted_predicted_and_compensated(tmp_path):
     """An arm as built, 0.4 mm and 0.2 mrad off: the URDF with its frames moved."""
     path, arm = made(tmp_path, offset_wrist, 4)
-    assert closed_form_obstacle(read_chain(path)).endswith("kinematics is numeric")
+    assert find_closed_form_obstacle(read_chain(path)).endswith("kinematics is numeric")
     rng = np.random.default_rng(6)
     (tmp_path / "cell.toml").write_text('[robot]\narm = "arm.toml"\n')
     built = tmp_path / "built.urdf"

@@ -10,10 +10,17 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from postproc.robot.arm import Arm, load_arm
+from postproc.robot.backlash_operator import (
+    Edges,
+    PlayOperator,
+    _insert_turning_values,
+    passing,
+    prefix,
+)
 from postproc.robot.direction import (
     WIDTH_IN_PLAYS,
     Arrivals,
-    Sides,
+    FlankState,
     arrivals,
     arrivals_of_rows,
     directions_of_rows,
@@ -22,13 +29,6 @@ from postproc.robot.direction import (
     passages,
     sides,
     sides_along,
-)
-from postproc.robot.play import (
-    Clamps,
-    Edges,
-    _refined,
-    passing,
-    prefix,
 )
 
 
@@ -83,7 +83,7 @@ def test_sequences_one_after_the_other_do_not_touch(q, begins) -> None:
 @given(arrays(float, (3, 2, 4), elements=angles), arrays(float, 4, elements=angles))
 @settings(max_examples=60, deadline=None)
 def test_clamps_are_a_monoid(bounds: np.ndarray, z: np.ndarray) -> None:
-    a, b, c = (Clamps(*np.sort(pair, axis=0)) for pair in bounds)
+    a, b, c = (PlayOperator(*np.sort(pair, axis=0)) for pair in bounds)
     np.testing.assert_array_equal(a.then(b)(z), b(a(z)))
     left, right = a.then(b).then(c), a.then(b.then(c))
     np.testing.assert_array_equal(left.lo, right.lo)
@@ -138,7 +138,7 @@ def test_a_turn_between_the_last_two_samples_is_not_missed(arm: Arm) -> None:
 def refined(y):
     """Put the turning values into one edge from the first row to the last."""
     edges = Edges(np.array([0, 1]), np.array([0]), y[1:], np.array([0, len(y) - 1]))
-    return _refined(y[:1], edges.source, edges.path, edges).values
+    return _insert_turning_values(y[:1], edges.source, edges.path, edges).values
 
 
 def test_turning_values_are_exact_for_parabolas() -> None:
@@ -301,7 +301,7 @@ def test_a_walk_goes_on_where_it_was_cut(arm: Arm, seed: int) -> None:
         for name in ("direction", "side", "travel"):
             wanted = getattr(whole, name)[begin:]
             np.testing.assert_array_equal(getattr(found, name), wanted)
-        again = sides(arm, some, passages(arm, some, edges), Sides(
+        again = sides(arm, some, passages(arm, some, edges), FlankState(
             whole.side[begin:end], whole.past.play[begin:end]))  # fmt: skip
         np.testing.assert_array_equal(again.side, whole.side[begin:])
         np.testing.assert_array_equal(again.play.lo, whole.past.play.lo[begin:])
@@ -317,7 +317,7 @@ def test_a_play_along_ways_is_as_wide_as_it_is_there(arm: Arm) -> None:
     angles = q @ arm.coupling.T
     wide = half * (1.3 + np.cos(angles / half / 20.0))
     z = angles[begins] - side * half
-    least, most = sides_along(arm, q, begins, Clamps(z, z), wide)
+    least, most = sides_along(arm, q, begins, PlayOperator(z, z), wide)
     np.testing.assert_allclose(least, most, rtol=0, atol=1e-9)
     wanted, way = np.empty((200, 6)), -1
     for k in range(200):
@@ -334,7 +334,7 @@ def test_a_play_that_is_not_known_stays_open_until_a_flank_is_reached(arm: Arm) 
     half = half_width(arm)
     q = np.zeros((4, 6))
     q[:, 0] = np.array([0.0, 1.0, 2.5, 5.0]) * half[0]
-    z = Clamps(q[:1] - half, q[:1] + half)
+    z = PlayOperator(q[:1] - half, q[:1] + half)
     wide = np.tile(2.0 * half, (4, 1))
     least, most = sides_along(arm, q, np.arange(4) == 0, z, wide)
     np.testing.assert_allclose(least[:, 0], [-1.0, -0.5, 0.25, 1.0], atol=1e-9)

@@ -34,7 +34,7 @@ def test_it_finds_what_the_closed_form_finds(name):
     arm = load_arm(name)
     low, high = np.maximum(arm.lower, -3.1), np.minimum(arm.upper, 3.1)
     flange = arm.flange(np.random.default_rng(5).uniform(low, high, (150, 6)))
-    form = NumericForm(arm.dh.packed())
+    form = NumericForm(arm.dh.pack())
     numeric = Inverse(form, np.eye(6), arm.lower, arm.upper).branches(flange).q
     closed = arm.inverse(flange).q
     missed = 0

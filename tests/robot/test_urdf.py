@@ -11,7 +11,7 @@ from postproc.exceptions import ArmError
 from postproc.robot.arm import load_arm
 from postproc.robot.arm_file import read_arm_file
 from postproc.robot.inverse import wrap
-from postproc.robot.ortho_parallel import arm_text, closed_form_obstacle
+from postproc.robot.ortho_parallel import arm_text, find_closed_form_obstacle
 from postproc.robot.urdf import read_chain
 from tests.reference import urdf
 from tests.robot.urdfs import (
@@ -154,13 +154,13 @@ def test_what_is_not_such_an_arm_is_refused_with_its_joint(tmp_path, rows, said)
 )
 def test_an_arm_of_another_structure_has_no_closed_form(tmp_path, rows, said):
     chain = read_chain(write(tmp_path, rows))
-    assert re.search(rf":\d+: {said}.*numeric", closed_form_obstacle(chain))
+    assert re.search(rf":\d+: {said}.*numeric", find_closed_form_obstacle(chain))
     (tmp_path / "arm.toml").write_text(arm_text(chain, 0.1))
     arm = load_arm(tmp_path / "arm.toml")
     q = np.random.default_rng(5).uniform(-3.0, 3.0, (50, 6))
     np.testing.assert_allclose(arm.flange(q), urdf.flange(rows, q), atol=1e-9)
     assert arm.file.opw is None
-    assert closed_form_obstacle(read_chain(write(tmp_path, IRB))) == ""
+    assert find_closed_form_obstacle(read_chain(write(tmp_path, IRB))) == ""
 
 
 @pytest.mark.parametrize(

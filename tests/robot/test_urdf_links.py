@@ -6,7 +6,7 @@ import pytest
 from postproc.model.effects.compliance import moments
 from postproc.robot.arm import build_arm, load_arm
 from postproc.robot.ortho_parallel import arm_text
-from postproc.robot.urdf import read_chain, turned
+from postproc.robot.urdf import read_chain, rotate_about
 from postproc.robot.urdf_links import placeholder
 from tests.robot.test_urdf import OBLIQUE
 from tests.robot.urdfs import URDFS, urdf_text
@@ -40,7 +40,7 @@ def height(chain, q):
     for joint in chain.joints:
         place = place @ joint.origin
         if joint.kind == "revolute":
-            place = place @ turned(joint.axis, next(angles))
+            place = place @ rotate_about(joint.axis, next(angles))
             total = total + next(masses) * (place @ [*CENTRE, 1.0])[:, 2]
     return total
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.language.pdl2.dialect import PDL2_DIALECT
+from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.visits import Literals, Meaning, NumberPlaces, Visits
 from postproc.robot.trajectory import Motion
 from postproc.simulation.kinematics import pose_of_record

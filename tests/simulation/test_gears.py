@@ -126,7 +126,7 @@ def shown(kind: str, path: np.ndarray, gears: Gears | None = None) -> np.ndarray
     gears = gears or replace(GEARS, kind=GearKind(kind))
     states = follow(gears, at_start(gears, path[0], np.ones(6)), path[1:])
     flank = np.array([s.flank for s in states])
-    return gears.shown(make_arrivals(path[1:], flank=flank))
+    return gears.show_sides(make_arrivals(path[1:], flank=flank))
 
 
 def test_the_kind_of_the_gears_changes_nothing_else() -> None:
@@ -167,10 +167,10 @@ def test_fast_braking_changes_the_flank_and_slow_braking_does_not() -> None:
     path = np.linspace(Q - 0.1, Q + 0.1, 20)
     state = move(gears, at_start(gears, path[0], np.ones(6)), path[1:])
     slow, fast = 0.9 * gears.runs_on, 1.1 * gears.runs_on
-    np.testing.assert_array_equal(gears.braked(state, slow).flank, 1.0)
-    np.testing.assert_array_equal(gears.braked(state, fast).flank, -1.0)
-    np.testing.assert_array_equal(gears.braked(state, -fast).flank, 1.0)
-    behind = move(gears, gears.braked(state, fast), path[-1:] + 3 * gears.gap)
+    np.testing.assert_array_equal(gears.brake(state, slow).flank, 1.0)
+    np.testing.assert_array_equal(gears.brake(state, fast).flank, -1.0)
+    np.testing.assert_array_equal(gears.brake(state, -fast).flank, 1.0)
+    behind = move(gears, gears.brake(state, fast), path[-1:] + 3 * gears.gap)
     np.testing.assert_allclose(behind.flank, 1.0)
     sharp = arm_with("sharp").gears
-    np.testing.assert_array_equal(sharp.braked(state, fast).flank, 1.0)
+    np.testing.assert_array_equal(sharp.brake(state, fast).flank, 1.0)

@@ -45,7 +45,7 @@ def test_frames_are_rigid_and_end_in_the_flange() -> None:
 
 def test_growth_of_every_link_stretches_the_whole_arm() -> None:
     q = np.random.default_rng(0).uniform(-2, 2, (30, 6))
-    grown = NJ220.bent(np.full((30, 6), 1e-3)).flange(q)
+    grown = NJ220.grow(np.full((30, 6), 1e-3)).flange(q)
     np.testing.assert_allclose(grown[:, :3, 3], 1.001 * NJ220.flange(q)[:, :3, 3])
 
 

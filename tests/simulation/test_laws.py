@@ -25,7 +25,9 @@ def arm_with(name: str, seed: int = 1, **more) -> VirtualArm:
 
 
 def displacement(arm: VirtualArm, arrivals=REFERENCE) -> np.ndarray:
-    return arm.seen(arrivals, arm.tcp(arrivals)) - arm.nominal_tcp(arrivals)
+    return arm.simulate_readings(arrivals, arm.tcp(arrivals)) - arm.nominal_tcp(
+        arrivals
+    )
 
 
 def angle_error(arm: VirtualArm, joint: int, **changes) -> np.ndarray:

@@ -70,9 +70,9 @@ class Case:
                                 cell)  # fmt: skip
         after = planner._claim("output", planner.read_program(job.output, cell).visits,
                                cell)  # fmt: skip
-        return cls(job, before, planner._corrected_for(after, before.visits, record))
+        return cls(job, before, planner._take_directions(after, before.visits, record))
 
-    def judged(self, claims: Claims) -> Opinion:
+    def weigh_rows(self, claims: Claims) -> Opinion:
         """Judge other claims of source and output."""
         return judge("job", facts_of(self.job.cell), *claims)
 
@@ -200,9 +200,9 @@ def plant(seed: int, cell: Cell, model: Model) -> Planted:
     """Plant the fault of a seed in the program of that seed."""
     fault, rng = FAULTS[seed % len(FAULTS)], np.random.default_rng(seed)
     one = case(seed, cell, model)
-    assert one.judged(one.right).agrees, seed
+    assert one.weigh_rows(one.right).agrees, seed
     what, wrong, otherwise = fault(one, rng)
-    opinion = one.judged(wrong)
+    opinion = one.weigh_rows(wrong)
     rows = [row.what for row in opinion.rows if row.beyond]
     came = FOUND if rows else otherwise
     if (
@@ -221,7 +221,7 @@ def compares_directions(one: Case, wrong: Claims) -> bool:
     """
     told = one.output.direction
     unsaid = one.with_directions(np.where(wrong[1].direction != told, 0.0, told))
-    right, less = (_compared(one.judged(claims)) for claims in (one.right, unsaid))
+    right, less = (_compared(one.weigh_rows(claims)) for claims in (one.right, unsaid))
     return less < right
 
 

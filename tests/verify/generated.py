@@ -73,7 +73,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         jobs = jobs_of(Path(name), () if given.shipped else seeds)
         found = {which: judged(job) for which, job in jobs}
-    whole = Opinion.joined("generated", [opinion for _, opinion in found.values()])
+    whole = Opinion.join("generated", [opinion for _, opinion in found.values()])
     print_opinion(whole)
     visits, wrong = (
         sum(n for n, _ in found.values()),

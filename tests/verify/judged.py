@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.options import AS_USUAL, Options
+from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.program import prepared
+from postproc.compensation.program import prepare_cell
 from postproc.compensation.program_files import read_files
 from postproc.compensation.second_opinion import second_opinion
 from postproc.files import variables_of
@@ -67,7 +67,10 @@ def model_of(cell: Cell, model: Model) -> Model:
 
 
 def compensated(
-    files: Mapping[str, bytes], cell: Cell, model: Model, options: Options = AS_USUAL
+    files: Mapping[str, bytes],
+    cell: Cell,
+    model: Model,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Compensated:
     """Compensate a program, the files of which begin with the program itself."""
     name, source = next(iter(files.items()))
@@ -76,12 +79,12 @@ def compensated(
     outcome = compensate(
         source, cell, model, name=name, variables=values, pages=rest, options=options
     )
-    own = prepared(cell, model, options)
+    own = prepare_cell(cell, model, options)
     return Compensated(own, files, {**files, **outcome.outputs}, outcome)
 
 
 def shipped(
-    name: str, models: Mapping[str, Model], options: Options = AS_USUAL
+    name: str, models: Mapping[str, Model], options: Options = DEFAULT_OPTIONS
 ) -> Compensated:
     """Compensate one of `programs/` with the model of its own arm."""
     cell = load_cell(PROGRAMS / SHIPPED[name])

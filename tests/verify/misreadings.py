@@ -64,7 +64,9 @@ def planned(
         replace(planner._claim(c.label, misread(c.visits), cell), visits=c.visits)
         for c in (source, output)
     )
-    return before, planner._corrected_for(after, before.visits, one.job.outcome.record)
+    return before, planner._take_directions(
+        after, before.visits, one.job.outcome.record
+    )
 
 
 def planned_anew(
@@ -436,7 +438,7 @@ class Misread:
 def misread(kind: Misreading, one: Case, seed: int) -> Misread:
     """Plant one kind in one program."""
     wrong = kind(one, np.random.default_rng(seed))
-    rows = [row.what for row in one.judged(wrong).rows if row.beyond]
+    rows = [row.what for row in one.weigh_rows(wrong).rows if row.beyond]
     came = FOUND if rows else otherwise(one, wrong)
     return Misread(kind.__name__, seed, came, next(iter(rows), ""))
 
@@ -484,7 +486,7 @@ def _same(one: Case, wrong: Claims, name: str) -> bool:
 def _compared(one: Case, claims: Claims) -> int:
     """Count the limits that are compared."""
     what = "output: joint limits"
-    return next(row.compared for row in one.judged(claims).rows if row.what == what)
+    return next(row.compared for row in one.weigh_rows(claims).rows if row.what == what)
 
 
 def _times_differ(right: Claim, told: Claim) -> bool:

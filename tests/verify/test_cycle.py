@@ -27,7 +27,7 @@ def cases(models) -> dict[str, Case]:
 
 def told(one: Case, **changes: object) -> Opinion:
     """Judge what the planner says otherwise of the output."""
-    return one.judged((one.source, replace(one.output, **changes)))
+    return one.weigh_rows((one.source, replace(one.output, **changes)))
 
 
 def slower(claim: Claim, rows: np.ndarray, by: float) -> np.ndarray:
@@ -45,7 +45,7 @@ def slower(claim: Claim, rows: np.ndarray, by: float) -> np.ndarray:
     ],
 )
 def test_every_stop_is_compared_once(cases, name, counts) -> None:
-    opinion = cases[name].judged(cases[name].right)
+    opinion = cases[name].weigh_rows(cases[name].right)
     rows = [row(opinion, what) for what in (MOVES, RUNS, ARCS, FLY)]
     v = cases[name].output.visits
     lost = sum(rows[3].skipped.values())
@@ -85,7 +85,7 @@ def test_a_time_that_nobody_says_is_counted(cases) -> None:
 def test_joint_limits_disagree_either_way(cases, within) -> None:
     """One target is said to be beyond its limits, or another arm has narrower ones."""
     one = cases["drilling.pdl"]
-    right = row(one.judged(one.right), LIMITS)
+    right = row(one.weigh_rows(one.right), LIMITS)
     assert right.compared == len(one.output) and right.largest == 0.0
     if within < 0:
         said = np.array(one.output.within)
@@ -107,6 +107,6 @@ def test_an_arm_without_speeds_has_no_times(cases) -> None:
     joints = facts.file.joints.model_copy(update={"velocity_deg_s": None})
     file = facts.file.model_copy(update={"joints": joints})
     found = judge("job", replace(facts, file=file), *one.right)
-    assert found.agrees, found.told()
+    assert found.agrees, found.to_dict()
     assert not [r.what for r in found.rows if ": time " in r.what]
     assert row(found, "output: approach directions").compared > 300

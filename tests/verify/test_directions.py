@@ -66,7 +66,7 @@ def test_a_joint_move_is_timed() -> None:
 def test_the_shipped_programs_agree(name: str, models) -> None:
     job = shipped(name, models)
     opinion = job.opinion()
-    assert opinion.agrees, opinion.told()
+    assert opinion.agrees, opinion.to_dict()
     ends = row(opinion, "output: end of the way")
     assert 0.9 < ends.compared / min(len(job.outcome.visits), MOVES)
     assert ends.largest < 1e-8  # [rad]
@@ -113,7 +113,7 @@ def test_the_same_program_is_drawn_from_alike(models) -> None:
 
 def test_clones_are_judged_by_what_they_are_corrected_for(models) -> None:
     opinion = shipped("handling.pdl", models, Options(shared_points="clone")).opinion()
-    assert opinion.agrees, opinion.told()
+    assert opinion.agrees, opinion.to_dict()
     assert row(opinion, "output: approach directions").compared > 400
 
 
@@ -121,7 +121,7 @@ def test_points_on_ways_are_visits_of_the_output_alone(models) -> None:
     options = Options(path_tolerance_mm=0.05, max_inserted=50)
     job = shipped("drilling.pdl", models, options)
     opinion = job.opinion()
-    assert opinion.agrees, opinion.told()
+    assert opinion.agrees, opinion.to_dict()
     before, after = (row(opinion, f"{k}: place").compared for k in ("source", "output"))
     assert before < after <= before + 50
     swung = [r for r in opinion.rows if "swing" in r.what or "by correction" in r.what]

@@ -40,7 +40,7 @@ def library(request, kind, tmp_path, monkeypatch) -> Iterator[str]:
 
 
 def test_an_error_of_any_kind_is_a_broken_library(library) -> None:
-    assert f"a library is broken ({library}: " in extra.broken()
+    assert f"a library is broken ({library}: " in extra.explain_missing()
     with pytest.raises(PostprocError, match="pip install pin toppra"):
         extra.load()
 
@@ -61,5 +61,5 @@ def test_who_did_not_ask_gets_a_note(library, tmp_path, bench_model) -> None:
 
 
 def test_libraries_that_load_are_not_broken() -> None:
-    assert extra.broken() == ""
+    assert extra.explain_missing() == ""
     extra.load()

@@ -13,7 +13,7 @@ def test_generated_programs_agree(seed: int, bench_cell, bench_model) -> None:
     visits, opinion = judged(
         compensated(files_of(seed, bench_cell), bench_cell, bench_model)
     )
-    assert opinion.agrees, opinion.told()
+    assert opinion.agrees, opinion.to_dict()
     poses, joints = (
         row(opinion, f"output: {what}").compared for what in ("place", "joint targets")
     )

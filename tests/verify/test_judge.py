@@ -42,7 +42,7 @@ def test_the_output_comes_first_where_time_is_short(models, monkeypatch) -> None
 
 def test_what_one_program_takes_the_next_has_not(models) -> None:
     one = Case.of(shipped("handling.pdl", models))
-    opinion = one.judged(one.right)
+    opinion = one.weigh_rows(one.right)
     left = Allowance(60.0, 60.0).less(opinion)
     assert 59.0 < left.positions < 60.0 and 50.0 < left.ways < 60.0
     spent = 120.0 - left.positions - left.ways

@@ -38,5 +38,5 @@ def test_a_misreading_is_found_or_not_reached(kind, one) -> None:
 
 def test_the_right_reading_agrees(one) -> None:
     _, case = one
-    assert case.judged(case.right).agrees
+    assert case.weigh_rows(case.right).agrees
     assert misread(lambda case, rng: case.right, case, 0).came == NOTHING

@@ -34,7 +34,7 @@ LOOP = (
 def test_it_ends_in_a_table(name, source, bench_cell, bench_model) -> None:
     job = compensated({name: source}, bench_cell, bench_model)
     opinion = job.opinion()
-    assert opinion.agrees, opinion.told()
+    assert opinion.agrees, opinion.to_dict()
     for label in ("source", "output"):
         found = row(opinion, f"{label}: joint targets")
         places = row(opinion, f"{label}: place")
@@ -55,7 +55,7 @@ def test_an_arm_whose_branches_nobody_names(bench_cell, bench_model) -> None:
     cell = replace(bench_cell, arm=load_arm("ur10"))
     job = compensated({"u.pdl": LINES}, cell, model_of(cell, bench_model))
     opinion = job.opinion()
-    assert opinion.agrees, opinion.told()
+    assert opinion.agrees, opinion.to_dict()
     branches = [r for r in opinion.rows if "branch" in r.what]
     assert [(r.compared, sum(r.skipped.values())) for r in branches] == [(0, 4)] * 2
     assert row(opinion, "output: joint targets").compared == 3

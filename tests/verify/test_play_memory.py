@@ -14,7 +14,7 @@ PLAY = np.full(6, 0.01)
 
 def passed(*angles: float) -> PlayMemory:
     drive = np.repeat(np.array(angles)[:, None], 6, axis=1)
-    return PlayMemory.at(drive[0]).passed(drive, PLAY)
+    return PlayMemory.at(drive[0]).pass_angles(drive, PLAY)
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_where_both_are_sure_they_agree() -> None:
         told = directions_of_rows(arm, q)
         memory = PlayMemory.at(q[0])
         for row in range(1, 40):
-            memory = memory.passed(q[row : row + 1], arm.play)
+            memory = memory.pass_angles(q[row : row + 1], arm.play)
             both = memory.sure(arm.play) & (told[row] != 0)
             assert (memory.side == told[row])[both].all()
             compared += int(both.sum())

@@ -9,7 +9,7 @@ import pytest
 
 from postproc.compensation.second_opinion import facts_of
 from postproc.robot.arm import load_arm
-from postproc.robot.arm_file import shipped_arms
+from postproc.robot.arm_file import list_shipped_arms
 from postproc.robot.cell import load_cell
 from postproc.verify.pinocchio_arm import PinocchioArm
 from postproc.verify.positions import branch_bits, posture_of
@@ -27,7 +27,7 @@ def facts(name: str):
     return facts_of(replace(cell, arm=load_arm(name)))
 
 
-@pytest.mark.parametrize("name", shipped_arms())
+@pytest.mark.parametrize("name", list_shipped_arms())
 def test_the_two_kinematics_agree_on_every_arm(name: str) -> None:
     arm, theirs = load_arm(name), PinocchioArm.build(facts(name))
     for q in drawn(arm, 50):
@@ -36,7 +36,7 @@ def test_the_two_kinematics_agree_on_every_arm(name: str) -> None:
         np.testing.assert_allclose(theirs.jacobian(q), J, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", shipped_arms())
+@pytest.mark.parametrize("name", list_shipped_arms())
 def test_the_branch_is_told_by_where_the_joints_are(name: str) -> None:
     arm = load_arm(name)
     if arm.file.opw is None:
@@ -52,7 +52,7 @@ def test_the_branch_is_told_by_where_the_joints_are(name: str) -> None:
 
 def test_gravity_pulls_as_it_does_for_the_effects() -> None:
     cell = load_cell(PROGRAMS / "cell.toml")
-    arm = load_arm("nj220-2.7").mounted(np.array([0.3, -0.5, -0.8]))
+    arm = load_arm("nj220-2.7").mount(np.array([0.3, -0.5, -0.8]))
     load = np.array([80.0, 0.1, -0.05, 0.2])
     theirs = PinocchioArm.build(facts_of(replace(cell, arm=arm)), load)
     q = drawn(arm, 50)
@@ -64,7 +64,7 @@ def test_gravity_pulls_as_it_does_for_the_effects() -> None:
 @pytest.mark.parametrize("name", [n for n in SHIPPED if n != "milling.pdl"])
 def test_the_shipped_programs_agree(name: str, models) -> None:
     opinion = shipped(name, models).opinion()
-    assert opinion.agrees, opinion.told()
+    assert opinion.agrees, opinion.to_dict()
     for label in ("source", "output"):
         found = row(opinion, f"{label}: place")
         assert found.compared > 5 and not found.skipped

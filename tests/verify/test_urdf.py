@@ -45,7 +45,7 @@ def made_of(made: UrdfChain) -> Arm:
 def test_an_arm_file_is_what_pinocchio_reads(tmp_path: Path, name: str) -> None:
     made = chain(tmp_path, name)
     opinion = judged(made, made_of(made))
-    assert opinion.agrees, opinion.told()
+    assert opinion.agrees, opinion.to_dict()
     assert {row.what for row in opinion.rows} >= {"flange: place", "joint limits"}
     assert [row.compared for row in opinion.rows][:3] == [100, 100, 18]
 
@@ -80,7 +80,7 @@ def test_links_are_compared(tmp_path: Path, wrong: str) -> None:
     arm = made_of(made)
     assert arm.file.links is not None
     right = judged(made, arm)
-    assert right.agrees, right.told()
+    assert right.agrees, right.to_dict()
     assert [r.compared for r in right.rows if r.what == "link masses"] == [6]
     old, new = ("30.0", "30.001") if wrong == "mass" else ("0.15", "0.1505")
     off = [r.what for r in judged(made, arm, text.replace(old, new)).rows if r.beyond]
@@ -92,7 +92,7 @@ def test_rounded_quarter_turns_widen_the_bound_and_no_more(tmp_path: Path) -> No
     text = made.path.read_text().replace("-1.5707963267948966", "-1.57")
     arm = made_of(made)
     opinion = judged(made, arm, text)
-    assert opinion.agrees, opinion.told()
+    assert opinion.agrees, opinion.to_dict()
     rows = {row.what: row for row in opinion.rows}
     assert rows["flange: place"].largest < 1e-9  # [mm]
     stated = rows["flange, angles of the URDF as rounded: place"]
@@ -135,4 +135,4 @@ def test_arms_of_a_public_package(tmp_path: Path, given: urdfs.Given) -> None:
     if robots is None:
         pytest.skip(f"{urdfs.PACKAGE} is not installed")
     opinion = urdfs.judged(given, robots, tmp_path)
-    assert opinion.agrees, opinion.told()
+    assert opinion.agrees, opinion.to_dict()

@@ -21,17 +21,23 @@ from postproc.calibration.diagnosis.held_out import (
     noise_floor,
     whole_poses,
 )
-from postproc.calibration.diagnosis.next_poses import (
-    poses_that_separate,
-    poses_that_sharpen,
+from postproc.calibration.diagnosis.investigate import (
+    Investigation,
+    investigate,
+    no_progress,
+    trace,
 )
-from postproc.calibration.diagnosis.refit import (
+from postproc.calibration.diagnosis.model_update import (
+    FrameShift,
     Revision,
-    SetAnew,
     fold_back,
     is_fresh,
     no_surer,
     refit,
+)
+from postproc.calibration.diagnosis.next_poses import (
+    poses_that_separate,
+    poses_that_sharpen,
 )
 from postproc.calibration.diagnosis.result import (
     Diagnosis,
@@ -43,26 +49,24 @@ from postproc.calibration.diagnosis.result import (
     statistics,
 )
 from postproc.calibration.diagnosis.search import NEAR, Progress, Search
-from postproc.calibration.diagnosis.trace import (
-    Investigation,
-    investigate,
-    silent,
-    trace,
-)
-from postproc.calibration.directions import mend_directions
+from postproc.calibration.direction_labels import mend_directions
+from postproc.calibration.effect_selection import attribute_drift, model_of
 from postproc.calibration.measurements import Measurements
+from postproc.calibration.monuments import exclude_effects
 from postproc.calibration.orientations import means
-from postproc.calibration.references import ruled_out
 from postproc.calibration.regression import Fit, fit_effects
-from postproc.calibration.report import report_directions, weighed_down
-from postproc.calibration.reversals import newer_widths, split_reversals, tell_widths
-from postproc.calibration.selection import model_of, told_apart
+from postproc.calibration.report import list_downweighted, report_directions
+from postproc.calibration.reversal_test import (
+    newer_widths,
+    split_reversals,
+    tell_widths,
+)
 from postproc.calibration.stops import AVERAGED, pool_readings
 from postproc.exceptions import ModelError
-from postproc.model.combination import Combination
 from postproc.model.covariate import JOINTS
 from postproc.model.doubt import Doubt
-from postproc.model.kinematics import Batch
+from postproc.model.effect_sum import Combination
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import WORST_STD, Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
@@ -149,9 +153,11 @@ def hold_out(
         more = investigate(less, causes, found.null, lambda *_: None).fit
         rows.append(out)
         before.append(
-            left_by(less, base, out, told) if given is None else np.asarray(given[out])
+            predict_residuals(less, base, out, told)
+            if given is None
+            else np.asarray(given[out])
         )
-        after.append(left_by(more, base, out, told))
+        after.append(predict_residuals(more, base, out, told))
         fitted = len(inside)
     which = np.concatenate(rows)
     across = base.batch.states[which].across
@@ -164,13 +170,15 @@ def hold_out(
 def _fit_of(base: Fit, rows: NDArray[np.int64]) -> Fit:
     """Fit the effects of a fit to some of its rows only."""
     batch, position = (
-        Batch(base.batch.arm, base.batch.states[rows]),
+        ArmStates(base.batch.arm, base.batch.states[rows]),
         base.position[rows],
     )
     return fit_effects(batch, position, base.combination.effects, base.noise.origin)
 
 
-def left_by(fit: Fit, every: Fit, rows: NDArray[np.int64], told: Floats) -> Floats:
+def predict_residuals(
+    fit: Fit, every: Fit, rows: NDArray[np.int64], told: Floats
+) -> Floats:
     """Return what a fit leaves of the errors of other rows, (m, 3) [m].
 
     Args:
@@ -180,7 +188,7 @@ def left_by(fit: Fit, every: Fit, rows: NDArray[np.int64], told: Floats) -> Floa
         told: Directions of all rows, (n, 6).
     """
     states = every.batch.states[rows].with_(direction=told[rows])
-    batch = Batch(every.batch.arm, states)
+    batch = ArmStates(every.batch.arm, states)
     predicted = Combination(fit.combination.effects).error(batch, fit.values)
     left: Floats = every.error[rows] - predicted
     return left
@@ -258,7 +266,7 @@ def extend_model(
     tracker: Floats | None = None,
     setup: tuple[str, ...] = (),
     seed: int = 0,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Extension:
     """Find what a model lacks, and add it.
 
@@ -281,13 +289,13 @@ def extend_model(
     """
     survey, reversals = split_reversals(pool_readings(survey), arm)
     bases = refit(survey, arm, model, tracker, setup)
-    without, sides = ruled_out(survey.motion), survey.states.direction
+    without, sides = exclude_effects(survey.motion), survey.states.direction
     tried = [trace(base, seed, progress, without) for base in bases]
     traced = max(tried, key=lambda each: each.search.fit.log_evidence)
     if not survey.inferred.all():
         traced = _with_mended_directions(traced, seed, progress, without)
     search = traced.search
-    settled = told_apart(search.fit, survey.motion)
+    settled = attribute_drift(search.fit, survey.motion)
     traced = replace(traced, search=replace(search, fit=settled))
     given = None
     if is_fresh(survey, model):
@@ -295,7 +303,7 @@ def extend_model(
         given = survey.position - nominal - model.error(arm, survey.states)
     held_out = hold_out(traced.search, sides, seed, progress, given)
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
-    extended = _extended(model, survey, traced.search, diagnosis)
+    extended = _extend_model(model, survey, traced.search, diagnosis)
     widths = newer_widths(model.flank_widths, extended, arm, reversals)
     extended = replace(extended, flank_widths=widths)
     if reversals is not None:
@@ -315,7 +323,7 @@ def _with_mended_directions(
     if mended is fit:
         return traced
     states = base.batch.states.with_(direction=mended.batch.states.direction)
-    batch, effects = Batch(base.batch.arm, states), base.combination.effects
+    batch, effects = ArmStates(base.batch.arm, states), base.combination.effects
     progress("directions mended: again", 0.0)
     again = fit_effects(batch, base.position, effects, base.noise.origin, start=base)
     return trace(again, seed, progress, without)
@@ -331,7 +339,7 @@ def _conclude(
     """Put everything together."""
     found = traced.search
     floor = noise_floor(found.fit, tracker is not None)
-    batch = Batch(found.fit.batch.arm, found.fit.batch.states[held_out.rows])
+    batch = ArmStates(found.fit.batch.arm, found.fit.batch.states[held_out.rows])
     verdict = _judge(traced, held_out, floor)
     before = multi_directional(batch, held_out.before)
     after = multi_directional(batch, held_out.after)
@@ -350,13 +358,13 @@ def _conclude(
         places=_places(found),
         next_measurements=poses,
         why_next=why,
-        dropped=survey.dropped + weighed_down(found.fit, survey),
+        dropped=survey.dropped + list_downweighted(found.fit, survey),
         directions=report_directions(found.fit, survey),
         not_excluded=not_excluded(found.fit.batch),
         fixed_points=() if survey.motion is None else survey.motion.tell(),
         notes=tuple(w for w in survey.warnings if w.endswith(AVERAGED)),
-        set_anew=SetAnew.of(found.fit),
-        explained=_explained(held_out, floor) if traced.findings else None,
+        set_anew=FrameShift.of(found.fit),
+        explained=_measure_explained(held_out, floor) if traced.findings else None,
     )
 
 
@@ -377,7 +385,7 @@ def _judge(traced: Investigation, held_out: HeldOut, floor: NoiseFloor) -> Verdi
     return traced.verdict
 
 
-def _explained(held_out: HeldOut, floor: NoiseFloor) -> float:
+def _measure_explained(held_out: HeldOut, floor: NoiseFloor) -> float:
     """Return the part of the squared error above the noise floor that is explained."""
     before, after = (
         (e**2).sum(axis=1).mean() for e in (held_out.before, held_out.after)
@@ -419,7 +427,7 @@ def _next(traced: Investigation, seed: int) -> tuple[str, Floats]:
     return f"sharpen {name}, known worst for what it moves", poses
 
 
-def _extended(
+def _extend_model(
     model: Model, survey: Measurements, found: Search, diagnosis: Diagnosis
 ) -> Model:
     """Write the extended model with the record of how it came about."""
@@ -441,16 +449,16 @@ def _extended(
     if is_fresh(survey, model):
         fitted = replace(
             fitted,
-            ranges=model.ranges.joined(fitted.ranges, _unlike(found, diagnosis)),
+            ranges=model.ranges.join(fitted.ranges, _unlike(found, diagnosis)),
             statistics=fitted.statistics | _worst(model, fitted),
         )
     return replace(
         fitted, parent=model.id, history=(*model.history, record),
-        doubt=_left_open(model, fitted),
+        doubt=_keep_open(model, fitted),
     )  # fmt: skip
 
 
-def _left_open(model: Model, extended: Model) -> Doubt | None:
+def _keep_open(model: Model, extended: Model) -> Doubt | None:
     """Keep what may be there besides a model, unless some of it is there by now."""
     doubt, names = model.doubt, {e.name for e in extended.effects.effects}
     old = {e.name for e in model.effects.effects}
@@ -460,7 +468,7 @@ def _left_open(model: Model, extended: Model) -> Doubt | None:
 
 
 def _unlike(found: Search, diagnosis: Diagnosis) -> set[str]:
-    """Name what a revised model knows from its fresh rows alone, see `Ranges.joined`.
+    """Name what a revised model knows from its fresh rows alone, see `Ranges.join`.
 
     What drives an effect that was added is one: nobody has seen it elsewhere. Where
     something is left without a name, every joint is.
@@ -507,7 +515,12 @@ def evidence_of(found: Extension) -> dict[str, Any]:
     report = found.diagnosis.to_dict()
     search = found.search
     effects = [
-        effect | {"evidence": _seen(profile(search.fit, search.place(k), a.candidate))}
+        effect
+        | {
+            "evidence": _describe_profile(
+                profile(search.fit, search.place(k), a.candidate)
+            )
+        }
         for k, (effect, a) in enumerate(
             zip(report["effects"], search.additions, strict=True)
         )
@@ -520,15 +533,15 @@ def evidence_of(found: Extension) -> dict[str, Any]:
     }
 
 
-def dumped(report: Mapping[str, Any]) -> str:
+def dump_json(report: Mapping[str, Any]) -> str:
     """Write a report as JSON text, a key a line, rows in one."""
     keys = [f" {json.dumps(k)}: {json.dumps(v)}" for k, v in report.items()]
     return "{\n" + ",\n".join(keys) + "\n}\n"
 
 
-def _seen(shown: Profile) -> Mapping[str, Any]:
+def _describe_profile(shown: Profile) -> Mapping[str, Any]:
     """Write a profile, in millimetres of the TCP."""
-    some = thinned(len(shown.values))
+    some = thin_rows(len(shown.values))
     before, after = (
         (values * shown.lever)[some] for values in (shown.before, shown.after)
     )
@@ -562,14 +575,14 @@ def _candidates(found: Extension) -> list[dict[str, Any]]:
 def _rows(found: Extension) -> dict[str, list[Any]]:
     """List error vectors of held-out rows [mm]."""
     rows = found.held_out
-    some = thinned(len(rows.rows))
+    some = thin_rows(len(rows.rows))
     return {
         "before_mm": _plain(rows.before[some] / MM),
         "after_mm": _plain(rows.after[some] / MM),
     }
 
 
-def thinned(count: int) -> NDArray[np.int64]:
+def thin_rows(count: int) -> NDArray[np.int64]:
     """Choose at most so many rows, evenly.
 
     >>> len(thinned(10)), len(thinned(100_000))

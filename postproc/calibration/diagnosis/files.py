@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from postproc.calibration.diagnosis.diagnose import Extension, extend_model
+from postproc.calibration.diagnosis.investigate import no_progress
 from postproc.calibration.diagnosis.search import Progress
-from postproc.calibration.diagnosis.trace import silent
 from postproc.calibration.fit import file_shifts, several_points
 from postproc.calibration.measurements import Measurements
-from postproc.calibration.plausibility import (
+from postproc.calibration.registration import register, station_of
+from postproc.calibration.survey_checks import (
     check_against,
     check_own_registration,
     check_stops,
 )
-from postproc.calibration.registration import register, station_of
 from postproc.calibration.survey_files import (
     MeasurementFile,
     frame_of,
@@ -25,7 +25,7 @@ from postproc.calibration.survey_files import (
 )
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.model.effects.placement import Placement
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, as_model
 from postproc.model.provenance import Provenance
 from postproc.model.registration import Registration
@@ -46,7 +46,7 @@ def diagnose(
     name: str = "measurements.csv",
     reading: TableFormat = DETECT,
     seed: int = 0,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Extension:
     """Find what a model lacks by fresh measurements, and add it.
 
@@ -149,7 +149,7 @@ def registrations(
 
     def mean_gap(rows: Measurements) -> float:
         error = model.error(cell.arm, rows.states)
-        gap = rows.position - Batch(cell.arm, rows.states).walk.tcp - error
+        gap = rows.position - ArmStates(cell.arm, rows.states).walk.tcp - error
         return float(np.linalg.norm(gap, axis=1).mean()) / MM
 
     spent = 6 * len(placed.transforms) + 3 * len(placed.probes)

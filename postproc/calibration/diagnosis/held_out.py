@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
-from postproc.calibration.design import DesignMatrix
-from postproc.calibration.evidence import inverted
+from postproc.calibration.design_matrix import DesignMatrix
+from postproc.calibration.evidence import invert_information
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import Candidate
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.noise import Noise, poses_of
 
 # Whether a candidate predicts rows that did not fit it.
@@ -113,7 +113,7 @@ class Gain:
         return self.mean > self.std_error
 
 
-def held_out_gain(fit: Fit, number: int, candidate: Candidate) -> Gain:
+def compare_held_out(fit: Fit, number: int, candidate: Candidate) -> Gain:
     """Compare held-out errors with and without one effect of a fit.
 
     Args:
@@ -204,12 +204,12 @@ class Folds:
                 out[rows] = self.target[rows] - self.design[rows].times(self.prior * p)
         return left
 
-    def solved(self) -> Iterator[tuple[NDArray[np.int64], Floats, Floats]]:
+    def solve(self) -> Iterator[tuple[NDArray[np.int64], Floats, Floats]]:
         """Fit all others than each fold: its rows, values and covariance, (p, p)."""
         gram = self.grams.sum(axis=0) + np.eye(len(self.prior))
         moment = self.moments.sum(axis=0)
         for k, rows in enumerate(self.rows):
-            _, inverse, part = inverted(gram - self.grams[k])
+            _, inverse, part = invert_information(gram - self.grams[k])
             values = (inverse if part is None else part) @ (moment - self.moments[k])
             covariance = inverse * np.outer(self.prior, self.prior)
             yield rows, self.prior * values, covariance
@@ -217,7 +217,7 @@ class Folds:
     def variance(self) -> Floats:
         """Say how unsure every fold is of what the others tell of it, (n, 3)."""
         out = np.empty_like(self.target)
-        for rows, _, covariance in self.solved():
+        for rows, _, covariance in self.solve():
             out[rows] = self.design[rows].variance(covariance)
         return out
 
@@ -229,13 +229,13 @@ def _with_and_without(
 
     With C the inverse, the others are p - C_k (C_kk)^-1 p_k where those k are 0.
     """
-    _, inverse, told = inverted(gram)
+    _, inverse, told = invert_information(gram)
     if told is None:
         p = inverse @ moment
         own = inverse[:, part]
         return p, p - own @ np.linalg.solve(own[part], p[part])
     others = np.delete(np.arange(len(moment)), part)
-    _, inverse, some = inverted(gram[np.ix_(others, others)])
+    _, inverse, some = invert_information(gram[np.ix_(others, others)])
     less = np.zeros_like(moment)
     less[others] = (inverse if some is None else some) @ moment[others]
     return told @ moment, less
@@ -285,7 +285,7 @@ def noise_floor(fit: Fit, tracker_known: bool) -> NoiseFloor:
     )
 
 
-def repeats(batch: Batch) -> list[NDArray[np.int64]]:
+def repeats(batch: ArmStates) -> list[NDArray[np.int64]]:
     """Group the rows that went to one pose in the same way."""
     s = batch.states
     key = np.column_stack([poses_of(s), s.direction, s.tool_id])
@@ -293,7 +293,7 @@ def repeats(batch: Batch) -> list[NDArray[np.int64]]:
     return _several(label)
 
 
-def sides(batch: Batch) -> list[list[NDArray[np.int64]]]:
+def sides(batch: ArmStates) -> list[list[NDArray[np.int64]]]:
     """Group the rows of one pose by the side that they came from, if several."""
     s = batch.states
     pose = np.column_stack([poses_of(s), s.tool_id])
@@ -315,7 +315,7 @@ def _several(label: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [rows for rows in np.split(order, cuts) if len(rows) > 1]
 
 
-def multi_directional(batch: Batch, error: Floats) -> float | None:
+def multi_directional(batch: ArmStates, error: Floats) -> float | None:
     """Compute vAP, the multi-directional pose accuracy variation of ISO 9283 [m].
 
     At every pose that is visited from several sides: the largest distance between the

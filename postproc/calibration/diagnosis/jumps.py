@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from postproc.calibration.diagnosis.library import Projection, reduce_some
+from postproc.calibration.diagnosis.candidates import Projection, reduce_some
 from postproc.calibration.diagnosis.score import Score, rank
 from postproc.model.carrier import every_carrier
 from postproc.model.covariate import covariate, varies, varies_enough
 from postproc.model.effects.effect import Candidate, Effect
 from postproc.model.effects.part_motion import OF_STATE, PartMotion, family_of
 from postproc.model.effects.step import CampaignStep
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 ALIKE = 0.98  # part of the rows that a value parts as the step does
 
@@ -35,9 +35,9 @@ def jumps(effect: Effect, projection: Projection) -> list[Score]:
     return rank(reduced, square, projection.rows)
 
 
-def _candidates(step: CampaignStep, batch: Batch) -> Iterator[Candidate]:
+def _candidates(step: CampaignStep, batch: ArmStates) -> Iterator[Candidate]:
     """List the parts by the values that are passed."""
-    for driver, value in _passed(step, batch):
+    for driver, value in _list_crossed_values(step, batch):
         half = float(np.ptp(covariate(batch, driver))) / 2
         for moved in every_carrier():
             family = family_of(moved, driver)
@@ -47,7 +47,9 @@ def _candidates(step: CampaignStep, batch: Batch) -> Iterator[Candidate]:
             yield Candidate(family, jump, driver, 0.0)
 
 
-def _passed(step: CampaignStep, batch: Batch) -> Iterator[tuple[str, float]]:
+def _list_crossed_values(
+    step: CampaignStep, batch: ArmStates
+) -> Iterator[tuple[str, float]]:
     """List what is below a value before the step and above it after, or the reverse."""
     before = step.before(batch)
     for driver in OF_STATE:

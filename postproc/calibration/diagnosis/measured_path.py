@@ -13,8 +13,8 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.diagnosis.diagnose import Extension, extend_model
 from postproc.calibration.diagnosis.files import REGISTERED
+from postproc.calibration.diagnosis.investigate import no_progress
 from postproc.calibration.diagnosis.search import Progress
-from postproc.calibration.diagnosis.trace import silent
 from postproc.calibration.measurements import POSITION, Measurements
 from postproc.calibration.survey_files import frame_of
 from postproc.calibration.tables import (
@@ -23,10 +23,14 @@ from postproc.calibration.tables import (
     read_foreign,
     read_table,
 )
-from postproc.compensation.paths.accuracy import PredictedWays, predicted_ways
-from postproc.compensation.paths.flanks import JointInMotion, in_motion, measured_steps
-from postproc.compensation.paths.measured import Aligned, OnTheWay, Track, align
+from postproc.compensation.paths.backlash_steps import (
+    JointInMotion,
+    in_motion,
+    measure_steps,
+)
+from postproc.compensation.paths.path_error import PredictedWays, predict_ways
 from postproc.compensation.paths.servo_lag import ServoLag, servo_lag
+from postproc.compensation.paths.track_alignment import Aligned, OnTheWay, Track, align
 from postproc.compensation.program import read_program, with_measured_play
 from postproc.compensation.program_files import read_files
 from postproc.compensation.targets import targets_from_visits
@@ -35,7 +39,7 @@ from postproc.language.visits import Visits
 from postproc.model.model import READING, Model, as_model
 from postproc.model.provenance import Provenance
 from postproc.model.statistics import ErrorStatistics
-from postproc.motion.cycle import ProgramCycle, run
+from postproc.motion.cycle_time import ProgramCycle, run
 from postproc.robot.cell import Cell, PointFrame, as_cell
 from postproc.robot.pose import MM, inverse, lengths
 from postproc.robot.state import States, make_states
@@ -118,7 +122,7 @@ def diagnose_path(
     program: str | Path | None,
     frame: PointFrame | None = None,
     seed: int = 0,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> PathDiagnosis:
     """Lay a tracker's readings along a program's ways, and diagnose what they say.
 
@@ -138,10 +142,10 @@ def diagnose_path(
         raise PostprocError("--path: name the program that ran with --program")
     cell = as_cell(cell)
     model, frame = as_model(model, cell.arm), frame_of(cell, frame)
-    return _diagnosed(track, cell, model, Path(program), frame, seed, progress)
+    return _diagnose_track(track, cell, model, Path(program), frame, seed, progress)
 
 
-def _diagnosed(
+def _diagnose_track(
     track: Path,
     cell: Cell,
     model: Model,
@@ -156,10 +160,10 @@ def _diagnosed(
     visits = read_program(read_files(program), cell).visits
     own = with_measured_play(cell, model)
     cycle = run(own.arm, targets_from_visits(visits, own)[0])
-    ways = predicted_ways(cycle, own, model, cell.temperature)
+    ways = predict_ways(cycle, own, model, cell.temperature)
     found = align(read, ways, visits.fly)
     _check(found, track, frame)
-    joints = in_motion(measured_steps(ways, found.on_the_way, read.scatter))
+    joints = in_motion(measure_steps(ways, found.on_the_way, read.scatter))
     lag = _lag(found, ways, visits, cycle, own)
     rows = _rows(found, ways, visits, cycle, cell)
     survey = Measurements(
@@ -277,7 +281,7 @@ def _rows(
 ) -> _Rows:
     """Make rows of a track: whole ones at stops, elsewhere what lies across the way."""
     at = ways.first[found.ended + 1] - 1
-    on = found.on_the_way[_chosen(found.on_the_way, ways)]
+    on = found.on_the_way[_choose_readings(found.on_the_way, ways)]
     q = ways.q[on.sample]
     q = q + on.share[:, None] * (ways.q[np.minimum(on.sample + 1, len(ways.q) - 1)] - q)
     sample = np.concatenate([at, on.sample])
@@ -315,7 +319,7 @@ def _distinct(ids: Sequence[str]) -> tuple[str, ...]:
     return tuple(out)
 
 
-def _chosen(read: OnTheWay, ways: PredictedWays) -> Ints:
+def _choose_readings(read: OnTheWay, ways: PredictedWays) -> Ints:
     """Choose readings with sure sides that lie well apart, (k,)."""
     next_ = np.minimum(read.sample + 1, len(ways.q) - 1)
     rows = np.flatnonzero(_resting(ways, read.sample) & _resting(ways, next_))

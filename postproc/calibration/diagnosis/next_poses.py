@@ -9,7 +9,7 @@ from postproc.arrays import Floats
 from postproc.calibration.diagnosis.score import Score
 from postproc.calibration.diagnosis.search import extend
 from postproc.calibration.regression import Fit
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.state import make_states
 
 TRIED = 400  # random poses
@@ -90,7 +90,7 @@ def poses_that_sharpen(fit: Fit, seed: int) -> tuple[str, Floats]:
     return name, np.asarray(batch.states.q[chosen])
 
 
-def _tries(fit: Fit, seed: int) -> Batch:
+def _tries(fit: Fit, seed: int) -> ArmStates:
     """Draw poses between the surveyed ranges, from random sides, in surveyed states."""
     rng = np.random.default_rng(seed)
     seen, arm = fit.batch.states, fit.batch.arm
@@ -104,10 +104,10 @@ def _tries(fit: Fit, seed: int) -> Batch:
         time=np.full(TRIED, np.nanmax(seen.time, initial=0.0)),
         order=np.full(TRIED, seen.order.max() + 1),
     )  # fmt: skip
-    return Batch(arm, states)
+    return ArmStates(arm, states)
 
 
-def _uncertainty(fit: Fit, batch: Batch) -> tuple[Floats, Floats]:
+def _uncertainty(fit: Fit, batch: ArmStates) -> tuple[Floats, Floats]:
     """Return columns at other states, (n, 3, p), and the parameters' covariance."""
     at = fit.combination.at(batch, fit.values)
     return fit.combination.columns(at), np.array(fit.covariance)

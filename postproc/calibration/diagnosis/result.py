@@ -9,16 +9,16 @@ from typing import Any, Literal
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.calibration.diagnosis.library import Projection
-from postproc.calibration.diagnosis.refit import SetAnew
-from postproc.calibration.diagnosis.score import LENGTHS, Leftover
+from postproc.calibration.diagnosis.candidates import Projection
+from postproc.calibration.diagnosis.model_update import FrameShift
+from postproc.calibration.diagnosis.score import LENGTHS, ResidualTest
 from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import DirectionReport
 from postproc.model.covariate import covariate, unit
 from postproc.model.effects import BY_NAME, EFFECTS
 from postproc.model.effects.effect import Candidate, Effect, Family
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.pose import MM
 
@@ -152,7 +152,7 @@ class Diagnosis:
     after: ErrorStatistics
     vap_mm: tuple[float, float] | None
     findings: tuple[Finding, ...]
-    leftovers: tuple[Leftover, ...]
+    leftovers: tuple[ResidualTest, ...]
     places: tuple[ResidualPlace, ...]
     next_measurements: Floats
     why_next: str
@@ -161,7 +161,7 @@ class Diagnosis:
     not_excluded: tuple[str, ...] = ()
     fixed_points: tuple[str, ...] = ()
     flanks: str = ""
-    set_anew: SetAnew | None = None
+    set_anew: FrameShift | None = None
     explained: float | None = None
     notes: tuple[str, ...] = ()
 
@@ -274,7 +274,7 @@ def statistics(spread: ErrorStatistics) -> dict[str, float]:
 # What rows cannot show, however large it is.
 
 
-def not_excluded(batch: Batch) -> tuple[str, ...]:
+def not_excluded(batch: ArmStates) -> tuple[str, ...]:
     """Say what may hide in what looks like noise: what no candidate asked for."""
     out = [what for kind in EFFECTS for what in kind.not_tried(batch)]
     finest = max(min(LENGTHS), 1.0 / np.sqrt(max(len(batch), 1)))
@@ -318,7 +318,7 @@ def profile(fit: Fit, place: int, candidate: Candidate) -> Profile:
         candidate: The candidate that it was.
     """
     part = fit.combination.slices[place]
-    moved = fit.moved(part)
+    moved = fit.move(part)
     joint = candidate.family.joint
     if joint is None:
         axis = moved / np.maximum(np.linalg.norm(moved, axis=1, keepdims=True), 1e-12)
@@ -346,10 +346,10 @@ def profile(fit: Fit, place: int, candidate: Candidate) -> Profile:
     return Profile(name, what, values, direction, seen[0], seen[1], lever)
 
 
-def odd(effect: Effect, batch: Batch) -> bool:
+def odd(effect: Effect, batch: ArmStates) -> bool:
     """Tell whether an effect turns round with the direction of arrival."""
     turned = batch.states.with_(direction=-batch.states.direction)
-    there, back = effect.columns(batch), effect.columns(Batch(batch.arm, turned))
+    there, back = effect.columns(batch), effect.columns(ArmStates(batch.arm, turned))
     return bool(np.allclose(there, -back) and np.any(there))
 
 

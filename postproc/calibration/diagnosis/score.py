@@ -10,7 +10,7 @@ from scipy.stats import f as fisher
 
 from postproc._native import of_blocks
 from postproc.arrays import Floats, floats
-from postproc.calibration.diagnosis.library import (
+from postproc.calibration.diagnosis.candidates import (
     Projection,
     ReducedCandidates,
 )
@@ -68,7 +68,7 @@ def _of_one_column(share: Floats, rows: int) -> Floats:
     return evidence
 
 
-def explained(blocks: ReducedCandidates) -> tuple[Floats, Floats]:
+def explain_squares(blocks: ReducedCandidates) -> tuple[Floats, Floats]:
     """Return the squares that blocks explain by least squares, and their ranks.
 
     Returns:
@@ -82,7 +82,7 @@ def explained(blocks: ReducedCandidates) -> tuple[Floats, Floats]:
 
 def score_p_value(blocks: ReducedCandidates, square: float, rows: int) -> Floats:
     """Compute the score (F) test of every block against the first draw, (c,)."""
-    squares, rank = explained(blocks)
+    squares, rank = explain_squares(blocks)
     top = squares[:, 0] / np.maximum(rank, 1)
     under = np.maximum(square - squares[:, 0], 1e-12) / np.maximum(rows - rank, 1)
     return np.asarray(fisher.sf(top / under, np.maximum(rank, 1), rows - rank))
@@ -254,7 +254,7 @@ MAPPED_ROWS = 4000  # more rows than this are thinned for the maps
 
 
 @dataclass(frozen=True)
-class Leftover:
+class ResidualTest:
     """One statistic of what is left.
 
     Attributes:
@@ -268,7 +268,7 @@ class Leftover:
     p_value: float
 
 
-def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
+def leftovers(projection: Projection, seed: int) -> tuple[ResidualTest, ...]:
     """Ask all questions of a filtered residual, the most telling first."""
     rng = np.random.default_rng(seed)
     rest = projection.rest.reshape(-1, 3) * (projection.fit.rows.weight > 0)[:, None]
@@ -278,10 +278,10 @@ def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
         *_serial(projection, flipped),
         *_scatter(projection, rest, dealt),
     ]
-    spread = np.array([_standardised(values) for _, values in found])
+    spread = np.array([_standardise(values) for _, values in found])
     null = Null(np.sort(spread[:, 1:].max(axis=0)))
     out = [
-        Leftover(what, float(values[0]), null.p_value(float(values[0])))
+        ResidualTest(what, float(values[0]), null.p_value(float(values[0])))
         for (what, _), values in zip(found, spread, strict=True)
     ]
     return tuple(sorted(out, key=lambda x: x.p_value))
@@ -309,7 +309,7 @@ def _draws(rest: Floats, rng: np.random.Generator) -> tuple[Floats, Dealt]:
     return flipped.reshape(3 * n, -1), dealt
 
 
-def _standardised(values: Floats) -> Floats:
+def _standardise(values: Floats) -> Floats:
     """Give values the scale of their draws (all but the first)."""
     draws = values[1:]
     return np.asarray((values - draws.mean()) / max(float(draws.std()), 1e-300))
@@ -323,7 +323,7 @@ def _maps(
     q = at.states.q
     place = (q - q.min(axis=0)) / np.maximum(np.ptp(q, axis=0), 1e-9)
     whitened = projection.fit.whiten(at.jacobian).reshape(len(q), 3, 6)
-    keep, square = _thinned(len(q), rng), np.einsum("rd,rd->d", rows, rows)
+    keep, square = _thin_rows(len(q), rng), np.einsum("rd,rd->d", rows, rows)
     out = []
     for k in range(MAPS):
         a, b = rng.choice(6, 2, replace=False)
@@ -342,7 +342,7 @@ def _maps(
     return out
 
 
-def _thinned(n: int, rng: np.random.Generator) -> Floats:
+def _thin_rows(n: int, rng: np.random.Generator) -> Floats:
     """Mark the rows that the maps use, (n,)."""
     keep = np.ones(n)
     if n > MAPPED_ROWS:

@@ -8,17 +8,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from postproc.calibration.diagnosis.candidates import Projection, reduce_some
 from postproc.calibration.diagnosis.held_out import (
     Folds,
     Gain,
-    held_out_gain,
+    compare_held_out,
     regions,
 )
 from postproc.calibration.diagnosis.jumps import jumps
-from postproc.calibration.diagnosis.library import Projection, reduce_some
-from postproc.calibration.diagnosis.refit import revises
+from postproc.calibration.diagnosis.model_update import revises
 from postproc.calibration.diagnosis.score import Null, Score, rank
-from postproc.calibration.diagnosis.table import Causes, loosened
+from postproc.calibration.diagnosis.table import Causes, free_carrier
 from postproc.calibration.regression import Fit, beside, fit_effects
 from postproc.model.carrier import Carrier, carrier
 from postproc.model.covariate import JOINTS, covariate
@@ -34,7 +34,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.joint_offset import JointOffset
 from postproc.model.effects.part_motion import PartMotion
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 # Finer settings around a candidate that a grid found.
 
@@ -68,7 +68,7 @@ def refine(projection: Projection, score: Score) -> Score:
 def _finer(projection: Projection, score: Score, width: float) -> tuple[Score, float]:
     """Take the best settings around those of a score, and what is gained [nats]."""
     here, share = score.best.effect, score.best.log_prior
-    effects = [here, *here.refined(width * OFFSETS, projection.at)]
+    effects = [here, *here.refine(width * OFFSETS, projection.at)]
     if len(effects) == 1:
         return score, 0.0
     square = float(projection.rest @ projection.rest)
@@ -155,8 +155,8 @@ def ranking(projection: Projection, causes: Causes) -> list[Score]:
             scores += rank(reduced, square, view.rows, without=known)
     if causes.table is not None:
         scores += causes.table.scores(views.of_carrier)
-        scores += causes.table.moved_since(projection)
-    scores = [expected(s, projection) for s in scores]
+        scores += causes.table.score_moved_parts(projection)
+    scores = [raise_expected(s, projection) for s in scores]
     scores.sort(key=lambda s: -s.evidence)
     leading: list[Score] = []
     for tier in (NAMED, FREE):
@@ -171,7 +171,7 @@ def ranking(projection: Projection, causes: Causes) -> list[Score]:
     return sorted([*refined, *rest], key=lambda s: -s.evidence)
 
 
-def expected(score: Score, projection: Projection) -> Score:
+def raise_expected(score: Score, projection: Projection) -> Score:
     """Raise the evidence of a law of the weight that other joints follow.
 
     Weight pulls at all joints at once: what yields at two of them does at a third.
@@ -200,7 +200,7 @@ class Views:
         if joint is None:
             return self.projection
         if joint not in self.made:
-            self.made[joint] = opened(self.projection, joint)
+            self.made[joint] = free_joint_zero(self.projection, joint)
         return self.made[joint]
 
     def of_carrier(self, carrier: Carrier) -> Projection:
@@ -210,7 +210,7 @@ class Views:
         if not revises(self.projection.fit):
             return self.projection
         if str(carrier) not in self.made:
-            self.made[str(carrier)] = loosened(self.projection, carrier)
+            self.made[str(carrier)] = free_carrier(self.projection, carrier)
         return self.made[str(carrier)]
 
     def of(self, family: Family, effect: Effect) -> Projection:
@@ -220,7 +220,7 @@ class Views:
         return self.of_joint(family.joint if effect.has_mean() else None)
 
 
-def opened(projection: Projection, joint: int) -> Projection:
+def free_joint_zero(projection: Projection, joint: int) -> Projection:
     """Return a filter that takes the zero of a joint, from 1, out of the rows too.
 
     It is the same where no given model is revised, or its zero is open already.
@@ -228,9 +228,9 @@ def opened(projection: Projection, joint: int) -> Projection:
     fit = projection.fit
     first, *others = fit.combination.effects or (JointOffset(()),)
     offsets = [j for e in others if isinstance(e, JointOffset) for j in e.joints]
-    if joint in offsets or first.opened((joint,)) is first:
+    if joint in offsets or first.free_zeros((joint,)) is first:
         return projection
-    laid = beside(fit, (first.opened((joint,)), *others))
+    laid = beside(fit, (first.free_zeros((joint,)), *others))
     left = {n for n in fit.combination.names if n not in projection.names}
     out = [k for k, n in enumerate(laid.combination.names) if n in left]
     return Projection.leaving(laid, np.array(out, dtype=np.int64))
@@ -245,12 +245,12 @@ def choose(scores: list[Score]) -> Score:
     names = [s for s in scores if s.family.tier == NAMED]
     name = max(names, key=lambda s: s.evidence - s.best.effect.least_evidence())
     free = next((s for s in scores if s.family.tier == FREE), name)
-    if free.evidence - name.evidence > needed(name, free):
+    if free.evidence - name.evidence > find_margin(name, free):
         return _law(free, names) or plainest(free, scores)
     return _forerunner(name, scores)
 
 
-def needed(name: Score, free: Score) -> float:
+def find_margin(name: Score, free: Score) -> float:
     """Return by how much a free form must be ahead of a name [nats].
 
     A law with one or two numbers is no freer than a name: it must be ahead for sure. A
@@ -510,7 +510,7 @@ def grow_on(found: Search, progress: Progress) -> Search:
 
 def _grow(found: Search) -> Search:
     """Add the best candidate, or say which one was refused."""
-    near = found.causes.narrowed(Views(Projection.of(found.fit)).of_carrier, found.near)
+    near = found.causes.narrow(Views(Projection.of(found.fit)).of_carrier, found.near)
     found = replace(found, near=near)
     scores = found.ranking_under(found.fit)
     found = replace(found, ranked=(found.fit, scores))
@@ -519,7 +519,7 @@ def _grow(found: Search) -> Search:
     if p_value > LEVEL or best.p_value > ALONE:
         return replace(found, refused=None)
     fit = extend(found.fit, best.best)
-    gain = held_out_gain(fit, len(fit.combination.effects) - 1, best.best)
+    gain = compare_held_out(fit, len(fit.combination.effects) - 1, best.best)
     added = Addition(best, p_value, gain)
     if not gain.sure:
         return replace(found, refused=added)
@@ -573,7 +573,7 @@ def _again(found: Search, number: int, elsewhere: bool) -> Search:
     other = found
     if best.best.effect != old.effect:
         other = put_instead(found, number, best)
-    return _confirmed(found, number) if other is found else other
+    return _confirm_addition(found, number) if other is found else other
 
 
 def predicts_elsewhere(
@@ -595,7 +595,7 @@ def predicts_elsewhere(
     fit = found.fit
     region = regions(fit.batch.states.q)
     best, left = present, Folds.of_fit(fit, region).errors()[0]
-    for rival in alike(present.family, present.evidence - NEAR, scores):
+    for rival in tied_candidates(present.family, present.evidence - NEAR, scores):
         other = extend(fit, rival.best, instead_of=place)
         other = replace(other, noise=fit.noise, rows=fit.rows, whitener=fit.whitener)
         less = Folds.of_fit(other, region).errors()[0]
@@ -605,7 +605,7 @@ def predicts_elsewhere(
     return best
 
 
-def alike(own: Family, least: float, scores: list[Score]) -> list[Score]:
+def tied_candidates(own: Family, least: float, scores: list[Score]) -> list[Score]:
     """List the best names, but for a family's own, that have some evidence [nats]."""
     name = (own.effect, own.joint)
     names = [s for s in scores if s.family.tier == NAMED and s.evidence >= least]
@@ -620,7 +620,7 @@ def put_instead(found: Search, number: int, best: Score) -> Search:
     """
     place = found.place(number)
     fit = extend(found.fit, best.best, instead_of=place)
-    gain = held_out_gain(fit, place, best.best)
+    gain = compare_held_out(fit, place, best.best)
     if not gain.sure:
         return found
     additions = list(found.additions)
@@ -628,10 +628,10 @@ def put_instead(found: Search, number: int, best: Score) -> Search:
     return replace(found, fit=fit, additions=tuple(additions))
 
 
-def _confirmed(found: Search, number: int) -> Search:
+def _confirm_addition(found: Search, number: int) -> Search:
     """Keep an addition if it still predicts held-out rows with all others in."""
     addition = found.additions[number]
-    gain = held_out_gain(found.fit, found.place(number), addition.candidate)
+    gain = compare_held_out(found.fit, found.place(number), addition.candidate)
     if not gain.sure:
         return _drop(found, number)
     additions = list(found.additions)
@@ -693,10 +693,10 @@ def stand(found: Search, number: int) -> JudgedAddition:
         evidence = max(evidence, _of_cause(found, own.family.effect))
     p_value = found.null.p_of(replace(here, evidence=evidence))
     rivals = apart(own, rivals, projection.at)
-    return JudgedAddition(evidence, p_value, _told(own.family, rivals))
+    return JudgedAddition(evidence, p_value, _choose_reported(own.family, rivals))
 
 
-def apart(own: Candidate, rivals: Sequence[Score], at: Batch) -> list[Score]:
+def apart(own: Candidate, rivals: Sequence[Score], at: ArmStates) -> list[Score]:
     """Leave out cells that a name in the group stands for, by whatever law.
 
     A joint 4 that turns by the moment across joint 5 is no cause beside compliance of
@@ -719,14 +719,14 @@ def _cells_of(name: Candidate) -> list[tuple[str, str]]:
     return [(c, driver) for c, driver, _ in every if own in f"{c} {driver}"]
 
 
-def _same_cell(cell: tuple[str, str], other: Candidate, at: Batch) -> bool:
+def _same_cell(cell: tuple[str, str], other: Candidate, at: ArmStates) -> bool:
     """Tell whether a candidate moves what a cell moves, by the same driver."""
     moves, driver = cell
     if driver != other.source and not _same_load((driver, other.source), at):
         return False
     effect = other.effect
     assert isinstance(effect, PartMotion | Curve)
-    one, two = (carrier(c).moved(at).reshape(-1) for c in (moves, effect.direction))
+    one, two = (carrier(c).move(at).reshape(-1) for c in (moves, effect.direction))
     return bool(abs(one @ two) > ALIKE * np.linalg.norm(one) * np.linalg.norm(two))
 
 
@@ -742,7 +742,7 @@ def _of_cause(found: Search, effect: str) -> float:
     return found.fit.log_evidence - less.log_evidence
 
 
-def _told(own: Family, rivals: Sequence[Score]) -> tuple[Score, ...]:
+def _choose_reported(own: Family, rivals: Sequence[Score]) -> tuple[Score, ...]:
     """Choose those that are told: names first, and more cells with a cell."""
     cells = [s for s in rivals if s.family.effect == PART_MOTION]
     others = [s for s in rivals if s.family.effect != PART_MOTION][:MOST_OTHERS]
@@ -750,7 +750,7 @@ def _told(own: Family, rivals: Sequence[Score]) -> tuple[Score, ...]:
     return (*others, *cells[:most])
 
 
-def _same_load(both: tuple[str, str], at: Batch) -> bool:
+def _same_load(both: tuple[str, str], at: ArmStates) -> bool:
     """Tell whether two loads are one but for weights that nobody knows so well.
 
     About the axis of joint 4, say, that is the torque of joint 4 and the moment across

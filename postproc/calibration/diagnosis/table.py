@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.calibration.diagnosis.library import (
+from postproc.calibration.diagnosis.candidates import (
     JointAxes,
     Library,
     Projection,
@@ -25,7 +25,7 @@ from postproc.calibration.diagnosis.library import (
     reduce_columns,
     reduce_some,
 )
-from postproc.calibration.diagnosis.refit import revises
+from postproc.calibration.diagnosis.model_update import revises
 from postproc.calibration.diagnosis.score import (
     Null,
     Score,
@@ -54,7 +54,7 @@ from postproc.model.effects.part_motion import (
     PartMotion,
     family_of,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 ORDERS = 8  # waves per turn of an angle's harmonics that are tried
 PLAINER = 3.0  # nats that a law may be behind one with more columns: odds of 20 to 1
@@ -126,12 +126,12 @@ class MotionLaws:
     widths: tuple[tuple[tuple[MotionLaw, ...], Floats, Ints], ...]
 
     @classmethod
-    def of(cls, batch: Batch, drivers: Sequence[str], factor: str) -> MotionLaws:
+    def of(cls, batch: ArmStates, drivers: Sequence[str], factor: str) -> MotionLaws:
         """Evaluate all laws of some drivers, multiplied by a factor if there is one."""
         alike: dict[int, list[tuple[MotionLaw, Floats, int]]] = defaultdict(list)
         for k, driver in enumerate(drivers):
             for law in _laws_of(batch, driver, factor):
-                values = _scaled(law.effect, batch)
+                values = _scale_functions(law.effect, batch)
                 alike[values.shape[0]].append((law, values, k))
         widths = []
         for _, some in sorted(alike.items()):
@@ -199,7 +199,7 @@ class MotionFamily:
         alike = [x for x in own if x[0] >= least]
         return min(alike, key=lambda x: (x[1].columns, -x[0]))[1]
 
-    def placed(self) -> MotionLaw | None:
+    def find_located_law(self) -> MotionLaw | None:
         """Take the best of the laws that have a place, None where there is none."""
         own = [x for x in self._own() if x[1].cell[1] in PLACED]
         return max(own, key=lambda x: x[0])[1] if own else None
@@ -270,9 +270,7 @@ class Table:
         best = self._scan(view_of)[:TOLD]
         return [self._score(view_of(family.carrier), family) for family in best]
 
-    def narrowed(
-        self, view_of: Callable[[Carrier], Projection], before: Table
-    ) -> Table:
+    def narrow(self, view_of: Callable[[Carrier], Projection], before: Table) -> Table:
         """Return the table of the best families alone, and of those of another one.
 
         A search goes through the whole table where it looks for a further effect. What
@@ -298,7 +296,7 @@ class Table:
         asked: list[tuple[Carrier, str, Floats]] = []
         for carrier in every_carrier():
             view = view_of(carrier)
-            axes = JointAxes.of(view.fit, carrier.moved(view.at))
+            axes = JointAxes.of(view.fit, carrier.move(view.at))
             rest = axes.along(view.twice)[:, 0]
             for factor in _factors(carrier):
                 if factor in self.laws:
@@ -330,7 +328,7 @@ class Table:
         own = {carrier for carrier, _ in self.only}
         return tuple(c for c in every_carrier() if c in own)
 
-    def moved_since(self, projection: Projection) -> list[Score]:
+    def score_moved_parts(self, projection: Projection) -> list[Score]:
         """Score parts that have moved once since a given model was made."""
         if not self.revised:
             return []
@@ -352,7 +350,7 @@ class Table:
         loose = self.revised and not holds_mean(view, family.carrier)
         plain = family.plainest()
         candidate = plain.on(family.carrier, loose)
-        placed = family.placed() if isinstance(plain.effect, Curve) else None
+        placed = family.find_located_law() if isinstance(plain.effect, Curve) else None
         law = None if placed is None else placed.on(family.carrier, loose)
         square = float(view.rest @ view.rest)
         score = rank(reduce_some(view, [candidate]), square, view.rows)[0]
@@ -382,10 +380,10 @@ class Table:
         Yields:
             A factor, its laws, and by width their evidence and share, (c, draws).
         """
-        axes = JointAxes.of(view.fit, carrier.moved(view.at))
+        axes = JointAxes.of(view.fit, carrier.move(view.at))
         along = View(axes.size, axes.along(view.squares), axes.along(rows))
         for factor in _factors(carrier):
-            laws, each = self._tried(carrier, factor), []
+            laws, each = self._list_laws(carrier, factor), []
             for some, values, _ in laws.widths:
                 reduced = reduce_columns(along, (), axes.size.apply(values))
                 evidence = log_evidence(reduced, square, view.rows)
@@ -394,7 +392,7 @@ class Table:
             if each:
                 yield factor, laws, tuple(each)
 
-    def _tried(self, carrier: Carrier, factor: str) -> MotionLaws:
+    def _list_laws(self, carrier: Carrier, factor: str) -> MotionLaws:
         """Return the laws of a factor that are tried on a carrier."""
         laws = self.laws.get(factor, MotionLaws((), ()))
         if self.only is None:
@@ -416,11 +414,11 @@ def holds_mean(projection: Projection, carrier: Carrier) -> bool:
     return any(n.startswith(begins) for n in mean)
 
 
-def loosened(projection: Projection, moved: Carrier) -> Projection:
+def free_carrier(projection: Projection, moved: Carrier) -> Projection:
     """Return a filter that takes a constant motion of a carrier out of the rows too."""
     if holds_mean(projection, moved):
         return projection
-    return projection.beside(projection.fit.whiten(moved.moved(projection.at)))
+    return projection.beside(projection.fit.whiten(moved.move(projection.at)))
 
 
 def _factors(carrier: Carrier) -> tuple[str, str, str]:
@@ -440,7 +438,7 @@ def _by_driver(laws: MotionLaws, each: Sequence[Floats]) -> Floats:
 # What may drive, and how.
 
 
-def _drivers(batch: Batch) -> list[str]:
+def _drivers(batch: ArmStates) -> list[str]:
     """Name what varies over the rows and may drive a motion."""
     names = [f"{kind} {j}" for kind in ("joint", "lambda", "way") for j in JOINTS]
     names += [f"torque {j}" for j in JOINTS]
@@ -451,7 +449,7 @@ def _drivers(batch: Batch) -> list[str]:
     return [n for n in names if _varies(batch, n)]
 
 
-def _varies(batch: Batch, name: str) -> bool:
+def _varies(batch: ArmStates, name: str) -> bool:
     """Tell whether a driver varies enough to show."""
     x = covariate(batch, name)
     if name.startswith(LOADS):
@@ -467,7 +465,7 @@ def _may_multiply(factor: str, driver: str) -> bool:
     return kind in ("joint", "temperature", "way")
 
 
-def _laws_of(batch: Batch, driver: str, factor: str) -> list[MotionLaw]:
+def _laws_of(batch: ArmStates, driver: str, factor: str) -> list[MotionLaw]:
     """List the laws that a driver may act by, each kind with the same share."""
     x = covariate(batch, driver)
     low, high = float(x.min()), float(x.max())
@@ -508,7 +506,7 @@ def _places(x: Floats, alone: bool) -> list[float]:
     return sorted({*map(float, even), *map(float, np.quantile(x, part))})
 
 
-def _scaled(effect: PartMotion | Curve, batch: Batch) -> Floats:
+def _scale_functions(effect: PartMotion | Curve, batch: ArmStates) -> Floats:
     """Evaluate the functions of an effect over their relative prior scales, (k, n)."""
     scale = np.array([p.scale for p in effect.parameters()])
     values: Floats = (effect.turning(batch) * (scale / scale.max())).T
@@ -547,13 +545,13 @@ class Causes:
         """Names of effects that are known not to be there."""
         return self.library.without
 
-    def narrowed(
+    def narrow(
         self, view_of: Callable[[Carrier], Projection], before: Causes
     ) -> Causes:
-        """Keep the best families of the table alone, see `Table.narrowed`."""
+        """Keep the best families of the table alone, see `Table.narrow`."""
         if self.table is None or before.table is None:
             return self
-        return replace(self, table=self.table.narrowed(view_of, before.table))
+        return replace(self, table=self.table.narrow(view_of, before.table))
 
     def at_rows(self, rows: Ints) -> Causes:
         """Return the candidates for some of the rows."""

@@ -20,8 +20,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.calibration.diagnosis.held_out import held_out_gain
-from postproc.calibration.diagnosis.library import Projection, reduce_some
+from postproc.calibration.backward_elimination import ENOUGH, SURE, keep_needed
+from postproc.calibration.diagnosis.candidates import Projection, reduce_some
+from postproc.calibration.diagnosis.held_out import compare_held_out
 from postproc.calibration.diagnosis.score import Score, rank
 from postproc.calibration.diagnosis.search import (
     NEAR,
@@ -35,7 +36,6 @@ from postproc.calibration.diagnosis.search import (
 )
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import impossible
-from postproc.calibration.weighing import ENOUGH, SURE, keep_needed
 from postproc.model.effects.compliance import Compliance, WeightEffect
 from postproc.model.effects.effect import Candidate, JointEffect
 
@@ -47,20 +47,20 @@ def weigh_laws(found: Search, progress: Progress) -> Search:
         found: The search.
         progress: Told what is being done.
     """
-    if not _lacking(found) or not _shaped(found):
+    if not _lacking(found) or not _has_shape(found):
         return found
     start = replace(found, fit=found.base, additions=(), refused=None, ranked=None)
-    before = _needed(grow_on(_with_laws(start), progress))
+    before = _drop_unneeded(grow_on(_with_laws(start), progress))
     tried = [
         tried
-        for tried, least in ((_needed(_with_laws(found)), SURE), (before, -NEAR))
-        if _together(tried) and _gained(tried, found) > least
+        for tried, least in ((_drop_unneeded(_with_laws(found)), SURE), (before, -NEAR))
+        if _together(tried) and _compare_searches(tried, found) > least
     ]
     if not tried:
         return found
     best = max(tried, key=lambda s: s.fit.log_evidence)
     settled = settle(grow_on(best, progress), 0)
-    return settled if _gained(settled, found) > -NEAR else found
+    return settled if _compare_searches(settled, found) > -NEAR else found
 
 
 def pass_on(found: Search, progress: Progress) -> Search:
@@ -86,7 +86,7 @@ def _further(found: Search) -> Search | None:
             return None
         place = len(found.fit.combination.effects)
         fit = extend(found.fit, score.best)
-        added = _judged(found, fit, place, score.best)
+        added = _score_law(found, fit, place, score.best)
         grown = replace(
             found, fit=fit, additions=(*found.additions, added), ranked=None
         )
@@ -100,7 +100,7 @@ def _of_weight(score: Score) -> bool:
     return isinstance(score.best.effect, WeightEffect)
 
 
-def _gained(tried: Search, found: Search) -> float:
+def _compare_searches(tried: Search, found: Search) -> float:
     """Return by how many nats a search explains the rows better than another."""
     return tried.fit.log_evidence - found.fit.log_evidence
 
@@ -117,7 +117,7 @@ def _lacking(found: Search) -> list[Candidate]:
     ]
 
 
-def _shaped(found: Search) -> bool:
+def _has_shape(found: Search) -> bool:
     """Tell whether a joint that carries weight was given a shape of its own angle."""
     own = [a.candidate for a in found.additions]
     return any(c.source == f"joint {c.family.joint}" and c.family.joint != 1
@@ -130,15 +130,15 @@ def _with_laws(found: Search) -> Search:
     effects = [*found.fit.combination.effects, *(c.effect for c in laws)]
     fit = with_effects(found.fit, effects)
     first = len(found.fit.combination.effects)
-    added = tuple(_judged(found, fit, first + k, c) for k, c in enumerate(laws))
+    added = tuple(_score_law(found, fit, first + k, c) for k, c in enumerate(laws))
     return replace(found, fit=fit, additions=(*found.additions, *added), ranked=None)
 
 
-def _judged(found: Search, fit: Fit, place: int, law: Candidate) -> Addition:
+def _score_law(found: Search, fit: Fit, place: int, law: Candidate) -> Addition:
     """Score a law that a fit has."""
     seen = Projection.of(fit, without=place)
     score = rank(reduce_some(seen, [law]), float(seen.rest @ seen.rest), seen.rows)[0]
-    gain = held_out_gain(fit, place, law)
+    gain = compare_held_out(fit, place, law)
     return Addition(score, found.null.p_of(score), gain, together=True)
 
 
@@ -147,7 +147,7 @@ def _together(found: Search) -> tuple[int, ...]:
     return tuple(k for k, a in enumerate(found.additions) if a.together)
 
 
-def _needed(found: Search) -> Search:
+def _drop_unneeded(found: Search) -> Search:
     """Drop laws that are not needed beside all else, or that nothing can follow."""
     asked = {found.place(k): k for k in _together(found)}
     effects = found.fit.combination.effects
@@ -161,7 +161,7 @@ def _only(found: Search, kept: set[int]) -> Search:
     while True:
         out = set(_together(found)) - kept
         if out:
-            found, kept = _without(found, out), _renumbered(found, out, kept)
+            found, kept = _without(found, out), _renumber_laws(found, out, kept)
         bad = {k for k in kept if _impossible(found, k)}
         if not bad:
             return found
@@ -173,11 +173,11 @@ def _impossible(found: Search, number: int) -> bool:
     place = found.place(number)
     own = np.zeros(len(found.fit.values), dtype=bool)
     own[found.fit.combination.slices[place]] = True
-    gain = held_out_gain(found.fit, place, found.additions[number].candidate)
+    gain = compare_held_out(found.fit, place, found.additions[number].candidate)
     return bool(impossible(found.fit, own)) or not gain.sure
 
 
-def _renumbered(found: Search, out: set[int], kept: set[int]) -> set[int]:
+def _renumber_laws(found: Search, out: set[int], kept: set[int]) -> set[int]:
     """Number laws again once others are out."""
     left = [k for k in range(len(found.additions)) if k not in out]
     return {left.index(k) for k in kept}

@@ -16,11 +16,11 @@ from types import MappingProxyType
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.paths.points import Points
-from postproc.language.interface import ArcPiece
+from postproc.compensation.paths.insertion_report import Points
+from postproc.language.language import ArcPiece
 from postproc.language.visits import Visits
 from postproc.motion.blending import zones
-from postproc.motion.cycle import ProgramCycle
+from postproc.motion.cycle_time import ProgramCycle
 from postproc.motion.path import Segments, arcs, circles
 from postproc.motion.targets import Fly, Targets
 from postproc.robot.arm import Arm
@@ -147,7 +147,7 @@ class CutArc:
         out[0, :3] = pose[:3, 3] / MM
         own = rotation_from_vector(self._turn(half, share)[None])[0]
         turned = pose[:3, :3] @ own @ self.halves[0].rotation[0].T
-        return np.asarray(self.visits.dialect.turned(out, turned[None])[0])
+        return np.asarray(self.visits.dialect.rotate(out, turned[None])[0])
 
     def _turn(self, half: int, share: float) -> Floats:
         """Return what the tool turns by at a share of a half, (3,) [rad]."""
@@ -226,7 +226,7 @@ def zone_sizes(arm: Arm, cycle: ProgramCycle, targets: Targets) -> Floats:
     return size
 
 
-def passed(zone: Floats, radius: float) -> Floats:
+def measure_passing(zone: Floats, radius: float) -> Floats:
     """Say how far a rounded point of an arc is passed because the arc bends [m].
 
     Two moves that are superposed are at a quarter of the zone from the point each.

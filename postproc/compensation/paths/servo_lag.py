@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats
-from postproc.compensation.paths.accuracy import PredictedWays
-from postproc.compensation.paths.measured import OnTheWay
+from postproc.compensation.paths.path_error import PredictedWays
+from postproc.compensation.paths.track_alignment import OnTheWay
 from postproc.robot.pose import lengths
 
 REACH = 0.01  # [m] on both sides of a place over which its way bends
@@ -39,14 +39,14 @@ class ServoLag:
     moves: int
 
     @property
-    def is_told(self) -> bool:
+    def is_certain(self) -> bool:
         """Tell whether there is one for certain."""
         return self.square > CLEAR * self.error
 
     @property
     def seconds(self) -> float:
         """Return T [s]; NaN where it is not told."""
-        return float(np.sqrt(self.square)) if self.is_told else float("nan")
+        return float(np.sqrt(self.square)) if self.is_certain else float("nan")
 
     @property
     def most(self) -> float:

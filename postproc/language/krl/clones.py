@@ -7,18 +7,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
-from postproc.language.interface import Cloner, NamedPoint
 from postproc.language.krl import syntax as said
 from postproc.language.krl.moves import HOMES
 from postproc.language.krl.program import KrlDatum, KrlFile
-from postproc.language.krl.task import KrlTask
+from postproc.language.krl.symbols import KrlTask
+from postproc.language.language import Cloner, NamedPoint
 from postproc.language.source import (
     CloneError,
     Edit,
     Source,
     Span,
     check_length,
-    inserted_after,
+    insert_after,
 )
 from postproc.language.visits import Literals
 
@@ -90,7 +90,7 @@ class KrlCloner(Cloner):
         source = self.task.files[file].text.source
         if _is_of_form(source, line):
             raise CloneError("an inline form names its point in its own text")
-        span = self._named(file, row, operand.name)
+        span = self._find_name(file, row, operand.name)
         spelt = source.text[span.start : span.end]
         return KrlPoint((module, routine, operand.name), spelt, file, span)
 
@@ -115,7 +115,7 @@ class KrlCloner(Cloner):
             raise CloneError(f"{name} is a parameter, or declared in no data list")
         return found
 
-    def _named(self, file: int, row: int, name: str) -> Span:
+    def _find_name(self, file: int, row: int, name: str) -> Span:
         """Find the only place in a statement that names data."""
         text = self.task.files[file].text
         code = _QUIET.sub(lambda found: " " * len(found.group()), text.text(row))
@@ -126,7 +126,7 @@ class KrlCloner(Cloner):
         begin, _ = text.span(row)
         return Span(begin + found[0].start(), begin + found[0].end())
 
-    def declared(self, named: NamedPoint) -> int:
+    def find_declaration(self, named: NamedPoint) -> int:
         """Return the 1-based line that declares data."""
         file, datum = next(iter(self._data(named).values()))
         return self.task.files[file].text.line(datum.row)
@@ -195,7 +195,9 @@ class KrlCloner(Cloner):
         if not shape:
             lines = [head + values[0]]
         last = max(file.text.line(datum.row) for _, datum in data)
-        return inserted_after(file.text.source, last, _joined(file.text.source, lines))
+        return insert_after(
+            file.text.source, last, _join_lines(file.text.source, lines)
+        )
 
     def _head(self, point: KrlPoint, file: KrlFile) -> tuple[str, str]:
         """Return the type of a point, and the sizes of an array as they are written."""
@@ -207,7 +209,7 @@ class KrlCloner(Cloner):
         items = one.items if isinstance(one, said.KrlDeclaration) else ()
         if not any(item.name == name and item.dimensions for item in items):
             return own[0].type, ""
-        span = self._named(self.task.files.index(file), own[0].row, name)
+        span = self._find_name(self.task.files.index(file), own[0].row, name)
         rest = text[span.end - file.text.span(own[0].row).start :]
         shape = re.match(r"\s*(\[[\d,\s]+\])", rest)
         if shape is None:
@@ -219,12 +221,12 @@ class KrlCloner(Cloner):
         one = file.text.statement(datum.row)
         if isinstance(one, said.KrlDeclaration) and len(one.items) != 1:
             raise CloneError("its declaration declares other data, too")
-        span = self._named(self.task.files.index(file), datum.row, name)
+        span = self._find_name(self.task.files.index(file), datum.row, name)
         end = file.text.span(datum.row).end
         return file.text.source.text[span.end : end].rstrip()
 
 
-def _joined(source: Source, lines: Sequence[str]) -> str:
+def _join_lines(source: Source, lines: Sequence[str]) -> str:
     """Join lines by the line ending of a file."""
     return source.newline.decode("latin-1").join(lines)
 

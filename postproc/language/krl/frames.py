@@ -9,19 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.collect import IDENTITY, Pose, composed, flat
+from postproc.language.interpreter import Scope
 from postproc.language.krl import syntax as said
-from postproc.language.krl.dialect import COMPONENTS, KRL_DIALECT
-from postproc.language.krl.program import whole
-from postproc.language.krl.store import (
+from postproc.language.krl.abstract_state import (
     CORRECTIONS,
     NOTHING_SET,
     PERHAPS,
     KrlStore,
     entry_name,
 )
-from postproc.language.krl.task import CONFIG, KrlRecord, KrlTask
-from postproc.language.machine import Scope
+from postproc.language.krl.pose_encoding import COMPONENTS, KRL_DIALECT
+from postproc.language.krl.program import whole
+from postproc.language.krl.symbols import CONFIG, KrlRecord, KrlTask
+from postproc.language.to_visits import IDENTITY, Pose, compose_poses, flat
 
 
 @dataclass(frozen=True)
@@ -110,22 +110,22 @@ class FrameReader:
         value = self.task.value(first, self.row, self.here)
         match name:
             case "stool2" if isinstance(value, KrlRecord):
-                found = self.numbered("$tool", value.number("tool_no"))
+                found = self.read_numbered("$tool", value.number("tool_no"))
                 still = value.get("ipo_frame") != "#base"
                 return replace(found, remote=still) if still else found
             case "stool":
-                return self.numbered(
+                return self.read_numbered(
                     "$tool", self.task.number(first, self.row, self.here)
                 )
             case "sbase":
-                return self.numbered(
+                return self.read_numbered(
                     "$base", self.task.number(first, self.row, self.here)
                 )
             case "ek" | "lk" | "ey":
                 return no_frame(_CHAINED.format(name.upper()), Code.EXTERNAL_AXES)
         return no_frame(f"what {name.upper()} gives is not known")
 
-    def numbered(self, name: str, number: float) -> KrlFrame:
+    def read_numbered(self, name: str, number: float) -> KrlFrame:
         """Return the tool or the base that BAS sets for a number; 0 is none."""
         entry, table = whole(number), TABLES[name]
         if entry is None:
@@ -138,10 +138,10 @@ class FrameReader:
 
     def _correction(self, name: str, frame: str, switch: str) -> KrlFrame:
         """Return a frame that BAS links to an entry, no shift where it does not."""
-        on = self._held(switch, switch)
+        on = self._read_held(switch, switch)
         if on is None:
             on = self.task.initial_switch(switch)
-        found = self._held(frame, frame)
+        found = self._read_held(frame, frame)
         if on is False or (on == PERHAPS and found == ZERO):
             return ZERO
         shown = name.upper()
@@ -164,7 +164,7 @@ class FrameReader:
 
     def _element(self, table: str, number: int) -> KrlFrame | None:
         """Read an element of an array of frames, None where it is not known."""
-        held = self._held(table, entry_name(table, number))
+        held = self._read_held(table, entry_name(table, number))
         if isinstance(held, KrlFrame) and self.task.is_global(table, self.here):
             return held
         if not self.task.is_steady(table, number):
@@ -178,7 +178,7 @@ class FrameReader:
         taught = self.task.is_taught(table, file, datum.row)
         return KrlFrame(pose, taught=taught) if pose else None
 
-    def _held(self, name: str, key: str) -> object | None:
+    def _read_held(self, name: str, key: str) -> object | None:
         """Return what the program has set, unless something beside it may change it."""
         return None if name in self.task.beside else self.store.get(key)
 
@@ -196,7 +196,7 @@ class FrameReader:
         return not known == 0.0
 
     def _unknown(self, shown: str, name: str) -> Reason:
-        code, text = self.task.untold(name, self.here)
+        code, text = self.task.explain_unknown(name, self.here)
         where = f" ({CONFIG}.dat)" if code is Code.UNDECLARED_VARIABLE else ""
         return Reason(code, f"{shown} {text}{where}")
 
@@ -226,7 +226,7 @@ class FrameReader:
         if ZERO in (first, second):
             return second if first == ZERO else first
         return KrlFrame(
-            composed(first.pose, second.pose),
+            compose_poses(first.pose, second.pose),
             taught=first.taught or second.taught,
             remote=first.remote or second.remote,
         )

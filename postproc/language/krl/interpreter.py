@@ -8,12 +8,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from postproc.diagnostics import Code, Reason
-from postproc.language.collect import FoundGoal, cell_pose
-from postproc.language.flow import HeadedRows
-from postproc.language.interface import Start
+from postproc.language.control_flow import HeadedRows
+from postproc.language.interpreter import Arrived, CallContext, Scope, TaskMachine
 from postproc.language.krl import syntax as said
+from postproc.language.krl.abstract_state import HELD
+from postproc.language.krl.external_routines import AHEAD, ASSUMED, package_routines
 from postproc.language.krl.frames import KrlFrame
-from postproc.language.krl.modes import (
+from postproc.language.krl.modal_state import (
     HALTING,
     HARMLESS,
     PLANNED,
@@ -22,18 +23,17 @@ from postproc.language.krl.modes import (
 )
 from postproc.language.krl.moves import KrlGoals
 from postproc.language.krl.program import whole
-from postproc.language.krl.routines import AHEAD, ASSUMED, package_routines
 from postproc.language.krl.statements import KrlText
-from postproc.language.krl.store import HELD
-from postproc.language.krl.task import (
+from postproc.language.krl.symbols import (
     FUNCTIONS,
     STILL,
     KrlTask,
-    changed_by,
+    list_changes,
     operands_of,
     parts_of,
 )
-from postproc.language.machine import Arrived, CallContext, Scope, TaskMachine
+from postproc.language.language import Start
+from postproc.language.to_visits import FoundGoal, cell_pose
 from postproc.language.visits import START
 
 _PASSED = (
@@ -139,7 +139,7 @@ class KrlMachine(TaskMachine):
     def _sets(self, one: said.SourceStatement) -> set[str]:
         """Return the names of data that a statement sets, also as a loop."""
         named = {one.name} if isinstance(one, said.ForLoop) else set()
-        return named | {data.name for data in changed_by(one, self.task.routines)}
+        return named | {data.name for data in list_changes(one, self.task.routines)}
 
     def _calls_own(self, statements: Sequence[said.SourceStatement]) -> bool:
         """Return True if a statement calls a routine of the files."""
@@ -177,7 +177,7 @@ class KrlMachine(TaskMachine):
         if after is None:
             self.enter(context, row + 1, here)
             return None
-        return after.joined(here)
+        return after.join(here)
 
     def _carry_out(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
@@ -193,13 +193,13 @@ class KrlMachine(TaskMachine):
             case said.Instruction():
                 return self._call(context, row, one, here)
             case said.Waiting():
-                return _halted(here, True)
+                return _halt(here, True)
             case said.ContinueWord():
                 return replace(here, modes=replace(here.modes, goes_on=True))
             case said.InterruptDeclared():
                 return self._declare(context, row, one, here)
             case said.InterruptSwitched():
-                return self._switch(context, row, one, _halted(here, None))
+                return self._switch(context, row, one, _halt(here, None))
             case said.PathTrigger():
                 return self._trigger(context, one, here)
             case _:
@@ -213,7 +213,7 @@ class KrlMachine(TaskMachine):
             return here
         own = one.target if isinstance(one, said.Assignment) else None
         store = here.modes.store
-        for target in changed_by(one, self.task.routines):
+        for target in list_changes(one, self.task.routines):
             name = target.name
             if target is own or not _is_modal(name):
                 continue
@@ -245,8 +245,8 @@ class KrlMachine(TaskMachine):
         """Give a value to data, or change how moves are made."""
         name = one.target.name
         if name.startswith("$") and name not in PLANNED:
-            here = _halted(here, True if name in HALTING else None)
-        modes = self._modes(context, row).assigned(here.modes, one)
+            here = _halt(here, True if name in HALTING else None)
+        modes = self._modes(context, row).assign(here.modes, one)
         if modes is None:
             what = (
                 f"sets {name.upper()}: what that does to moves is not known. Take it "
@@ -268,15 +268,15 @@ class KrlMachine(TaskMachine):
                 self.run_beside(file, routine)
             return self.unknown(context, row, here, "names several routines")
         if name == "bas":
-            here = _halted(here, None) if _puts_out(one) else here
+            here = _halt(here, None) if _puts_out(one) else here
             modes = self._modes(context, row).bas(here.modes, one.arguments)
             return replace(here, modes=modes)
         if name == "pulse":
-            return _halted(here, True)
+            return _halt(here, True)
         if name == "on_error_proceed":
             return replace(here, modes=here.modes.with_(perhaps=True))
-        if name in STILL or self.said_still(name):
-            return _halted(here, None)
+        if name in STILL or self.declares_motionless(name):
+            return _halt(here, None)
         if name in package_routines() and not self._is_overruled(name):
             return self._assume(context, row, name, here)
         return self.outside(context, row, name, here)
@@ -293,7 +293,7 @@ class KrlMachine(TaskMachine):
             return here
         place = context.scope.file, row
         self._assumed[name] = min(self._assumed.get(name, place), place)
-        return _halted(here, None)
+        return _halt(here, None)
 
     def after_functions(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
@@ -307,7 +307,7 @@ class KrlMachine(TaskMachine):
                 known = part.name in PLANNED or isinstance(one, said.KrlMove)
                 if given or (known and part.name not in HALTING):
                     continue
-                here = _halted(here, True if part.name in HALTING else None)
+                here = _halt(here, True if part.name in HALTING else None)
         return here
 
     def _function(
@@ -317,11 +317,11 @@ class KrlMachine(TaskMachine):
         found = self.task.routine(name, context.scope)
         if found is not None:
             if not self._moves(found[0], found[2]):
-                return _halted(here, None)
+                return _halt(here, None)
             self.run_beside(found[0], found[2])
             what = f"calls the function {name}, which moves: it is not followed"
             return self.unknown(context, row, here, what)
-        if name in FUNCTIONS or name in STILL or self.said_still(name):
+        if name in FUNCTIONS or name in STILL or self.declares_motionless(name):
             return here
         what = f"calls the function {name}, which is not known: it may move"
         return self.unknown(context, row, here, what)
@@ -344,7 +344,7 @@ class KrlMachine(TaskMachine):
         if effects:
             own = number, _INTERRUPT if MOVES in effects else _RESUMED
             modes = replace(modes, declared=others | {own})
-            if not {number, EVERY} & self._switched_on:
+            if not {number, EVERY} & self._enabled_interrupts:
                 self._begin_early(own[1], here)
                 modes = replace(modes, active=modes.active | {own})
         return replace(here, modes=modes)
@@ -367,7 +367,7 @@ class KrlMachine(TaskMachine):
         left = {d for d in modes.active if one.number is not None and d[0] != number}
         if left == modes.active:
             return here
-        return replace(here, modes=replace(modes, active=frozenset(left))).lost()
+        return replace(here, modes=replace(modes, active=frozenset(left))).forget()
 
     def _begin_early(self, why: Reason, here: Arrived) -> None:
         """Note that an interrupt may come in moves before it is switched on.
@@ -402,7 +402,7 @@ class KrlMachine(TaskMachine):
         return EVERY if number is None else number
 
     @cached_property
-    def _switched_on(self) -> set[int]:
+    def _enabled_interrupts(self) -> set[int]:
         """Numbers of the interrupts that some statement switches on."""
         found = set()
         for file, text in self._robot_texts():
@@ -532,7 +532,7 @@ class KrlMachine(TaskMachine):
                 return frozenset([word])
             case said.PathTrigger(action=action):
                 return self._own(file, action, called)
-        changed = changed_by(one, self.task.routines)
+        changed = list_changes(one, self.task.routines)
         if any(_is_modal(target.name) for target in changed):
             return frozenset([MOVES])
         here = Scope(file, self.task.files[file].name, "")
@@ -550,7 +550,7 @@ class KrlMachine(TaskMachine):
 
     def _is_still(self, name: str) -> bool:
         """Return True if a routine without a text is known to be still."""
-        known = name in STILL or name in FUNCTIONS or self.said_still(name)
+        known = name in STILL or name in FUNCTIONS or self.declares_motionless(name)
         listed = name in package_routines() and not self._is_overruled(name)
         return known or listed
 
@@ -572,7 +572,7 @@ def _frame(record: tuple[float, ...] | None) -> KrlFrame:
     return KrlFrame(() if record is None else cell_pose(record))
 
 
-def _halted(here: Arrived, halted: bool | None) -> Arrived:
+def _halt(here: Arrived, halted: bool | None) -> Arrived:
     """Say that the arm stops before it goes on, or that it may (None)."""
     modes = here.modes
     if modes.goes_on:

@@ -11,24 +11,24 @@ import numpy as np
 from postproc.exceptions import ProgramError
 from postproc.files import KRL_PROGRAMS
 from postproc.language.archive import Archive
+from postproc.language.blocks import read_once
 from postproc.language.grammars import line_parser
-from postproc.language.interface import (
+from postproc.language.krl import syntax as said
+from postproc.language.krl.archive import read_archive
+from postproc.language.krl.clones import KrlCloner
+from postproc.language.krl.interpreter import KrlMachine
+from postproc.language.krl.pose_encoding import KRL_DIALECT
+from postproc.language.krl.program import KrlFile, read_krl
+from postproc.language.krl.statements import KrlText
+from postproc.language.krl.symbols import KrlTask
+from postproc.language.krl.to_visits import visits_of
+from postproc.language.language import (
     Cloner,
     JobReading,
     Language,
     Start,
 )
-from postproc.language.krl import syntax as said
-from postproc.language.krl.archive import read_archive
-from postproc.language.krl.clones import KrlCloner
-from postproc.language.krl.collect import visits_of
-from postproc.language.krl.dialect import KRL_DIALECT
-from postproc.language.krl.interpreter import KrlMachine
-from postproc.language.krl.program import KrlFile, read_krl
-from postproc.language.krl.statements import KrlText
-from postproc.language.krl.task import KrlTask
-from postproc.language.outline import read_once
-from postproc.language.rewrite import Skeleton
+from postproc.language.number_edits import Skeleton
 from postproc.language.source import Source
 from postproc.language.visits import never_reached
 
@@ -78,7 +78,7 @@ class Krl(Language):
         machine = KrlMachine.of(KrlTask(files, start.taught), start)
         machine.run()
         visits = visits_of(machine)
-        missed = machine.missed({k: file.moves for k, file in enumerate(files)})
+        missed = machine.find_unreached({k: file.moves for k, file in enumerate(files)})
         told = never_reached(missed, f"DEF {files[0].routines[0].head.name}", "program")
         own = (d for file in files for d in file.diagnostics)
         found = [*own, *machine.diagnostics, *told]
@@ -96,7 +96,7 @@ class Krl(Language):
     ) -> Iterator[str]:
         """Name data by their declarations, and other lines by how they begin."""
         for line in wanted:
-            yield _begun(lines[line - 1]) if line else ""
+            yield _name_begin(lines[line - 1]) if line else ""
 
     def holds_joints(self, line: str) -> bool:
         """Tell whether a line holds joint angles."""
@@ -121,7 +121,7 @@ _MOVED = re.compile(r"\s*([A-Za-z_]\w*)\s+([A-Za-z_$]\w*(?:\[[^\]]*\])?)?")
 _JOINTS = re.compile(r"[^;\"]*?\{\s*(?:(?:E6)?AXIS\s*:\s*)?A1\s", re.I)
 
 
-def _begun(line: bytes) -> str:
+def _name_begin(line: bytes) -> str:
     """Name what a line declares, gives a value to or moves to."""
     text = line.decode("latin-1")
     found = _DECLARED.match(text) or _GIVEN.match(text)

@@ -10,14 +10,10 @@ from typing import Any
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.collect import (
-    FoundGoal,
-    FoundShift,
-    FoundVisit,
-    not_reached,
-)
+from postproc.language.interpreter import Scope
 from postproc.language.krl import syntax as said
-from postproc.language.krl.dialect import (
+from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame
+from postproc.language.krl.pose_encoding import (
     COMPONENTS,
     MEASURED,
     NOT_WRITTEN,
@@ -26,16 +22,20 @@ from postproc.language.krl.dialect import (
     abc_from_rotation,
     rotation_from_abc,
 )
-from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame
 from postproc.language.krl.program import whole
-from postproc.language.krl.task import (
+from postproc.language.krl.symbols import (
     POSITIONS,
     KrlNumber,
     KrlRecord,
     KrlTask,
 )
-from postproc.language.machine import Scope
 from postproc.language.shifts import Shift, ShiftKind
+from postproc.language.to_visits import (
+    FoundGoal,
+    FoundShift,
+    FoundVisit,
+    not_reached,
+)
 from postproc.language.visits import Meaning
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
@@ -225,7 +225,7 @@ class _Goal:
             case said.DataObject(name=name) if name in PRESENT:
                 return self._stay(name)
             case said.DataObject(name=name) if name in BEFORE:
-                return _left(no_target(RUN_TIME), name=name)
+                return _unknown_goal(no_target(RUN_TIME), name=name)
             case said.DataObject(name=name) if name in HOMES:
                 return self._home(operand)
             case said.Operation(operator=":", operands=(first, second)):
@@ -233,7 +233,7 @@ class _Goal:
             case said.KrlAggregate() | said.DataObject():
                 return self._point(operand)
             case _:
-                return _left(AT_RUN_TIME)
+                return _unknown_goal(AT_RUN_TIME)
 
     # Points.
 
@@ -242,7 +242,9 @@ class _Goal:
         name = operand.name if isinstance(operand, said.DataObject) else ""
         found = self.task.value(operand, self.row, self.here)
         if not isinstance(found, KrlRecord) or not found.whole:
-            return _left(self._untold(name) if name else AT_RUN_TIME, name=name)
+            return _unknown_goal(
+                self._explain_unknown(name) if name else AT_RUN_TIME, name=name
+            )
         names = {key for key, _ in found.fields}
         if names & set(AXES):
             goal = self._axes(found)
@@ -251,15 +253,15 @@ class _Goal:
         if not name:
             return goal
         if goal.why.code is Code.PARTIAL_TARGET:  # what data lack may be told elsewhere
-            return _left(PARTIAL, name=name)
-        return self._named(goal, operand)
+            return _unknown_goal(PARTIAL, name=name)
+        return self._describe_point(goal, operand)
 
-    def _untold(self, name: str) -> Reason:
+    def _explain_unknown(self, name: str) -> Reason:
         """Say why a name stands for no known point."""
-        code, text = self.task.untold(name, self.here)
+        code, text = self.task.explain_unknown(name, self.here)
         return Reason(code, f"{name} {text}")
 
-    def _named(self, goal: FoundGoal, operand: said.Operand) -> FoundGoal:
+    def _describe_point(self, goal: FoundGoal, operand: said.Operand) -> FoundGoal:
         """Say what is known of a point beside its numbers."""
         name = operand.name if isinstance(operand, said.DataObject) else ""
         declared = self.task.datum(name, self.here)
@@ -267,10 +269,10 @@ class _Goal:
         return FoundGoal(
             goal.target, goal.values, goal.file, goal.slots, NO_SLOTS,
             name + self._element(operand), goal.aux, goal.why,
-            self._pinned(name, goal), shared,
+            self._explain_pinned(name, goal), shared,
         )  # fmt: skip
 
-    def _pinned(self, name: str, goal: FoundGoal) -> str:
+    def _explain_pinned(self, name: str, goal: FoundGoal) -> str:
         """Say why a point must keep its numbers."""
         if goal.file >= 0 and self.task.files[goal.file].is_system:
             place = self.task.files[goal.file].text.source.name
@@ -291,7 +293,7 @@ class _Goal:
         """Read six joint angles; only PTP goes to them."""
         numbers = _numbers(found, AXES)
         if not self._by_joints:
-            return _left(NOT_BY_JOINTS)
+            return _unknown_goal(NOT_BY_JOINTS)
         if numbers is None:
             return self._partial(found, AXES, Meaning.PARTIAL_JOINTS)
         file, slots = _places(numbers)
@@ -314,9 +316,9 @@ class _Goal:
         own = tuple(one.slot if one.file == file else -1 for one in written)
         aux, why = self._outside(found), self._status(values[6], values[7])
         if self._by_joints and NOT_WRITTEN in values[6:]:
-            return _left(NO_STATUS)
+            return _unknown_goal(NO_STATUS)
         if self._by_joints and why.code is Code.CONFIGURATION_UNKNOWN:
-            return _left(why)
+            return _unknown_goal(why)
         why = why or (NO_REASON if file >= 0 else COMPUTED)
         return FoundGoal(
             Meaning.POSE, tuple(values), file, (*slots, *own), NO_SLOTS, aux=aux,
@@ -336,7 +338,7 @@ class _Goal:
         moves_so = (meaning == Meaning.PARTIAL_JOINTS) == self._by_joints
         alone = not in_block and self.move.via is None and bool(given & {*names})
         if not (moves_so and alone and given <= {*names, *OUTSIDE}):
-            return _left(PARTIAL)
+            return _unknown_goal(PARTIAL)
         values = [found.number(name) for name in names]
         values += [math.nan] * (WIDTH - len(values))
         return FoundGoal(meaning, tuple(values), aux=self._outside(found), why=PARTIAL)
@@ -364,7 +366,7 @@ class _Goal:
         """
         within = self.goals.block(self.row, self.here) is not None
         if within or self.move.via is not None:
-            return _left(no_target(RUN_TIME), name=name)
+            return _unknown_goal(no_target(RUN_TIME), name=name)
         meaning = Meaning.BY if self._by_joints else Meaning.RELATIVE_UFRAME
         why = no_target("it stays where it is")
         return FoundGoal(meaning, (0.0,) * WIDTH, name=name, why=why)
@@ -390,7 +392,7 @@ class _Goal:
         behind = isinstance(first, said.DataObject) and self._is_point(first)
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, said.DataObject):
-            return _left(AT_RUN_TIME)
+            return _unknown_goal(AT_RUN_TIME)
         base, held = self._point(point), self._held(other)
         frames = FrameReader(self.task, self.row, self.here, _NO, _NO)
         shift = frames.frame(other)
@@ -406,7 +408,7 @@ class _Goal:
                 Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
                 name=base.name, why=NO_STATUS, pins=pins, holds=held,
             )  # fmt: skip
-        values, turns = _linked(base.values, shift, behind)
+        values, turns = _link(base.values, shift, behind)
         found = self._shift(base, other, shift, behind)
         turned = turns and found.slots[0] < 0
         pins = base.pins or (f"{base.name} is turned too" if turned else "")
@@ -473,27 +475,27 @@ class _Goal:
         if not isinstance(operand, said.KrlAggregate) or not isinstance(
             found, KrlRecord
         ):
-            return _left(AT_RUN_TIME)
+            return _unknown_goal(AT_RUN_TIME)
         if not found.whole:
-            return _left(AT_RUN_TIME)
+            return _unknown_goal(AT_RUN_TIME)
         names = {key for key, _ in found.fields}
         values = {name: found.number(name) for name in names - {"s", "t"}}
         if self._by_joints and names <= {*AXES, *OUTSIDE}:
             steps = tuple(values.get(name, 0.0) for name in AXES)
-            return self._stepped(Meaning.BY, (*steps, 0.0, 0.0), values)
+            return self._step_goal(Meaning.BY, (*steps, 0.0, 0.0), values)
         place = tuple(values.get(name, 0.0) for name in PLACE[:3])
         turned = any(values.get(name, 0.0) for name in PLACE[3:])
         if self._by_joints or turned or self.move.via is not None:
-            return _left(no_target("a step that is not followed"))
+            return _unknown_goal(no_target("a step that is not followed"))
         tool = "#tool" in self.move.words
         meaning = Meaning.RELATIVE_TOOL if tool else Meaning.RELATIVE_UFRAME
-        return self._stepped(meaning, (*place, *(0.0,) * 5), values)
+        return self._step_goal(meaning, (*place, *(0.0,) * 5), values)
 
-    def _stepped(
+    def _step_goal(
         self, meaning: Meaning, values: tuple[float, ...], given: dict[str, float]
     ) -> FoundGoal:
         if any(given.get(name, 0.0) for name in OUTSIDE):
-            return _left(no_target("it moves an external axis"))
+            return _unknown_goal(no_target("it moves an external axis"))
         why = no_target("it goes on from where the arm is")
         return FoundGoal(meaning, values, why=why)
 
@@ -501,7 +503,7 @@ class _Goal:
 _NO = no_frame(RUN_TIME)
 
 
-def _left(why: Reason, name: str = "") -> FoundGoal:
+def _unknown_goal(why: Reason, name: str = "") -> FoundGoal:
     """Return a destination that nobody knows."""
     return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
 
@@ -528,7 +530,7 @@ def _six_numbers(frame: KrlFrame) -> list[float]:
     return [*(pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist()]
 
 
-def _linked(
+def _link(
     values: Sequence[float], shift: KrlFrame, behind: bool
 ) -> tuple[tuple[float, ...], bool]:
     """Link a point and a frame; tell whether the frame turns.

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from postproc.language.flow import EXIT
+from postproc.language.control_flow import EXIT
 from postproc.language.krl import syntax as said
-from postproc.language.parser import Children, FormParser, Word
+from postproc.language.template_parser import Children, FormParser, Word
 
 # From trees to statements, rule by rule. Every function here is named after a rule of
 # ``grammars/krl.lark`` and takes what its children gave.
@@ -56,15 +56,15 @@ _BUILT_IN = frozenset(
 )
 
 
-def _declared(c: Children) -> said.KrlDeclaration:
+def _build_declaration(c: Children) -> said.KrlDeclaration:
     flags = {_low(x) for x in c if isinstance(x, FlagPart)}
     type_ = next(str(x) for x in c if isinstance(x, TypePart))
     items = tuple(x for x in c if isinstance(x, said.DeclaredItem))
     return said.KrlDeclaration(type_, items, "global" in flags, "const" in flags)
 
 
-def _built_in(c: Children) -> said.SourceStatement:
-    found = _declared(c)
+def _build_builtin(c: Children) -> said.SourceStatement:
+    found = _build_declaration(c)
     return found if found.type in _BUILT_IN else said.NotUnderstood()
 
 
@@ -107,7 +107,7 @@ def _move(c: Children) -> said.KrlMove:
     return said.KrlMove(word, to, via, angle, _blends(c), _settings(c))
 
 
-def _switched(c: Children) -> said.InterruptSwitched:
+def _build_switch(c: Children) -> said.InterruptSwitched:
     number = next((x for x in c if isinstance(x, said.Operand)), None)
     return said.InterruptSwitched(_low(c[0]), number)
 
@@ -129,7 +129,7 @@ def _spline(c: Children) -> said.SplineBlock:
     return said.SplineBlock(_low(c[0]), _blends(c), _settings(c))
 
 
-def _called(make: Callable[[str, tuple[said.Argument, ...]], Any]) -> Any:
+def _build_call(make: Callable[[str, tuple[said.Argument, ...]], Any]) -> Any:
     def build(c: Children) -> Any:
         given = c[1]
         if len(given) == 1 and given[0].value is None:
@@ -160,8 +160,8 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "parameters": lambda c: tuple(c),
     "parameter": lambda c: _tokens(c, "NAME")[0],
     "empty_dimensions": lambda c: None,
-    "declared": _declared,
-    "built_in": _built_in,
+    "declared": _build_declaration,
+    "built_in": _build_builtin,
     "flag": lambda c: FlagPart(c[0]),
     "item": _item,
     "if_then": _branch("if"),
@@ -183,7 +183,7 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "wait": lambda c: said.Waiting(c[0]),
     "speed_part": lambda c: said.SpeedPart(),
     "interrupt_declared": lambda c: said.InterruptDeclared(*c[-3:]),
-    "interrupt_switched": _switched,
+    "interrupt_switched": _build_switch,
     "brake": lambda c: said.InterruptSwitched("brake"),
     "resume": lambda c: said.InterruptSwitched("resume"),
     "trigger": _trigger,
@@ -198,7 +198,7 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "setting": lambda c: said.Assignment(*c),
     "assignment": lambda c: said.Assignment(*c),
     "proceed": lambda c: said.Instruction("on_error_proceed", ()),
-    "instruction": _called(said.Instruction),
+    "instruction": _build_call(said.Instruction),
     "arguments": lambda c: tuple(c),
     "argument": lambda c: said.Argument(c[0] if c else None),
     "infix": _operation,
@@ -206,7 +206,7 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "number": lambda c: c[0],
     "string": lambda c: said.StringLiteral(str(c[0])),
     "enumerated": lambda c: said.EnumValue(_low(c[0])),
-    "function_call": _called(said.FunctionCall),
+    "function_call": _build_call(said.FunctionCall),
     "aggregate": _aggregate,
     "field": _field,
     "reference": lambda c: said.DataObject(_low(c[0]), tuple(c[1:])),

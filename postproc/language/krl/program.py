@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 from postproc.diagnostics import Code
 from postproc.files import base_name, is_submit
-from postproc.language.flow import HeadedRows
+from postproc.language.blocks import BlockWords, Outline
+from postproc.language.control_flow import HeadedRows
 from postproc.language.krl import syntax as said
 from postproc.language.krl.statements import KrlText, read_krl_statements
-from postproc.language.outline import BlockWords, Outline
 from postproc.language.source import Source
 from postproc.language.visits import Diagnostic
 
@@ -142,7 +142,7 @@ class _KrlReader:
             case said.KrlMove():
                 self.moves.append(row)
             case said.NotUnderstood():
-                message = f"{self.text.shown(row)} is not understood"
+                message = f"{self.text.quote(row)} is not understood"
                 self.diagnostics.append(
                     self.text.diagnostic(row, Code.UNKNOWN_STATEMENT, message)
                 )

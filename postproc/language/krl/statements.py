@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from postproc import _native
+from postproc.language.ir import SourceStatement
 from postproc.language.krl.parser import parse_statement
 from postproc.language.source import Source
-from postproc.language.statements import StatementText, read_text
-from postproc.language.syntax import SourceStatement
+from postproc.language.statement_table import StatementText, read_text
 
 KrlText = StatementText[SourceStatement]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from postproc.language.syntax import (
+from postproc.language.ir import (
     Argument,
     Assignment,
     BlockWord,

@@ -5,26 +5,24 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.diagnostics import Code, Reason
-from postproc.language.interface import Record
+from postproc.language.language import Record
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.disturbances import DISTURBING
-from postproc.language.pdl2.effects import (
-    CHANGING,
-    FRAMES,
-    PURE,
-    CallGraph,
-    call_graph_of,
-    changed_arguments,
-)
+from postproc.language.pdl2.abstract_state import Store
 from postproc.language.pdl2.evaluate import (
     FRAME_NAMES,
     bare,
     component_index,
-    copied,
+    copy_parts,
     fill,
     invalidate_key,
-    owned,
     parts_of,
+    set_owner,
+)
+from postproc.language.pdl2.external_routines import (
+    TRACKING,
+    RoutineEffect,
+    effect_of,
+    report_unknown_routine,
 )
 from postproc.language.pdl2.job import Place
 from postproc.language.pdl2.machine import (
@@ -36,13 +34,15 @@ from postproc.language.pdl2.machine import (
     let_others_run,
 )
 from postproc.language.pdl2.moves import move
-from postproc.language.pdl2.routines import (
-    TRACKING,
-    RoutineEffect,
-    effect_of,
-    report_unknown_routine,
+from postproc.language.pdl2.side_effects import (
+    CHANGING,
+    FRAMES,
+    PURE,
+    CallGraph,
+    call_graph_of,
+    list_changed_arguments,
 )
-from postproc.language.pdl2.store import Store
+from postproc.language.pdl2.untracked_settings import DISTURBING
 from postproc.language.pdl2.values import (
     Alias,
     Location,
@@ -70,7 +70,7 @@ def summarise_call(
     arguments: tuple[ast.Expression | None, ...] = (),
 ) -> None:
     """Take in what a call may do without following it; list the moves it may make."""
-    for argument in changed_arguments(arguments):
+    for argument in list_changed_arguments(arguments):
         here.world.pin(here.value(argument), f"{name} may move to it")
         invalidate(here, argument, f"{name} may change it")
     for part in reach.parts:
@@ -130,15 +130,15 @@ def calls_in_expressions(
     machine: Machine, here: Execution, statement: ast.Statement
 ) -> None:
     """Let the function calls inside of a statement have their effects."""
-    for call in machine.called(here.place, statement):
+    for call in machine.find_calls(here.place, statement):
         inside = here.world.find_routine(here.place.program, call.name)
         if inside is None:
             opaque_call(here, call.name, call.arguments)
         else:
-            _summarised(machine, here, inside, call.arguments)
+            _apply_summary(machine, here, inside, call.arguments)
 
 
-def _summarised(
+def _apply_summary(
     machine: Machine,
     here: Execution,
     inside: Place,
@@ -215,7 +215,7 @@ def opaque_call(
         here.world.pin(here.value(given), why)
     named = frozenset(r.name for r in map(bare, arguments) if r is not None)
     escape_names(here, named, why)
-    for argument in changed_arguments(arguments):
+    for argument in list_changed_arguments(arguments):
         invalidate(here, argument, f"{name} may change it (arguments go by reference)")
     if built_in:
         return
@@ -312,9 +312,9 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
     if statement.operator != ":=":
         new = ast.Binary(statement.operator[0], statement.target, statement.value)
     if _assigns_component(here, statement.target):
-        _assign_component(here, statement.target, here.written(new))
+        _assign_component(here, statement.target, here.read_number(new))
         return
-    if not statement.target.name.startswith("$") and copied(
+    if not statement.target.name.startswith("$") and copy_parts(
         here, new, statement.target
     ):
         return
@@ -335,7 +335,7 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
         return
     held = _new_value(here, statement, target, value)
     if isinstance(held, Position):
-        held = owned(here, statement.target.name, target.key, held)
+        held = set_owner(here, statement.target.name, target.key, held)
     if isinstance(held, Nothing) and target.component == ():
         here.store.forget(target.key, Nothing(held.why, code=held.code))
     else:
@@ -366,7 +366,7 @@ def _assign_component(
     if not isinstance(held, Position):
         held = _blank(here, reference.name, held)
     held = held.with_component(component_index(target), new)
-    here.store.write(target.key, owned(here, reference.name, target.key, held))
+    here.store.write(target.key, set_owner(here, reference.name, target.key, held))
 
 
 def _setting(here: Execution, reference: ast.Reference, value: Value) -> None:

@@ -9,22 +9,22 @@ from typing import cast
 
 import numpy as np
 
-from postproc.language.interface import Cloner, NamedPoint
-from postproc.language.lines import read_lines
+from postproc.language.language import Cloner, NamedPoint
+from postproc.language.lexer import scan_lines
+from postproc.language.logical_lines import read_lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.entries import is_nested, last_head
 from postproc.language.pdl2.parser import parse_value_form
 from postproc.language.pdl2.program import Body, Program, Variable
-from postproc.language.scan import scan_lines
-from postproc.language.shapes import parse_shapes
 from postproc.language.source import (
     CloneError,
     Edit,
     Source,
     Span,
     check_length,
-    inserted_after,
+    insert_after,
 )
+from postproc.language.templates import parse_shapes
 from postproc.language.visits import Literals
 
 # The variable that a move names as where it goes, as far as it can be cloned.
@@ -60,7 +60,7 @@ class CloneTarget:
         return self.variable.name
 
 
-def named_at(
+def find_clone_target(
     programs: Sequence[Program], file: int, line: int, via: bool, name: str
 ) -> CloneTarget:
     """Find the variable that a move goes to, as far as it can be cloned.
@@ -77,7 +77,7 @@ def named_at(
     """
     program = programs[file]
     row = int(np.searchsorted(program.lines.line, line))
-    move = _unwrapped(program.statement(row))
+    move = _unwrap(program.statement(row))
     where = None
     if isinstance(move, ast.Move) and move.how == "TO":
         where = move.via if via else move.where[0]
@@ -102,7 +102,7 @@ def named_at(
     return CloneTarget(file, body.name if own else "", variable, span)
 
 
-def _unwrapped(statement: ast.Statement) -> ast.Statement | None:
+def _unwrap(statement: ast.Statement) -> ast.Statement | None:
     inner = (ast.Label, ast.Case, ast.Else, ast.When)
     return statement.then if isinstance(statement, inner) else statement
 
@@ -152,7 +152,7 @@ def code_of(program: Program, line: int) -> str:
 _XPORT = re.compile(r"\bXport\b(?P<other>\s+from\b)?", re.I)
 
 
-def copied_entry(
+def copy_entry(
     values: Source, line: int, old: str, name: str, starts: list[int]
 ) -> Edit:
     """Enter the value of a variable once more, behind its entry.
@@ -190,7 +190,7 @@ def copied_entry(
     title, rest = re.split(r"(?=[\r\n]|\Z)", renamed, maxsplit=1)
     if renamed == text:
         raise CloneError(f"the entry of {old} in {values.name} is not understood")
-    return inserted_after(values, last, _own(title, old) + rest)
+    return insert_after(values, last, _own(title, old) + rest)
 
 
 def _own(title: str, old: str) -> str:
@@ -263,17 +263,17 @@ def clone(
     first = named[0]
     program, variable = programs[first.file], first.variable
     at = int(program.lines.line[variable.row])
-    found = [(first.file, _declared(program, at, variable.name, name))]
+    found = [(first.file, _declare_clone(program, at, variable.name, name))]
     for row in rows:
         file, line = int(literals.file[row]), int(literals.line[row])
         starts = literals.places[row : row + 1].start[0].tolist()
         if file == len(programs) and values is not None and first.file == 0:
-            entry = copied_entry(values, line, variable.name, name, starts)
+            entry = copy_entry(values, line, variable.name, name, starts)
             found.append((file, entry))
         elif file != first.file:
             raise CloneError("its value stands in another file")
         elif line != at:
-            found.append((file, _assigned(program, first, line, name, starts)))
+            found.append((file, _assign_clone(program, first, line, name, starts)))
     for one in named:
         source = program.lines.source
         length = len(source.line_text(source.line_of(one.span.start)))
@@ -291,19 +291,19 @@ def _means(program: Program, row: int, named: CloneTarget) -> bool:
     return not hidden
 
 
-def _declared(program: Program, line: int, old: str, name: str) -> Edit:
+def _declare_clone(program: Program, line: int, old: str, name: str) -> Edit:
     """Declare the new name in a line behind the old one's."""
     code = code_of(program, line).rstrip()
     head = re.match(r"(\s*)(VAR\b\s*)?([\w\s,]*?)(\s*:.*)\Z", code, re.I)
     if head is None or old.lower() not in re.split(r"[\s,]+", head[3].lower()):
         raise CloneError("its declaration is not understood")
     indent = head[1] + ("  " if head[2] else "")
-    return inserted_after(
+    return insert_after(
         program.lines.source, line, indent + name + _EXPORTED.sub("", head[4])
     )
 
 
-def _assigned(
+def _assign_clone(
     program: Program, named: CloneTarget, line: int, name: str, starts: list[int]
 ) -> Edit:
     """Assign a value to the new name behind the line that gives it to the old one."""
@@ -325,9 +325,7 @@ def _assigned(
     head = re.match(rf"(\s*){re.escape(old)}\b", code, re.I)
     if head is None:
         raise CloneError(f"line {line} is not understood")
-    return inserted_after(
-        program.lines.source, line, head[1] + name + code[head.end() :]
-    )
+    return insert_after(program.lines.source, line, head[1] + name + code[head.end() :])
 
 
 # All of it behind the interface of languages.
@@ -349,9 +347,9 @@ class Pdl2Cloner(Cloner):
 
     def target(self, file: int, line: int, via: bool, name: str) -> CloneTarget:
         """Find the variable that a move goes to, as far as it can be cloned."""
-        return named_at(self.programs, file, line, via, name)
+        return find_clone_target(self.programs, file, line, via, name)
 
-    def declared(self, named: NamedPoint) -> int:
+    def find_declaration(self, named: NamedPoint) -> int:
         """Return the 1-based line that declares a variable."""
         target = cast(CloneTarget, named)
         return int(self.programs[target.file].lines.line[target.variable.row])

@@ -11,17 +11,21 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Indices, Interned, Ints, chunks, is_one_value, slim, spans
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.marks import MEASURE
-from postproc.language.names import NameColumn
+from postproc.language.comment_directives import MEASURE
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.dialect import COMMENTS
-from postproc.language.pdl2.disturbances import disturbance, stated_load, weaves
+from postproc.language.pdl2.abstract_state import Settings
 from postproc.language.pdl2.job import base_variable
 from postproc.language.pdl2.machine import WRITTEN, Goal, Machine, MoveForm, MoveRun
+from postproc.language.pdl2.pose_encoding import COMMENTS
 from postproc.language.pdl2.program import Program
-from postproc.language.pdl2.store import Settings
+from postproc.language.pdl2.untracked_settings import (
+    disturbance,
+    load_of_settings,
+    weaves,
+)
 from postproc.language.pdl2.values import Nothing, Position, Value
-from postproc.language.shapes import numbered_in_order
+from postproc.language.symbol_column import NameColumn
+from postproc.language.templates import number_in_order
 from postproc.language.visits import (
     Blend,
     Meaning,
@@ -61,7 +65,7 @@ class SettingColumns:
         self._rows = Interned[int]()
         self._problems: list[tuple[Reason, Reason]] = []
         self._frames = Interned[tuple[tuple[float, ...], bool]]()
-        self._loads = Interned([stated_load({})])
+        self._loads = Interned([load_of_settings({})])
         self._table: dict[str, list[Any]] = {}
 
     def index(self, settings: Settings) -> int:
@@ -71,7 +75,7 @@ class SettingColumns:
             self._kept.append(settings)  # keeps its id from being used again
             for name, value in _row(settings, self._frame).items():
                 self._table.setdefault(name, []).append(value)
-            load = self._loads[stated_load(settings)]
+            load = self._loads[load_of_settings(settings)]
             self._table.setdefault("load", []).append(load)
             self._table.setdefault("weaves", []).append(weaves(settings))
             found = disturbance(settings)
@@ -80,7 +84,7 @@ class SettingColumns:
             self._problems.append((pose, found or _unknown(settings, tool)))
         return row
 
-    def kept(self, row: int) -> Settings:
+    def get_settings(self, row: int) -> Settings:
         """Return the state of the settings of a row."""
         return self._kept[row]
 
@@ -280,7 +284,9 @@ class ProgramMoves:
         self.run: Indices = np.repeat(np.arange(len(runs), dtype=np.int32), sizes)
         self.point: Ints = _together([run.point for run in runs])
         numbers = Interned[MoveForm]()
-        self.form: Indices = np.concatenate([_numbered(run, numbers) for run in runs])
+        self.form: Indices = np.concatenate(
+            [_number_forms(run, numbers) for run in runs]
+        )
         self.forms = [*numbers]
         self.first = np.zeros(len(self.row), dtype=np.int32)
         self.last = np.zeros(len(self.row), dtype=np.int32)
@@ -289,7 +295,7 @@ class ProgramMoves:
         """Return what is said of every move's form, (n,)."""
         return np.array([said(form) for form in self.forms])[self.form]
 
-    def evaluated(self) -> Iterator[tuple[int, MoveRun, Goal]]:
+    def list_evaluated(self) -> Iterator[tuple[int, MoveRun, Goal]]:
         """Yield the moves whose goals were evaluated: index, run, goal."""
         begin = 0
         for _, run in self.runs:
@@ -303,7 +309,7 @@ def _together(columns: Sequence[Ints]) -> Ints:
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
-def _numbered(run: MoveRun, numbers: Interned[MoveForm]) -> Indices:
+def _number_forms(run: MoveRun, numbers: Interned[MoveForm]) -> Indices:
     """Return the numbers of the forms of a run's moves."""
     if len(run.forms) == 1:
         (form,) = run.forms.values()
@@ -334,10 +340,10 @@ class Collector:
             moves = ProgramMoves(mine[0][1].place.program, mine)
             self._place(moves)
             self._settings(moves)
-            self._written(moves)
+            self._fill_written(moves)
             self._names(moves)
             self._points(moves)
-            self._evaluated(moves)
+            self._fill_evaluated(moves)
             self._reasons(moves)
             self._marks(moves)
 
@@ -357,10 +363,12 @@ class Collector:
         for number, form in enumerate(moves.forms):
             if form.overrides:
                 mine = np.flatnonzero(moves.form == number)
-                setting[mine] = self._overridden(moves, mine, setting[mine])
+                setting[mine] = self._override_settings(moves, mine, setting[mine])
         self.columns.setting[moves.visit] = setting
 
-    def _overridden(self, moves: ProgramMoves, mine: Ints, setting: Ints) -> Ints:
+    def _override_settings(
+        self, moves: ProgramMoves, mine: Ints, setting: Ints
+    ) -> Ints:
         """Return the settings at moves of one form whose WITH sets numbers, (m,)."""
         lines, overrides = (
             moves.program.lines,
@@ -372,12 +380,14 @@ class Collector:
         both = np.column_stack([setting, numbers])
         distinct, which = np.unique(both, axis=0, return_inverse=True)
         index = [
-            self.settings.index({**self.settings.kept(int(base)), **_set(names, row)})
+            self.settings.index(
+                {**self.settings.get_settings(int(base)), **_set(names, row)}
+            )
             for base, *row in distinct.tolist()
         ]
         return np.array(index, dtype=np.int64)[which.ravel()]
 
-    def _written(self, moves: ProgramMoves) -> None:
+    def _fill_written(self, moves: ProgramMoves) -> None:
         """Fill moves to six numbers that stand in them."""
         c, lines = self.columns, moves.program.lines
         base = self.machine.world.slot_base[lines.source.name]
@@ -415,7 +425,9 @@ class Collector:
         if points is not None and len(at):
             names = points.entries.name.take(moves.point[at])
         told = {
-            k: goal.position.name for k, _, goal in moves.evaluated() if goal.position
+            k: goal.position.name
+            for k, _, goal in moves.list_evaluated()
+            if goal.position
         }
         if told:
             at, names = _between(at, names, told)
@@ -447,9 +459,9 @@ class Collector:
                     c.aux[visit[mine], axis - 1] = entries.aux[rows[mine], column]
             moves.last[some[mine]] = self.reasons[self.aux_problem(layout.axes)]
 
-    def _evaluated(self, moves: ProgramMoves) -> None:
+    def _fill_evaluated(self, moves: ProgramMoves) -> None:
         """Fill moves whose goals were evaluated."""
-        c, found = self.columns, [*moves.evaluated()]
+        c, found = self.columns, [*moves.list_evaluated()]
         if not found:
             return
         index = np.array([k for k, _, _ in found])
@@ -543,7 +555,7 @@ class Collector:
 
     def _marks(self, moves: ProgramMoves) -> None:
         """Enter the ids of moves that are measured."""
-        rows, ids = _measured(moves.program)
+        rows, ids = _find_measured(moves.program)
         if not ids:
             return
         ends = np.flatnonzero(np.isin(moves.row, rows) & ~self.columns.via[moves.visit])
@@ -565,7 +577,7 @@ def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:
             code = np.unique(code, return_inverse=True)[1]
             codes = len(code)
         code, codes = code * size + kind, codes * size
-    return numbered_in_order(code)
+    return number_in_order(code)
 
 
 def _in_order(numbers: Ints) -> list[int]:
@@ -596,7 +608,7 @@ def _aux_axes(position: Position) -> tuple[int, ...] | None:
     return None if position.aux is None else tuple(axis for axis, _ in position.aux)
 
 
-def _measured(program: Program) -> tuple[Ints, list[str]]:
+def _find_measured(program: Program) -> tuple[Ints, list[str]]:
     """Return the rows of moves with a ``-- MEASURE`` comment, and its ids."""
     lines = program.lines
     marks = [*COMMENTS.marks(lines.source, MEASURE)]

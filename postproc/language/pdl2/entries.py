@@ -10,10 +10,10 @@ from typing import Self
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Indices, Ints, chunks, slim
-from postproc.language.lines import Lines
-from postproc.language.names import NameColumn
+from postproc.language.logical_lines import Lines
 from postproc.language.pdl2.parser import EntryPart
-from postproc.language.shapes import ParsedShapes, alike, name_index, numbered_in_order
+from postproc.language.symbol_column import NameColumn
+from postproc.language.templates import ParsedShapes, alike, name_index, number_in_order
 
 # The entries of a variable file as columns; single ones are made when asked for.
 
@@ -194,16 +194,16 @@ class Entries(Mapping[str, Entry]):
             self.name[row],
             layout.kind,
             int(self.line[row]),
-            _known(self.numbers[row]),
+            _numbers_or_none(self.numbers[row]),
             tuple(self.slots[row].tolist()),
-            tuple(zip(layout.axes, _known(self.aux[row]), strict=False)),
+            tuple(zip(layout.axes, _numbers_or_none(self.aux[row]), strict=False)),
             layout.config,
             layout.shared,
             int(self.arm[row]),
         )
 
 
-def _known(values: Floats) -> tuple[float | None, ...]:
+def _numbers_or_none(values: Floats) -> tuple[float | None, ...]:
     return tuple(None if value != value else value for value in values.tolist())
 
 
@@ -425,7 +425,7 @@ def read_records(
         tuple(c.layouts),
         c.numbers,
         c.slots,
-        _stacked(c.aux, k),
+        _stack(c.aux, k),
         slim(c.arm),
     )
 
@@ -436,7 +436,7 @@ def _alike(form: Ints, records: Records) -> Iterator[Ints]:
         return iter(())
     own = alike(form, records.first, records.closed)
     heads = form[records.head]
-    kind, first = numbered_in_order(own * (int(heads.max()) + 1) + heads)
+    kind, first = number_in_order(own * (int(heads.max()) + 1) + heads)
     ends = np.cumsum(np.bincount(kind, minlength=len(first)))
     return iter(np.split(np.argsort(kind, kind="stable"), ends[:-1]))
 
@@ -481,7 +481,7 @@ def _whole(values: Floats) -> Ints:
     return np.trunc(np.where(sound, values, 0.0)).astype(np.int64)
 
 
-def _stacked(parts: Sequence[tuple[Ints, Floats]], k: int) -> Floats:
+def _stack(parts: Sequence[tuple[Ints, Floats]], k: int) -> Floats:
     most = max((values.shape[1] for _, values in parts), default=0)
     stacked = np.full((k, most), np.nan)
     for rows, values in parts:

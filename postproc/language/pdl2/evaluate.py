@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.abstract_state import Store
 from postproc.language.pdl2.job import Place, World, base_variable
-from postproc.language.pdl2.store import Store
 from postproc.language.pdl2.values import (
     COMPONENTS,
     FARTHEST,
@@ -19,13 +19,13 @@ from postproc.language.pdl2.values import (
     SourceNumber,
     Value,
     Vector,
+    add_unknown,
     binary,
     function,
-    inverted,
+    invert_frame,
     part_of,
-    shifted,
+    shift_position,
     unary,
-    unsure,
 )
 
 # Evaluate expressions as far as the program text tells.
@@ -192,7 +192,7 @@ class ProgramPoint:
             return Nothing("its index is known only at run time")
         if self._unsteady(target):
             changed = Nothing("a condition handler changes it")
-            return unsure(changed, self.store.read(target.key))
+            return add_unknown(changed, self.store.read(target.key))
         held = self.store.read(target.key)
         if target.component == ():
             return held
@@ -256,26 +256,26 @@ class ProgramPoint:
         return replace(self._components(items[:6]), joints=True, aux=aux)
 
     def _components(self, items: tuple[ast.Expression | None, ...]) -> Position:
-        parts = [self.written(item) for item in items]
+        parts = [self.read_number(item) for item in items]
         return Position(
             numbers=tuple(part.number for part in parts),
             slots=tuple(part.slot for part in parts),
             along=frozenset(at for at, part in enumerate(parts) if part.along),
         )
 
-    def written(self, expression: ast.Expression | None) -> SourceNumber:
+    def read_number(self, expression: ast.Expression | None) -> SourceNumber:
         """Return a number, and where in the text it is written or comes from."""
         match expression:
             case ast.Number(slot):
                 return SourceNumber(self.real(expression), self.global_slot(slot))
             case ast.Unary("()", operand):
-                return self.written(operand)
+                return self.read_number(operand)
             case ast.Reference():
                 return self._part(expression) or SourceNumber(self.real(expression))
             case ast.Binary("+" | "-" as sign, ast.Reference() as left, right):
                 part = self._part(left)
                 if part is not None:
-                    return _moved(part, self.real(right), sign)
+                    return _add_shift(part, self.real(right), sign)
         return SourceNumber(self.real(expression))
 
     def _part(self, reference: ast.Reference) -> SourceNumber | None:
@@ -308,9 +308,9 @@ class ProgramPoint:
                 x, y, z = (self.real(a) for a in arguments)
                 return Vector((x, y, z))
             case "pos_shift", [Position() as p, Vector() as by]:
-                return shifted(p, by)
+                return shift_position(p, by)
             case "pos_inv", [Position() as p]:
-                return inverted(p)
+                return invert_frame(p)
             case (
                 ("abs" | "sqrt" | "sin" | "cos" | "tan" | "round" | "trunc"),
                 [float(x)],
@@ -344,7 +344,7 @@ def component_index(target: Location) -> int:
     return -1
 
 
-def _moved(part: SourceNumber, by: float | None, sign: str) -> SourceNumber:
+def _add_shift(part: SourceNumber, by: float | None, sign: str) -> SourceNumber:
     if part.number is None or by is None or abs(by) > FARTHEST:
         return replace(part, number=None)
     return replace(part, number=part.number + (by if sign == "+" else -by))
@@ -357,7 +357,9 @@ SINGLE = frozenset(
 )
 
 
-def copied(here: ProgramPoint, value: ast.Expression, target: ast.Reference) -> bool:
+def copy_parts(
+    here: ProgramPoint, value: ast.Expression, target: ast.Reference
+) -> bool:
     """Let a variable hold the parts of another one; tell whether it has parts."""
     origin = bare(value)
     if origin is None or not _may_have_parts(here, origin):
@@ -433,17 +435,17 @@ def fill(
     here.store.forget(key, Nothing(why))
     for suffix, value in parts.items():
         if isinstance(value, Position):
-            value = owned(here, name, key + suffix, value)
+            value = set_owner(here, name, key + suffix, value)
         if isinstance(value, Nothing):
-            value = unsure(value, here.store.read(key + suffix))
+            value = add_unknown(value, here.store.read(key + suffix))
         here.store.write(key + suffix, value)
 
 
-def owned(here: ProgramPoint, name: str, key: str, value: Position) -> Position:
+def set_owner(here: ProgramPoint, name: str, key: str, value: Position) -> Position:
     """Say which variable a literal is the value of."""
-    declared = here.world.declared(here.place, name)
+    declared = here.world.find_declaration(here.place, name)
     shared = value.shared or bool(declared and declared.exported)
     taught = value.taught or bool(declared and declared.taught)
-    owner = value.name or here.world.written(key)
+    owner = value.name or here.world.spell(key)
     here.world.hold(key, value)
     return replace(value, name=owner, shared=shared, taught=taught)

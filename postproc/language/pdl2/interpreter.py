@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnostics import Code, Reason
-from postproc.language.interface import Start
-from postproc.language.names import NameColumn
+from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.abstract_state import Store, root_of
+from postproc.language.pdl2.call_context import HANDLED, Context
 from postproc.language.pdl2.calls import (
     assign,
     call_statement,
@@ -21,18 +22,13 @@ from postproc.language.pdl2.calls import (
     frame_value,
     list_moves,
 )
-from postproc.language.pdl2.collect import collect
-from postproc.language.pdl2.context import HANDLED, Context
-from postproc.language.pdl2.effects import (
-    CallGraph,
-    changed_arguments,
-    is_harmless,
-    live_rows,
-    rows_effects,
-    words_in,
-)
 from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
 from postproc.language.pdl2.evaluate import ProgramPoint
+from postproc.language.pdl2.exported_variables import (
+    IMPORTED,
+    changing_variables,
+    find_imported_points,
+)
 from postproc.language.pdl2.job import FilePoints, Place, World, base_variable
 from postproc.language.pdl2.machine import (
     MAX_ROWS,
@@ -48,15 +44,18 @@ from postproc.language.pdl2.machine import (
     let_others_run,
     single,
 )
+from postproc.language.pdl2.move_blocks import MoveBlocks
 from postproc.language.pdl2.moves import move
-from postproc.language.pdl2.program import Program, Variable, Variables, recovered
-from postproc.language.pdl2.sharing import (
-    IMPORTED,
-    changing_variables,
-    imported_points,
+from postproc.language.pdl2.program import Program, Variable, Variables, recover_block
+from postproc.language.pdl2.side_effects import (
+    CallGraph,
+    is_harmless,
+    list_changed_arguments,
+    live_rows,
+    rows_effects,
+    words_in,
 )
-from postproc.language.pdl2.store import Store, root_of
-from postproc.language.pdl2.stretches import MoveBlocks
+from postproc.language.pdl2.to_visits import collect
 from postproc.language.pdl2.values import (
     Nothing,
     Position,
@@ -66,6 +65,7 @@ from postproc.language.pdl2.values import (
 )
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
+from postproc.language.symbol_column import NameColumn
 from postproc.language.visits import (
     ELSEWHERE,
     START,
@@ -93,7 +93,7 @@ def start_loop(machine: Machine, here: Execution, statement: ast.For) -> None:
         machine.go_on(here.context, end + 1, here.store)
         return
     loop = (here.context, row)
-    if rounds is not None and _unrolled(machine, here, statement, rounds, end):
+    if rounds is not None and _unroll(machine, here, statement, rounds, end):
         plan = (float(start), float(by), rounds)  # type: ignore[arg-type]
         if machine.ranges.setdefault(loop, plan) == plan:
             _round(machine, here, here.context, row, 0)
@@ -105,7 +105,7 @@ def start_loop(machine: Machine, here: Execution, statement: ast.For) -> None:
     machine.push(here.context, row + 1, here.store)
 
 
-def _unrolled(
+def _unroll(
     machine: Machine, here: Execution, statement: ast.For, rounds: int, end: int
 ) -> bool:
     """Tell whether a loop is followed round by round."""
@@ -143,7 +143,7 @@ def _round(
     """Start a round of a constant loop."""
     first, by, _ = machine.ranges[(context, row)]
     program = here.place.program
-    statement = recovered(program.statement(row))
+    statement = recover_block(program.statement(row))
     if isinstance(statement, ast.Label) and statement.then is not None:
         statement = statement.then
     inner = context.within(machine.position(program, row), number)
@@ -158,7 +158,7 @@ def end_round(machine: Machine, here: Execution) -> None:
     """Go into the next round, out of the loop, or both where that is not known."""
     row = here.place.body.blocks.opener[here.row]
     at = machine.position(here.place.program, row)
-    statement = recovered(here.place.program.statement(row))
+    statement = recover_block(here.place.program.statement(row))
     if isinstance(statement, ast.Label) and statement.then is not None:
         statement = statement.then
     name = statement.name if isinstance(statement, ast.For) else ""
@@ -188,7 +188,7 @@ _OTHERS_RUN = (
 def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
     """Run one statement; tell whether the next row follows."""
     text = statement.text if isinstance(statement, ast.Unknown) else ""
-    statement = recovered(statement)
+    statement = recover_block(statement)
     if machine.cycle_left:
         left = here.store.copy()
         left.last = frozenset({ELSEWHERE})
@@ -217,7 +217,7 @@ def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
             for operand in operands:
                 here.world.pin(here.value(operand), "the program writes it out")
         case ast.Transfer(word, operands):
-            for operand in changed_arguments(operands):
+            for operand in list_changed_arguments(operands):
                 invalidate(here, operand, f"{word} changes it")
         case ast.Unknown():
             _unknown(machine, here, statement)
@@ -392,9 +392,9 @@ def run_broken(machine: Machine, here: Execution) -> None:
 def fill_initial(world: World) -> None:
     """Enter declared initial values, constants and the variable file's values."""
     world.changing = changing_variables(world)
-    world.imported = imported_points(world)
+    world.imported = find_imported_points(world)
     for place, seen in world.declarations():
-        _declared(world, place, seen)
+        _enter_declarations(world, place, seen)
     if world.variables is not None and world.main.main is not None:
         place = Place(world.main, world.main.main)
         _enter_all(world, place, world.variables)
@@ -440,7 +440,7 @@ def _some(names: list[str]) -> str:
     return ", ".join(names[:10]) + rest
 
 
-def _declared(world: World, place: Place, seen: Variables) -> None:
+def _enter_declarations(world: World, place: Place, seen: Variables) -> None:
     """Enter the initial values of declarations, one by one: most have none."""
     store = Store(world.initial.find)
     for variable in (*_with_value(seen), *_with_value(place.body.variables)):
@@ -474,12 +474,12 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
     known = np.array(places, dtype=bool)[entries.layout]
     known &= np.isfinite(entries.numbers).all(axis=1)
     known &= np.isin(entries.arm, (0, world.arm))
-    known[_declared_for_other(world, place.program, entries)] = False
+    known[_list_other_arm_rows(world, place.program, entries)] = False
     shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
     shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
     named = entries.row.rows
     own, other = known.copy(), {}
-    for row in _told_by_declaration(place.program, entries):
+    for row in _list_declared_rows(place.program, entries):
         name = entries.name[row].lower()
         root = root_of(name)
         declared = place.program.variables[root]
@@ -504,7 +504,7 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
     world.initial.points = FilePoints(prefix, own, other, entries, base, shared, taught)
 
 
-def _told_by_declaration(program: Program, entries: Entries) -> list[int]:
+def _list_declared_rows(program: Program, entries: Entries) -> list[int]:
     """List the rows of variables that are exported, or marked as taught."""
     marked = {*program.variables.which(lambda v: v.taught or bool(v.exported))}
     if not marked:
@@ -512,7 +512,7 @@ def _told_by_declaration(program: Program, entries: Entries) -> list[int]:
     return [row for name, row in entries.row.items() if root_of(name) in marked]
 
 
-def _declared_for_other(world: World, program: Program, entries: Entries) -> list[int]:
+def _list_other_arm_rows(world: World, program: Program, entries: Entries) -> list[int]:
     """List the rows of variables that are declared for another arm."""
     other = {*program.variables.which(lambda v: v.arm not in (0, world.arm))}
     if not other:
@@ -583,20 +583,20 @@ def resolve(
     """
     world = World(program, dict(others or {}), start or Start(), variables)
     fill_initial(world)
-    machine = _followed(world)
+    machine = _follow(world)
     if machine.exhausted:
         world.report_once(
             program, 0, Code.TOO_COMPLEX, "", "the program has too many ways, or "
             f"calls, to be followed to the end (more than {MAX_STEPS} steps): nothing "
             "in it is compensated",
         )  # fmt: skip
-        machine = _listed(world)
+        machine = _list_moves(world)
     world.pin_loose()
     world.settle()
     return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
 
 
-def _followed(world: World) -> Machine:
+def _follow(world: World) -> Machine:
     """Follow every way from the start."""
     machine = Machine(world)
     stretches = MoveBlocks(machine)
@@ -606,7 +606,7 @@ def _followed(world: World) -> Machine:
     return machine
 
 
-def _listed(world: World) -> Machine:
+def _list_moves(world: World) -> Machine:
     """List every move of a job that is too complex to be followed, once."""
     machine = Machine(world, exhausted=True)
     for place, _ in world.declarations():

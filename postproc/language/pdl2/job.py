@@ -9,18 +9,18 @@ from itertools import chain
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints, give_back
+from postproc.arrays import Bools, Ints, release_memory
 from postproc.diagnostics import Code
 from postproc.files import base_name
-from postproc.language.interface import Start
-from postproc.language.names import NameColumn
+from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.dialect import COMMENTS
+from postproc.language.pdl2.abstract_state import root_of, wholes
 from postproc.language.pdl2.entries import Entries
+from postproc.language.pdl2.pose_encoding import COMMENTS
 from postproc.language.pdl2.program import Body, Program, Variable, Variables
-from postproc.language.pdl2.store import root_of, wholes
 from postproc.language.pdl2.values import Nothing, Position, Value
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
+from postproc.language.symbol_column import NameColumn
 from postproc.language.visits import Diagnostic
 
 # What variables hold when a program starts, by key.
@@ -202,7 +202,7 @@ class World:
             self.files.append(program.lines.source.name)
             base += len(program.lines.numbers)
             source = program.lines.source
-            self.taught_lines[source.name] = COMMENTS.taught(source)
+            self.taught_lines[source.name] = COMMENTS.list_taught(source)
             self.diagnostics |= dict.fromkeys(program.diagnostics)
         if self.variables is not None:
             self.slot_base[self.variables.source.name] = base
@@ -219,7 +219,7 @@ class World:
             program.variables.settle()
         if self.variables is not None:
             self.variables.entries.row.names.settle()
-        give_back(sum(len(program.lines) for program in self.programs()))
+        release_memory(sum(len(program.lines) for program in self.programs()))
 
     def programs(self) -> list[Program]:
         """Return the programs, the main one first, each once."""
@@ -281,7 +281,7 @@ class World:
             for slots in self.held.get(root, ()):
                 self.pin(Position(slots=slots), why)
 
-    def declared(self, place: Place, name: str) -> Variable | None:
+    def find_declaration(self, place: Place, name: str) -> Variable | None:
         """Return the declaration that a name means."""
         return place.body.variables.get(name) or place.program.variables.get(name)
 
@@ -314,7 +314,7 @@ class World:
         found: dict[str, str] = {}
         for place, seen in self.declarations():
             own = [variable.name for variable in place.body.variables.values()]
-            for name in (*seen.written(), *own):
+            for name in (*seen.list_names(), *own):
                 found.setdefault(self.root(place, name.lower()), name)
         if self.variables is not None and self.main.main is not None:
             place, entries = Place(self.main, self.main.main), self.variables.entries
@@ -325,7 +325,7 @@ class World:
                     found.setdefault(key, entries.name[row])
         return found
 
-    def written(self, key: str) -> str:
+    def spell(self, key: str) -> str:
         """Return how a variable or element is written."""
         if key in self.spelling:
             return self.spelling[key]
@@ -338,14 +338,14 @@ class World:
         for parameter in place.body.parameters:
             if parameter.name == name:
                 return parameter.type
-        declared = self.declared(place, name)
+        declared = self.find_declaration(place, name)
         return declared.type if declared else None
 
     def other_arm(self, place: Place, name: str) -> int:
         """Return the arm whose points a variable holds, 0 where it is ours."""
         arm = place.body.arms.get(name, 0)
         if not arm:
-            declared = self.declared(place, name)
+            declared = self.find_declaration(place, name)
             arm = declared.arm if declared else 0
         return 0 if arm == self.arm else arm
 

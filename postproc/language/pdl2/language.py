@@ -8,27 +8,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.arrays import give_back
+from postproc.arrays import release_memory
 from postproc.exceptions import ProgramError
 from postproc.files import base_name, is_variables
 from postproc.language.grammars import line_parser
-from postproc.language.interface import (
+from postproc.language.language import (
     Cloner,
     JobReading,
     Language,
     Splitter,
     Start,
 )
-from postproc.language.pdl2.dialect import AT_APPROACH, AT_VIA, MARK, PDL2_DIALECT
-from postproc.language.pdl2.effects import dead_lines
+from postproc.language.number_edits import Skeleton
 from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.pose_encoding import AT_APPROACH, AT_VIA, MARK, PDL2_DIALECT
 from postproc.language.pdl2.program import Program, parse, parse_again
+from postproc.language.pdl2.side_effects import dead_lines
 from postproc.language.pdl2.variable_file import (
     VariableFile,
     read_variables,
     read_variables_again,
 )
-from postproc.language.rewrite import Skeleton
 from postproc.language.source import Source
 from postproc.language.visits import never_reached
 
@@ -56,7 +56,7 @@ class Pdl2(Language):
         self, sources: Sequence[Source], start: Start, known: Sequence[Parsed] = ()
     ) -> JobReading:
         """Parse a program, its pages and its variable file; see `Language.read`."""
-        program = _parsed(sources[0], known)
+        program = _parse(sources[0], known)
         if program.main is None and not program.routines:
             problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
             raise ProgramError(sources[0].name, problem, cure)
@@ -69,10 +69,10 @@ class Pdl2(Language):
                 variables = _variables(source, known)
                 texts.append(Skeleton.of(variables.lines))
             else:
-                pages.append(_named(_parsed(source, known)))
+                pages.append(_name_page(_parse(source, known)))
                 texts.append(Skeleton.of(pages[-1].lines))
         others = _by_name(program, pages)
-        give_back(sum(len(text.numbers) for text in texts))
+        release_memory(sum(len(text.numbers) for text in texts))
         resolved = resolve(program, start, variables, others)
         visits, parsed = resolved.visits, (program, *pages)
         missed = dead_lines(parsed, visits)
@@ -103,7 +103,7 @@ class Pdl2(Language):
 
     def splitter(self, sources: Sequence[Source]) -> Splitter:
         """Parse the files of a job to put points on the ways of its moves."""
-        from postproc.language.pdl2.path_points import Pdl2Splitter
+        from postproc.language.pdl2.insert_moves import Pdl2Splitter
 
         own = [source for source in sources if not is_variables(source.name)]
         return Pdl2Splitter([parse(source) for source in own])
@@ -155,7 +155,7 @@ def _refuse_other_arm(program: Program, start: Start) -> None:
         raise ProgramError(name, problem, cure, line=program.head)
 
 
-def _parsed(source: Source, known: Sequence[Parsed]) -> Program:
+def _parse(source: Source, known: Sequence[Parsed]) -> Program:
     """Parse a file, unless it was parsed before."""
     for one in known:
         if isinstance(one, Program) and one.lines.source.name == source.name:
@@ -187,7 +187,7 @@ def _without_values(one: Parsed) -> Parsed:
     return replace(one, lines=one.lines.without_values())
 
 
-def _named(page: Program) -> Program:
+def _name_page(page: Program) -> Program:
     """Name a page whose PROGRAM line is not understood after its file."""
     return page if page.name else replace(page, name=_file(page))
 

@@ -12,12 +12,12 @@ import numpy as np
 from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.context import CALLED, Context, Point
-from postproc.language.pdl2.effects import PURE, circles, invocations, references
+from postproc.language.pdl2.abstract_state import MANY, MOST_ORIGINS, Settings, Store
+from postproc.language.pdl2.call_context import CALLED, Context, Point
 from postproc.language.pdl2.evaluate import ProgramPoint, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body, Program
-from postproc.language.pdl2.store import MANY, MOST_ORIGINS, Settings, Store
+from postproc.language.pdl2.side_effects import PURE, circles, invocations, references
 from postproc.language.pdl2.values import Nothing, Position
 from postproc.language.visits import ELSEWHERE, Meaning
 from postproc.robot.trajectory import Motion
@@ -287,7 +287,9 @@ class Machine:
             self.world, self.places[context], row, store, self.volatile, context
         )
 
-    def called(self, place: Place, statement: ast.Statement) -> tuple[ast.Invoke, ...]:
+    def find_calls(
+        self, place: Place, statement: ast.Statement
+    ) -> tuple[ast.Invoke, ...]:
         """Return the calls in a statement's expressions that may have effects.
 
         A function without arguments is called by its name alone.
@@ -401,7 +403,7 @@ def let_others_run(here: Execution) -> None:
 
 def invalidate(here: Execution, reference: ast.Reference, why: str) -> None:
     """Forget what a variable holds, unless it is a constant."""
-    declared = here.world.declared(here.place, reference.name)
+    declared = here.world.find_declaration(here.place, reference.name)
     if declared is not None and declared.constant:
         return
     if reference.name.startswith("$"):

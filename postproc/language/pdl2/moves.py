@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.effects import goes_to_target, references
+from postproc.language.pdl2.abstract_state import Settings
 from postproc.language.pdl2.evaluate import SINGLE, parts_under
 from postproc.language.pdl2.machine import (
     Execution,
@@ -16,8 +16,8 @@ from postproc.language.pdl2.machine import (
     escape_names,
     single,
 )
-from postproc.language.pdl2.store import Settings
-from postproc.language.pdl2.values import Nothing, Position, Value, Vector, unsure
+from postproc.language.pdl2.side_effects import goes_to_target, references
+from postproc.language.pdl2.values import Nothing, Position, Value, Vector, add_unknown
 from postproc.language.visits import ELSEWHERE, Meaning
 from postproc.robot.trajectory import Motion
 
@@ -48,7 +48,7 @@ def destination(here: Execution, reference: ast.Reference) -> Value:
     under = len(key) + 1
     names = {part[under:] for part in parts_under(here, key)}
     found = {name for name in names if name[:1] == "$" and "." not in name}
-    standard = sorted(found | _declared(here, reference))
+    standard = sorted(found | _list_declared(here, reference))
     fields = [
         here.value(ast.Reference(reference.name, (*reference.steps, name)))
         for name in standard
@@ -56,16 +56,18 @@ def destination(here: Execution, reference: ast.Reference) -> Value:
     ]
     if not fields:
         return whole
-    if _unread(here, key):
-        return unsure(Nothing("its values in the variable file are not read"), *fields)
+    if _has_unread(here, key):
+        return add_unknown(
+            Nothing("its values in the variable file are not read"), *fields
+        )
     if len(fields) == 1 == len(standard):
         return fields[0]
     several = len(fields) > 1
     why = "it has several positions" if several else "it has settings of its own"
-    return unsure(Nothing(f"{why} ({', '.join(standard).upper()})"), *fields)
+    return add_unknown(Nothing(f"{why} ({', '.join(standard).upper()})"), *fields)
 
 
-def _declared(here: Execution, reference: ast.Reference) -> frozenset[str]:
+def _list_declared(here: Execution, reference: ast.Reference) -> frozenset[str]:
     """Return the standard fields that the type of a node declares."""
     type_ = here.world.type_of(here.place, reference.name)
     steps = [step for step in reference.steps if isinstance(step, str)]
@@ -75,7 +77,7 @@ def _declared(here: Execution, reference: ast.Reference) -> frozenset[str]:
     return frozenset().union(*filter(None, found))
 
 
-def _unread(here: Execution, key: str) -> bool:
+def _has_unread(here: Execution, key: str) -> bool:
     """Tell whether the variable file may say more of a node than what was read."""
     file, name = here.world.variables, key.rpartition("/")[2]
     unread = file.unread if file is not None else ()
@@ -209,7 +211,7 @@ def _system(here: Execution, reference: ast.Reference) -> Goal:
 
 def _check_declared(here: Execution, name: str) -> None:
     if here.world.type_of(here.place, name) is None:
-        if here.world.declared(here.place, name) is not None:
+        if here.world.find_declaration(here.place, name) is not None:
             return
         here.world.report_once(
             here.place.program,

@@ -10,8 +10,7 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.diagnostics import Code
-from postproc.language.lines import Lines
-from postproc.language.names import NameColumn
+from postproc.language.logical_lines import Lines
 from postproc.language.pdl2.entries import (
     NESTED,
     POSITIONS,
@@ -22,7 +21,8 @@ from postproc.language.pdl2.entries import (
 )
 from postproc.language.pdl2.parser import EntryPart
 from postproc.language.pdl2.values import COMPONENTS
-from postproc.language.shapes import ParsedShapes
+from postproc.language.symbol_column import NameColumn
+from postproc.language.templates import ParsedShapes
 from postproc.language.visits import Diagnostic
 
 # A field of a record or of a node, as a variable file lists it.
@@ -116,10 +116,10 @@ class Nested:
         Raises:
             OddLine: A line leaves open to which part a value belongs.
         """
-        self.head = self._entered(self.row)
+        self.head = self._enter(self.row)
         self._begin_entry()
         for row in range(self.row + 1, end):
-            self._take(row, self._entered(row))
+            self._take(row, self._enter(row))
         self._close(end)
         return [
             one
@@ -128,7 +128,7 @@ class Nested:
             if part not in self.dropped
         ]
 
-    def _entered(self, row: int) -> EntryPart:
+    def _enter(self, row: int) -> EntryPart:
         entered = self.said[int(self.lines.shape[row])]
         if entered is None:
             text = self.lines.source.line_text(int(self.lines.line[row]))
@@ -302,13 +302,13 @@ def find_fields(
                 (end, _finding(lines, said, row, odd.row, Code.LSV_PARTS, text))
             )
         else:
-            findings += _unread(lines, said, entry, end)
+            findings += _report_unread(lines, said, entry, end)
             unread |= {names[at] + part.lower() for part in entry.dropped}
     twice = frozenset(names[at] for at in nested.tolist() if count[names[at]] > 1)
     return Fields(tuple(each), tuple(findings), twice, frozenset(unread))
 
 
-def _unread(
+def _report_unread(
     lines: Lines, said: ParsedShapes[EntryPart | None], entry: Nested, end: int
 ) -> Iterator[Finding]:
     """Say which fields of an entry are not read, once."""
@@ -352,7 +352,7 @@ def with_fields(records: Records, fields: Fields) -> Records:
     )
 
 
-def completed(entries: Entries, fields: Fields) -> Entries:
+def complete_entries(entries: Entries, fields: Fields) -> Entries:
     """Tell of the fields, the last entries, what the heads of their variables say."""
     k, of = len(fields.each), len(entries.layouts)
     if not k:

@@ -12,10 +12,10 @@ from typing import Any, cast
 import lark
 
 from postproc.language.grammars import line_parser
+from postproc.language.lexer import NAME_MARK, UNREADABLE, form_of
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.syntax import Number
-from postproc.language.scan import NAME_MARK, UNREADABLE, form_of
-from postproc.language.shapes import filled, open_name
+from postproc.language.templates import fill_names, open_name
 
 # Parts of a line on their way from tree to statement, told apart by type.
 
@@ -94,12 +94,12 @@ def _statement(children: Children) -> ast.Statement | None:
     return found[0] if found else None
 
 
-def _unquoted(mark: str) -> str:
+def _unquote(mark: str) -> str:
     """Return what stands between the quotes of a string; two are one inside of it."""
     return str(mark)[1:-1].replace(mark[0] * 2, mark[0])
 
 
-def _declared(children: Children, first: int) -> tuple[str, tuple[str, ...]]:
+def _read_attributes(children: Children, first: int) -> tuple[str, tuple[str, ...]]:
     """Return the exporting program and the other attributes."""
     rest = children[first:]
     exported = [str(c) for c in rest if isinstance(c, ExportedPart)]
@@ -121,7 +121,7 @@ def _arm_slot(c: Children) -> int:
 
 def _routine(c: Children) -> ast.Routine:
     parameters = _of(c, list)
-    exported, _ = _declared(c, 1)
+    exported, _ = _read_attributes(c, 1)
     return ast.Routine(
         _name(c[0]), tuple(parameters[0]) if parameters else (), exported
     )
@@ -129,7 +129,7 @@ def _routine(c: Children) -> ast.Routine:
 
 def _variables(c: Children) -> ast.Declare:
     initial = c[2] if len(c) > 2 and isinstance(c[2], ast.Expression) else None
-    exported, words = _declared(c, 2)
+    exported, words = _read_attributes(c, 2)
     return ast.Declare(tuple(c[0]), c[1], initial, exported, words)
 
 
@@ -247,7 +247,7 @@ RULES: dict[str, Rule] = {
     "labelled": lambda c: ast.Label(_name(c[0]).rstrip(": "), _statement(c)),
     "program": lambda c: ast.ProgramHead(_name(c[0]), max([-1, *_of(c, int)])),
     "program_attribute": _program_attribute,
-    "import": lambda c: ast.Import(_unquoted(c[0])),
+    "import": lambda c: ast.Import(_unquote(c[0])),
     "section": lambda c: ast.DeclarationSection(_statement(c)),
     "begin": lambda c: ast.Begin(),
     "end": lambda c: ast.End(_name(c[0]) if c else ""),
@@ -316,7 +316,7 @@ RULES: dict[str, Rule] = {
         ast.Unary("()", c[0]) if isinstance(c[0], ast.Reference) else c[0]
     ),
     "number": lambda c: c[0],
-    "string": lambda c: ast.Text(_unquoted(c[0])),
+    "string": lambda c: ast.Text(_unquote(c[0])),
     "aggregate": lambda c: ast.Aggregate(tuple(c)),
     "invoke": lambda c: ast.Invoke(_name(c[0]), c[1]),
     "arguments": tuple,
@@ -484,7 +484,7 @@ def parse_line(mask: str) -> ast.Statement:
     """
     form, names = form_of(mask)
     said = parse_form(form)
-    return cast(ast.Statement, filled(said, names)) if names else said
+    return cast(ast.Statement, fill_names(said, names)) if names else said
 
 
 def _parse(name: str, form: str, rules: Mapping[str, Rule]) -> object:

@@ -13,13 +13,13 @@ import numpy as np
 
 from postproc.arrays import Bools, Indices, Ints
 from postproc.diagnostics import Code
-from postproc.language.lines import Lines, read_lines, reread_lines
-from postproc.language.names import NameColumn
+from postproc.language.logical_lines import Lines, read_lines, reread_lines
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.dialect import COMMENTS
 from postproc.language.pdl2.parser import parse_form
-from postproc.language.shapes import ParsedShapes, parse_shapes
+from postproc.language.pdl2.pose_encoding import COMMENTS
 from postproc.language.source import Source
+from postproc.language.symbol_column import NameColumn
+from postproc.language.templates import ParsedShapes, parse_shapes
 from postproc.language.visits import Diagnostic
 
 # Block structure of one body: which line closes which, and where jumps lead.
@@ -71,7 +71,7 @@ class Blocks:
     broken: int
 
 
-def recovered(statement: ast.Statement) -> ast.Statement:
+def recover_block(statement: ast.Statement) -> ast.Statement:
     """Return the block that an unknown line opens, or the statement itself."""
     if isinstance(statement, ast.Unknown):
         for pattern, opener in _UNKNOWN_OPENERS:
@@ -106,7 +106,7 @@ class _BlockReader:
 
     def take(self, row: int) -> None:
         """Read the next row."""
-        statement = recovered(self._statements[int(self._lines.shape[row])])
+        statement = recover_block(self._statements[int(self._lines.shape[row])])
         if isinstance(statement, ast.Label):
             self._labels[statement.name] = row
             statement = statement.then or ast.Statement()
@@ -153,7 +153,9 @@ class _BlockReader:
             self._refuse(row, statement)
 
     def _refuse(self, row: int, statement: ast.Statement) -> None:
-        self._problems.append((row, _unmatched(statement, self._open, self._lines)))
+        self._problems.append(
+            (row, _describe_unmatched(statement, self._open, self._lines))
+        )
 
     @property
     def problems(self) -> list[tuple[int, str]]:
@@ -174,7 +176,7 @@ class _BlockReader:
         joins = {*self._labels.values(), *self._opener}
         loops, handlers = [], []
         for row, start in self._opener.items():
-            kind = recovered(self._statements[int(self._lines.shape[start])])
+            kind = recover_block(self._statements[int(self._lines.shape[start])])
             if isinstance(kind, ast.Label) and kind.then is not None:
                 kind = kind.then
             if isinstance(kind, ast.For):
@@ -214,7 +216,7 @@ def _word(statement: ast.Statement) -> str:
     return type(statement).__name__.upper()
 
 
-def _unmatched(
+def _describe_unmatched(
     statement: ast.Statement, stack: list[tuple[int, ast.Statement]], lines: Lines
 ) -> str:
     text = f"this {_word(statement)} closes or divides no block"
@@ -338,7 +340,7 @@ class Variables(Mapping[str, Variable]):
         """Return the lower-case names."""
         return self._names
 
-    def written(self) -> list[str]:
+    def list_names(self) -> list[str]:
         """Return the names as they are written, in order."""
         return [self._written[at] for at in self._at]
 
@@ -348,7 +350,7 @@ class Variables(Mapping[str, Variable]):
         Args:
             test: What no name decides.
         """
-        passed = self._passed(test)
+        passed = self._test_each(test)
         if not passed.any():
             return []
         found = passed[self._declaration(np.array(self._at, dtype=np.int32))]
@@ -365,7 +367,7 @@ class Variables(Mapping[str, Variable]):
         found[found] = passed[own]
         return found
 
-    def _passed(self, test: Callable[[Variable], bool]) -> Bools:
+    def _test_each(self, test: Callable[[Variable], bool]) -> Bools:
         return np.array([test(said) for said in self._said], dtype=bool)
 
     def _declaration(self, index: Indices) -> Ints:
@@ -608,7 +610,7 @@ def parse(source: Source) -> Program:
     """
     lines = read_lines(source)
     statements = parse_shapes(lines.shapes, parse_form)
-    taught = COMMENTS.taught(source)
+    taught = COMMENTS.list_taught(source)
     rows = _structural(statements, lines)
     reader = _Reader(lines, statements, taught, rows)
     for row in rows.tolist():
@@ -648,7 +650,7 @@ def parse_again(source: Source, before: Program) -> Program:
     found = reread_lines(source, before.lines)
     if found is None or found.change(_structural(before.statements, before.lines)):
         return parse(source)
-    told = found.moved(before.diagnostics)
+    told = found.move(before.diagnostics)
     return replace(before, lines=found.lines, diagnostics=told)
 
 

@@ -145,14 +145,14 @@ def join(a: Value, b: Value) -> Value:
     if a is b or (type(a) is type(b) and a == b):
         return a
     if isinstance(a, Nothing):
-        return unsure(a, b)
+        return add_unknown(a, b)
     if isinstance(b, Nothing):
-        return unsure(b, a)
+        return add_unknown(b, a)
     if isinstance(a, Alias) and isinstance(b, Alias):
         return Alias(a.keys | b.keys, False)
     if isinstance(a, Position) and isinstance(b, Position):
         return _join_positions(a, b)
-    return unsure(Nothing("it may hold different values here"), a, b)
+    return add_unknown(Nothing("it may hold different values here"), a, b)
 
 
 def may_be(value: Value | None) -> frozenset[int]:
@@ -164,7 +164,7 @@ def may_be(value: Value | None) -> frozenset[int]:
     return frozenset()
 
 
-def unsure(unknown: Nothing, *others: Value | None) -> Nothing:
+def add_unknown(unknown: Nothing, *others: Value | None) -> Nothing:
     """Return an unknown value that may be others too."""
     of = unknown.of
     for other in map(may_be, others):
@@ -193,22 +193,24 @@ def _join_positions(a: Position, b: Position) -> Value:
     )
 
 
-def composed(a: Position, b: Position) -> Value:
+def compose_frames(a: Position, b: Position) -> Value:
     """Return the composition a : b of two frames."""
     if a.joints or b.joints or not (a.complete and b.complete):
         return Nothing("a frame in `:` is not known")
     pose = pose_from_record(_array(a)) @ pose_from_record(_array(b))
-    return _derived(pose, b.config, "it is composed of two frames (`:`)", b.aux)
+    return _derive_position(pose, b.config, "it is composed of two frames (`:`)", b.aux)
 
 
-def inverted(a: Position) -> Value:
+def invert_frame(a: Position) -> Value:
     """Return the inverse frame (POS_INV)."""
     if a.joints or not a.complete:
         return Nothing("the argument of POS_INV is not known")
-    return _derived(inverse(pose_from_record(_array(a))), a.config, "it is POS_INV", ())
+    return _derive_position(
+        inverse(pose_from_record(_array(a))), a.config, "it is POS_INV", ()
+    )
 
 
-def shifted(a: Position, by: Vector) -> Value:
+def shift_position(a: Position, by: Vector) -> Value:
     """Return a position moved along its reference frame's axes (POS_SHIFT)."""
     if a.joints or not a.complete or None in by.numbers:
         return Nothing("an argument of POS_SHIFT is not known")
@@ -230,7 +232,7 @@ def _array(position: Position) -> np.ndarray:
     return np.array(position.numbers, dtype=float)
 
 
-def _derived(
+def _derive_position(
     pose: np.ndarray,
     config: str | None,
     why: str,
@@ -301,7 +303,7 @@ def binary(sign: str, a: Value, b: Value) -> Value:
         if isinstance(a, bool) and isinstance(b, bool):
             return not decisive
     if isinstance(a, Position) and isinstance(b, Position) and sign == ":":
-        return composed(a, b)
+        return compose_frames(a, b)
     if isinstance(a, Vector) and isinstance(b, Vector) and sign in "+-":
         return _add(a, b, sign)
     if sign in _COMPARE and type(a) is type(b) and isinstance(a, float | str | bool):

@@ -10,8 +10,8 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.diagnostics import Code
-from postproc.language.lines import Lines, read_lines, reread_lines
-from postproc.language.names import NameColumn
+from postproc.language.logical_lines import Lines, read_lines, reread_lines
+from postproc.language.pdl2.abstract_state import root_of
 from postproc.language.pdl2.entries import (
     NESTED,
     POSITIONS,
@@ -24,11 +24,11 @@ from postproc.language.pdl2.entries import (
     last_head,
     read_records,
 )
-from postproc.language.pdl2.nested import completed, find_fields, with_fields
+from postproc.language.pdl2.nested import complete_entries, find_fields, with_fields
 from postproc.language.pdl2.parser import EntryPart, parse_value_form
-from postproc.language.pdl2.store import root_of
-from postproc.language.shapes import ParsedShapes, parse_shapes
 from postproc.language.source import Source
+from postproc.language.symbol_column import NameColumn
+from postproc.language.templates import ParsedShapes, parse_shapes
 from postproc.language.visits import Diagnostic
 
 Finding = tuple[int, Diagnostic]
@@ -71,10 +71,10 @@ def read_variables(source: Source) -> VariableFile:
     head = last_head(lines, said)
     fields = find_fields(lines, said, head)
     records = with_fields(find_records(lines, said, head), fields)
-    read = completed(read_records(lines, said, records), fields)
-    entries, twice = _told_apart(read, fields.twice)
+    read = complete_entries(read_records(lines, said, records), fields)
+    entries, twice = _distinguish_entries(read, fields.twice)
     found = [
-        *_named_twice(source, entries, records, twice),
+        *_report_duplicates(source, entries, records, twice),
         *_incomplete(source, entries, records, {*twice}),
         *_not_understood(lines, said, head),
         *fields.findings,
@@ -100,12 +100,12 @@ def read_variables_again(source: Source, before: VariableFile) -> VariableFile:
     entries = before.entries.with_numbers(found.lines.value, found.changed)
     if entries is None:
         return read_variables(source)
-    told = found.moved(before.diagnostics)
+    told = found.move(before.diagnostics)
     lines = found.lines.without_values()
     return VariableFile(lines, entries, told, before.unread)
 
 
-def _told_apart(
+def _distinguish_entries(
     entries: Entries, ambiguous: frozenset[str]
 ) -> tuple[Entries, list[int]]:
     """Name the entries; also return those whose name an earlier one has.
@@ -148,7 +148,7 @@ def _not_understood(
             yield row, Diagnostic(lines.source.name, line, Code.LSV_LINE, message)
 
 
-def _named_twice(
+def _report_duplicates(
     source: Source, entries: Entries, records: Records, twice: list[int]
 ) -> Iterator[Finding]:
     for row in twice:

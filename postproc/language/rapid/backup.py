@@ -14,7 +14,7 @@ from postproc.arrays import Floats
 from postproc.exceptions import ProgramError
 from postproc.files import is_module, read_input
 from postproc.language.archive import Archive
-from postproc.language.rapid.dialect import RAPID_DIALECT
+from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import read_rapid
 from postproc.language.source import source_from_bytes
 from postproc.robot.pose import record_from_pose
@@ -96,7 +96,7 @@ def _modules(folder: Path | None) -> tuple[Path, ...]:
     return tuple(p for p in files if p.is_file() and _is_readable(p))
 
 
-def mounted_arms(program: Path) -> tuple[MountedArm, ...]:
+def read_mounted_arms(program: Path) -> tuple[MountedArm, ...]:
     """Return the arms of the backup that a program stands in, none where none is."""
     for parent in list(program.absolute().parents)[:DEPTH]:
         folder = _entry(parent, SETTINGS[0])

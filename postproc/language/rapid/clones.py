@@ -7,18 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
-from postproc.language.interface import Cloner, NamedPoint
-from postproc.language.machine import Scope
+from postproc.language.interpreter import Scope
+from postproc.language.language import Cloner, NamedPoint
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.program import Datum, MotionCall, RapidFile
-from postproc.language.rapid.task import TARGETS, RapidTask
+from postproc.language.rapid.symbols import TARGETS, RapidTask
 from postproc.language.source import (
     CloneError,
     Edit,
     Source,
     Span,
     check_length,
-    inserted_after,
+    insert_after,
 )
 from postproc.language.visits import Literals
 
@@ -87,8 +87,8 @@ class RapidCloner(Cloner):
             raise CloneError(f"{operand.name} is a parameter, or not declared once")
         at, datum = found
         _check(datum)
-        span = self._named(file, move.row, operand.name)
-        return RapidPoint(at, datum, self._spelt(at, datum), (file, span))
+        span = self._find_name(file, move.row, operand.name)
+        return RapidPoint(at, datum, self._spell(at, datum), (file, span))
 
     def _move(self, file: int, line: int) -> MotionCall:
         """Return the only move that begins on a line."""
@@ -107,7 +107,7 @@ class RapidCloner(Cloner):
             raise CloneError("the move stands outside of any routine")
         return self.task.scope_of(*place)
 
-    def _named(self, file: int, row: int, name: str) -> Span:
+    def _find_name(self, file: int, row: int, name: str) -> Span:
         """Find the only place in a statement that names data."""
         text = self.task.files[file].text
         begin, _ = text.span(row)
@@ -117,13 +117,13 @@ class RapidCloner(Cloner):
             raise CloneError(f"{name} stands {len(found)} times in the move")
         return Span(begin + found[0].start(), begin + found[0].end())
 
-    def _spelt(self, file: int, datum: Datum) -> str:
+    def _spell(self, file: int, datum: Datum) -> str:
         """Return the name of data as its declaration writes it."""
         text = self.task.files[file].text
-        start, end = self._named(file, datum.row, datum.declared.name)
+        start, end = self._find_name(file, datum.row, datum.declared.name)
         return text.source.text[start:end]
 
-    def declared(self, named: NamedPoint) -> int:
+    def find_declaration(self, named: NamedPoint) -> int:
         """Return the 1-based line that declares data."""
         point = cast(RapidPoint, named)
         return self.task.files[point.file].text.line(point.datum.row)
@@ -167,7 +167,7 @@ class RapidCloner(Cloner):
         point = points[0]
         text, row = self.task.files[point.file].text, point.datum.row
         source, (begin, end) = text.source, text.span(row)
-        start, stop = self._named(point.file, row, point.datum.declared.name)
+        start, stop = self._find_name(point.file, row, point.datum.declared.name)
         declared = source.text[begin:start] + name + source.text[stop:end]
         declared += "" if declared.endswith(";") else ";"
         if self.task.files[point.file].is_system:
@@ -176,7 +176,7 @@ class RapidCloner(Cloner):
         before = source.text[int(source.line_starts[first - 1]) : begin]
         if before.strip() or not _ends_line(source, end):
             raise CloneError("its declaration shares a line with other code")
-        return point.file, inserted_after(source, last, before + declared)
+        return point.file, insert_after(source, last, before + declared)
 
     def _beside(self, points: Sequence[RapidPoint], declared: str) -> tuple[int, Edit]:
         """Declare a point of a system module at the head of the module of its moves."""
@@ -194,7 +194,7 @@ class RapidCloner(Cloner):
         if not _ends_line(text.source, end):
             raise CloneError("other code stands on the line of its module")
         line = text.source.line_of(max(end - 1, begin))
-        return file, inserted_after(text.source, line, f"  {declared}")
+        return file, insert_after(text.source, line, f"  {declared}")
 
 
 def _check(datum: Datum) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
-from postproc.language.machine import CallContext
+from postproc.language.interpreter import CallContext
 from postproc.language.rapid.errors import (
     ANY,
     EXIT_CYCLE,

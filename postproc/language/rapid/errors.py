@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
 
-from postproc.language.flow import CLOSING, RoutineFlow
+from postproc.language.control_flow import CLOSING, RoutineFlow
 from postproc.language.rapid import syntax as said
+from postproc.language.rapid.symbols import SHIFTS, functions_in, inside
 from postproc.language.rapid.targets import operands_of
-from postproc.language.rapid.task import SHIFTS, functions_in, inside
-from postproc.language.statements import StatementText
+from postproc.language.statement_table import StatementText
 
 Numbers = frozenset[str] | None
 """Names of error numbers; None: any."""
@@ -166,9 +166,9 @@ def _ends(
     for row, one in statements:
         match one:
             case said.Branch(word="if", values=(condition, *_)):
-                blocks.append(_asked(condition, row, read))
+                blocks.append(_find_errors(condition, row, read))
             case said.Branch(word="elseif", values=(condition, *_)) if blocks:
-                blocks[-1] = _asked(condition, row, read)
+                blocks[-1] = _find_errors(condition, row, read)
             case said.Branch(word="test", values=(value, *_)):
                 tested.append(_is_errno(value))
                 blocks.append(NO_NUMBERS)
@@ -191,7 +191,7 @@ def _end(
 ) -> Iterator[HandlerEnd]:
     """Yield the word with which a statement of a handler goes on."""
     while isinstance(one, said.CompactIf):
-        numbers = common(numbers, _asked(one.condition, row, read))
+        numbers = common(numbers, _find_errors(one.condition, row, read))
         one = one.statement
     if isinstance(one, said.Leave) and one.word in LEAVES:
         yield HandlerEnd(one.word, numbers)
@@ -201,16 +201,18 @@ def _end(
         yield from (HandlerEnd(word, ANY) for word in LEAVES)
 
 
-def _asked(condition: said.Operand, row: int, read: ReadNumber) -> Numbers:
+def _find_errors(condition: said.Operand, row: int, read: ReadNumber) -> Numbers:
     """Return the errors for which a condition can hold."""
     match condition:
         case said.Operation(operator="=", operands=(left, right)):
             if _is_errno(left) or _is_errno(right):
                 return _read([right if _is_errno(left) else left], row, read)
         case said.Operation(operator="OR", operands=(left, right)):
-            return together(_asked(left, row, read), _asked(right, row, read))
+            return together(
+                _find_errors(left, row, read), _find_errors(right, row, read)
+            )
         case said.Operation(operator="AND", operands=(left, right)):
-            return common(_asked(left, row, read), _asked(right, row, read))
+            return common(_find_errors(left, row, read), _find_errors(right, row, read))
     return ANY
 
 

@@ -10,16 +10,15 @@ from functools import cached_property, partial
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
-from postproc.language.collect import FoundGoal
-from postproc.language.flow import HeadedRows
-from postproc.language.interface import Start
-from postproc.language.machine import (
+from postproc.language.control_flow import HeadedRows
+from postproc.language.interpreter import (
     NOWHERE,
     Arrived,
     CallContext,
     Scope,
     TaskMachine,
 )
+from postproc.language.language import Start
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.error_paths import ErrorExit, ErrorHandlers, exits_of
 from postproc.language.rapid.errors import (
@@ -33,27 +32,28 @@ from postproc.language.rapid.errors import (
     may_raise,
     numbers_of,
 )
-from postproc.language.rapid.modes import (
+from postproc.language.rapid.instructions import (
+    MOTIONS,
+    STILL_FUNCTIONS,
+    read_known_instructions,
+)
+from postproc.language.rapid.modal_state import (
     ANYTHING,
     AT_START,
     HARMLESS,
     Modes,
-    changed_modes,
-    given_modes,
+    change_modes,
+    list_set_modes,
 )
 from postproc.language.rapid.moves import Goals, pose_of
 from postproc.language.rapid.program import RapidFile
-from postproc.language.rapid.signatures import (
-    MOTIONS,
-    STILL_FUNCTIONS,
-    known_instructions,
-)
-from postproc.language.rapid.task import (
+from postproc.language.rapid.symbols import (
     RapidTask,
     functions_in,
     inside,
     parameters_of,
 )
+from postproc.language.to_visits import FoundGoal
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
@@ -112,13 +112,13 @@ class RapidMachine(TaskMachine):
         found = mains if len(mains) == 1 else self._procedures()
         here = Arrived(frozenset([START]), AT_START)
         if len(mains) != 1:
-            here = here.lost()
+            here = here.forget()
             self.say(
                 0, 0, Code.NO_MAIN, "no single PROC main: from where these routines "
                 "are called, and with what settings, is not known. Give the module "
                 "that holds main, with the others of its task in the same folder",
             )  # fmt: skip
-        if self._trapped():
+        if self._has_active_trap():
             here = replace(here, modes=replace(here.modes, blocked=frozenset([_TRAP])))
         for file, module, routine in found:
             self.call(file, module, routine, None, -1, here)
@@ -137,7 +137,7 @@ class RapidMachine(TaskMachine):
         """
         modes, own = here.modes, self._own_modes()
         for end in (*self.ends, *self.restarts):
-            modes = modes.continued(end.modes, modes.names(), own)
+            modes = modes.continue_cycle(end.modes, modes.names(), own)
         found = [here.origins, *(end.origins for end in self.ends)]
         found += [NOWHERE] if self.restarts else []
         return Arrived(frozenset().union(*found), modes)
@@ -152,19 +152,19 @@ class RapidMachine(TaskMachine):
             for row in range(routine.first + 1, routine.last):
                 one = inside(self.texts[file].statement(row))
                 if isinstance(one, said.Instruction) and self._sets_modes(one.name):
-                    given = given_modes(partial(self._changed, one, row, scope))
+                    given = list_set_modes(partial(self._change_modes, one, row, scope))
                     found |= set() if given >= ANYTHING else given
         return {name for name, value in found if value != getattr(AT_START, name)}
 
     def _sets_modes(self, name: str) -> bool:
-        own, kind = name in self.task.routines, known_instructions().get(name)
+        own, kind = name in self.task.routines, read_known_instructions().get(name)
         return kind == "modal" and not own and name not in STOPPED
 
     def _procedures(self) -> list[tuple[int, str, HeadedRows]]:
         routines = (one for found in self.task.routines.values() for one in found)
         return [one for one in routines if _kind(one[2]) == "proc"]
 
-    def _trapped(self) -> bool:
+    def _has_active_trap(self) -> bool:
         """Tell whether a trap moves, or changes how moves are carried out."""
         routines = (one for found in self.task.routines.values() for one in found)
         return any(
@@ -188,10 +188,10 @@ class RapidMachine(TaskMachine):
         """Return where the statements of a routine stand."""
         return self.task.scope_of(file, module, routine)
 
-    def called_with(
+    def bind_arguments(
         self, scope: Scope, routine: HeadedRows, caller: CallContext, row: int
     ) -> Scope:
-        """Add what a routine is called with, see `TaskMachine.called_with`.
+        """Add what a routine is called with, see `TaskMachine.bind_arguments`.
 
         One that calls itself has other values the next time.
         """
@@ -200,17 +200,17 @@ class RapidMachine(TaskMachine):
         if not known or self._is_recursive(scope.file, routine):
             return scope
         assert isinstance(call, said.Instruction)
-        return self.task.bound(scope, routine, call, row, caller.scope)
+        return self.task.bind(scope, routine, call, row, caller.scope)
 
     def _is_recursive(self, file: int, routine: HeadedRows) -> bool:
         """Return True if a routine has parameters and may come to call itself."""
         key = file, routine.first
         if key not in self._recursive:
-            found = bool(parameters_of(routine)) and key in self._reached_from(key)
+            found = bool(parameters_of(routine)) and key in self._find_reachable(key)
             self._recursive[key] = found
         return self._recursive[key]
 
-    def _reached_from(self, routine: tuple[int, int]) -> set[tuple[int, int]]:
+    def _find_reachable(self, routine: tuple[int, int]) -> set[tuple[int, int]]:
         """Return the routines that one may call, and those that they may call."""
         last = {
             (at, r.first): r.last for at, rs in self._by_file.items() for _, _, r in rs
@@ -244,7 +244,7 @@ class RapidMachine(TaskMachine):
         """Note the end of a cycle; forget what a handler may have changed."""
         if context.caller is None:
             self.ends.append(here)
-        return here.lost() if self._handlers_of(context).moves else here
+        return here.forget() if self._handlers_of(context).moves else here
 
     # Errors.
 
@@ -285,28 +285,30 @@ class RapidMachine(TaskMachine):
             if not self._may_raise(one, way.numbers):
                 continue
             if not beside:
-                self._handled(context, row, way, replace(here, origins=NOWHERE))
+                self._handle(context, row, way, replace(here, origins=NOWHERE))
             elif way.row and may_be_skipped(one):
-                self._handled(context, row, way, here)
+                self._handle(context, row, way, here)
 
     def _may_raise(self, one: said.RapidStatement, numbers: Numbers) -> bool:
         return may_raise(one, numbers, self.task.routines, self.task.declared)
 
-    def _interrupted(
+    def _interrupt(
         self, context: CallContext, row: int, one: said.Instruction, here: Arrived
     ) -> None:
         """Allow for an error that ends a move on its way."""
-        always = one.name.startswith(PROCESSES) or "procerrrecovery" in self.task.called
+        always = (
+            one.name.startswith(PROCESSES) or "procerrrecovery" in self.task.find_calls
+        )
         for way in self._exits_of(context):
             named = way.numbers is not None and bool(way.numbers & PATH_ERRORS)
             if way.own and (named or (always and self._may_raise(one, way.numbers))):
-                self._handled(context, row, way, replace(here, origins=NOWHERE))
+                self._handle(context, row, way, replace(here, origins=NOWHERE))
 
-    def _handled(
+    def _handle(
         self, context: CallContext, row: int, way: ErrorExit, here: Arrived
     ) -> None:
         """Go on behind an error."""
-        here = here.lost() if way.lost else here
+        here = here.forget() if way.lost else here
         if way.context is context and way.own:
             self.enter(context, row + way.row, here)
         elif way.context is not None:
@@ -325,7 +327,7 @@ class RapidMachine(TaskMachine):
         for way in self._exits_of(context):
             shared = common(way.numbers, raised)
             if shared is None or shared:
-                self._handled(context, row, way, here)
+                self._handle(context, row, way, here)
 
     def part_otherwise(
         self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
@@ -343,7 +345,7 @@ class RapidMachine(TaskMachine):
         if not isinstance(one, said.LateCall):
             return
         if _is_text(one.procedure):
-            self._run_named_beside(_called(one.procedure))
+            self._run_named_beside(_name_procedure(one.procedure))
         else:
             self._run_all_beside()
 
@@ -368,7 +370,7 @@ class RapidMachine(TaskMachine):
         if isinstance(inner, said.Instruction):
             texts = [a.value for a in inner.arguments if _is_text(a.value)]
             late = inner.name in SYNCHRONOUS
-            names |= {inner.name, *(_called(text) for text in texts if late)}
+            names |= {inner.name, *(_name_procedure(text) for text in texts if late)}
         found = [one for name in names for one in self.task.routines.get(name, [])]
         return [(at, routine) for at, _, routine in found]
 
@@ -395,7 +397,7 @@ class RapidMachine(TaskMachine):
         seen = seen | {(file, routine.first)}
         for caller, row, call in self._calls_by_name[routine.head.name]:
             for there in self._scopes_of(caller, seen):
-                yield self.task.bound(scope, routine, call, row, there)
+                yield self.task.bind(scope, routine, call, row, there)
 
     @cached_property
     def _calls_by_name(
@@ -454,16 +456,16 @@ class RapidMachine(TaskMachine):
         if name in self.task.routines:
             self._run_named_beside(name)
             return self.unknown(context, row, here, "names several routines")
-        kind = known_instructions().get(name)
+        kind = read_known_instructions().get(name)
         if name == EXIT_CYCLE:
             self.restarts.append(here)
             return None
         if name in STOPPED:
-            return here.lost()
+            return here.forget()
         if kind == "modal":
-            changed = self._changed(one, row, scope, here.modes)
+            changed = self._change_modes(one, row, scope, here.modes)
             return replace(here, modes=changed.allowing())
-        if kind in ("still", "modal") or self.said_still(name):
+        if kind in ("still", "modal") or self.declares_motionless(name):
             return here
         if name == BY_NAME:
             self._run_all_beside()
@@ -471,11 +473,11 @@ class RapidMachine(TaskMachine):
             return self.unknown(context, row, here, _LEFT)
         return self.outside(context, row, name, here)
 
-    def _changed(
+    def _change_modes(
         self, one: said.Instruction, row: int, scope: Scope, modes: Modes
     ) -> Modes:
         """Carry out an instruction that changes how the moves after it are."""
-        return changed_modes(
+        return change_modes(
             one.name, one.arguments, modes,
             lambda operand: self.task.number(operand, row, scope),
             lambda operand: pose_of(self.task.record(operand, row, scope)),
@@ -487,7 +489,7 @@ class RapidMachine(TaskMachine):
     ) -> Arrived:
         """Record the visits of a move."""
         signature, scope = MOTIONS[one.name], context.scope
-        self._interrupted(context, row, one, here)
+        self._interrupt(context, row, one, here)
         after = self.arrive(
             context, row, here,
             lambda: [*self.goals.visits(one, signature, row, scope, here.modes)],
@@ -505,11 +507,11 @@ class RapidMachine(TaskMachine):
         """Allow for the procedure that a move calls while the program runs ahead."""
         placed = [argument.value for argument in one.arguments if not argument.name]
         called = placed[-1] if placed else None
-        name = _called(called) if _is_text(called) else ""
-        if self.said_still(name) and name not in self.task.routines:
+        name = _name_procedure(called) if _is_text(called) else ""
+        if self.declares_motionless(name) and name not in self.task.routines:
             return here
         found = self.task.routine(name, context.scope)
-        given = None if found is None else self._given(*found)
+        given = None if found is None else self._list_set_modes(*found)
         if given is None:
             self._run_named_beside(name)
             what = "calls a procedure on its way that may move the arm"
@@ -518,7 +520,7 @@ class RapidMachine(TaskMachine):
         modes = here.modes.allowing(ANYTHING if given is None else given)
         return replace(here, modes=modes)
 
-    def _given(
+    def _list_set_modes(
         self, file: int, module: str, routine: HeadedRows
     ) -> frozenset[tuple[str, Any]] | None:
         """Return the modes that a procedure may set; None where it may move the arm."""
@@ -531,11 +533,13 @@ class RapidMachine(TaskMachine):
                 return None
             own = isinstance(one, said.Instruction) and one.name in self.task.routines
             if isinstance(one, said.Instruction) and not own:
-                kind = known_instructions().get(one.name)
+                kind = read_known_instructions().get(one.name)
                 if kind == "modal" and one.name not in STOPPED:
-                    found |= given_modes(partial(self._changed, one, row, scope))
+                    found |= list_set_modes(
+                        partial(self._change_modes, one, row, scope)
+                    )
                     continue
-                if kind == "still" or self.said_still(one.name):
+                if kind == "still" or self.declares_motionless(one.name):
                     continue
             if own or isinstance(one, said.Instruction | said.LateCall):
                 return None
@@ -642,11 +646,11 @@ class RapidMachine(TaskMachine):
         return False
 
     def _is_still_function(self, name: str) -> bool:
-        return name in STILL_FUNCTIONS or self.said_still(name)
+        return name in STILL_FUNCTIONS or self.declares_motionless(name)
 
     def _is_still(self, name: str) -> bool:
-        still = known_instructions().get(name) == "still" or name in HARMLESS
-        return still or self.said_still(name)
+        still = read_known_instructions().get(name) == "still" or name in HARMLESS
+        return still or self.declares_motionless(name)
 
 
 _LEFT = "may move the arm, or change how it moves, in a way that is not followed"
@@ -664,7 +668,7 @@ def _is_text(operand: said.Operand | None) -> TypeGuard[said.StringLiteral]:
     return isinstance(operand, said.StringLiteral)
 
 
-def _called(text: said.StringLiteral) -> str:
+def _name_procedure(text: said.StringLiteral) -> str:
     """Return the procedure that a text names, without its module."""
     return text.text.strip('"').lower().rpartition(":")[2]
 

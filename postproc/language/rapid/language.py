@@ -13,28 +13,28 @@ from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.files import MODULES, task_beside
 from postproc.language.archive import Archive
+from postproc.language.blocks import read_once
 from postproc.language.grammars import line_parser
-from postproc.language.interface import (
+from postproc.language.language import (
     Cloner,
     JobReading,
     Language,
     Start,
 )
-from postproc.language.outline import read_once
+from postproc.language.number_edits import Skeleton
 from postproc.language.rapid.backup import (
     modules_beside,
-    mounted_arms,
     read_backup,
+    read_mounted_arms,
     system_modules,
 )
 from postproc.language.rapid.clones import RapidCloner
-from postproc.language.rapid.collect import visits_of
-from postproc.language.rapid.dialect import RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
+from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.rapid.statements import RapidText
-from postproc.language.rapid.task import RapidTask, other_tasks
-from postproc.language.rewrite import Skeleton
+from postproc.language.rapid.symbols import RapidTask, other_tasks
+from postproc.language.rapid.to_visits import visits_of
 from postproc.language.source import Source
 from postproc.language.visits import never_reached
 
@@ -70,7 +70,7 @@ class Rapid(Language):
         machine.run()
         visits = visits_of(machine)
         moves = {k: [m.row for m in file.moves] for k, file in enumerate(task.files)}
-        missed = machine.missed(moves)
+        missed = machine.find_unreached(moves)
         system = frozenset(f.text.source.name for f in task.files if f.is_system)
         missed = {k: v for k, v in missed.items() if k not in system}
         told = never_reached(missed, "main", "module")
@@ -96,7 +96,7 @@ class Rapid(Language):
             if line == 0:
                 yield ""
                 continue
-            before = (_begun(lines[k]) for k in range(line - 1, seen - 1, -1))
+            before = (_name_begin(lines[k]) for k in range(line - 1, seen - 1, -1))
             name, seen = next(filter(None, before), name), line
             yield name
 
@@ -112,9 +112,9 @@ class Rapid(Language):
         """Read ``MOC.cfg`` of a backup."""
         return read_backup(folder)
 
-    def placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
+    def list_placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
         """Return the arms of a backup, and where ``MOC.cfg`` places them."""
-        return tuple((arm.name, arm.pose) for arm in mounted_arms(program))
+        return tuple((arm.name, arm.pose) for arm in read_mounted_arms(program))
 
     def prepare(self) -> None:
         """Load the parser of statements."""
@@ -150,7 +150,7 @@ _WORDS = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\\[^,;]*,)?\s*([A-Za-z_]\w*)?")
 _JOINTS = re.compile(r"[^!\"]*?\b(?:jointtarget\s|\w+AbsJ\b|\w+ExtJ\b)", re.I)
 
 
-def _begun(line: bytes) -> str:
+def _name_begin(line: bytes) -> str:
     """Name what a line begins, "" where it goes on with what another began."""
     text = line.decode("latin-1")
     declared = _DECLARED.match(text)

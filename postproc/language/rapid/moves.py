@@ -10,33 +10,33 @@ from functools import cache
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.collect import (
-    IDENTITY,
-    FoundGoal,
-    FoundShift,
-    FoundVisit,
-    Pose,
-    composed,
-    flat,
-    not_reached,
-)
-from postproc.language.machine import Scope
+from postproc.language.interpreter import Scope
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.dialect import (
+from postproc.language.rapid.instructions import POINT, Signature
+from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
+from postproc.language.rapid.pose_encoding import (
     RAPID_DIALECT,
     WIDTH,
     rotation_from_quaternion,
 )
-from postproc.language.rapid.modes import EMPTY_HAND, Modes
-from postproc.language.rapid.signatures import POINT, Signature
-from postproc.language.rapid.targets import COUNTS
-from postproc.language.rapid.task import (
+from postproc.language.rapid.symbols import (
     SHIFTS,
     Nested,
     RapidTask,
     WrittenNumber,
 )
+from postproc.language.rapid.targets import COUNTS
 from postproc.language.shifts import Shift, ShiftKind
+from postproc.language.to_visits import (
+    IDENTITY,
+    FoundGoal,
+    FoundShift,
+    FoundVisit,
+    Pose,
+    compose_poses,
+    flat,
+    not_reached,
+)
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
@@ -247,9 +247,9 @@ class Goals:
                 and name not in self.task.routines
                 and not signature.joints
             ):
-                shifted = self._shifted(name, arguments, row, scope)
+                shifted = self._read_shifted(name, arguments, row, scope)
                 own = operand is written  # not given to a routine, which may read it
-                return shifted if own else _fixed(shifted)
+                return shifted if own else _fix_shift(shifted)
             case _:
                 return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
 
@@ -263,12 +263,12 @@ class Goals:
         """Read a point that is written or named."""
         name = operand.name if isinstance(operand, said.DataObject) else ""
         if isinstance(operand, said.Composite):
-            plain = self._written(operand, joints, row, scope)
+            plain = self._read_written(operand, joints, row, scope)
             if plain is not None:
                 return plain
         found = _numbers(self.task.record(operand, row, scope), joints)
         if found is None:
-            why = self._untold(name, scope) if name else AT_RUN_TIME
+            why = self._explain_unknown(name, scope) if name else AT_RUN_TIME
             return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
         shown = name + self._element(operand, row, scope)
         main, aux = found
@@ -285,7 +285,7 @@ class Goals:
             name=shown,
             aux=aux,
             why=why or (NO_REASON if file >= 0 else _COMPUTED),
-            pins=self._pinned(name, scope),
+            pins=self._explain_pinned(name, scope),
         )
 
     def _own_places(
@@ -310,7 +310,7 @@ class Goals:
         own = all(first <= one.slot < behind for one in numbers)
         return (file, slots) if own else (-1, NO_SLOTS)
 
-    def _written(
+    def _read_written(
         self, operand: said.Composite, joints: bool, row: int, scope: Scope
     ) -> FoundGoal | None:
         """Read a point whose numbers all stand in the move, None for others."""
@@ -344,7 +344,7 @@ class Goals:
                 spelt.append("{" + ",".join(f"{k:g}" for k in at) + "}")
         return "".join(spelt)
 
-    def _untold(self, name: str, scope: Scope) -> Reason:
+    def _explain_unknown(self, name: str, scope: Scope) -> Reason:
         """Say why a name stands for no known point."""
         found, code = self.task.datum(name, scope), Code.RUNTIME_VALUE
         if found is None:
@@ -361,7 +361,7 @@ class Goals:
             text = f"has an element or value that is not known: {RUN_TIME}"
         return Reason(code, f"{name} {text}")
 
-    def _pinned(self, name: str, scope: Scope) -> str:
+    def _explain_pinned(self, name: str, scope: Scope) -> str:
         """Say why a point must keep its numbers."""
         if not name:
             return ""
@@ -370,7 +370,7 @@ class Goals:
                 f"{name} stands beside its original (o_): the controller limits how "
                 "far apart they may be"
             )
-        if "getdataval" in self.task.called:
+        if "getdataval" in self.task.find_calls:
             return f"GetDataVal may take {name} by a name in a string"
         if self.task.is_used_beside(name, scope):
             return f"{name} is data of another task too, which has its numbers as well"
@@ -378,7 +378,7 @@ class Goals:
             return f"{name} is used otherwise than as a destination too"
         return ""
 
-    def _shifted(
+    def _read_shifted(
         self, name: str, arguments: Sequence[said.Argument], row: int, scope: Scope
     ) -> FoundGoal:
         """Read Offs and RelTool: the point is moved along, the shift stays."""
@@ -401,10 +401,10 @@ class Goals:
                 Meaning.UNKNOWN, NOTHING, base.file, follows=_from(base),
                 name=base.name, why=base.why or AT_RUN_TIME, pins=pins, holds=held,
             )  # fmt: skip
-        values = _moved(np.array(base.values), name, shift, angles)
+        values = _move_point(np.array(base.values), name, shift, angles)
         turned = any(angles)
         kind = ShiftKind.AXES if name == "offs" else ShiftKind.OWN
-        found = self._found_shift(
+        found = self._place_shift(
             Shift(kind, (*shift, *angles), base.values), base, [*placed[1:], *(
                 turns.get(axis) for axis in ("rx", "ry", "rz")
             )], row, scope,
@@ -416,7 +416,7 @@ class Goals:
             base.why, pins, shift=found, holds=held if fixed else (-1, -1),
         )  # fmt: skip
 
-    def _found_shift(
+    def _place_shift(
         self,
         shift: Shift,
         base: FoundGoal,
@@ -472,7 +472,7 @@ class Goals:
         found = self.task.record(operand, arguments.row, arguments.scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
-            why = self._untold(name, arguments.scope)
+            why = self._explain_unknown(name, arguments.scope)
             return FrameOfMove((), kind == "tool", why)
         return replace(read, taught=self.task.is_taught(name, found))
 
@@ -485,7 +485,7 @@ def _is_written(numbers: Sequence[said.Operand | None]) -> bool:
     )
 
 
-def _fixed(goal: FoundGoal) -> FoundGoal:
+def _fix_shift(goal: FoundGoal) -> FoundGoal:
     """Return a shifted goal whose shift keeps its numbers."""
     if goal.shift is None:
         return goal
@@ -545,7 +545,7 @@ class _Arguments:
             return "zonedata"
         return "speeddata" if _SPEED.match(operand.name) else ""
 
-    def _named(self, type_: str) -> tuple[said.DataObject | None, _Arguments]:
+    def _find_argument(self, type_: str) -> tuple[said.DataObject | None, _Arguments]:
         """Return the only argument of a type, and the arguments where it stands."""
         found = self.task.behind(self.of_type(type_), self.row, self.scope)
         named = found[0] if isinstance(found[0], said.DataObject) else None
@@ -557,7 +557,7 @@ class _Arguments:
         return not hidden
 
     def _stops(self) -> bool:
-        operand, _ = self._named("zonedata")
+        operand, _ = self._find_argument("zonedata")
         return operand is not None and operand.name == "fine"
 
     def zone(self) -> float:
@@ -570,7 +570,7 @@ class _Arguments:
                 return UNKNOWN_ZONE
             own = self.task.number(size, self.row, self.scope)
             return own if own >= 0.0 else UNKNOWN_ZONE
-        operand, there = self._named("zonedata")
+        operand, there = self._find_argument("zonedata")
         if operand is None:
             return UNKNOWN_ZONE
         if operand.name == "fine":
@@ -590,7 +590,7 @@ class _Arguments:
         own = self.option("v")
         if own is not None:
             return self.task.number(own, self.row, self.scope) / 1000.0
-        operand, there = self._named("speeddata")
+        operand, there = self._find_argument("speeddata")
         if operand is None:
             return np.nan
         usual = _SPEED.match(operand.name)
@@ -662,7 +662,7 @@ def _places(numbers: Sequence[WrittenNumber]) -> tuple[int, tuple[int, ...]]:
     return files.pop(), tuple(slots + [-1] * (WIDTH - len(slots)))
 
 
-def _moved(
+def _move_point(
     base: np.ndarray, name: str, shift: Sequence[float], angles: Sequence[float]
 ) -> tuple[float, ...]:
     """Shift a point: Offs in its work object, RelTool along and about its own axes."""
@@ -675,7 +675,7 @@ def _moved(
         about_y = np.array([[cos[1], 0, sin[1]], [0, 1, 0], [-sin[1], 0, cos[1]]])
         about_z = np.array([[cos[2], -sin[2], 0], [sin[2], cos[2], 0], [0, 0, 1]])
         by = rotation @ about_x @ about_y @ about_z @ rotation.T
-        out = RAPID_DIALECT.turned(out[None], by[None])[0]
+        out = RAPID_DIALECT.rotate(out[None], by[None])[0]
     return tuple(out.tolist())
 
 
@@ -740,5 +740,5 @@ def _wobj_of(found: Nested | None) -> FrameOfMove | None:
         isinstance(fixed, WrittenNumber) and fixed.value
     ):
         why = _CARRIED
-    pose = composed(pose_of_numbers(user), pose_of_numbers(object_))
+    pose = compose_poses(pose_of_numbers(user), pose_of_numbers(object_))
     return FrameOfMove(pose, bool(held.value), why)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from postproc.language.parser import Children, FormParser, Word
 from postproc.language.rapid import syntax as said
+from postproc.language.template_parser import Children, FormParser, Word
 
 # From trees to statements, rule by rule. Every function here is named after a rule of
 # ``grammars/rapid.lark`` and takes what its children gave.
@@ -100,7 +100,7 @@ def _reference(c: Children) -> said.DataObject:
     return said.DataObject(_low(c[0]), tuple(c[1:]))
 
 
-def _joined(c: Children) -> tuple[said.Argument, ...]:
+def _join_arguments(c: Children) -> tuple[said.Argument, ...]:
     return tuple(argument for part in c for argument in part)
 
 
@@ -147,7 +147,7 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "connect": lambda c: said.ConnectTrap(c[0], _low(c[1])),
     "leave": lambda c: said.Leave(_low(c[0])),
     "nothing": lambda c: said.RapidStatement(),
-    "arguments": _joined,
+    "arguments": _join_arguments,
     "part": _part,
     "switch": lambda c: _option(c[0]),
     "named": lambda c: _option(c[0], c[1]),

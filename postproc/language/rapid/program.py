@@ -10,9 +10,13 @@ import numpy as np
 
 from postproc.diagnostics import Code
 from postproc.files import is_named_as_system
-from postproc.language.flow import HeadedRows
-from postproc.language.outline import BlockWords, Outline
-from postproc.language.rapid.signatures import MOTIONS, Signature, known_instructions
+from postproc.language.blocks import BlockWords, Outline
+from postproc.language.control_flow import HeadedRows
+from postproc.language.rapid.instructions import (
+    MOTIONS,
+    Signature,
+    read_known_instructions,
+)
 from postproc.language.rapid.statements import RapidText, read_statements
 from postproc.language.rapid.syntax import (
     Argument,
@@ -225,10 +229,13 @@ class _Calls:
             )
             if to is None or (signature.via >= 0 and via is None):
                 self._complain(row, Code.UNKNOWN_STATEMENT, "has too few positions")
-        elif known_instructions().get(name, "left") == "left" and name not in self.own:
+        elif (
+            read_known_instructions().get(name, "left") == "left"
+            and name not in self.own
+        ):
             what = "is neither a known instruction nor a routine here: it may move"
             self._complain(row, Code.UNKNOWN_INSTRUCTION, what)
 
     def _complain(self, row: int, code: Code, what: str) -> None:
-        message = f"{self.text.shown(row)} {what}"
+        message = f"{self.text.quote(row)} {what}"
         self.diagnostics.append(self.text.diagnostic(row, code, message))

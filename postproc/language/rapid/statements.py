@@ -6,7 +6,7 @@ from postproc import _native
 from postproc.language.rapid.parser import parse_statement
 from postproc.language.rapid.syntax import RapidStatement
 from postproc.language.source import Source
-from postproc.language.statements import StatementText, read_text
+from postproc.language.statement_table import StatementText, read_text
 
 RapidText = StatementText[RapidStatement]
 

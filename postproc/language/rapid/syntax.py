@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from postproc.language.syntax import (
+from postproc.language.ir import (
     Argument,
     Assignment,
     BlockWord,
@@ -24,7 +24,7 @@ from postproc.language.syntax import (
     Operation,
     StringLiteral,
 )
-from postproc.language.syntax import (
+from postproc.language.ir import (
     SourceStatement as RapidStatement,
 )
 

@@ -120,7 +120,7 @@ def operands_of(said: RapidStatement) -> Sequence[Operand]:
     """Return the values that a statement gives: declared, assigned, as arguments."""
     match said:
         case DataDeclaration(value=value):
-            return _given([value])
+            return _drop_none([value])
         case Assignment(value=value):
             return [value]
         case Instruction(arguments=arguments) | LateCall(arguments=arguments):
@@ -131,12 +131,12 @@ def operands_of(said: RapidStatement) -> Sequence[Operand]:
             return []
 
 
-def _given(values: Sequence[T | None]) -> list[T]:
+def _drop_none(values: Sequence[T | None]) -> list[T]:
     return [value for value in values if value is not None]
 
 
 def _values(arguments: Sequence[Argument]) -> Sequence[Operand]:
-    return _given([argument.value for argument in arguments])
+    return _drop_none([argument.value for argument in arguments])
 
 
 def _inside(operand: Operand) -> Sequence[Operand]:

@@ -137,15 +137,15 @@ def restore(name: str, settings: Mapping[str, Any]) -> Effect:
     if name not in PLACES:
         raise ValueError(f"unknown effect {name!r}")
     try:
-        return kind_of(name)(**{k: _frozen(v) for k, v in settings.items()})
+        return kind_of(name)(**{k: _freeze(v) for k, v in settings.items()})
     except TypeError:
         raise ValueError(f"settings do not fit effect {name!r}") from None
 
 
-def _frozen(value: Any) -> Any:
+def _freeze(value: Any) -> Any:
     """Turn lists into tuples, at all depths."""
     if isinstance(value, Mapping):
-        return {k: _frozen(v) for k, v in value.items()}
+        return {k: _freeze(v) for k, v in value.items()}
     if isinstance(value, list):
-        return tuple(_frozen(v) for v in value)
+        return tuple(_freeze(v) for v in value)
     return value

@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.effects.effect import Candidate, Effect, Parameter, alternatives
 from postproc.model.effects.sighting import Sighting
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 TURN = 2e-5  # [rad]
 NEAREST, FARTHER, RINGS = 1.5, 2.0**0.5, 7  # [m], ratio: rings of places to try
@@ -27,15 +27,15 @@ class Azimuth(Sighting):
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("base turn", "joint"),)
 
     @classmethod
-    def sighted(
-        cls, batch: Batch, tracker: tuple[float, float, float] | None
+    def propose_sighted(
+        cls, batch: ArmStates, tracker: tuple[float, float, float] | None
     ) -> list[Candidate]:
         """Try it at the tracker's place, or where the tracker may stand."""
         places = [cls(tracker)] if tracker else cls._anywhere(batch)
         return alternatives([(place, "joint 1") for place in places])
 
     @classmethod
-    def _anywhere(cls, batch: Batch) -> list[Effect]:
+    def _anywhere(cls, batch: ArmStates) -> list[Effect]:
         """List places round the base; their height changes nothing."""
         rings = NEAREST * FARTHER ** np.arange(RINGS)
         turns = 2 * np.pi * np.arange(BEARINGS) / BEARINGS
@@ -48,12 +48,12 @@ class Azimuth(Sighting):
         return cls((float(x), float(y), 0.0), told=False)
 
     @staticmethod
-    def _clear(batch: Batch, places: list[Azimuth]) -> list[Effect]:
+    def _clear(batch: ArmStates, places: list[Azimuth]) -> list[Effect]:
         """Leave out what stands where the arm works."""
         level = [np.hypot(*p.beam(batch)[:, :2].T).min() for p in places]
         return [p for p, near in zip(places, level, strict=True) if near > CLEAR]
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Move a tracker whose place nobody told."""
         if self.told:
             return []
@@ -74,7 +74,7 @@ class Azimuth(Sighting):
         """Name the two parts of the wave."""
         return tuple(Parameter(part, "rad", TURN, "circle") for part in ("sin", "cos"))
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the reading, (n, 3, 2)."""
         x, y, _ = self.beam(batch).T
         across = np.column_stack([-y, x, np.zeros_like(x)])

@@ -16,7 +16,7 @@ from postproc.model.effects.effect import (
     alternatives,
     own_cells,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 SCALE = 1e-4  # [rad] prior scale of half a backlash
 
@@ -38,7 +38,7 @@ class Backlash(JointEffect):
         return own_cells("lambda {j}", "linear")
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every joint."""
         return [
             c for j in JOINTS for c in alternatives([(cls((j,)), f"lambda {j}")], j)
@@ -48,7 +48,7 @@ class Backlash(JointEffect):
         """Name one b per joint."""
         return tuple(Parameter(f"b{j}", "rad", SCALE, "b", j) for j in self.joints)
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate lambda, (n, p)."""
         side: Floats = batch.states.direction[:, self.acts_on()]
         return side

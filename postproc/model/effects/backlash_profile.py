@@ -23,7 +23,7 @@ from postproc.model.effects.effect import (
     fade_turns,
     own_cells,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -65,7 +65,7 @@ class BacklashProfile(JointEffect):
         return cls(lower=tuple(map(float, low)), upper=tuple(map(float, high)))
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every joint."""
         every = cls.propose(batch.arm, batch.states)
         return [
@@ -86,24 +86,24 @@ class BacklashProfile(JointEffect):
                     out.append(Parameter(name, "rad", SCALE, f"order {k}", j))
         return tuple(out)
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate lambda times the harmonics, (n, p)."""
         joint, waves = self.acts_on(), batch.once(self, self._waves)
         flat = waves.reshape(len(joint), len(batch))
         turned: Floats = batch.states.direction.T[joint] * flat
         return turned.T
 
-    def angles(self, batch: Batch, p: Floats) -> Floats:
+    def angles(self, batch: ArmStates, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad], summed joint by joint."""
         sizes = p.reshape(len(self.joints), self.constant + 2 * len(self.orders))
         states = batch.states.q, batch.states.direction
         return _native.profile(
-            tuple(map(np.ascontiguousarray, states)), self._turned.tolist(),
+            tuple(map(np.ascontiguousarray, states)), self._profiled_joints.tolist(),
             self.orders, self.constant, sizes, (self.lower, self.upper),
         )  # fmt: skip
 
     @property
-    def _turned(self) -> NDArray[np.int64]:
+    def _profiled_joints(self) -> NDArray[np.int64]:
         """Return the 0-based joints that have a profile, (j,)."""
         return np.array(self.joints, dtype=int) - 1
 
@@ -113,7 +113,7 @@ class BacklashProfile(JointEffect):
         Sine and cosine of k theta come from those of (k - 1) theta, which takes a
         quarter of the time and is as good but for the last digit.
         """
-        angle = np.ascontiguousarray(q[:, self._turned].T)
+        angle = np.ascontiguousarray(q[:, self._profiled_joints].T)
         waves = np.ones((len(angle), self.constant + 2 * len(self.orders), len(q)))
         sin, cos = np.sin(angle), np.cos(angle)
         s, c = np.zeros_like(sin), np.ones_like(cos)
@@ -124,5 +124,5 @@ class BacklashProfile(JointEffect):
                 waves[:, at], waves[:, at + 1] = s, c
         within = fade_turns(q, np.array(self.lower), np.array(self.upper))
         if (within != 1.0).any():
-            waves[:, int(self.constant) :] *= within.T[self._turned, None]
+            waves[:, int(self.constant) :] *= within.T[self._profiled_joints, None]
         return waves

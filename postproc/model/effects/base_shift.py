@@ -17,13 +17,13 @@ from postproc.model.effects.effect import (
     cells_in_time,
 )
 from postproc.model.effects.step import CampaignStep, moments
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 SHIFT, TURN = 1e-4, 5e-5  # [m], [rad]
 AXES = "xyz"
 
 
-def rigid_columns(batch: Batch) -> Floats:
+def rigid_columns(batch: ArmStates) -> Floats:
     """Differentiate the TCP by a shift and a turn of the base frame, (n, 3, 6)."""
     return rigid_motions(batch.walk.tcp)
 
@@ -35,7 +35,7 @@ def rigid_motions(points: Floats) -> Floats:
     return np.stack(moved, axis=2)
 
 
-def rigid_rotations(batch: Batch) -> Floats:
+def rigid_rotations(batch: ArmStates) -> Floats:
     """Differentiate the tool's rotation by the same six motions, (n, 3, 6)."""
     turned = np.concatenate([np.zeros((3, 3)), np.eye(3)], axis=1)
     return np.tile(turned, (len(batch), 1, 1))
@@ -54,7 +54,7 @@ class BaseShift(CampaignStep):
         return cells_in_time("base", "step")
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try moments all along the campaign."""
         return alternatives([(cls(float(r)), "order") for r in moments(batch)])
 
@@ -65,12 +65,12 @@ class BaseShift(CampaignStep):
         turn = [Parameter(f"r{a}_row{self.row:g}", "rad", TURN, group) for a in AXES]
         return (*shift, *turn)
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, 6)."""
         before = self.before(batch)[:, None, None]
         return np.where(before, -rigid_columns(batch), 0.0)
 
-    def rotation_columns(self, batch: Batch) -> Floats:
+    def rotation_columns(self, batch: ArmStates) -> Floats:
         """Differentiate the tool's rotation, (n, 3, 6)."""
         before = self.before(batch)[:, None, None]
         return np.where(before, -rigid_rotations(batch), 0.0)

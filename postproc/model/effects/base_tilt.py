@@ -17,7 +17,7 @@ from postproc.model.effects.effect import (
     Sought,
     alternatives,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import GRAVITY, Arm
 from postproc.robot.state import States
 
@@ -54,14 +54,14 @@ class BaseTilt(Effect):
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """Take what is unsure of the arm's own weight."""
-        return cls(unsure=unsure_mass(arm), twist=not arm.stands)
+        return cls(unsure=uncertain_mass(arm), twist=not arm.stands)
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try a foundation along the base's axes, and any other, where weight moves."""
         if not any(map(varies, batch.loads.tilting.T)):
             return []
-        unsure, twist = unsure_mass(batch.arm), not batch.arm.stands
+        unsure, twist = uncertain_mass(batch.arm), not batch.arm.stands
         members = [(cls(skew, unsure, twist), TILTING) for skew in (False, True)]
         return alternatives(members)
 
@@ -82,15 +82,15 @@ class BaseTilt(Effect):
             out += [Parameter(f"h{a}", unit, scale, "pivot") for a in "xy"]
         return tuple(out)
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
         return self._leaning(batch, rigid_columns(batch))
 
-    def rotation_columns(self, batch: Batch) -> Floats:
+    def rotation_columns(self, batch: ArmStates) -> Floats:
         """Differentiate the tool's rotation, (n, 3, p)."""
         return self._leaning(batch, rigid_rotations(batch))
 
-    def _leaning(self, batch: Batch, moved: Floats) -> Floats:
+    def _leaning(self, batch: ArmStates, moved: Floats) -> Floats:
         """Multiply six motions of the base (n, 3, 6) by the moments, (n, 3, p)."""
         about = _moments(batch)
         by = moved[:, :, 3:, None]
@@ -104,13 +104,13 @@ class BaseTilt(Effect):
         return np.concatenate(out, axis=2)
 
 
-def unsure_mass(arm: Arm) -> float:
+def uncertain_mass(arm: Arm) -> float:
     """Say how much of an arm's mass may hang elsewhere than its file says [kg]."""
     links = arm.file.links
     return LEAST if links is None else max(links.spread * arm.mass, LEAST)
 
 
-def _moments(batch: Batch) -> Floats:
+def _moments(batch: ArmStates) -> Floats:
     """Give the moments about x, y, z, and those of 1 kg at each place, (n, 3, 3)."""
     at = batch.arm.landmarks(batch.states.q, batch.states.tool)[:, :2]
     places = np.cross(at, GRAVITY * batch.arm.weight)  # (n, place, axis)

@@ -20,7 +20,7 @@ from postproc.model.effects.effect import (
     Cells,
     Parameter,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 BENDING = (2, 3, 4, 5, 6)  # joint 1 stands on the base: that is `base_tilt`
 ACROSS = "xy"  # axes of the frame before a joint, which turns about its z
@@ -60,7 +60,7 @@ class Bending(WeightEffect):
         )
 
     @classmethod
-    def on(cls, batch: Batch) -> Self:
+    def on(cls, batch: ArmStates) -> Self:
         """Make the effect of all joints across which the load varies."""
         across = np.stack(
             [
@@ -105,16 +105,16 @@ class Bending(WeightEffect):
                     ]
         return tuple(out)
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
         w = batch.walk
         return self._about(batch, lambda axis, k: np.cross(axis, w.tcp - w.pivot[:, k]))
 
-    def rotation_columns(self, batch: Batch) -> Floats:
+    def rotation_columns(self, batch: ArmStates) -> Floats:
         """Differentiate the tool's rotation, (n, 3, p)."""
         return self._about(batch, lambda axis, k: axis)
 
-    def _about(self, batch: Batch, moved: Moved) -> Floats:
+    def _about(self, batch: ArmStates, moved: Moved) -> Floats:
         """Multiply motions about the axes across the joints by the moments, (n, 3, p).
 
         Args:
@@ -132,7 +132,7 @@ class Bending(WeightEffect):
 
     def _moments(
         self,
-        batch: Batch,
+        batch: ArmStates,
         joint: int,
         across: int,
         links: tuple[tuple[int, float], ...],

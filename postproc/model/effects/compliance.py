@@ -20,7 +20,7 @@ from postproc.model.effects.effect import (
     alternatives,
     own_cells,
 )
-from postproc.model.kinematics import Batch, Loads
+from postproc.model.kinematics import ArmStates, Loads
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -58,7 +58,7 @@ def moments(arm: Arm, joint: int) -> tuple[tuple[int, float], ...]:
     return tuple(out)
 
 
-def loads(batch: Batch, torque: Floats, unit: Floats) -> Floats:
+def loads(batch: ArmStates, torque: Floats, unit: Floats) -> Floats:
     """Estimate by how much the load of every joint varies, (n, 6) [N m].
 
     Args:
@@ -106,11 +106,11 @@ class WeightEffect(Effect):
 
     @classmethod
     @abstractmethod
-    def on(cls, batch: Batch) -> Self:
+    def on(cls, batch: ArmStates) -> Self:
         """Make the effect of all joints whose load varies over the states."""
 
     @classmethod
-    def of_joints(cls, batch: Batch, joints: tuple[int, ...], load: Floats) -> Self:
+    def of_joints(cls, batch: ArmStates, joints: tuple[int, ...], load: Floats) -> Self:
         """Make the effect of some joints.
 
         Args:
@@ -128,10 +128,10 @@ class WeightEffect(Effect):
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """Let all joints yield that carry weight."""
-        return cls.on(Batch(arm, states))
+        return cls.on(ArmStates(arm, states))
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every joint that carries weight, or may if no weight is known."""
         return [
             c
@@ -170,7 +170,7 @@ class Compliance(WeightEffect, JointEffect):
         return own_cells("torque {j}", "linear")
 
     @classmethod
-    def along_axes(cls, batch: Batch) -> tuple[Self, Self, Self]:
+    def along_axes(cls, batch: ArmStates) -> tuple[Self, Self, Self]:
         """Make the effect of weight along each axis of the base.
 
         All have the same parameters: weight along any direction is a mix of them, its
@@ -178,7 +178,7 @@ class Compliance(WeightEffect, JointEffect):
         """
         load = np.zeros(6)
         for axis in np.eye(3):
-            on = Batch(batch.arm.mounted(axis), batch.states).loads
+            on = ArmStates(batch.arm.mount(axis), batch.states).loads
             unit = on.basis.reshape(len(batch), 6, 6, 4)[..., 1:]
             load = np.maximum(load, loads(batch, on.total, unit))
         known = batch.arm.file.links is not None
@@ -196,7 +196,7 @@ class Compliance(WeightEffect, JointEffect):
         return *along, replace(made, along=(0.0, 0.0, 1.0))
 
     @classmethod
-    def on(cls, batch: Batch) -> Self:
+    def on(cls, batch: ArmStates) -> Self:
         """Make the effect of all joints whose load varies over the states."""
         total, unit = batch.loads.total, batch.loads.basis
         load = loads(batch, total, unit.reshape(len(batch), 6, 6, 4)[..., 1:])
@@ -241,13 +241,13 @@ class Compliance(WeightEffect, JointEffect):
             return ""
         return "_along_" + "_".join(f"{v:g}" for v in self.along)
 
-    def _loads(self, batch: Batch) -> Loads:
+    def _loads(self, batch: ArmStates) -> Loads:
         """Take the torques of weight in its own direction."""
         if self.along is None:
             return batch.loads
-        return Loads(batch.arm.mounted(np.array(self.along)), batch.states)
+        return Loads(batch.arm.mount(np.array(self.along)), batch.states)
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate torque [N m] and torque per unit of moment, (n, p)."""
         of = self._loads(batch)
         torque = of.gravity + of.payload

@@ -16,7 +16,7 @@ from postproc.model.effects.effect import (
     Unasked,
     alternatives,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 SCALE = 2e-4  # [rad] at the spring's largest torque
 SPRINGS = tuple(
@@ -50,11 +50,11 @@ class Counterbalance(JointEffect):
     preload: float = 0.2
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try springs of usual proportions."""
         return alternatives([(cls(*spring), "joint 2") for spring in SPRINGS], 2)
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Turn the spring, and change its pins and its preload."""
         turned = [replace(self, upright=float(self.upright + 0.1 * x)) for x in offsets]
         ratio = [replace(self, ratio=float(self.ratio * 1.5**x)) for x in offsets]
@@ -75,7 +75,7 @@ class Counterbalance(JointEffect):
         """Name the size, at u = 90 deg."""
         return (Parameter("c2", "rad", SCALE, "2", 2),)
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the spring's torque, 1 at u = 90 deg, (n, 1)."""
         u = batch.states.q[:, 1] - self.upright
         return np.asarray((self._torque(u) / self._torque(np.pi / 2))[:, None])

@@ -16,7 +16,7 @@ from postproc.model.effects.effect import (
     Unasked,
     alternatives,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 SCALE = 5e-5  # [rad/rad]
 HOLLOW_WRIST = ((3, 2), (5, 4), (6, 4), (6, 5))  # receiving, driving
@@ -42,7 +42,7 @@ class Coupling(JointEffect):
         return tuple((f"joint {j}", f"joint {k}", "linear") for j, k in TRIED)
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try neighbours, both ways; what drives a joint is part of the name."""
         out = []
         for pair in TRIED:
@@ -57,7 +57,7 @@ class Coupling(JointEffect):
             for j, k in self.pairs
         )
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the driving angles, (n, p)."""
         driving = np.array([k - 1 for _, k in self.pairs], dtype=int)
         theta: Floats = batch.states.q[:, driving]

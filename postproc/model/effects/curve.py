@@ -21,7 +21,7 @@ from postproc.model.effects.effect import (
     fade,
 )
 from postproc.model.effects.part_motion import CarriedEffect
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 16, 3, 5
 LINEAR = ("temperature", "payload", "speed", "torque", "moment")  # beyond their ranges
@@ -62,7 +62,7 @@ class Curve(CarriedEffect):
     whole: bool = False
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try pairs of joints, and what was before, at every joint.
 
         Curves of one covariate are cells of the table of causes, of any carrier.
@@ -75,7 +75,7 @@ class Curve(CarriedEffect):
         return out
 
     @classmethod
-    def _by_what_was_before(cls, batch: Batch, joint: int) -> list[Candidate]:
+    def _by_what_was_before(cls, batch: ArmStates, joint: int) -> list[Candidate]:
         """Turn a joint by its last two reversals, or its side at the visit before."""
         where, out = f"joint {joint}", []
         both = (f"travel {joint}", f"loop {joint}")
@@ -92,7 +92,7 @@ class Curve(CarriedEffect):
     @classmethod
     def _candidate(
         cls,
-        batch: Batch,
+        batch: ArmStates,
         direction: str,
         source: tuple[str, ...],
         signed: bool = False,
@@ -111,7 +111,7 @@ class Curve(CarriedEffect):
     @classmethod
     def over(
         cls,
-        batch: Batch,
+        batch: ArmStates,
         direction: str,
         source: tuple[str, ...],
         factor: str,
@@ -127,9 +127,9 @@ class Curve(CarriedEffect):
         """Name the sources and the factor."""
         return (*self.source, self.factor) if self.factor else self.source
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Make links heavier or lighter where a load drives it."""
-        return [*self.weighed(offsets, batch)]
+        return [*self.vary_masses(offsets, batch)]
 
     def sentence(self, p: Floats, covariance: Floats) -> str:
         """Say place and drivers."""
@@ -157,13 +157,13 @@ class Curve(CarriedEffect):
             for k in self._orders()
         )  # fmt: skip
 
-    def shape(self, batch: Batch) -> Floats:
+    def shape(self, batch: ArmStates) -> Floats:
         """Evaluate the terms without their direction in space, (n, p)."""
         value, inside = np.ones((len(batch), len(self._orders()))), np.ones(len(batch))
         order = np.array(self._orders())
         for k, name in enumerate(self.source):
             low, high = self.lower[k], self.upper[k]
-            x = self.driven(batch, name)
+            x = self.look_up_driver(batch, name)
             if not name.startswith(HELD):
                 inside *= np.nan_to_num(fade(x, np.array(low), np.array(high)))
             u = _place(name, np.nan_to_num(x), low, high)
@@ -171,11 +171,11 @@ class Curve(CarriedEffect):
             value *= terms[:, order[:, k]]
         return np.asarray(value * inside[:, None])
 
-    def law_values(self, batch: Batch) -> Floats:
+    def law_values(self, batch: ArmStates) -> Floats:
         """Evaluate the terms, with the factor if there is one, (n, p)."""
         shape = self.shape(batch)
         if self.factor:
-            shape *= np.nan_to_num(self.driven(batch, self.factor))[:, None]
+            shape *= np.nan_to_num(self.look_up_driver(batch, self.factor))[:, None]
         return shape
 
 

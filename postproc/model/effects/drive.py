@@ -37,7 +37,7 @@ from postproc.model.effects.transmission import (
     turns_alone,
     whole,
 )
-from postproc.model.kinematics import Batch, Loads
+from postproc.model.kinematics import ArmStates, Loads
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -124,41 +124,41 @@ class DriveEffect(Effect):
         """Take those of the law; their joints are drives."""
         return self.law.parameters()
 
-    def driven(self, batch: Batch) -> Batch:
+    def look_up_driver(self, batch: ArmStates) -> ArmStates:
         """Put drives in the place of joints: angles and torques, sides are theirs."""
         angles = batch.states.q @ np.array(self.coupling).T
-        out = Batch(batch.arm, batch.states.with_(q=angles))
+        out = ArmStates(batch.arm, batch.states.with_(q=angles))
         out.loads = DriveLoads(batch.loads, self.inverse)
         return out
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position: (n, 3, p) [m per unit]."""
         return self._about(batch.jacobian, batch)
 
-    def rotation_columns(self, batch: Batch) -> Floats:
+    def rotation_columns(self, batch: ArmStates) -> Floats:
         """Differentiate the tool's rotation: (n, 3, p) [rad per unit]."""
         return self._about(batch.angular, batch)
 
-    def _about(self, joints: Floats, batch: Batch) -> Floats:
+    def _about(self, joints: Floats, batch: ArmStates) -> Floats:
         """Turn the joints, (n, 3, 6) per unit, by what moves the drives."""
         law = self.law
         columns: Floats = (joints @ self.inverse)[:, :, law.acts_on()]
-        return np.asarray(columns * law.basis(self.driven(batch))[:, None, :])
+        return np.asarray(columns * law.basis(self.look_up_driver(batch))[:, None, :])
 
     def only_joint(self) -> int | None:
         """Tell a drive that moves its own joint alone."""
         drive = self.law.only_joint()
         return None if drive is None or drive + 1 in dragging(self.coupling) else drive
 
-    def turning(self, batch: Batch) -> Floats:
+    def turning(self, batch: ArmStates) -> Floats:
         """Evaluate the law, (n, p)."""
-        return self.law.basis(self.driven(batch))
+        return self.law.basis(self.look_up_driver(batch))
 
-    def angles(self, batch: Batch, p: Floats) -> Floats:
+    def angles(self, batch: ArmStates, p: Floats) -> Floats:
         """Return the errors of the drives (n, 6) [rad] for parameters p."""
-        return self.law.angles(self.driven(batch), p)
+        return self.law.angles(self.look_up_driver(batch), p)
 
-    def direction_slopes(self, batch: Batch, p: Floats) -> Floats:
+    def direction_slopes(self, batch: ArmStates, p: Floats) -> Floats:
         """Give the position error per unit of each drive's direction, (n, 3, 6) [m]."""
         ones = np.ones_like(batch.states.q)
         both = [self.angles(batch.arriving(side), p) for side in (ones, -ones)]
@@ -189,7 +189,7 @@ class DriveBacklash(DriveEffect):
         return cls(coupling_of(arm), dragging(coupling_of(arm)))
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every drive."""
         every, out = cls.propose(batch.arm, batch.states), []
         for j in every.drives:
@@ -224,7 +224,7 @@ class DriveTransmission(DriveEffect):
         return cls(coupling_of(arm), waves)
 
     @classmethod
-    def not_tried(cls, batch: Batch) -> tuple[str, ...]:
+    def not_tried(cls, batch: ArmStates) -> tuple[str, ...]:
         """Say that drives may be coupled, where the arm file tells of none."""
         if following(batch.arm):
             return ()
@@ -234,23 +234,23 @@ class DriveTransmission(DriveEffect):
         )
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every drive; eccentricity, the motor and the teeth share the prior."""
         coupling, out = coupling_of(batch.arm), []
         for j in following(batch.arm):
             family = Family(cls.name, j, angle_text(coupling[j - 1]), NAMED)
-            for order, share in cls.orders(batch, j).tried():
+            for order, share in cls.orders(batch, j).list_orders():
                 one = cls(coupling, ((j, order),))
                 out.append(Candidate(family, one, f"drive {j}", share))
         return out
 
     @classmethod
-    def orders(cls, batch: Batch, drive: int) -> Orders:
+    def orders(cls, batch: ArmStates, drive: int) -> Orders:
         """Take the orders of a drive, from 1, that may be tried."""
         ratio = float(abs(batch.arm.gear_ratio[drive - 1]))
         return orders_of(batch, coupling_of(batch.arm)[drive - 1], ratio)
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Change the order of one wave, as in `Transmission`."""
         (drive, order), *others = self.waves
         tries = [] if others else self.orders(batch, drive).near(order, offsets)
@@ -303,7 +303,7 @@ class DriveLoad(DriveEffect):
         return cls(coupling_of(arm), drives, t0=max([1.0, *typical]))
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try all forms at every drive that moves several joints and carries weight."""
         coupling, inverse = coupling_of(batch.arm), np.linalg.inv(batch.arm.coupling)
         joints = np.abs(batch.loads.gravity + batch.loads.payload)

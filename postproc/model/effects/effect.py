@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.model.covariate import covariate, varies_enough
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.splines import Splines
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -132,7 +132,7 @@ class Effect(ABC):
         return cls.may_show(states)
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """List what a search may try of it, a grid over what is not linear.
 
         Args:
@@ -146,8 +146,8 @@ class Effect(ABC):
         return ()
 
     @classmethod
-    def sighted(
-        cls, batch: Batch, tracker: tuple[float, float, float] | None
+    def propose_sighted(
+        cls, batch: ArmStates, tracker: tuple[float, float, float] | None
     ) -> list[Candidate]:
         """List what else may be tried of it by where the tracker stands.
 
@@ -157,16 +157,16 @@ class Effect(ABC):
         """
         return []
 
-    def seen_from(self, tracker: tuple[float, float, float] | None) -> Self:
+    def see_from(self, tracker: tuple[float, float, float] | None) -> Self:
         """Return it as it shows to a tracker at a place, base frame [m]."""
         return self
 
     @classmethod
-    def not_tried(cls, batch: Batch) -> tuple[str, ...]:
+    def not_tried(cls, batch: ArmStates) -> tuple[str, ...]:
         """Say what of its kind is no candidate for these rows, however large it is."""
         return ()
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Vary what is not linear in it; nothing where there is nothing finer.
 
         Args:
@@ -180,7 +180,7 @@ class Effect(ABC):
         return self
 
     def readable(
-        self, batch: Batch, without: Collection[str]
+        self, batch: ArmStates, without: Collection[str]
     ) -> tuple[Effect, str] | None:
         """Return it as driven by what a job can read, and the covariate's name.
 
@@ -209,11 +209,11 @@ class Effect(ABC):
         """Return True if the zero of its joint, fitted without it, holds its mean."""
         return False
 
-    def opened(self, joints: Collection[int]) -> Effect:
+    def free_zeros(self, joints: Collection[int]) -> Effect:
         """Return it with the zeros of joints, from 1, to be fitted again."""
         return self
 
-    def told_apart(self, told: bool, batch: Batch) -> Effect:
+    def attribute_drift(self, told: bool, batch: ArmStates) -> Effect:
         """Return it as it counts by what is known of the tracker's own drift.
 
         Args:
@@ -234,7 +234,7 @@ class Effect(ABC):
         """List the covariates of `States` without which it cannot be evaluated."""
         return ()
 
-    def bent_by(self) -> tuple[str, ...]:
+    def list_nonlinear_drivers(self) -> tuple[str, ...]:
         """List the covariates of `States` that drive it by a law that is no line."""
         return ()
 
@@ -250,7 +250,7 @@ class Effect(ABC):
         """
         return self
 
-    def unknown_variance(self, at: Batch) -> Floats | None:
+    def unknown_variance(self, at: ArmStates) -> Floats | None:
         """Variance of readings by what no row of the survey shows, (n, 3) [m^2].
 
         Args:
@@ -261,7 +261,7 @@ class Effect(ABC):
         """
         return None
 
-    def moment_variance(self, batch: Batch, p: Floats) -> Floats | None:
+    def moment_variance(self, batch: ArmStates, p: Floats) -> Floats | None:
         """Give the variance that an unknown moment brings, (n, 3) [m^2], None for 0.
 
         Args:
@@ -275,30 +275,30 @@ class Effect(ABC):
         """Name the p parameters, in the order of the columns."""
 
     @abstractmethod
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position: (n, 3, p) [m per unit], base frame."""
 
-    def rotation_columns(self, batch: Batch) -> Floats | None:
+    def rotation_columns(self, batch: ArmStates) -> Floats | None:
         """Differentiate the tool's rotation: (n, 3, p) [rad per unit], None if 0."""
         return None
 
-    def displacement(self, batch: Batch, p: Floats) -> Floats:
+    def displacement(self, batch: ArmStates, p: Floats) -> Floats:
         """Move the TCP: (n, 3) [m] for parameters p."""
         moved: Floats = self.columns(batch) @ p
         return moved
 
-    def angles(self, batch: Batch, p: Floats) -> Floats:
+    def angles(self, batch: ArmStates, p: Floats) -> Floats:
         """Return the errors of gears, joints or drives, (n, 6) [rad], 0 without."""
         return np.zeros((len(batch), 6))
 
-    def direction_slopes(self, batch: Batch, p: Floats) -> Floats | None:
+    def direction_slopes(self, batch: ArmStates, p: Floats) -> Floats | None:
         """Give its position error per unit of each direction, (n, 3, 6) [m].
 
         None where that follows from the errors of joints, or there is none.
         """
         return None
 
-    def beyond(self, batch: Batch, prior_std: Floats) -> Floats | None:
+    def beyond(self, batch: ArmStates, prior_std: Floats) -> Floats | None:
         """Give the variance of what it may be where it has ended, (n, 6) [rad^2].
 
         A free form that fades to zero outside the surveyed range knows nothing there:
@@ -318,7 +318,7 @@ class Effect(ABC):
         """Number its parameters that map a joint, from 1, finely enough for waves."""
         return np.zeros(0, dtype=np.int64)
 
-    def turning(self, batch: Batch) -> Floats:
+    def turning(self, batch: ArmStates) -> Floats:
         """Evaluate by what each column turns `only_joint`, (n, p) [rad per unit]."""
         raise TypeError(f"{self.name} turns no joint alone")
 
@@ -338,7 +338,7 @@ class Effect(ABC):
         """
         return np.zeros(6)
 
-    def tied(self, batch: Batch) -> tuple[str, ...]:
+    def list_tied(self, batch: ArmStates) -> tuple[str, ...]:
         """Name effects that explain the same at any poses: one is never named alone.
 
         Args:
@@ -382,10 +382,10 @@ class JointEffect(Effect):
     """An effect that turns joints: columns are J_j(q) phi(covariate)."""
 
     @abstractmethod
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate phi: the angle of each parameter's joint, (n, p) [rad per unit]."""
 
-    def splines(self, batch: Batch) -> list[tuple[int, Splines, Floats]] | None:
+    def splines(self, batch: ArmStates) -> list[tuple[int, Splines, Floats]] | None:
         """Write the columns as splines, in their order, where they are made of them.
 
         Returns:
@@ -411,24 +411,24 @@ class JointEffect(Effect):
         joints = set(self.acts_on().tolist())
         return joints.pop() if len(joints) == 1 else None
 
-    def turning(self, batch: Batch) -> Floats:
+    def turning(self, batch: ArmStates) -> Floats:
         """Evaluate phi, (n, p)."""
         return self.basis(batch)
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position: (n, 3, p) [m per unit]."""
         return self._about(batch.jacobian, batch)
 
-    def rotation_columns(self, batch: Batch) -> Floats:
+    def rotation_columns(self, batch: ArmStates) -> Floats:
         """Differentiate the tool's rotation: (n, 3, p) [rad per unit]."""
         return self._about(batch.angular, batch)
 
-    def _about(self, joints: Floats, batch: Batch) -> Floats:
+    def _about(self, joints: Floats, batch: ArmStates) -> Floats:
         """Turn the joints, (n, 3, 6) per unit, by each parameter, (n, 3, p)."""
         columns: Floats = joints.T[self.acts_on()] * self.basis(batch).T[:, None]
         return columns.T
 
-    def angles(self, batch: Batch, p: Floats) -> Floats:
+    def angles(self, batch: ArmStates, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad] for parameters p."""
         out = np.zeros((len(batch), 6))
         turned = self.basis(batch) * p
@@ -544,7 +544,7 @@ class Candidate:
         """Whether what drives it passes with time rather than from pose to pose."""
         return self.source in ("order", "time", "temperature")
 
-    def driver(self, batch: Batch) -> Floats:
+    def driver(self, batch: ArmStates) -> Floats:
         """Return the covariate along which the candidate varies, (n,)."""
         name = "order" if self.in_time else self.source.split(" x ")[0]
         return np.nan_to_num(covariate(batch, name))

@@ -17,7 +17,7 @@ from postproc.model.effects.effect import (
     fade,
 )
 from postproc.model.effects.joint_spline import LEAST_ROWS
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -142,7 +142,7 @@ class Elm(JointEffect):
             for k in range(len(self.layer))
         )
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the neurons for every joint, (n, 6 neurons)."""
         low, high = np.array(self.layer.lower), np.array(self.layer.upper)
         inside = fade(batch.states.q, low, high).prod(axis=1)
@@ -181,7 +181,7 @@ class ElmMap(Effect):
             for k in range(len(self.layer))
         )
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Lay the neurons out per axis, (n, 3, 3 neurons)."""
         h = self.layer(batch.states)
         out = np.zeros((len(batch), 3, 3, h.shape[1]))
@@ -189,7 +189,7 @@ class ElmMap(Effect):
             out[:, k, k] = h
         return out.reshape(len(batch), 3, -1)
 
-    def displacement(self, batch: Batch, p: Floats) -> Floats:
+    def displacement(self, batch: ArmStates, p: Floats) -> Floats:
         """Evaluate the network, (n, 3) [m]."""
         moved: Floats = self.layer(batch.states) @ p.reshape(3, -1).T
         return moved

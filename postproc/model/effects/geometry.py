@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.effects.effect import Effect, Parameter, Unasked
 from postproc.model.effects.placement import Placement
-from postproc.model.kinematics import Batch, Deviation
+from postproc.model.kinematics import ArmStates, Deviation
 from postproc.robot.arm import Arm
 from postproc.robot.pose import cross
 from postproc.robot.state import States
@@ -100,7 +100,7 @@ class Geometry(Effect):
         return np.array(self.deviation(p).link[:, KINDS.index("theta")])
 
     def _kind(
-        self, batch: Batch, kind: int, joint: int
+        self, batch: ArmStates, kind: int, joint: int
     ) -> tuple[Floats, Floats | None]:
         """Return the axis (n, 3) of a link motion and, if it is a turn, its point."""
         w = batch.walk
@@ -108,7 +108,7 @@ class Geometry(Effect):
         point = (None, None, w.corner, w.pivot, w.corner)[kind]
         return axis, None if point is None else point[:, joint]
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position at the batch's deviation, (n, 3, p)."""
         w, n = batch.walk, len(batch)
         columns = []
@@ -122,7 +122,7 @@ class Geometry(Effect):
         columns += [w.flange[:, :, k] for k in range(3)]
         return np.stack([column.T for column in columns]).T
 
-    def rotation_columns(self, batch: Batch) -> Floats:
+    def rotation_columns(self, batch: ArmStates) -> Floats:
         """Differentiate the tool's rotation, (n, 3, p) [rad per unit]."""
         w, n = batch.walk, len(batch)
         still = np.zeros((n, 3))
@@ -136,7 +136,7 @@ class Geometry(Effect):
         columns += [still] * 3
         return np.stack(columns, axis=-1)
 
-    def displacement(self, batch: Batch, p: Floats) -> Floats:
+    def displacement(self, batch: ArmStates, p: Floats) -> Floats:
         """Move the TCP exactly: full kinematics with deviations against without."""
-        moved: Floats = batch.moved(self.deviation(p), batch.shift).walk.tcp
+        moved: Floats = batch.move(self.deviation(p), batch.shift).walk.tcp
         return moved - batch.walk.tcp

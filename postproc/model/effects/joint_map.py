@@ -21,7 +21,7 @@ from postproc.model.effects.effect import (
     own_cells,
 )
 from postproc.model.effects.joint_spline import LONG_SURVEY
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -83,7 +83,7 @@ class JointMap(JointEffect):
         return len(states) < LONG_SURVEY
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try a worn spot anywhere, and free maps of a joint's whole range."""
         return [
             c
@@ -95,7 +95,7 @@ class JointMap(JointEffect):
         ]
 
     @classmethod
-    def _spots(cls, batch: Batch, joint: int) -> list[tuple[Effect, str]]:
+    def _spots(cls, batch: ArmStates, joint: int) -> list[tuple[Effect, str]]:
         """List single bumps all along a joint."""
         q = batch.states.q[:, joint - 1]
         return [
@@ -105,7 +105,7 @@ class JointMap(JointEffect):
         ]
 
     @classmethod
-    def _maps(cls, batch: Batch, joint: int) -> list[tuple[Effect, str]]:
+    def _maps(cls, batch: ArmStates, joint: int) -> list[tuple[Effect, str]]:
         """List smooth maps of one joint's own angle, as fine as the rows allow."""
         q = batch.states.q[:, joint - 1]
         return [
@@ -114,7 +114,7 @@ class JointMap(JointEffect):
             if k == KNOTS_TRIED[0] or ROWS_PER_KNOT * k <= len(q)
         ]
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Move and widen a spot, and give it a shape of its own."""
         if len(self.bumps) != 1:
             return []
@@ -122,9 +122,9 @@ class JointMap(JointEffect):
         each = self.width * 2.0 ** np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
         moved = centre + self.width * offsets
         single = [JointMap(((joint, float(c)),), float(w)) for c in moved for w in each]
-        return [*single, *(self._shaped(half) for half in (2, 4))]
+        return [*single, *(self._shape(half) for half in (2, 4))]
 
-    def _shaped(self, half: int) -> JointMap:
+    def _shape(self, half: int) -> JointMap:
         """Replace a spot by narrower bumps over the same place, 2 half + 1 of them."""
         ((joint, centre),) = self.bumps
         reach = 2.0 * self.width
@@ -153,7 +153,7 @@ class JointMap(JointEffect):
             for j, c in self.bumps
         )
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the bumps, (n, p)."""
         joint = np.array([j - 1 for j, _ in self.bumps], dtype=int)
         centre = np.array([c for _, c in self.bumps])

@@ -15,7 +15,7 @@ from postproc.model.effects.effect import (
     Parameter,
     alternatives,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 MASTERED = 3e-4  # [rad] by which two masterings of a joint differ
 FIRST, LAST = 1, 6  # joints that turn as the base, and as the tool, is turned
@@ -40,11 +40,11 @@ class JointOffset(JointEffect):
     joints: tuple[int, ...] = JOINTS
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every joint."""
         return [c for j in JOINTS for c in alternatives([(cls((j,)), f"joint {j}")], j)]
 
-    def tied(self, batch: Batch) -> tuple[str, ...]:
+    def list_tied(self, batch: ArmStates) -> tuple[str, ...]:
         """Name the shift of base or tool that turns the arm as the joint does.
 
         Joint 1 turns about the axis of the base, joint 6 about that of the flange: one
@@ -61,7 +61,7 @@ class JointOffset(JointEffect):
             Parameter(f"theta{j}", "rad", MASTERED, f"{j}", j) for j in self.joints
         )
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate 1, (n, p)."""
         return np.ones((len(batch), len(self.joints)))
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from postproc.arrays import Floats
 from postproc.model.effects.effect import JointEffect, Parameter, Unasked, fade
 from postproc.model.effects.smooth import smooth, smooth_count
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.splines import Splines
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -63,7 +63,7 @@ class JointSpline(JointEffect):
         """Resolve as much as the number of rows allows, on every joint that moved."""
         low, high = states.q.min(axis=0), states.q.max(axis=0)
         span = np.minimum(high - low, TURN)
-        short = _resolved(states, ROWS_A_LENGTH, SHORTEST)
+        short = _resolve_length(states, ROWS_A_LENGTH, SHORTEST)
         return cls(
             joints=tuple(int(j) + 1 for j in np.flatnonzero(span > LEAST_RANGE)),
             lower=tuple(map(float, low)),
@@ -80,7 +80,7 @@ class JointSpline(JointEffect):
 
     def beside_waves(self, states: States) -> Self:
         """Resolve what named waves leave: as much as more rows allow."""
-        short = _resolved(states, ROWS_BESIDE_WAVES, FINEST)
+        short = _resolve_length(states, ROWS_BESIDE_WAVES, FINEST)
         if short >= min(self.lengths):
             return self
         return replace(self, lengths=(max(self.lengths), short))
@@ -101,7 +101,7 @@ class JointSpline(JointEffect):
             return low, high, False
         return middle - np.pi, middle + np.pi, True
 
-    def _counted(self, q: Floats) -> Floats:
+    def _count_angles(self, q: Floats) -> Floats:
         """Take angles (n, 6) as they count."""
         if not self.turns:
             return q
@@ -127,32 +127,32 @@ class JointSpline(JointEffect):
         short = [(part.j + 1, part.length) == (joint, shortest) for part in parts]
         return np.flatnonzero(np.repeat(short, [part.count for part in parts]))
 
-    def splines(self, batch: Batch) -> list[tuple[int, Splines, Floats]]:
+    def splines(self, batch: ArmStates) -> list[tuple[int, Splines, Floats]]:
         """Write the functions of every joint and length as splines, see `smooth`."""
-        q, out = self._counted(batch.states.q), []
+        q, out = self._count_angles(batch.states.q), []
         for part in self._parts():
             x = q[:, part.j]
             found, mix = smooth(x, part.lower, part.upper, part.length, part.closed)
-            out.append((part.j, found.faded(part.inside(x)), mix))
+            out.append((part.j, found.fade(part.inside(x)), mix))
         return out
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the functions, (n, p)."""
-        columns = [found.mixed(mix) for _, found, mix in self.splines(batch)]
+        columns = [found.combine(mix) for _, found, mix in self.splines(batch)]
         return np.concatenate(columns, axis=1)
 
-    def angles(self, batch: Batch, p: Floats) -> Floats:
+    def angles(self, batch: ArmStates, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad]: one function for every joint."""
         start, out = 0, np.zeros((len(batch), 6))
         for j, found, mix in self.splines(batch):
             part = slice(start, start + mix.shape[1])
-            out[:, j] += found.mixed(mix @ p[part])
+            out[:, j] += found.combine(mix @ p[part])
             start = part.stop
         return out
 
-    def beyond(self, batch: Batch, prior_std: Floats) -> Floats:
+    def beyond(self, batch: ArmStates, prior_std: Floats) -> Floats:
         """Give back the prior's variance as far as the functions have faded, (n, 6)."""
-        q, start, out = self._counted(batch.states.q), 0, np.zeros((len(batch), 6))
+        q, start, out = self._count_angles(batch.states.q), 0, np.zeros((len(batch), 6))
         for part in self._parts():
             ended = 1.0 - part.inside(q[:, part.j]) ** 2
             out[:, part.j] += ended * prior_std[start] ** 2
@@ -160,7 +160,7 @@ class JointSpline(JointEffect):
         return out
 
 
-def _resolved(states: States, rows: float, shortest: float) -> float:
+def _resolve_length(states: States, rows: float, shortest: float) -> float:
     """Say what length so many rows see, `shortest` at least [rad]."""
     span = min(float(np.ptp(states.q, axis=0).max()), TURN)
     seen = rows * span / max(len(states), 1)

@@ -19,7 +19,7 @@ from postproc.model.effects.effect import (
     own_cells,
 )
 from postproc.model.effects.step import CampaignStep, moments
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 TURN = 1e-4  # [rad]
 
@@ -46,7 +46,7 @@ class JointStep(CampaignStep, JointEffect):
         return (*own_cells("order", "step"), *own_cells("time", "step"))
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every joint at moments all along the campaign."""
         rows = moments(batch)
         return [
@@ -72,7 +72,7 @@ class JointStep(CampaignStep, JointEffect):
             for j in self.joints
         )
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate -1 before the step and 0 after it, (n, p)."""
         turned = np.where(self.before(batch), -1.0, 0.0)
         return np.tile(turned[:, None], (1, len(self.joints)))

@@ -18,7 +18,7 @@ from postproc.model.effects.effect import (
     alternatives,
     own_cells,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 SCALE = 2e-4  # [rad s/m]
 
@@ -44,7 +44,7 @@ class Lag(JointEffect):
         return own_cells("lambda {j} x speed", "linear")
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every joint, where the speed varies."""
         if not varies(batch.states.speed):
             return []
@@ -60,7 +60,7 @@ class Lag(JointEffect):
             Parameter(f"k{j}", "rad s/m", SCALE, f"{j}", j) for j in self.joints
         )
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate lambda * speed [m/s], (n, p)."""
         speed = np.nan_to_num(batch.states.speed)[:, None]
         return np.asarray(batch.states.direction[:, self.acts_on()] * speed)

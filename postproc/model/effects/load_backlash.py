@@ -20,7 +20,7 @@ from postproc.model.effects.effect import (
     alternatives,
     own_cells,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -68,7 +68,7 @@ class LoadBacklash(JointEffect):
         return cls(t0=max(float(np.median(torque)), 1.0))
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try all forms at every joint that carries weight."""
         typical = np.median(np.abs(batch.loads.total), axis=0)
         out = []
@@ -82,7 +82,7 @@ class LoadBacklash(JointEffect):
         """Return True: weight mostly chooses one flank of a joint."""
         return True
 
-    def passes_bend(self, batch: Batch) -> bool:
+    def passes_bend(self, batch: ArmStates) -> bool:
         """Return True if the rows can tell its law from laws of other causes.
 
         A flank that weight chooses shows where weight pushes both ways beyond the bend
@@ -100,7 +100,7 @@ class LoadBacklash(JointEffect):
         ]
         return bool(np.logical_or(*shown).all())
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Change the torque at which the flank changes."""
         if self.form == "load":
             return []
@@ -123,7 +123,7 @@ class LoadBacklash(JointEffect):
             out.append(Parameter(name, "rad", UNSURE * SCALE, group, j))
         return tuple(out)
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the laws and their corrections, (n, p)."""
         joint = np.array(self.joints) - 1
         torque = (batch.loads.gravity + batch.loads.payload)[:, joint] / self.t0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
 from postproc.model.effects.effect import Effect, Parameter
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.state import States
 
 # Spatial interpolation: the error at a place is that of its measured neighbours.
@@ -50,7 +50,7 @@ class Interpolation(Effect):
             for axis in "xyz"
         )
 
-    def _weights(self, batch: Batch) -> tuple[NDArray[np.int64], Floats]:
+    def _weights(self, batch: ArmStates) -> tuple[NDArray[np.int64], Floats]:
         """Find neighbours and their weights, (n, k) each."""
         from scipy.spatial import cKDTree  # slow to load, and seldom wanted
 
@@ -59,7 +59,7 @@ class Interpolation(Effect):
         weight = np.maximum(np.asarray(gap), NEAREST_GAP) ** -self.power
         return np.asarray(index), weight / weight.sum(axis=1, keepdims=True)
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Lay the weights out, (n, 3, 3 m)."""
         index, weight = self._weights(batch)
         out = np.zeros((len(batch), 3, len(self.points), 3))
@@ -68,7 +68,7 @@ class Interpolation(Effect):
             out[rows, k, index, k] = weight
         return out.reshape(len(batch), 3, -1)
 
-    def displacement(self, batch: Batch, p: Floats) -> Floats:
+    def displacement(self, batch: ArmStates, p: Floats) -> Floats:
         """Average the neighbours' errors, (n, 3) [m]."""
         index, weight = self._weights(batch)
         moved: Floats = (p.reshape(-1, 3)[index] * weight[:, :, None]).sum(axis=1)
@@ -112,13 +112,13 @@ class Kriging(Effect):
             for name in ("mean", *map(str, range(1, len(self.centres) + 1)))
         )
 
-    def _design(self, batch: Batch) -> Floats:
+    def _design(self, batch: ArmStates) -> Floats:
         """Evaluate one and the kernel, (n, 1 + m)."""
-        x = scaled(batch.states, np.array(self.lower), np.array(self.upper))
+        x = scale_states(batch.states, np.array(self.lower), np.array(self.upper))
         K = correlation(x, np.array(self.centres), np.array(self.length))
         return np.hstack([np.ones((len(x), 1)), K])
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Lay the design out per axis, (n, 3, p)."""
         D = self._design(batch)
         out = np.zeros((len(batch), 3, 3, D.shape[1]))
@@ -126,13 +126,13 @@ class Kriging(Effect):
             out[:, k, k] = D
         return out.reshape(len(batch), 3, -1)
 
-    def displacement(self, batch: Batch, p: Floats) -> Floats:
+    def displacement(self, batch: ArmStates, p: Floats) -> Floats:
         """Evaluate the process, (n, 3) [m]."""
         moved: Floats = self._design(batch) @ p.reshape(3, -1).T
         return moved
 
 
-def scaled(states: States, lower: Floats, upper: Floats) -> Floats:
+def scale_states(states: States, lower: Floats, upper: Floats) -> Floats:
     """Scale joint angles to [-1, 1] and append the directions, (n, 12)."""
     span = np.where(upper - lower > 1e-9, upper - lower, 2.0)
     x = 2 * (states.q - lower) / span - 1
@@ -167,7 +167,7 @@ def train(states: States, error: Floats, seed: int) -> tuple[Kriging, Floats]:
             f"kriging of {len(states)} rows is too large. Use at most {MOST_CENTRES}"
         )
     lower, upper = states.q.min(axis=0), states.q.max(axis=0)
-    x = scaled(states, lower, upper)
+    x = scale_states(states, lower, upper)
     mean = error.mean(axis=0)
     size = float(np.std(error - mean)) or 1.0
     y = (error - mean) / size

@@ -20,7 +20,7 @@ from postproc.model.effects.effect import (
     Origin,
     Parameter,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 TURN, SHIFT = 1e-4, 1e-4  # [rad], [m] prior size of a motion
 ANEW = 3e-4  # [rad], [m] by which a part may sit otherwise than a model has it
@@ -68,10 +68,10 @@ class CarriedEffect(Effect):
         """Name the unknowns of its law."""
 
     @abstractmethod
-    def law_values(self, batch: Batch) -> Floats:
+    def law_values(self, batch: ArmStates) -> Floats:
         """Evaluate by how much each of them moves the carrier, (n, p)."""
 
-    def driven(self, batch: Batch, name: str) -> Floats:
+    def look_up_driver(self, batch: ArmStates, name: str) -> Floats:
         """Look up what drives it, (n,): a load as the weights of the links make it."""
         value = covariate(batch, name)
         for link, more in self.heavier:
@@ -80,7 +80,7 @@ class CarriedEffect(Effect):
                 value = value + per_moment[:, link - 1] @ np.array(more)
         return value
 
-    def weighed(self, offsets: Floats, batch: Batch) -> list[Self]:
+    def vary_masses(self, offsets: Floats, batch: ArmStates) -> list[Self]:
         """Make links heavier or lighter, in parts of what is unsure of their moments.
 
         Masses and centres of an arm file are known to a tenth or so, and a jump at a
@@ -118,7 +118,7 @@ class CarriedEffect(Effect):
         si = self.own_unit()[0]
         return (*own, Parameter(group, si, ANEW, group, self.carrier.joint))
 
-    def turning(self, batch: Batch) -> Floats:
+    def turning(self, batch: ArmStates) -> Floats:
         """Evaluate by how much each column moves the carrier, (n, p)."""
         values = self.law_values(batch)
         if not self.loose:
@@ -143,7 +143,7 @@ class CarriedEffect(Effect):
         """Need the covariates that a program does not tell."""
         return tuple(name for name in self.covariates() if name in OF_STATE)
 
-    def bent_by(self) -> tuple[str, ...]:
+    def list_nonlinear_drivers(self) -> tuple[str, ...]:
         """List what drives it: its law may be any."""
         return self.requires()
 
@@ -156,21 +156,21 @@ class CarriedEffect(Effect):
         joint = self.carrier.joint
         return None if joint is None else joint - 1
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
-        return self._along(self.carrier.moved(batch), batch)
+        return self._along(self.carrier.move(batch), batch)
 
-    def rotation_columns(self, batch: Batch) -> Floats | None:
+    def rotation_columns(self, batch: ArmStates) -> Floats | None:
         """Differentiate the tool's rotation, (n, 3, p)."""
-        turned = self.carrier.turned(batch)
+        turned = self.carrier.turn(batch)
         return None if turned is None else self._along(turned, batch)
 
-    def _along(self, axis: Floats, batch: Batch) -> Floats:
+    def _along(self, axis: Floats, batch: ArmStates) -> Floats:
         """Multiply a direction per unit (n, 3) by what moves it, (n, 3, p)."""
         columns: Floats = axis[:, :, None] * self.turning(batch)[:, None, :]
         return columns
 
-    def direction_slopes(self, batch: Batch, p: Floats) -> Floats | None:
+    def direction_slopes(self, batch: ArmStates, p: Floats) -> Floats | None:
         """Give the position error per unit of the direction that drives it."""
         sides = [n for n in self.covariates() if n.startswith("lambda")]
         if len(sides) != 1:
@@ -226,7 +226,7 @@ class PartMotion(CarriedEffect):
         own = () if self.law == "constant" else (self.source,)
         return (*own, self.factor) if self.factor else own
 
-    def bent_by(self) -> tuple[str, ...]:
+    def list_nonlinear_drivers(self) -> tuple[str, ...]:
         """List what drives it, but for what drives it along a line."""
         if self.law == "linear":
             return ()
@@ -250,11 +250,13 @@ class PartMotion(CarriedEffect):
         kind, _, order = self.law.partition(" ")
         return int(order) if kind == "harmonic" else 0
 
-    def law_values(self, batch: Batch) -> Floats:
+    def law_values(self, batch: ArmStates) -> Floats:
         """Evaluate the law, (n, 1), of a harmonic (n, 2)."""
-        value = self._law(np.nan_to_num(self.driven(batch, self.source)))
+        value = self._law(np.nan_to_num(self.look_up_driver(batch, self.source)))
         if self.factor:
-            value = value * np.nan_to_num(self.driven(batch, self.factor))[:, None]
+            value = (
+                value * np.nan_to_num(self.look_up_driver(batch, self.factor))[:, None]
+            )
             value /= self.size
         return value
 
@@ -272,16 +274,16 @@ class PartMotion(CarriedEffect):
         }
         return laws[self.law][:, None]
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Move the place of a step or a bend, in parts of the range, and its width.
 
         Where a load drives it the weights of links are others, too, but for a linear
         law, which is hardly another one then.
         """
-        weighed = [] if self.law == "linear" else self.weighed(offsets, batch)
-        return [*self._placed(offsets, batch), *weighed]
+        weighed = [] if self.law == "linear" else self.vary_masses(offsets, batch)
+        return [*self._move_place(offsets, batch), *weighed]
 
-    def _placed(self, offsets: Floats, batch: Batch) -> list[PartMotion]:
+    def _move_place(self, offsets: Floats, batch: ArmStates) -> list[PartMotion]:
         """Move the place of a step or a bend, and its width."""
         if self.law not in PLACED:
             return []

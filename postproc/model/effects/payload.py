@@ -18,7 +18,7 @@ from postproc.model.effects.effect import (
     Unasked,
     alternatives,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 UNSURE_LEVER = 0.5  # [m] along the links of an arm of this size
 
@@ -43,7 +43,7 @@ class Payload(JointEffect):
     joints: tuple[int, ...] = (2, 3, 5)
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every joint that carries weight, where the payload varies."""
         if not varies(batch.states.payload):
             return []
@@ -83,7 +83,7 @@ class Payload(JointEffect):
             ]
         return tuple(out)
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the payload's torque, and that per metre of every lever, (n, p)."""
         unit = batch.loads.basis.reshape(len(batch), 6, 6, 4)
         mass = np.nan_to_num(batch.states.payload)[:, None]

@@ -18,7 +18,7 @@ from postproc.model.effects.base_shift import (
     rigid_rotations,
 )
 from postproc.model.effects.effect import Effect, Origin, Parameter
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -107,7 +107,7 @@ class Placement(Effect):
         )
         if len(states) == 0:
             return found
-        walk, which = Batch(arm, states).walk, np.array(found.stations)
+        walk, which = ArmStates(arm, states).walk, np.array(found.stations)
         number = np.searchsorted(which, states.station)
         hidden = unseen_axes(walk.flange, walk.tcp, number)
         return replace(found, unseen=tuple((u.axis, u.follow, u.std) for u in hidden))
@@ -134,18 +134,18 @@ class Placement(Effect):
         """Say which of its columns are the probe points', point by point."""
         return slice(part.start + 6 * len(self.stations), part.stop)
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the measured position, (n, 3, 6 s + 3 k)."""
         flange, which = batch.walk.flange, batch.states.tool_id
         points = [flange * (which == t)[:, None, None] for t in self.tools]
         placed = self._by_station(batch, rigid_columns(batch))
         return np.concatenate([*placed, *points], axis=2)
 
-    def unknown_variance(self, at: Batch) -> Floats | None:
+    def unknown_variance(self, at: ArmStates) -> Floats | None:
         """Return the variance of readings by what no row shows, (n, 3) [m^2]."""
         if not self.unseen:
             return None
-        nominal, out = Batch(at.arm, at.states), np.zeros((len(at), 3))
+        nominal, out = ArmStates(at.arm, at.states), np.zeros((len(at), 3))
         own = self._by_station(nominal, rigid_columns(nominal))
         placed, flange = np.concatenate(own, axis=2), nominal.walk.flange
         for axis, follow, std in self.unseen:
@@ -153,13 +153,13 @@ class Placement(Effect):
             out += (std * moved) ** 2
         return out
 
-    def rotation_columns(self, batch: Batch) -> Floats:
+    def rotation_columns(self, batch: ArmStates) -> Floats:
         """Differentiate the measured orientation, (n, 3, 6 s + 3 k)."""
         still = np.zeros((len(batch), 3, 3 * len(self.tools)))
         placed = self._by_station(batch, rigid_rotations(batch))
         return np.concatenate([*placed, still], axis=2)
 
-    def _by_station(self, batch: Batch, moved: Floats) -> list[Floats]:
+    def _by_station(self, batch: ArmStates, moved: Floats) -> list[Floats]:
         """Give motions (n, 3, 6) to the rows of every station; one has all rows."""
         if len(self.stations) == 1:
             return [moved]

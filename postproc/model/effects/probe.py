@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.model.effects.effect import Effect, Origin, Parameter
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -43,7 +43,7 @@ class Probe(Effect):
             Parameter(f"{a}_{t}", "m", SCALE, "nest") for t in self.tools for a in "xyz"
         )
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Shift the point that a row measures, (n, 3, p)."""
         R = batch.walk.flange
         parts = [R * (batch.states.tool_id == t)[:, None, None] for t in self.tools]

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.model.effects.effect import Effect, Origin, Parameter
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -48,11 +48,11 @@ class ProbeTurn(Effect):
             for a in "xyz"
         )
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Move nothing, (n, 3, p)."""
         return np.zeros((len(batch), 3, 3 * len(self.tools)))
 
-    def rotation_columns(self, batch: Batch) -> Floats:
+    def rotation_columns(self, batch: ArmStates) -> Floats:
         """Turn the probe that a row measures, (n, 3, p)."""
         R = batch.walk.flange
         parts = [R * (batch.states.tool_id == t)[:, None, None] for t in self.tools]

@@ -11,7 +11,7 @@ from postproc.arrays import Floats
 from postproc.model.covariate import varies
 from postproc.model.effects.effect import Candidate, Parameter, alternatives
 from postproc.model.effects.sighting import Sighting
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 BEND = 1e-6  # [1/m] 1 K a metre of height
 STRETCH = 1e-6  # [1/K] of the air's refractive index
@@ -36,8 +36,8 @@ class Refraction(Sighting):
     reference: float = 20.0
 
     @classmethod
-    def sighted(
-        cls, batch: Batch, tracker: tuple[float, float, float] | None
+    def propose_sighted(
+        cls, batch: ArmStates, tracker: tuple[float, float, float] | None
     ) -> list[Candidate]:
         """Try a bend, and a range that follows a recorded temperature."""
         seen = cls(tracker) if tracker else cls(told=False)
@@ -62,7 +62,7 @@ class Refraction(Sighting):
         ]
         return (size,) if self.told else (size, *places)
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the reading, (n, 3, 1) or (n, 3, 4).
 
         What does not depend on where the arm is, or turns all of it, is left out of

@@ -16,7 +16,7 @@ from postproc.model.effects.effect import (
     alternatives,
     own_cells,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 SCALE = 5e-5  # [rad/rad]
 
@@ -40,7 +40,7 @@ class Scale(JointEffect):
         return own_cells("joint {j}", "linear")
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every joint."""
         return [c for j in JOINTS for c in alternatives([(cls((j,)), f"joint {j}")], j)]
 
@@ -50,7 +50,7 @@ class Scale(JointEffect):
             Parameter(f"gain{j}", "rad/rad", SCALE, f"{j}", j) for j in self.joints
         )
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate theta, (n, p)."""
         theta: Floats = batch.states.q[:, self.acts_on()]
         return theta

@@ -10,7 +10,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
 from postproc.model.effects.effect import Effect, Origin, Unasked
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Sighting(Effect):
     tracker: tuple[float, float, float] = (0.0, 0.0, 0.0)
     told: bool = True
 
-    def seen_from(self, tracker: tuple[float, float, float] | None) -> Self:
+    def see_from(self, tracker: tuple[float, float, float] | None) -> Self:
         """Put the tracker where it stands.
 
         Raises:
@@ -47,6 +47,6 @@ class Sighting(Effect):
         """Say that it is the set-up's."""
         return "setup"
 
-    def beam(self, batch: Batch) -> Floats:
+    def beam(self, batch: ArmStates) -> Floats:
         """Return the way from the tracker to the TCP, (n, 3) [m]."""
         return np.asarray(batch.walk.tcp - np.array(self.tracker))

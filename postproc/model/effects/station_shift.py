@@ -14,7 +14,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.effects.base_shift import AXES, rigid_columns, rigid_rotations
 from postproc.model.effects.effect import Effect, Origin, Parameter
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -66,15 +66,15 @@ class StationShift(Effect):
             ]
         return tuple(out)
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, 6 s)."""
         return self._by_station(batch, rigid_columns(batch))
 
-    def rotation_columns(self, batch: Batch) -> Floats:
+    def rotation_columns(self, batch: ArmStates) -> Floats:
         """Differentiate the tool's rotation, (n, 3, 6 s)."""
         return self._by_station(batch, rigid_rotations(batch))
 
-    def _by_station(self, batch: Batch, moved: Floats) -> Floats:
+    def _by_station(self, batch: ArmStates, moved: Floats) -> Floats:
         """Give motions (n, 3, 6) to the rows of every station, (n, 3, 6 s)."""
         at = batch.states.station
         each = [moved * (at == s)[:, None, None] for s in self.stations]

@@ -9,13 +9,13 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats
 from postproc.model.effects.effect import Effect, Origin
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 STEPS = 48  # moments at which a step is tried
 EDGE = 10  # rows before and after a step that must show it
 
 
-def moments(batch: Batch) -> Floats:
+def moments(batch: ArmStates) -> Floats:
     """List the places in the visit order at which a step is tried; none of few rows."""
     order = np.sort(batch.states.order)
     if len(order) < 3 * EDGE:
@@ -24,7 +24,7 @@ def moments(batch: Batch) -> Floats:
     return np.asarray(order[places])
 
 
-def moments_near(row: float, offsets: Floats, batch: Batch) -> Floats:
+def moments_near(row: float, offsets: Floats, batch: ArmStates) -> Floats:
     """List the places near one, offsets (k,) in steps of `moments`.
 
     None is so near to an end that next to no row shows the step: what all rows but a
@@ -52,7 +52,7 @@ class CampaignStep(Effect):
 
     row: float = 0.0
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Move the moment."""
         return [self.at_row(r) for r in moments_near(self.row, offsets, batch)]
 
@@ -68,6 +68,6 @@ class CampaignStep(Effect):
         """Say that it is the survey's: no program runs before the step."""
         return "setup"
 
-    def before(self, batch: Batch) -> Bools:
+    def before(self, batch: ArmStates) -> Bools:
         """Tell which rows come before the step, (n,)."""
         return np.asarray(batch.states.order < self.row)

@@ -21,7 +21,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.step import moments
 from postproc.model.effects.tracker_drift import TrackerDrift
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -116,7 +116,7 @@ class Thermal(Effect):
         )
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try growth with the recorded temperature, and along a warm-up."""
         lengths, states = growing(batch.arm), batch.states
         members: list[tuple[Effect, str]] = []
@@ -127,7 +127,7 @@ class Thermal(Effect):
             members += [(effect, effect.clock) for effect in warm]
         return alternatives(members)
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Change how fast the arm warms up."""
         if self.form == "temperature":
             return []
@@ -135,7 +135,7 @@ class Thermal(Effect):
         return [replace(self, time_constant=c) for c in each]
 
     def readable(
-        self, batch: Batch, without: Collection[str]
+        self, batch: ArmStates, without: Collection[str]
     ) -> tuple[Effect, str] | None:
         """Follow the temperature where that was recorded and the tracker may drift."""
         if self.form == "temperature" or not varies(batch.states.temperature):
@@ -151,7 +151,7 @@ class Thermal(Effect):
         unit = "s" if self.clock == "time" else "rows"
         return {"time_constant": (float(self.time_constant), unit)}
 
-    def told_apart(self, told: bool, batch: Batch) -> Effect:
+    def attribute_drift(self, told: bool, batch: ArmStates) -> Effect:
         """Refer to the end of the survey where it is the arm's, else to its mean.
 
         Nothing was measured of a warmer arm than at the end. What may as well be the
@@ -170,11 +170,11 @@ class Thermal(Effect):
             return self
         return replace(self, clock="unknown")
 
-    def moment_variance(self, batch: Batch, p: Floats) -> Floats | None:
+    def moment_variance(self, batch: ArmStates, p: Floats) -> Floats | None:
         """Spread it between cold and warm, (n, 3) [m^2], where it is the survey's."""
         if self.clock != "unknown":
             return None
-        return np.square(self._grown(batch) @ p) / 12.0  # uniform between 0 and 1
+        return np.square(self._grow(batch) @ p) / 12.0  # uniform between 0 and 1
 
     def belongs_to(self) -> Origin:
         """Say that it is of the state: the cell declares the temperature.
@@ -211,7 +211,7 @@ class Thermal(Effect):
         ]
         return (Parameter(name, unit, scale, group, positive=True), *each)
 
-    def warmth(self, batch: Batch) -> Floats:
+    def warmth(self, batch: ArmStates) -> Floats:
         """Return temperature above the reference [K], or share of the warm-up, (n,)."""
         if self.form == "temperature":
             return np.nan_to_num(batch.states.temperature - self.reference)
@@ -222,17 +222,17 @@ class Thermal(Effect):
         warm = self.level - np.exp(-since / self.time_constant)
         return np.nan_to_num(warm)
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
-        return self._grown(batch) * self.warmth(batch)[:, None, None]
+        return self._grow(batch) * self.warmth(batch)[:, None, None]
 
-    def _grown(self, batch: Batch) -> Floats:
+    def _grow(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position by whole growth, (n, 3, p)."""
         each = np.stack([self._length(batch, name) for name in self.lengths], axis=2)
         every = each.sum(axis=2, keepdims=True)
         return np.concatenate([every, each], axis=2)
 
-    def _length(self, batch: Batch, name: str) -> Floats:
+    def _length(self, batch: ArmStates, name: str) -> Floats:
         """Differentiate the TCP position by the growth of one length, (n, 3) [m]."""
         kind, joint = name[0], int(name[1]) - 1
         if kind == "a":

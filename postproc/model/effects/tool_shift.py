@@ -17,7 +17,7 @@ from postproc.model.effects.effect import (
     cells_in_time,
 )
 from postproc.model.effects.step import CampaignStep, moments
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 SHIFT, TURN = 1e-4, 2e-4  # [m], [rad]
 AXES = "xyz"
@@ -42,7 +42,7 @@ class ToolShift(CampaignStep):
         return cells_in_time("tool", "step")
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try moments all along the campaign."""
         several = len(np.unique(batch.states.tool.round(6), axis=0)) > 1
         return alternatives([(cls(float(r), several), "order") for r in moments(batch)])
@@ -54,7 +54,7 @@ class ToolShift(CampaignStep):
         turn = [Parameter(f"r{a}_row{self.row:g}", "rad", TURN, group) for a in AXES]
         return (*shift, *(turn if self.turns else ()))
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
         axes, before = batch.walk.flange, self.before(batch)
         if self.turns:
@@ -62,7 +62,7 @@ class ToolShift(CampaignStep):
             axes = np.concatenate([axes, axes @ np.swapaxes(arms, 1, 2)], axis=2)
         return np.where(before[:, None, None], -axes, 0.0)
 
-    def rotation_columns(self, batch: Batch) -> Floats | None:
+    def rotation_columns(self, batch: ArmStates) -> Floats | None:
         """Differentiate the tool's rotation, (n, 3, p)."""
         if not self.turns:
             return None

@@ -22,7 +22,7 @@ from postproc.model.effects.effect import (
     cells_in_time,
 )
 from postproc.model.effects.step import moments
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -69,7 +69,7 @@ class TrackerDrift(Effect):
         return cls(float(passed.min()), max(float(np.ptp(passed)), 1e-9), clock)
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try it where the campaign is long enough to tell it from a step."""
         drift = cls.propose(batch.arm, batch.states)
         return alternatives([(drift, drift.clock)]) if len(moments(batch)) else []
@@ -101,7 +101,7 @@ class TrackerDrift(Effect):
         """Take its mean over the campaign where the rows lack its clock."""
         return self if self.clock in known else replace(self, clock="unknown")
 
-    def moment_variance(self, batch: Batch, p: Floats) -> Floats | None:
+    def moment_variance(self, batch: ArmStates, p: Floats) -> Floats | None:
         """Sum the spread of its terms over the campaign, (n, 3) [m^2]."""
         if self.clock != "unknown":
             return None
@@ -109,15 +109,15 @@ class TrackerDrift(Effect):
         moved = rigid_columns(batch) @ p.reshape(TERMS, 6).T  # (n, 3, terms)
         return np.asarray(np.einsum("nik,kl,nil->ni", moved, spread, moved))
 
-    def columns(self, batch: Batch) -> Floats:
+    def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
-        return self.in_time(self._passed(batch), rigid_columns(batch))
+        return self.in_time(self._read_clock(batch), rigid_columns(batch))
 
-    def rotation_columns(self, batch: Batch) -> Floats:
+    def rotation_columns(self, batch: ArmStates) -> Floats:
         """Differentiate the tool's rotation, (n, 3, p)."""
-        return self.in_time(self._passed(batch), rigid_rotations(batch))
+        return self.in_time(self._read_clock(batch), rigid_rotations(batch))
 
-    def _passed(self, batch: Batch) -> Floats:
+    def _read_clock(self, batch: ArmStates) -> Floats:
         """Return what the clock shows, (n,) [s] or rows, NaN where it is unknown."""
         if self.clock == "unknown":
             return np.full(len(batch), np.nan)

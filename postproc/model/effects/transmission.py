@@ -21,7 +21,7 @@ from postproc.model.effects.effect import (
     Unasked,
     own_cells,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 
 SCALE = 5e-5  # [rad]
@@ -57,17 +57,17 @@ class Transmission(JointEffect):
         return own_cells("joint {j}", "harmonic")
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try every joint; eccentricity, the motor and the teeth share the prior."""
         out = []
         for j in JOINTS:
             family = Family(cls.name, j, None, NAMED)
-            for order, share in cls.orders(batch, j).tried():
+            for order, share in cls.orders(batch, j).list_orders():
                 out.append(Candidate(family, cls(((j, order),)), f"joint {j}", share))
         return out
 
     @classmethod
-    def not_tried(cls, batch: Batch) -> tuple[str, ...]:
+    def not_tried(cls, batch: ArmStates) -> tuple[str, ...]:
         """Say which orders are too high for the spacing of the poses, or not known."""
         highest: dict[int, list[int]] = {}
         for j in JOINTS:
@@ -82,12 +82,12 @@ class Transmission(JointEffect):
         return tuple(out)
 
     @classmethod
-    def orders(cls, batch: Batch, joint: int) -> Orders:
+    def orders(cls, batch: ArmStates, joint: int) -> Orders:
         """Take the orders of a joint, from 1, that may be tried."""
         own = tuple(float(j == joint) for j in JOINTS)
         return orders_of(batch, own, motor_ratio(batch.arm, joint))
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Change the order of one wave; those of eccentricity are what they are."""
         (joint, _), *others = self.waves
         orders = self.orders(batch, joint)
@@ -118,7 +118,7 @@ class Transmission(JointEffect):
             for wave in ("sin", "cos")
         )
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the waves, (n, p)."""
         joint = np.array([j - 1 for j, _ in self.waves])
         order = np.array([k for _, k in self.waves])
@@ -190,7 +190,7 @@ class Orders:
         """Give once and twice a turn of the motor, where the poses can tell."""
         return [k * self.ratio for k in ECCENTRIC if k * self.ratio < self.told]
 
-    def tried(self) -> list[tuple[float, float]]:
+    def list_orders(self) -> list[tuple[float, float]]:
         """List the orders, each with the log of its share of the prior."""
         sets = [list(ECCENTRIC), self.motor, self.free.tolist()]
         sets = [some for some in sets if some]
@@ -207,7 +207,7 @@ class Orders:
         return tries
 
 
-def orders_of(batch: Batch, row: tuple[float, ...], ratio: float) -> Orders:
+def orders_of(batch: ArmStates, row: tuple[float, ...], ratio: float) -> Orders:
     """Take the orders that may be tried of an angle, row @ q, found once."""
     key = ("orders", row, None if np.isnan(ratio) else ratio)
     return batch.once(key, lambda q: Orders.of(q @ np.array(row), ratio))

@@ -20,7 +20,7 @@ from postproc.model.effects.effect import (
     alternatives,
     own_cells,
 )
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 
 SCALE = 3e-5  # [rad]
 WAYS = tuple(np.radians([0.5, 1.0, 2.0, 4.0, 7.0]))  # d0 that are tried
@@ -61,7 +61,7 @@ class Windup(JointEffect):
         return own_cells("lambda {j} x way {j}", *ANY)
 
     @classmethod
-    def candidates(cls, batch: Batch) -> list[Candidate]:
+    def candidates(cls, batch: ArmStates) -> list[Candidate]:
         """Try short and long ways at every joint whose travel is known."""
         out = []
         for j in JOINTS:
@@ -76,7 +76,7 @@ class Windup(JointEffect):
         return out
 
     @classmethod
-    def not_tried(cls, batch: Batch) -> tuple[str, ...]:
+    def not_tried(cls, batch: ArmStates) -> tuple[str, ...]:
         """Say that joints may wind up, where nothing tells how far they came."""
         if any(varies(batch.states.travel[:, j - 1]) for j in JOINTS):
             return ()
@@ -85,7 +85,7 @@ class Windup(JointEffect):
             "way: the rows do not tell it (travel1_deg ..), nor does their order",
         )
 
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+    def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Change the way."""
         longest = LONGEST_FLANK if self.form == "elastic" else LONGEST
         ways = np.unique(np.minimum(self.d0 * 2.0**offsets, longest))
@@ -103,17 +103,17 @@ class Windup(JointEffect):
             Parameter(f"w{j}", "rad", SCALE, f"{j} {over}", j) for j in self.joints
         )
 
-    def basis(self, batch: Batch) -> Floats:
+    def basis(self, batch: ArmStates) -> Floats:
         """Evaluate lambda s(travel), (n, p)."""
         joint = self.acts_on()
         travel = np.nan_to_num(batch.states.travel[:, joint], nan=np.inf)
         if self.form == "elastic":
             wound = -np.cos(np.pi * np.minimum(travel / self.d0, 1.0))
         else:
-            wound = 1.0 - 2.0 * self._left(batch) * np.exp(-travel / self.d0)
+            wound = 1.0 - 2.0 * self._remaining_share(batch) * np.exp(-travel / self.d0)
         return np.asarray(batch.states.direction[:, joint] * wound)
 
-    def _left(self, batch: Batch) -> Floats:
+    def _remaining_share(self, batch: ArmStates) -> Floats:
         """Return the share of the friction that a reversal had to turn, (n, p)."""
         if self.form != "dahl":
             return np.ones((1, len(self.joints)))

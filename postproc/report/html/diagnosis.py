@@ -15,7 +15,7 @@ from postproc.report.html.figure import (
     distribution,
     figure,
     points,
-    rounded,
+    round_values,
     thin,
 )
 from postproc.report.html.model import name_of, steps
@@ -162,7 +162,7 @@ def running_mean(x: Any, y: Any) -> tuple[list[float | None], list[float | None]
     filled = [band for band in bands if len(band)]
     middle = np.array([np.median(x[band]) for band in filled])
     mean = np.array([np.mean(y[band]) for band in filled])
-    return rounded(middle, 6), rounded(mean, 6)
+    return round_values(middle, 6), round_values(mean, 6)
 
 
 def significance(candidates: Sequence[Mapping[str, Any]]) -> Figure:
@@ -173,7 +173,7 @@ def significance(candidates: Sequence[Mapping[str, Any]]) -> Figure:
     trace = {
         "type": "bar",
         "orientation": "h",
-        "x": rounded(-np.log10(p), 3),
+        "x": round_values(-np.log10(p), 3),
         "y": [f"{k + 1}. {name_of(c)}" for k, c in enumerate(candidates)],
         "marker": marker,
     }

@@ -30,7 +30,7 @@ def figure(traces: Sequence[Figure], x: str, y: str, **layout: Any) -> Figure:
     return {"traces": list(traces), "layout": {**axes, **layout}}
 
 
-def rounded(values: Floats, digits: int = 5) -> list[float | None]:
+def round_values(values: Floats, digits: int = 5) -> list[float | None]:
     """Round for the page; what is not known becomes None."""
     flat = np.asarray(values, dtype=np.float64).ravel()
     return [v if v == v else None for v in np.round(flat, digits).tolist()]
@@ -54,8 +54,8 @@ def points(name: str, x: Floats, y: Floats, **more: Any) -> Figure:
         "type": "scatter",
         "mode": "markers",
         "name": name,
-        "x": rounded(x),
-        "y": rounded(y),
+        "x": round_values(x),
+        "y": round_values(y),
         "marker": {
             "color": BEFORE if before else AFTER,
             "symbol": "circle-open" if before else "circle",
@@ -82,7 +82,7 @@ def distribution(errors: Mapping[str, Floats]) -> Figure:
                 "type": "scatter",
                 "mode": "lines",
                 "name": name,
-                "x": rounded(edges, 6),
+                "x": round_values(edges, 6),
                 "y": [*counts.tolist(), 0],
                 "line": line,
                 "fill": "tozeroy",
@@ -120,11 +120,11 @@ def along_axes(errors: Mapping[str, Floats]) -> Figure:
                 "type": "box",
                 "name": name,
                 "x": list("xyz"),
-                "q1": rounded(low),
-                "median": rounded(mid),
-                "q3": rounded(high),
-                "lowerfence": rounded(least),
-                "upperfence": rounded(most),
+                "q1": round_values(low),
+                "median": round_values(mid),
+                "q3": round_values(high),
+                "lowerfence": round_values(least),
+                "upperfence": round_values(most),
                 "marker": {"color": colour_of(name)},
                 "fillcolor": "#fff" if k == 0 else "#9cc8e4",
                 "xaxis": f"x{number}",
@@ -146,7 +146,7 @@ def in_space(position_mm: Floats, errors: Mapping[str, Floats]) -> Figure:
         usual = float(np.percentile(np.linalg.norm(e, axis=1), 95))
         scale = magnification(0.06 * extent / max(usual, 1e-9))
         ends = np.stack([p, p + scale * e[rows], np.full_like(p, np.nan)], axis=1)
-        x, y, z = (rounded(ends[:, :, k], 2) for k in range(3))
+        x, y, z = (round_values(ends[:, :, k], 2) for k in range(3))
         width = 2 if name == "before" else 5
         traces.append(
             {

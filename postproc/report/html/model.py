@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.report import FitReport
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.report.html.figure import (
     AFTER,
@@ -25,7 +25,7 @@ from postproc.report.html.figure import (
     log_axis,
     points,
     pose_figures,
-    rounded,
+    round_values,
     thin,
 )
 from postproc.report.html.page import render
@@ -97,7 +97,7 @@ def calibration_report(
     figures = {"coverage": coverage(model["ranges"], rows)}
     figures |= residuals(rows) if rows else {}
     parameters = told.get("parameters") or parameter_table(model["parameters"])
-    pairs = told.get("correlated") or correlated(model)
+    pairs = told.get("correlated") or list_correlated(model)
     return render(
         "calibration.html.j2",
         f"Model {model['id']}",
@@ -160,8 +160,8 @@ def coverage(ranges: Mapping[str, Any], rows: Mapping[str, Floats]) -> Figure:
         "orientation": "h",
         "name": "range covered",
         "y": joints,
-        "base": rounded(low, 2),
-        "x": rounded(high - low, 2),
+        "base": round_values(low, 2),
+        "x": round_values(high - low, 2),
         "marker": {"color": "#dcdcdc", "line": {"color": OTHER, "width": 1}},
         "hovertemplate": "%{base:.1f} deg and %{x:.1f} deg on<extra></extra>",
     }
@@ -175,7 +175,7 @@ def coverage(ranges: Mapping[str, Any], rows: Mapping[str, Floats]) -> Figure:
                 "type": "scatter",
                 "mode": "markers",
                 "name": "rows",
-                "x": rounded(q.T, 2),
+                "x": round_values(q.T, 2),
                 "y": np.repeat(joints, len(q)).tolist(),
                 "marker": marker,
             }
@@ -209,7 +209,7 @@ def at_prior(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
     return [str(p["name"]) for p in parameters if p["determined"] < UNSEEN]
 
 
-def correlated(model: Mapping[str, Any]) -> list[tuple[str, str, float]]:
+def list_correlated(model: Mapping[str, Any]) -> list[tuple[str, str, float]]:
     """List pairs of parameters that the rows cannot tell apart well, worst first."""
     names = [p["name"] for p in model["parameters"]]
     packed = np.array(model["covariance"], dtype=float)
@@ -238,8 +238,8 @@ def fit_evidence(
         ``after_mm`` (what the model leaves of it), in visit order, base frame.
     """
     states = survey.states
-    before = survey.position - Batch(arm, states).walk.tcp
-    after = before - model.measured_error(arm, states)
+    before = survey.position - ArmStates(arm, states).walk.tcp
+    after = before - model.predict_measured(arm, states)
     told = asdict(report) | {"unseen": [str(u) for u in report.unseen]}
     rows = {
         "id": list(survey.ids),

@@ -413,13 +413,17 @@ def listing(sources: Mapping[str, bytes], columns: PageColumns) -> Listing:
     out: Listing = {}
     for name, source in given.items():
         last = len(source.line_starts)
-        wanted = np.arange(1, last + 1) if total <= WHOLE else _used(columns, name)
+        wanted = (
+            np.arange(1, last + 1)
+            if total <= WHOLE
+            else _list_used_lines(columns, name)
+        )
         wanted = wanted[(wanted >= 1) & (wanted <= last)]
         out[visible(name)] = {"line": stretches(wanted), "text": _texts(source, wanted)}
     return out
 
 
-def _used(columns: PageColumns, name: str) -> NDArray[np.int64]:
+def _list_used_lines(columns: PageColumns, name: str) -> NDArray[np.int64]:
     """Return the lines of a file that the visits name, ascending."""
     pairs = (
         (columns.file, columns.line),
@@ -461,7 +465,7 @@ LEFT_ALONE = (Status.CONFLICT, Status.REJECTED, Status.RUNTIME)  # most urgent f
 
 
 @dataclass(frozen=True)
-class LeftAlone:
+class UncorrectedGroup:
     """Visits that were left alone for the same reason.
 
     Attributes:
@@ -486,7 +490,7 @@ class Stage:
     share: float
 
 
-def left_alone(columns: PageColumns) -> tuple[LeftAlone, ...]:
+def group_uncorrected(columns: PageColumns) -> tuple[UncorrectedGroup, ...]:
     """Group what was not corrected by status and reason, the largest group first."""
     groups = []
     for status in LEFT_ALONE:
@@ -495,7 +499,7 @@ def left_alone(columns: PageColumns) -> tuple[LeftAlone, ...]:
         for k in np.argsort(-counts, kind="stable"):
             rows = np.flatnonzero(mine & (columns.why == codes[k]))
             groups.append(
-                LeftAlone(
+                UncorrectedGroup(
                     status.name.lower(),
                     columns.reasons[codes[k]],
                     int(counts[k]),
@@ -658,7 +662,7 @@ def _page(program: ProgramPage) -> str:
         program=program,
         counts=tell_counts(columns),
         corrected=int((columns.status == Status.CORRECTED).sum()),
-        groups=left_alone(columns),
+        groups=group_uncorrected(columns),
         predicted=finite(program.predicted),
         sigma=uncertainty(columns),
         stages=seconds(program.stages),

@@ -7,7 +7,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from postproc.compensation.record import FileRecord, read_sidecar, restore, sidecar_path
+from postproc.compensation.sidecar import (
+    FileRecord,
+    read_sidecar,
+    restore,
+    sidecar_path,
+)
 from postproc.exceptions import ProgramError
 from postproc.files import schema, write_all
 from postproc.language.source import Source
@@ -38,7 +43,7 @@ def find_sources(report: Mapping[str, Any], folder: Path) -> dict[str, bytes]:
     for name in sorted(names):
         data = _read_if_there(folder / name)
         if data is not None and is_stamped(Source(name, data)):
-            data = _restored(data, records.get(name), name)
+            data = _restore_bytes(data, records.get(name), name)
         if data is not None:
             found[name] = data
     return found
@@ -61,7 +66,7 @@ def _read_if_there(path: Path) -> bytes | None:
         return None
 
 
-def _restored(data: bytes, record: FileRecord | None, name: str) -> bytes | None:
+def _restore_bytes(data: bytes, record: FileRecord | None, name: str) -> bytes | None:
     """Give a compensated file back, if its record fits."""
     if record is None:
         return None

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.diagnose import (
     Extension,
-    dumped,
+    dump_json,
     evidence_of,
     extend_model,
 )
@@ -21,17 +22,16 @@ from postproc.calibration.diagnosis.held_out import (
     repeats,
     sides,
 )
-from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.next_poses import poses_that_sharpen
 from postproc.calibration.diagnosis.result import periodogram, profile
 from postproc.calibration.diagnosis.score import leftovers
+from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.measurements import Measurements
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.exceptions import ModelError, PostprocError
 from postproc.model.covariate import covariate, loops, unit
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.curve import Curve
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, load_model
 from postproc.report.diagnosis import tell
 from postproc.report.html import diagnosis_report
@@ -50,7 +50,7 @@ from tests.calibration.planted import (
     survey,
 )
 from tests.calibration.simulator import NJ
-from tests.calibration.test_directions import flipped
+from tests.calibration.test_direction_labels import flipped
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def found(planted: tuple[Measurements, Model]) -> Extension:
 
 
 def test_report_has_the_keys_that_other_tools_read(found: Extension) -> None:
-    report = json.loads(dumped(evidence_of(found)))
+    report = json.loads(dump_json(evidence_of(found)))
     assert report["verdict"] == "effect"
     statistics = {"mean_mm", "std_mm", "p95_mm", "max_mm"}
     assert set(report["before"]) == set(report["after"]) == statistics
@@ -88,7 +88,7 @@ def test_report_has_the_keys_that_other_tools_read(found: Extension) -> None:
 
 
 def test_report_holds_the_evidence_that_its_page_shows(found: Extension) -> None:
-    report = json.loads(dumped(evidence_of(found)))
+    report = json.loads(dump_json(evidence_of(found)))
     (effect,) = report["effects"]
     seen = effect["evidence"]
     assert seen["covariate"] == effect["source"]
@@ -223,17 +223,17 @@ def test_a_given_model_of_other_data_is_judged_as_it_is() -> None:
     model = base_model(first)
     found = extend_model(second, ARM, model, tracker=TRACKER)
     assert found.diagnosis.verdict == "noise"
-    error = second.position - Batch(ARM, second.states).walk.tcp
+    error = second.position - ArmStates(ARM, second.states).walk.tcp
     left = error - model.error(ARM, second.states)
     wanted = np.linalg.norm(left, axis=1).mean() * 1e3
     assert found.diagnosis.before.mean_mm == pytest.approx(wanted, rel=0.02)
 
 
-def repeated(sides_of: np.ndarray) -> Batch:
+def repeated(sides_of: np.ndarray) -> ArmStates:
     """Ten poses, each visited four times from the given sides."""
     rng = np.random.default_rng(0)
     q = np.repeat(rng.uniform(-1, 1, (10, 6)), 4, axis=0)
-    return Batch(ARM, make_states(q, sides_of, np.array([0.1, 0.0, 0.2])))
+    return ArmStates(ARM, make_states(q, sides_of, np.array([0.1, 0.0, 0.2])))
 
 
 def test_noise_floor_comes_from_repeats_where_there_are_any(found: Extension) -> None:
@@ -273,7 +273,7 @@ def test_leftovers_see_maps_and_serial_correlation(found: Extension) -> None:
 
 def test_loops_are_the_ways_that_the_gears_went() -> None:
     arrivals = survey(virtual_arm(335, BASE), 335, 120)
-    batch = Batch(ARM, states_of(arrivals))
+    batch = ArmStates(ARM, states_of(arrivals))
     for joint in range(6):
         known = ~np.isnan(loops(batch, joint))
         assert known.sum() > 110
@@ -325,7 +325,7 @@ def test_wrong_directions_are_listed_and_held_out_rows_keep_theirs() -> None:
     assert out.sum() > 20
     assert np.median(off[out]) > 4.0 * np.median(off[~out])
     assert "likeliest wrong: row " in tell(found.diagnosis)
-    report = json.loads(dumped(evidence_of(found)))
+    report = json.loads(dump_json(evidence_of(found)))
     assert report["directions"]["turned"] == listed.turned
 
 

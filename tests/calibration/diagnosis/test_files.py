@@ -17,7 +17,7 @@ from postproc.calibration.diagnosis.files import (
 )
 from postproc.calibration.fit import fit
 from postproc.calibration.survey_files import read_measurements
-from postproc.cli.loop import extended_path
+from postproc.cli.loop import path_of_extension
 from postproc.exceptions import OutputError
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import load_model
@@ -89,7 +89,7 @@ def test_files_in_model_and_words_out(job: Path, tmp_path: Path) -> None:
     assert found.to_frame()["effect"].tolist() == ["coupling"]
     assert told == sorted(told)
     assert 0 <= told[0] < told[-1] < 1
-    written = extended_path(tmp_path / "model.json")
+    written = path_of_extension(tmp_path / "model.json")
     found.save(written)
     better = load_model(written)
     assert better.id == found.model.id

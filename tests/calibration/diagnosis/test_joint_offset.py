@@ -8,7 +8,7 @@ import pytest
 from postproc.calibration.diagnosis.diagnose import extend_model
 from postproc.calibration.diagnosis.result import Finding
 from postproc.model.effects.joint_offset import JointOffset
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.pose import lengths
 from postproc.simulation import Planted, VirtualArm, sample_survey, stream, virtual_arm
@@ -69,8 +69,8 @@ def test_two_nests_tell_joint_6_from_a_tool() -> None:
     states = states_of(survey(remastered(6), SEED, 20))
     two = states.with_(tool=np.repeat(NESTS, 10, axis=0))
     six = JointOffset((6,))
-    assert six.tied(Batch(ARM, states)) == ("tool_shift",)
-    assert six.tied(Batch(ARM, two)) == ()
+    assert six.list_tied(ArmStates(ARM, states)) == ("tool_shift",)
+    assert six.list_tied(ArmStates(ARM, two)) == ()
 
 
 def test_joints_that_always_yielded_are_no_offsets() -> None:

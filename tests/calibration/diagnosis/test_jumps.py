@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
+from postproc.calibration.diagnosis.candidates import Projection
+from postproc.calibration.diagnosis.investigate import trace
 from postproc.calibration.diagnosis.jumps import jumps
-from postproc.calibration.diagnosis.library import Projection
-from postproc.calibration.diagnosis.trace import trace
 from postproc.calibration.regression import Fit
 from postproc.model.carrier import every_carrier
 from postproc.model.effects.tool_shift import ToolShift
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from tests.calibration.planted import campaign
 
 JUMPS = "rotation:tool:y by temperature sign"
@@ -34,7 +34,7 @@ def test_a_step_back_and_forth_is_no_jump_of_the_temperature(base: Fit) -> None:
     states = base.batch.states
     order = states.order.copy()
     order[::2] = order[::2][::-1]  # half of the rows were read the other way round
-    mixed = replace(base, batch=Batch(base.batch.arm, states.with_(order=order)))
+    mixed = replace(base, batch=ArmStates(base.batch.arm, states.with_(order=order)))
     assert not jumps(ToolShift(100.0), Projection.of(mixed))
 
 

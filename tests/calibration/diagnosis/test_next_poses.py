@@ -7,12 +7,12 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from postproc.calibration.diagnosis.investigate import Investigation, trace
 from postproc.calibration.diagnosis.next_poses import poses_that_separate
 from postproc.calibration.diagnosis.score import Score
 from postproc.calibration.diagnosis.search import NEAR, JudgedAddition
-from postproc.calibration.diagnosis.trace import Investigation, trace
 from postproc.calibration.regression import fit_effects
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from postproc.simulation import VirtualArrivals, stream
 from tests.calibration.planted import (
     ARM,
@@ -55,7 +55,7 @@ def lead(c: Campaign, found: Investigation, more: VirtualArrivals | None) -> flo
             VirtualArrivals(**joined),
             np.concatenate([position, fresh]),
         )
-    batch = Batch(ARM, states_of(arrivals))
+    batch = ArmStates(ARM, states_of(arrivals))
     evidence = {
         s.family.effect: fit_effects(
             batch,

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from postproc.calibration.diagnosis import search
-from postproc.calibration.diagnosis.held_out import RUN, Gain, deal, held_out_gain
-from postproc.calibration.diagnosis.library import Library, Projection
-from postproc.calibration.diagnosis.score import Leftover, Null, Score
+from postproc.calibration.diagnosis.candidates import Library, Projection
+from postproc.calibration.diagnosis.held_out import RUN, Gain, compare_held_out, deal
+from postproc.calibration.diagnosis.investigate import Investigation, no_progress
+from postproc.calibration.diagnosis.score import Null, ResidualTest, Score
 from postproc.calibration.diagnosis.search import NEAR, Search, choose, ranking, stand
 from postproc.calibration.diagnosis.table import Causes
-from postproc.calibration.diagnosis.trace import Investigation, silent
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects.effect import FREE, NAMED, Candidate, Family
 from postproc.model.effects.scale import Scale
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from tests.calibration.planted import ARM, TRACKER, Campaign, campaign
 
 
@@ -37,7 +37,7 @@ def found(two: Campaign) -> Search:
     base = two.base_fit()
     causes = Causes(Library.of(base))
     null = causes.null(Projection.of(base), seed=0)
-    return search.search(base, causes, null, silent)
+    return search.search(base, causes, null, no_progress)
 
 
 def test_everything_is_refitted_after_each_addition(
@@ -45,7 +45,7 @@ def test_everything_is_refitted_after_each_addition(
 ) -> None:
     names = [a.candidate.family.effect for a in found.additions]
     assert sorted(names) == ["scale", "transmission"]
-    batch = Batch(ARM, two.states)
+    batch = ArmStates(ARM, two.states)
     effects = found.fit.combination.effects
     anew = fit_effects(batch, two.position, effects, tuple(TRACKER))
     assert np.abs(found.fit.residual - anew.residual).max() < 1e-6
@@ -55,7 +55,7 @@ def test_everything_is_refitted_after_each_addition(
 
 def test_every_addition_gains_more_than_its_standard_error(found: Search) -> None:
     for number, addition in enumerate(found.additions):
-        gain = held_out_gain(found.fit, found.place(number), addition.candidate)
+        gain = compare_held_out(found.fit, found.place(number), addition.candidate)
         assert gain.mean > gain.std_error
         assert addition.gain.mean == pytest.approx(gain.mean, rel=0.2)
 
@@ -63,8 +63,8 @@ def test_every_addition_gains_more_than_its_standard_error(found: Search) -> Non
 def test_nothing_is_added_whose_gain_is_within_its_standard_error(
     found: Search, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(search, "held_out_gain", lambda *_: Gain(0.1, 0.11))
-    nothing = search.search(found.base, found.causes, found.null, silent)
+    monkeypatch.setattr(search, "compare_held_out", lambda *_: Gain(0.1, 0.11))
+    nothing = search.search(found.base, found.causes, found.null, no_progress)
     assert nothing.additions == ()
     assert nothing.fit is found.base
     assert nothing.refused is not None
@@ -74,8 +74,8 @@ def test_nothing_is_added_whose_gain_is_within_its_standard_error(
 def test_an_addition_that_stops_predicting_is_taken_out(
     found: Search, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(search, "held_out_gain", lambda *_: Gain(0.1, 0.11))
-    fewer = search._confirmed(found, 0)
+    monkeypatch.setattr(search, "compare_held_out", lambda *_: Gain(0.1, 0.11))
+    fewer = search._confirm_addition(found, 0)
     assert fewer.additions == found.additions[1:]
     assert len(fewer.fit.values) < len(found.fit.values)
 
@@ -176,7 +176,7 @@ def test_two_names_stand_for_the_free_form_that_one_cannot_reach(
 def test_both_questions_together_are_wrong_in_1_of_100(found: Search) -> None:
     nothing = replace(found, additions=())
     for p_value, verdict in ((0.0075, "noise"), (0.0025, "unexplained")):
-        left = (Leftover("rows err alike", 3.0, p_value),)
+        left = (ResidualTest("rows err alike", 3.0, p_value),)
         assert Investigation(nothing, (), left).verdict == verdict
     null = Null(np.sort(np.random.default_rng(0).exponential(1.0, 10**5)))
     wrong = np.exp(-null.threshold(search.LEVEL)) + 0.005

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from postproc.calibration.diagnosis.held_out import Folds, deal
-from postproc.calibration.diagnosis.library import (
+from postproc.calibration.diagnosis.candidates import (
     Library,
     Projection,
     ReducedCandidates,
 )
+from postproc.calibration.diagnosis.held_out import Folds, deal
 from postproc.calibration.diagnosis.score import (
     SIGNALS,
     Null,
     Score,
-    explained,
+    explain_squares,
     leftovers,
     log_evidence,
     rank,
@@ -67,7 +67,7 @@ def test_score_test_is_the_f_test_of_a_linear_model() -> None:
     n, k = 80, 4
     B, z = rng.standard_normal((n, k)), rng.standard_normal(n)
     fitted = B @ np.linalg.lstsq(B, z)[0]
-    squares, rank_of = explained(blocks_of(B, z))
+    squares, rank_of = explain_squares(blocks_of(B, z))
     assert squares[0, 0] == pytest.approx(fitted @ fitted)
     assert rank_of[0] == k
     draws = rng.standard_normal((n, 400))
@@ -136,7 +136,7 @@ def test_library_gives_the_same_blocks_for_kept_and_for_new_columns(
         return rank(reduced, float(base.rest @ base.rest), base.rows)
 
     kept = scores(Library.of(base.fit))
-    monkeypatch.setattr("postproc.calibration.diagnosis.library.KEPT", 0)
+    monkeypatch.setattr("postproc.calibration.diagnosis.candidates.KEPT", 0)
     library = Library.of(base.fit)
     assert all(shelf.columns is None for shelf in library.shelves)
     again = scores(library)

@@ -10,12 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.candidates import Projection
+from postproc.calibration.diagnosis.investigate import trace
 from postproc.calibration.diagnosis.search import extend, predicts_elsewhere, ranking
-from postproc.calibration.diagnosis.trace import trace
 from postproc.calibration.regression import fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
-from postproc.model.kinematics import Batch
+from postproc.model.kinematics import ArmStates
 from tests.calibration.planted import ARM, TRACKER, campaign, states_of, survey
 from tests.undeclared_score import close, ok
 from tests.undeclared_trial import moved, run, without_rigid
@@ -94,7 +94,7 @@ def test_nothing_is_asked_of_visits_before_where_all_are_missing() -> None:
     c = campaign(313, ("joint_step",), 1.0)
     lost = c.states.with_(order=2.0 * c.states.order)
     base = propose(BASE_EFFECTS, ARM, lost)
-    fit = fit_effects(Batch(ARM, lost), c.position, base, tuple(TRACKER))
+    fit = fit_effects(ArmStates(ARM, lost), c.position, base, tuple(TRACKER))
     traced = trace(fit, seed=0)
     assert [f.effect for f in traced.findings] == ["joint_step"]
     tried = [x for s in traced.search.causes.library.shelves for x in s.candidates]
@@ -120,7 +120,7 @@ def test_a_tracker_that_stands_anywhere_is_named_and_not_compensated(
     kind: str, seed: int, size: float
 ) -> None:
     c = campaign(seed, (kind,), size)
-    batch = Batch(ARM, c.states)
+    batch = ArmStates(ARM, c.states)
     fit = fit_effects(batch, c.position, propose(BASE_EFFECTS, ARM, c.states), None)
     found = trace(fit, seed=0)
     assert [f.effect for f in found.findings] == [kind]
@@ -129,7 +129,7 @@ def test_a_tracker_that_stands_anywhere_is_named_and_not_compensated(
         (place,) = (f.settings["tracker"] for f in found.findings)
         assert np.hypot(*(np.array(place) - TRACKER)[:2]) < 1.0  # [m]
     fresh = survey(c.arm, seed + 10**6, 200)
-    at = Batch(ARM, states_of(fresh))
+    at = ArmStates(ARM, states_of(fresh))
     left = c.arm.error(fresh) - moved(found.search.fit, at, ("arm", "state"))
     mean = np.linalg.norm(without_rigid(at, left), axis=1).mean() * 1e3
     assert mean < 1.2 * run("none", seed, 0.0).registered_mm[2]

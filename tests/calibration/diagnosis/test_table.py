@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.calibration.diagnosis.library import Library, Projection, reduce_some
+from postproc.calibration.diagnosis.candidates import Library, Projection, reduce_some
+from postproc.calibration.diagnosis.investigate import Investigation, no_progress, trace
 from postproc.calibration.diagnosis.score import rank
 from postproc.calibration.diagnosis.search import Search, ranking, search
 from postproc.calibration.diagnosis.table import Causes, Table
-from postproc.calibration.diagnosis.trace import Investigation, silent, trace
 from postproc.calibration.regression import Fit
 from postproc.model.carrier import carrier
 from postproc.model.effects.effect import PART_MOTION
@@ -85,7 +85,7 @@ def test_it_is_told_by_place_driver_law_and_size(traced: Investigation) -> None:
 def test_a_free_column_is_taken_out_as_one_of_any_size_is(base: Fit) -> None:
     """(I + X X^T + s^2 c c^T)^-1 for s to infinity, by its definition."""
     view = Projection.of(base)
-    column = base.whiten(carrier("link 3 turn x").moved(view.at))
+    column = base.whiten(carrier("link 3 turn x").move(view.at))
     loose = view.beside(column)
     n = len(view.rest)
     once = view.filter(np.eye(n))
@@ -122,6 +122,6 @@ def test_several_names_stand_for_a_cell_only_where_they_explain_more(
     """A link that bends with the temperature is no chain of three other names."""
     names = Causes(Library.of(base))
     null = Causes.of(base).null(Projection.of(base), seed=0)
-    without: Search = search(base, names, null, silent)
+    without: Search = search(base, names, null, no_progress)
     within = trace(base, seed=0).search
     assert within.fit.log_evidence > without.fit.log_evidence

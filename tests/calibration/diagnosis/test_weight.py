@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from postproc.calibration.diagnosis.library import Library, Projection
+from postproc.calibration.diagnosis.candidates import Library, Projection
+from postproc.calibration.diagnosis.investigate import no_progress
 from postproc.calibration.diagnosis.search import Search, search
 from postproc.calibration.diagnosis.table import Causes
-from postproc.calibration.diagnosis.trace import silent
 from postproc.calibration.diagnosis.weight import pass_on, weigh_laws
 from postproc.calibration.regression import Fit
 from postproc.simulation import Planted, stream
@@ -21,7 +21,7 @@ def searched(base: Fit) -> Search:
     """Search among names and shapes alone, which is fast."""
     causes = Causes(Library.of(base))
     null = causes.null(Projection.of(base), 0)
-    return search(base, causes, null, silent)
+    return search(base, causes, null, no_progress)
 
 
 def joints(found: Search, effect: str) -> set[int | None]:
@@ -37,7 +37,7 @@ def shaped() -> Search:
 
 
 def test_the_law_of_the_weight_stays_where_shapes_took_it(shaped):
-    found = weigh_laws(shaped, silent)
+    found = weigh_laws(shaped, no_progress)
     assert joints(shaped, "compliance") == {2, 3, 5}
     assert joints(found, "compliance") == {2, 3, 4, 5}
     assert found.fit.log_evidence > shaped.fit.log_evidence
@@ -46,12 +46,12 @@ def test_the_law_of_the_weight_stays_where_shapes_took_it(shaped):
 
 def test_shapes_stay_alone_where_no_joint_yields():
     found = searched(weight_laws.measured(31_001, 1.0, "whole", nothing=True).base)
-    assert weigh_laws(found, silent) is found
+    assert weigh_laws(found, no_progress) is found
 
 
 def test_a_search_without_shapes_is_not_asked(shaped):
     bare = replace(shaped, fit=shaped.base, additions=())
-    assert weigh_laws(bare, silent) is bare
+    assert weigh_laws(bare, no_progress) is bare
 
 
 def test_a_law_is_passed_on_to_joints_where_it_stands_out_less():
@@ -62,4 +62,4 @@ def test_a_law_is_passed_on_to_joints_where_it_stands_out_less():
     position = arm.measure(rows, TRACKER, stream(33_002, "tracker"))
     before = searched(replace(c, position=position).base_fit())
     assert joints(before, "bending") == {4, 6}
-    assert joints(pass_on(before, silent), "bending") == {4, 5, 6}
+    assert joints(pass_on(before, no_progress), "bending") == {4, 5, 6}

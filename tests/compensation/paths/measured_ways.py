@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.compensation.paths.accuracy import PredictedWays
-from postproc.compensation.paths.measured import Track
+from postproc.compensation.paths.path_error import PredictedWays
+from postproc.compensation.paths.track_alignment import Track
 
 MOVES, COUNT, RATE = 6, 401, 100.0
 STEP = np.array([0.0, 0.0, 3e-4])  # [m] that joint 1 makes as it changes its flank

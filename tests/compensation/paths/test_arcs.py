@@ -16,14 +16,14 @@ from postproc.compensation.paths.arcs import (
     WantedArcs,
     flat_pieces,
     hindrances_of_arcs,
-    passed,
+    measure_passing,
 )
-from postproc.compensation.paths.insertions import are_near, insert
-from postproc.compensation.paths.splitting import CLOSEST, shortest_pieces
-from postproc.compensation.paths.taking_up import MeantSides
-from postproc.compensation.program import Reading, plan_visits, read_program
+from postproc.compensation.paths.backlash_preload import MeantSides
+from postproc.compensation.paths.split_constraints import CLOSEST, shortest_pieces
+from postproc.compensation.paths.write_points import are_near, insert
+from postproc.compensation.program import ParsedProgram, plan_visits, read_program
 from postproc.language.languages import language_of
-from postproc.motion.cycle import run
+from postproc.motion.cycle_time import run
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM, rotation_vector
 from tests.written import program
@@ -50,7 +50,7 @@ def read(
     angles: tuple[float, float, float] = (0.0, 50.0, 170.0),
     via: str = "",
     end_turn: tuple[float, ...] = TURN,
-) -> Reading:
+) -> ParsedProgram:
     begin, middle, end = angles
     text = program(
         "$FLY_TYPE := FLY_CART",
@@ -274,4 +274,4 @@ def test_two_arcs_that_are_superposed_pass_their_point() -> None:
     rest = np.array([zone / 4, -zone / 4]) / radius  # of either, in the middle
     places = radius * np.array([np.cos(rest), np.sin(rest)]).T - [radius, 0.0]
     far = float(np.linalg.norm(places.sum(axis=0)))
-    assert passed(np.array([zone]), radius)[0] == pytest.approx(far, rel=1e-3)
+    assert measure_passing(np.array([zone]), radius)[0] == pytest.approx(far, rel=1e-3)

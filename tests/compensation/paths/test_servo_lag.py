@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensation.paths.accuracy import PredictedWays
-from postproc.compensation.paths.measured import OnTheWay
+from postproc.compensation.paths.path_error import PredictedWays
 from postproc.compensation.paths.servo_lag import CORNER, REACH, ServoLag, servo_lag
+from postproc.compensation.paths.track_alignment import OnTheWay
 
 MOVES, COUNT, RATE, SPEED, RADIUS = 8, 301, 500.0, 0.2, 0.1
 SHARP = np.zeros(2 * MOVES + 2, dtype=bool)
@@ -47,7 +47,7 @@ def read(ways: PredictedWays, lag: float, scatter: float = 5e-6) -> OnTheWay:
         rows = np.arange(0, len(time), round(1e4 / RATE))
         position = lagging[rows] + rng.normal(size=(len(rows), 3)) * scatter
         parts.append(laid(position, time[rows], place, first))
-    return OnTheWay.joined(parts)
+    return OnTheWay.join(parts)
 
 
 def laid(
@@ -69,7 +69,7 @@ def laid(
 def test_a_lag_is_told_by_how_arcs_are_cut(lag: float) -> None:
     ways = arcs()
     found = servo_lag(ways, ways.place, read(ways, lag), SHARP)
-    assert found.is_told and found.moves == MOVES
+    assert found.is_certain and found.moves == MOVES
     assert found.seconds == pytest.approx(lag, rel=0.03)
     assert found.most > found.seconds
 
@@ -77,14 +77,14 @@ def test_a_lag_is_told_by_how_arcs_are_cut(lag: float) -> None:
 def test_servos_that_do_not_lag_have_none_told() -> None:
     ways = arcs()
     found = servo_lag(ways, ways.place, read(ways, 0.0), SHARP)
-    assert not found.is_told and np.isnan(found.seconds)
+    assert not found.is_certain and np.isnan(found.seconds)
     assert found.most < 3e-3
 
 
 def test_of_straight_ways_nothing_is_told() -> None:
     ways = ways_of(np.linspace([0.0, 0.0, 0.0], [0.3, 0.0, 0.0], COUNT))
     found = servo_lag(ways, ways.place, read(ways, 15e-3), SHARP)
-    assert not found.is_told
+    assert not found.is_certain
     assert found.most > 15e-3  # whatever it is, it may be
 
 

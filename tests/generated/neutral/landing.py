@@ -10,10 +10,10 @@ import numpy as np
 
 from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
-from postproc.compensation.notes import SURE
+from postproc.compensation.findings import SURE
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import DONE, NOT_ALL, Outcome, Status
-from postproc.compensation.record import restore
+from postproc.compensation.sidecar import restore
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Blend, Meaning, Visits, ZoneRule
 from postproc.model.model import Model

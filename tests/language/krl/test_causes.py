@@ -9,7 +9,7 @@ import pytest
 
 from postproc.exceptions import ProgramError
 from postproc.language.krl.parser import RESERVED
-from postproc.language.krl.task import FUNCTIONS, STILL
+from postproc.language.krl.symbols import FUNCTIONS, STILL
 from postproc.language.visits import ELSEWHERE, ZoneRule
 from tests.language.krl.test_visits import job, origins, reasons
 

@@ -8,8 +8,8 @@ import pytest
 
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing, find_shared, is_system_source
-from postproc.language.interface import Start
 from postproc.language.krl.language import Krl
+from postproc.language.language import Start
 from postproc.language.source import Source
 from postproc.language.visits import ZoneRule
 from tests.language.krl.test_visits import CONFIG, DATA, codes, reasons

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.visits import ELSEWHERE, START
 from tests.language.krl.test_visits import (
     CONFIG,

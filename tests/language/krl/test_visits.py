@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import ProgramError
-from postproc.language.interface import Start
 from postproc.language.krl.language import Krl
+from postproc.language.language import Start
 from postproc.language.source import Source
 from postproc.language.visits import (
     ELSEWHERE,

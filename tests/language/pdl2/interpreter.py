@@ -26,21 +26,21 @@ class Interpreter(Running):
         self.log(Literal.at(self.line, numbers))
 
     def do_move_to(self, name: str) -> None:
-        self.log(self.held(name))
+        self.log(self.hold(name))
 
     def do_move_table(self, index: str) -> None:
-        self.log(self.held(f"tab[{self.subscript(index)}]"))
+        self.log(self.hold(f"tab[{self.subscript(index)}]"))
 
     def do_move_shifted(self, name: str, by: Any) -> None:
         self.log(self.shifted(name, by))
 
     def do_near(self, name: str, short_mm: float, how: str = "NEAR") -> None:
-        self.log(self.held(name), how, short_mm)
+        self.log(self.hold(name), how, short_mm)
 
     def do_arc(self, name: str, via: str) -> None:
-        self.log(self.held(via), "VIA")
+        self.log(self.hold(via), "VIA")
         self.fire()
-        self.log(self.held(name))
+        self.log(self.hold(name))
 
     def do_without(self, how: str, numbers: Any) -> None:
         self.log(numbers, how)
@@ -52,21 +52,21 @@ class Interpreter(Running):
         self.values[self.name(name)] = held
 
     def do_copy(self, a: str, b: str) -> None:
-        self.values[self.name(a)] = self.held(b)
+        self.values[self.name(a)] = self.hold(b)
 
     def do_shift(self, a: str, b: str, by: Any) -> None:
         self.values[self.name(a)] = self.shifted(b, by)
 
     def do_compose(self, a: str, b: str, by: Any) -> None:
-        held = self.held(b)
+        held = self.hold(b)
         self.values[self.name(a)] = None if held is None else composed(held, by)
 
     def do_invert(self, a: str, b: str) -> None:
-        held = self.held(b)
+        held = self.hold(b)
         self.values[self.name(a)] = None if held is None else inverted(held)
 
     def do_component(self, name: str, at: int, number: float, add: bool) -> None:
-        held = self.held(name)
+        held = self.hold(name)
         if held is not None:
             new = held[at] + number if add else number
             self.values[self.name(name)] = (*held[:at], new, *held[at + 1 :])
@@ -75,7 +75,7 @@ class Interpreter(Running):
         self.values[self.name(name)] = float(self.rng.randrange(5))
 
     def do_add(self, name: str) -> None:
-        if self.held(name) is not None:
+        if self.hold(name) is not None:
             self.values[self.name(name)] += 1.0
 
     def do_frame(self, name: str, numbers: Any) -> None:
@@ -90,11 +90,11 @@ class Interpreter(Running):
         self.values[self.name(name)] = tuple(self.rng.random() for _ in range(6))
 
     def subscript(self, index: str) -> str:
-        held = float(index) if index.isdigit() else self.held(index)
+        held = float(index) if index.isdigit() else self.hold(index)
         return str(held)
 
     def shifted(self, name: str, by: Any) -> Any:
-        held = self.held(name)
+        held = self.hold(name)
         if held is None:
             return None
         return (*(v + d for v, d in zip(held[:3], by, strict=True)), *held[3:])
@@ -108,7 +108,7 @@ class Interpreter(Running):
         return self.stack.pop()[0] if self.stack else 0
 
     def do_give(self, kind: str, value: Any) -> int:
-        self.returned = self.held(value) if kind == "point" else value
+        self.returned = self.hold(value) if kind == "point" else value
         return self.do_return()
 
     def do_evaluate(self, name: str, argument: str, then: Any) -> int | None:
@@ -145,7 +145,7 @@ class Interpreter(Running):
         return None if self.test(*test) else line
 
     def do_select(self, name: str, cases: Any, otherwise: int) -> int:
-        held = self.held(name)
+        held = self.hold(name)
         if held is None:
             held = float(self.rng.randrange(5))
         return next((line for values, line in cases if held in values), otherwise)
@@ -156,7 +156,7 @@ class Interpreter(Running):
         return None if self._inside(self.line, first, by) else end + 1
 
     def do_next(self, start: int, name: str, by: float) -> Any:
-        value = self.held(name) + by
+        value = self.hold(name) + by
         if self._inside(start, value, by):
             self.values[self.name(name)] = value
             return start + 1

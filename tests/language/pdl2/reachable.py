@@ -43,7 +43,7 @@ class Within(Motions, Assignments, Blocks):
         else:
             super().statement(depth)
 
-    def drawn(self, kind: str) -> tuple[float, ...]:
+    def draw(self, kind: str) -> tuple[float, ...]:
         """Draw six numbers."""
         rng = self.rng
         return tuple(round(rng.uniform(m - w, m + w), 4) for m, w in BOXES[kind])

@@ -84,7 +84,7 @@ class Running:
         page = 0 if name in EVERYWHERE else self.line // PAGE
         return f"{page}:{name}"
 
-    def held(self, name: str) -> Any:
+    def hold(self, name: str) -> Any:
         return self.values.get(self.name(name))
 
     def log(self, values: Any, how: str = "TO", short_mm: float = 0.0) -> None:
@@ -94,7 +94,7 @@ class Running:
     def test(self, kind: str, name: str = "", value: float = 0.0) -> bool:
         if kind == "random":
             return self.rng.random() < 0.5
-        held = self.held(name)
+        held = self.hold(name)
         if held is None:
             return self.rng.random() < 0.5
         return held == value if kind == "equal" else held < value

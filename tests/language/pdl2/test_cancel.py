@@ -5,7 +5,13 @@ from __future__ import annotations
 import pytest
 
 from postproc.language.visits import ELSEWHERE
-from tests.language.pdl2.test_routines import FIRST, followed, handler, reasons, routine
+from tests.language.pdl2.test_external_routines import (
+    FIRST,
+    followed,
+    handler,
+    reasons,
+    routine,
+)
 
 AHEAD = "MOVE LINEAR TO POS(110, 400, 150, 0, 175, 0, '') ADVANCE"
 LAST = "MOVE LINEAR TO POS(300, 300, 200, 0, 175, 0, '')"

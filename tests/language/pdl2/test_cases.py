@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.language.pdl2.dialect import PDL2_DIALECT
+from postproc.language.number_edits import difference, edits
 from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import parse
-from postproc.language.rewrite import difference, edits
 from postproc.language.source import Source, apply, source_from_bytes
 
 CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.pdl"))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from postproc.diagnostics import Code
-from postproc.language.pdl2.effects import dead_lines
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
+from postproc.language.pdl2.side_effects import dead_lines
 from postproc.language.source import Source
 from postproc.language.visits import never_reached
 

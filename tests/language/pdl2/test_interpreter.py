@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.source import source_from_bytes

@@ -5,10 +5,10 @@ import random
 import numpy as np
 import pytest
 
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.move_blocks import MoveBlocks
 from postproc.language.pdl2.program import parse
-from postproc.language.pdl2.stretches import MoveBlocks
 from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.source import source_from_bytes
 from postproc.language.visits import Visits

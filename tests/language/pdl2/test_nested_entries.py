@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from postproc.language.interface import Start
-from postproc.language.pdl2.clones import copied_entry
-from postproc.language.pdl2.dialect import PDL2_DIALECT
+from postproc.language.language import Start
+from postproc.language.number_edits import edits
+from postproc.language.pdl2.clones import copy_entry
 from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
-from postproc.language.rewrite import edits
 from postproc.language.source import CloneError, apply, source_from_bytes
 
 HEAD = """PROGRAM job
@@ -275,8 +275,8 @@ def test_a_field_is_no_entry_to_copy_for_the_variable_of_its_name():
     text = "r REC rt Priv\np POS\n" + place(1) + "p POS Priv\n" + place(2)
     values = source_from_bytes("job.lsv", text.encode())
     with pytest.raises(CloneError, match=r"line 3 of job\.lsv is no entry of p"):
-        copied_entry(values, 3, "p", "p__2", [])
+        copy_entry(values, 3, "p", "p__2", [])
     with pytest.raises(CloneError, match="r is a record or a path"):
-        copied_entry(values, 3, "r", "r__2", [])
-    copy = copied_entry(values, 6, "p", "p__2", [])
+        copy_entry(values, 3, "r", "r__2", [])
+    copy = copy_entry(values, 6, "p", "p__2", [])
     assert apply(values.data, [copy]).decode() == text + "p__2 POS Priv\n" + place(2)

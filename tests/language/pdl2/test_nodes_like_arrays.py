@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables

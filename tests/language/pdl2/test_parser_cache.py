@@ -9,8 +9,8 @@ import lark
 import pytest
 
 from postproc.language import grammars
-from postproc.language.lines import read_lines
-from postproc.language.scan import form_of
+from postproc.language.lexer import form_of
+from postproc.language.logical_lines import read_lines
 from postproc.language.source import source_from_bytes
 
 ROOT = Path(__file__).parents[3]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.pdl2 import language
 from postproc.language.pdl2.language import Pdl2
 from postproc.language.source import Source

@@ -7,7 +7,7 @@ import pytest
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.program import parse
 from postproc.language.source import Source
-from tests.language.pdl2.test_routines import FIRST, codes, followed, reasons
+from tests.language.pdl2.test_external_routines import FIRST, codes, followed, reasons
 
 STRINGS = {
     "'l''utensile'": "l'utensile", "'x'''": "x'", "''''": "'", "''": "",

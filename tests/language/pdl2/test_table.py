@@ -9,7 +9,13 @@ import pytest
 
 from postproc.language.grammars import grammar
 from postproc.language.visits import ELSEWHERE
-from tests.language.pdl2.test_routines import FIRST, followed, handler, reasons, routine
+from tests.language.pdl2.test_external_routines import (
+    FIRST,
+    followed,
+    handler,
+    reasons,
+    routine,
+)
 
 PAGE = Path(__file__).parents[3] / "docs" / "pdl2.md"
 AHEAD = "MOVE LINEAR TO POS(110, 400, 150, 0, 175, 0, '') ADVANCE"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.language.rapid.backup import mounted_arms, read_arms, system_modules
+from postproc.language.rapid.backup import read_arms, read_mounted_arms, system_modules
 from tests.golden.case import HERE
 from tests.golden.rapid_cases import DATA, go, module
 from tests.written import cli
@@ -102,4 +102,4 @@ def test_arms_of_a_backup():
 
 def test_the_settings_are_found_above_the_program(backup, tmp_path):
     job = backup / "RAPID" / "TASK1" / "PROGMOD" / "Job.mod"
-    assert [arm.name for arm in mounted_arms(job)] == ["ROB_1", "ROB_2"]
+    assert [arm.name for arm in read_mounted_arms(job)] == ["ROB_1", "ROB_2"]

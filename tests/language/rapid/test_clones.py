@@ -13,7 +13,7 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
-from postproc.compensation.record import restore
+from postproc.compensation.sidecar import restore
 from postproc.files import name_read
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED

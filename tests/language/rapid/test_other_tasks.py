@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from postproc.compensation.program_files import ProgramFiles
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.rapid.backup import modules_beside
 from postproc.language.rapid.language import Rapid
 from postproc.language.source import Source

@@ -11,8 +11,8 @@ from hypothesis import example, given, settings
 
 from postproc.exceptions import ProgramError
 from postproc.language.rapid import syntax as said
+from postproc.language.rapid.instructions import MOTIONS, read_known_instructions
 from postproc.language.rapid.program import read_rapid
-from postproc.language.rapid.signatures import MOTIONS, known_instructions
 from postproc.language.rapid.targets import WIDTH, RecordKind, find_literals
 from postproc.language.source import Edit, Replacements, Source, Span, apply
 from tests.language.rapid.test_statements import TEXTS
@@ -100,7 +100,7 @@ def test_no_statement_that_may_move_is_passed_in_silence(path):
         if quiet and not in_record(file, row):
             assert not isinstance(statement, said.NotUnderstood | said.LateCall)
             if isinstance(statement, said.Instruction):
-                assert statement.name in known_instructions().keys() | own
+                assert statement.name in read_known_instructions().keys() | own
                 assert statement.name not in MOTIONS
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.visits import ELSEWHERE
 from tests.language.rapid.test_visits import L, codes, origins, reasons, task
 

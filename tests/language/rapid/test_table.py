@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from postproc.language.rapid.errors import EXIT_CYCLE
-from postproc.language.rapid.signatures import MOTIONS, known_instructions
+from postproc.language.rapid.instructions import MOTIONS, read_known_instructions
 from postproc.language.visits import ELSEWHERE, START, OrientationLaw, Switch
 from tests.language.rapid.test_visits import L, origins, reasons, task
 
@@ -146,9 +146,9 @@ def test_a_row_of_the_table_holds(row):
 def test_every_instruction_is_in_a_list():
     lines = WORDS.read_text(encoding="utf-8").splitlines()
     words = {w.lower() for line in lines if line[:1] != "#" for w in line.split()}
-    known = {*MOTIONS, *known_instructions(), EXIT_CYCLE}
+    known = {*MOTIONS, *read_known_instructions(), EXIT_CYCLE}
     assert len(words) > 400 and not words - known
 
 
 def test_no_instruction_is_in_two_lists():
-    assert not {*MOTIONS} & {*known_instructions()}
+    assert not {*MOTIONS} & {*read_known_instructions()}

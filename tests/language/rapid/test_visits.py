@@ -7,13 +7,13 @@ import pytest
 
 from postproc.compensation.program import read_program
 from postproc.exceptions import ProgramError
-from postproc.language.interface import Start
-from postproc.language.rapid.dialect import (
+from postproc.language.language import Start
+from postproc.language.rapid.language import Rapid
+from postproc.language.rapid.pose_encoding import (
     RAPID_DIALECT,
     quaternion_from_rotation,
     rotation_from_quaternion,
 )
-from postproc.language.rapid.language import Rapid
 from postproc.language.source import Source
 from postproc.language.visits import (
     ELSEWHERE,
@@ -362,7 +362,7 @@ def test_quaternions_are_normalised_and_keep_their_sign():
     written = rng.normal(size=(200, 4))
     values = np.zeros((200, 11))
     values[:, 3:7] = written
-    turned = RAPID_DIALECT.turned(values, np.tile(np.eye(3), (200, 1, 1)))[:, 3:7]
+    turned = RAPID_DIALECT.rotate(values, np.tile(np.eye(3), (200, 1, 1)))[:, 3:7]
     unit = written / np.linalg.norm(written, axis=1, keepdims=True)
     np.testing.assert_allclose(turned, unit, atol=1e-12)
     R = rotation_from_quaternion(written)
@@ -378,8 +378,13 @@ def test_quarter_turns_are_written_anew_where_they_are_left():
     q = np.zeros((4, 6))
     q[:, 0] = np.deg2rad([89.0, 90.01, 90.5, -0.5])
     inside = np.full((4, 6), np.deg2rad(45.0))
-    assert RAPID_DIALECT.reflagged(values, q, inside)[:, 7].tolist() == [0, 1, 1, -1]
-    assert RAPID_DIALECT.reflagged(values, q, q)[:, 7].tolist() == [0, 0, 1, -1]
+    assert RAPID_DIALECT.rewrite_flags(values, q, inside)[:, 7].tolist() == [
+        0,
+        1,
+        1,
+        -1,
+    ]
+    assert RAPID_DIALECT.rewrite_flags(values, q, q)[:, 7].tolist() == [0, 0, 1, -1]
     assert RAPID_DIALECT.misses(values, q).tolist() == [False, False, True, True]
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from postproc.exceptions import PostprocError
 from postproc.files import MODULES
-from postproc.language.interface import Start
+from postproc.language.language import Start
 from postproc.language.rapid.language import Rapid
 from postproc.language.rapid.moves import RUN_TIME
 from postproc.language.source import source_from_bytes

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from postproc.compensation.outcome import Decisions, Outcome, Status
-from postproc.compensation.record import Sidecar
+from postproc.compensation.sidecar import Sidecar
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.pdl2.dialect import PDL2_DIALECT
+from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.visits import Diagnostic, Literals, NumberPlaces, Visits
 from postproc.model.statistics import ErrorStatistics
 

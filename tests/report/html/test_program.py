@@ -18,8 +18,8 @@ from postproc.report.html import program, program_report, program_report_from_js
 from postproc.report.html.program import (
     columns_from,
     columns_of,
+    group_uncorrected,
     histogram,
-    left_alone,
     listing,
     stretches,
 )
@@ -103,7 +103,7 @@ def test_left_alone_comes_first_and_in_words() -> None:
     outcome = outcome_of(200)
     text = program_report(outcome)
     assert text.index('id="left"') < text.index('id="bench"') < text.index("Time</h2>")
-    groups = left_alone(columns_of(outcome))
+    groups = group_uncorrected(columns_of(outcome))
     assert [g.status for g in groups] == ["conflict", "rejected", "runtime"]
     assert [g.count for g in groups] == [5, 5, 5]
     assert groups[0].examples[0] == (4, "panel.pdl", FIRST_LINE + 3, "")
@@ -113,7 +113,7 @@ def test_left_alone_comes_first_and_in_words() -> None:
 
 def test_nothing_left_alone_is_said() -> None:
     outcome = outcome_of(3)
-    assert not left_alone(columns_of(outcome))
+    assert not group_uncorrected(columns_of(outcome))
     assert "every target that the program holds was corrected" in program_report(
         outcome
     )

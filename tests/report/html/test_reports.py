@@ -21,7 +21,7 @@ from postproc.report.html.figure import (
     magnification,
     pose_figures,
 )
-from postproc.report.html.model import correlated, steps
+from postproc.report.html.model import list_correlated, steps
 from postproc.report.json import report_text
 from tests.report.html.builders import outcome_of, program_text
 from tests.report.html.test_program import NASTY, Elements
@@ -193,7 +193,7 @@ def test_a_model_may_carry_its_fit() -> None:
 
 
 def test_correlations_come_from_the_packed_covariance() -> None:
-    ((a, b, r),) = correlated(model_file())
+    ((a, b, r),) = list_correlated(model_file())
     assert (a, b) == ("geometry.a1", "backlash.b1")
     assert r == pytest.approx(0.95)
 

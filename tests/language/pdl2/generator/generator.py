@@ -118,11 +118,11 @@ class Generator(Motions, Assignments, Blocks):
         else:
             self.move_literal()
 
-    def called(self, name: str) -> tuple[str, tuple[str, str, str]]:
+    def find_calls(self, name: str) -> tuple[str, tuple[str, str, str]]:
         """Return a call and its instruction, with a point if the routine takes one."""
         point = self.point() if self.takes[name] else ""
         return f"{name}({point})" if point else name, ("call", name, point.lower())
 
     def call_with_point(self, name: str) -> None:
-        text, op = self.called(name)
+        text, op = self.find_calls(name)
         self.emit(text, *op)

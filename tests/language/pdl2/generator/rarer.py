@@ -76,7 +76,7 @@ class Rarer(Computed, RarerMoves, Functions, Handlers, Generator):
         if self.in_main:
             self.call_with_point(self.rng.choice(self.calling))
         elif self.has.recursion and self.rng.random() < 0.5:
-            text, op = self.called(self.rng.choice(self.calling))
+            text, op = self.find_calls(self.rng.choice(self.calling))
             self.guarded(text, *op)
         else:
             self.move_literal()

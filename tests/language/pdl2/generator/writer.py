@@ -60,12 +60,12 @@ class Writer:
     def number(self) -> float:
         return round(self.rng.uniform(-900.0, 900.0), 4)
 
-    def drawn(self, kind: str) -> tuple[float, ...]:
+    def draw(self, kind: str) -> tuple[float, ...]:
         """Draw six numbers: of a pose, joints, a tool, a uframe, or a small step."""
         return tuple(self.number() for _ in range(6))
 
     def record(self, kind: str = "pose") -> tuple[tuple[float, ...], str]:
-        numbers = self.drawn(kind)
+        numbers = self.draw(kind)
         gap = self.rng.choice([", ", ",", " , "])
         return numbers, gap.join(f"{n:.4f}" for n in numbers)
 

@@ -1,0 +1,398 @@
+"""Refusing surveys that cannot be what they say, with the likely reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.calibration.likely_causes import (
+    CLOSE,
+    UNKNOWN,
+    Cause,
+    cause_in_any_frame,
+    find_cause,
+    find_cause_in_tracker_frame,
+    wrong_directions,
+)
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.nest_check import FEWEST, find_groups
+from postproc.calibration.orientations import Turns
+from postproc.calibration.registration import (
+    STOPS,
+    covers_a_plane,
+    register,
+    typical_gap,
+)
+from postproc.calibration.regression import observe
+from postproc.exceptions import MeasurementError
+from postproc.model.effect_sum import Combination
+from postproc.model.effects.base_shift import rigid_motions
+from postproc.model.effects.geometry import Geometry
+from postproc.model.kinematics import ArmStates
+from postproc.model.model import Model
+from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
+from postproc.robot.state import States, make_states
+
+FAR = 0.05  # [m] no arm that works is off by more
+APART = 10.0  # rows this many times farther off than the typical one are another kind
+MANY = 0.1  # share of such rows from which the file is at fault, not the rows
+PROBES = 400  # random poses that show what could be determined at best
+ENOUGH = 0.75  # share of the determinable directions that a survey must show
+STILL = 1e-4  # readings move by more of what the poses do, in whatever unit
+ENOUGH_ROWS_OF_ARM = 12  # that tell an arm from another
+OTHER_ARM = (
+    0.7  # of what the nominal arm leaves: a model that leaves more knows nothing
+)
+LEAST_OF_ARM = 2e-4  # [m] that such a model leaves
+TOOL_APART = 1e-3  # [m] tools that differ by less are told by the fit, not refused
+
+
+def check_survey(survey: Measurements, arm: Arm) -> None:
+    """Check units, frame, tools and number of rows of a survey in the base frame.
+
+    Raises:
+        MeasurementError: With the likely reason and the cure.
+    """
+    check_rows(survey, arm)
+    check_places(survey, arm)
+    gap = survey.position - ArmStates(arm, survey.states).walk.tcp
+    _check_cause(survey, find_cause(survey, arm, _no_error))
+    _check_frame(survey, arm, gap, "nominal")
+    check_tools(survey, arm)
+    _check_kinds(survey, arm, gap)
+
+
+def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
+    """Check rows in the base frame against a model: units, frame, arm, directions.
+
+    Raises:
+        MeasurementError: With the likely reason and the cure.
+    """
+
+    def error(states: States) -> Floats:
+        return model.error(arm, states)
+
+    if len(survey) == 0:
+        return
+    gap = (
+        survey.position - ArmStates(arm, survey.states).walk.tcp - error(survey.states)
+    )
+    _check_cause(survey, find_cause(survey, arm, error))
+    _check_frame(survey, arm, gap, "predicted")
+    wrong = wrong_directions(survey, arm, model)
+    if wrong is not None:
+        cure = (
+            "Correct the columns (lambda is 1 where a joint came forward, -1 back), or "
+            "fit a new model if the model's survey had them so"
+        )
+        raise MeasurementError(survey.path, wrong, cure)
+    _check_arm(survey, arm, error(survey.states))
+
+
+def _no_error(states: States) -> Floats:
+    """Return no error, (n, 3) [m]."""
+    return np.zeros((len(states), 3))
+
+
+def _check_cause(survey: Measurements, cause: Cause | None) -> None:
+    """Refuse rows that a mistake explains; one of all rows is named by its cure."""
+    if cause is None:
+        return
+    if cause.place != "all":
+        line = int(survey.line[cause.first])
+        problem = cause.problem(survey)
+        raise MeasurementError(survey.path, problem, cause.guess.cure, line=line)
+    problem = "measured positions are not those of the joint angles"
+    raise MeasurementError(survey.path, problem, cause.guess.all_rows)
+
+
+def _check_frame(survey: Measurements, arm: Arm, gap: Floats, what: str) -> None:
+    """Refuse rows that are far off as a whole."""
+    typical = float(np.median(np.linalg.norm(gap, axis=1)))
+    if typical > FAR:
+        if what == "nominal":
+            check_tools(survey, arm)
+        problem = f"measured and {what} positions differ by {typical / MM:.0f} mm"
+        enough = len(survey) >= STOPS
+        cure = cause_in_any_frame(survey, arm) if enough else UNKNOWN
+        raise MeasurementError(survey.path, problem, cure)
+
+
+def _check_kinds(survey: Measurements, arm: Arm, gap: Floats) -> None:
+    """Refuse rows of which many are far off, and the others not."""
+    size = np.linalg.norm(gap, axis=1)
+    limit = max(APART * float(np.median(size)), CLOSE)
+    apart = size > limit
+    if apart.mean() > MANY:
+        line = int(survey.line[np.argmax(apart)])
+        problem = (
+            f"{int(apart.sum())} of {len(survey)} rows are more than "
+            f"{limit / MM:.0f} mm off, the others are not"
+        )
+        cure = "Two tools or two units in one file? Add tool_id, or split the file"
+        raise MeasurementError(survey.path, problem, cure, line=line)
+
+
+def _check_arm(survey: Measurements, arm: Arm, error: Floats) -> None:
+    """Refuse rows of which a model explains nothing: they are another arm's.
+
+    Base, tool and zeros of the joints may differ from those of the model's survey: an
+    arm that was mastered or moved since is no other.
+    """
+    if len(survey) < ENOUGH_ROWS_OF_ARM:
+        return
+    batch = ArmStates(arm, survey.states)
+    free = np.concatenate(
+        [rigid_motions(batch.walk.tcp), batch.walk.flange, batch.jacobian], axis=2
+    ).reshape(-1, 15)
+    scale = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
+    read = survey.position - batch.walk.tcp
+    sizes = []
+    for left in (read - error, read):
+        sizes.append(_typical_beside(free / scale, left))
+    with_model, nominal = sizes
+    if with_model > OTHER_ARM * nominal and with_model > LEAST_OF_ARM:
+        raise MeasurementError(
+            survey.path,
+            "the model explains nothing of these rows: it leaves "
+            f"{with_model / MM:.2f} mm, the nominal arm {nominal / MM:.2f} mm, base, "
+            "tool and zeros of the joints apart",
+            "Are they another arm's? After a crash or a repair, fit a new model",
+        )
+
+
+def _typical_beside(columns: Floats, left: Floats) -> float:
+    """Return the median distance that columns (3 n, p) leave of rows (n, 3) [m].
+
+    Robust: the rows that are farthest off count less.
+    """
+    weight, rest = np.ones(len(left)), left
+    for _ in range(5):
+        root = np.repeat(np.sqrt(weight), 3)
+        rows, target = columns * root[:, None], left.reshape(-1) * root
+        fitted = np.linalg.lstsq(rows, target, rcond=1e-6)[0]
+        rest = (left.reshape(-1) - columns @ fitted).reshape(-1, 3)
+        size = np.linalg.norm(rest, axis=1)
+        ratio = size / max(3.0 * float(np.median(size)), 1e-12)
+        weight = 1.0 / np.maximum(ratio, 1.0) ** 2
+    return float(np.median(np.linalg.norm(rest, axis=1)))
+
+
+def check_places(survey: Measurements, arm: Arm) -> None:
+    """Refuse readings that are one place, where the poses are not.
+
+    Raises:
+        MeasurementError: How far apart both are.
+    """
+    read = np.linalg.norm(np.ptp(survey.position, axis=0))
+    posed = np.linalg.norm(np.ptp(ArmStates(arm, survey.states).walk.tcp, axis=0))
+    if read < STILL * posed:
+        problem = (
+            f"all {len(survey)} positions lie within {read / MM:.3f} mm, the poses "
+            f"within {posed / MM:.0f} mm"
+        )
+        cure = "The tracker was not read at every pose, or these are other columns"
+        raise MeasurementError(survey.path, problem, cure)
+
+
+def check_tools(survey: Measurements, arm: Arm) -> None:
+    """Refuse rows of several tools that have no tool_id of their own.
+
+    Raises:
+        MeasurementError: Saying how the tools lie to each other, and a row of each.
+    """
+    batch = ArmStates(arm, survey.states)
+    left = survey.position - batch.walk.tcp
+    X = Geometry.propose(arm, survey.states).columns(batch)
+    X = X.reshape(-1, X.shape[2])
+    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    size = np.linalg.norm(left, axis=1)
+    used = size <= max(APART * float(np.median(size)), CLOSE)
+    if 1.0 - used.mean() > FEWEST:  # they are too many for outliers
+        used[:] = True
+    at = np.repeat(used, 3)
+    fitted = np.linalg.lstsq((X / scale)[at], left.reshape(-1)[at], rcond=1e-6)[0]
+    left = left - (X / scale @ fitted).reshape(-1, 3)
+    for tool in np.unique(survey.states.tool_id):
+        rows = np.flatnonzero((survey.states.tool_id == tool) & used)
+        found = find_groups(left[rows], batch.walk.flange[rows])
+        if found is not None and found.apart > TOOL_APART:
+            first = sorted(rows[np.argmax(found.which == k)] for k in found.kinds)
+            raise MeasurementError(
+                survey.path,
+                f"the rows were measured with {len(first)} tools (first seen in rows "
+                f"{', '.join(survey.ids[i] for i in first)}); from the first one the "
+                f"others are at {found.describe()} in the flange frame",
+                "Add a column tool_id and the points to [survey] in the cell file, or "
+                "columns tool_x_mm, tool_y_mm, tool_z_mm, or split the file",
+                line=int(survey.line[first[1]]),
+            )
+
+
+def check_registered(
+    survey: Measurements, registered: Measurements, arm: Arm, typical: float
+) -> None:
+    """Check a survey in the tracker's frame by what its registration leaves.
+
+    Args:
+        survey: The measurements, tracker frame.
+        registered: The same in the base frame, as far as they could be placed.
+        arm: The arm.
+        typical: Median distance that the registration leaves [m].
+
+    Raises:
+        MeasurementError: With the likely reason and the cure.
+    """
+    check_rows(survey, arm)
+    check_places(survey, arm)
+    _check_stations(survey, arm)
+    if typical > CLOSE:
+        check_tools(registered, arm)
+        problem = f"the registration leaves {typical / MM:.0f} mm"
+        raise MeasurementError(survey.path, problem, cause_in_any_frame(survey, arm))
+
+
+def _check_stations(survey: Measurements, arm: Arm) -> None:
+    """Refuse rows of the tracker's frame that a mistake explains, by station."""
+    for number in range(len(survey.stations)):
+        rows = survey[survey.states.station == number]
+        here = np.zeros(len(rows), dtype=np.int64)
+        rows = rows.with_states(rows.states.with_(station=here))
+        _check_cause(rows, find_cause_in_tracker_frame(rows, arm))
+
+
+def check_own_registration(survey: Measurements, arm: Arm) -> None:
+    """Check rows in the tracker's frame that find their own registration.
+
+    Raises:
+        MeasurementError: With the likely reason and the cure.
+    """
+    _check_stations(survey, arm)
+    nothing = Combination(())
+    placed = register(
+        arm, survey.states, survey.position, nothing, np.zeros(0), survey.stations
+    )
+    typical = typical_gap(placed, arm, survey.states, survey.position)
+    if typical > CLOSE:
+        problem = f"the registration leaves {typical / MM:.0f} mm"
+        raise MeasurementError(survey.path, problem, cause_in_any_frame(survey, arm))
+
+
+def check_stops(survey: Measurements, arm: Arm) -> None:
+    """Check that every station's rows can place the tracker.
+
+    Raises:
+        MeasurementError: Naming a station with fewer than six stops, or one whose
+            stops lie about a line.
+    """
+    for number, name in enumerate(survey.stations):
+        rows = survey.states.station == number
+        of = f" of station {name}" if name else ""
+        poses = len(np.unique(np.round(survey.states.q[rows], 4), axis=0))
+        if poses >= STOPS and covers_a_plane(arm, survey.states[rows]):
+            continue
+        where = ", all about one line," if poses >= STOPS else ""
+        raise MeasurementError(
+            survey.path,
+            f"{int(rows.sum())} rows{of} at {poses} poses{where} do not tell where the "
+            "tracker stands",
+            f"Measure {STOPS} poses or more, spread over the workspace. Files of one "
+            "station say so in a column station",
+        )
+
+
+def check_rows(survey: Measurements, arm: Arm) -> None:
+    """Check that the rows can determine the geometry.
+
+    Raises:
+        MeasurementError: Too few different poses.
+    """
+    possible = determinable(arm, survey)
+    seen = _rank(arm, survey.states) if len(survey) else 0
+    if seen < ENOUGH * possible:
+        poses = len(np.unique(np.round(survey.states.q, 4), axis=0))
+        rows = int(survey.states.readings.sum())
+        raise MeasurementError(
+            survey.path,
+            f"{rows} rows at {poses} poses determine {seen} of {possible} "
+            "directions of the geometry",
+            "Measure more poses, spread over the workspace, all joints moving",
+        )
+
+
+def determinable(arm: Arm, survey: Measurements) -> int:
+    """Count the directions of the geometry that any survey with its tools can show."""
+    rng = np.random.default_rng(0)
+    low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
+    tools = np.unique(np.concatenate([np.zeros((0, 3)), survey.states.tool]), axis=0)
+    tools = tools if len(tools) else np.zeros((1, 3))
+    tool = tools[np.arange(PROBES) % len(tools)]
+    return _rank(arm, make_states(rng.uniform(low, high, (PROBES, 6)), tool=tool))
+
+
+def _rank(arm: Arm, states: States) -> int:
+    """Count the directions of the geometry that states show."""
+    geometry = Geometry.propose(arm, states)
+    names = tuple(p.name for p in geometry.parameters())
+    scales = np.array([p.scale for p in geometry.parameters()])
+    X = geometry.columns(ArmStates(arm, states)).reshape(-1, len(names)) * scales
+    return observe(X, names).rank
+
+
+def list_losses(arm: Arm, survey: Measurements) -> tuple[str, ...]:
+    """Say what a fit lacks, or a model cannot be used for, for want of the arm file."""
+    told = []
+    if arm.file.links is None:
+        told.append(
+            "the arm file has no [links]: how joints yield to the arm's own weight is "
+            "fitted by the shapes of gravity alone, which tell less where no row was; "
+            "gaps that depend on it cannot be fitted and stay in what is left"
+        )
+    if arm.file.joints.drive_coupling is None and survey.inferred.any():
+        told.append(
+            "the arm file has no drive_coupling: directions of joints are inferred as "
+            "if no motor turned another joint's gear"
+        )
+    return tuple(told)
+
+
+# Whether the orientations of a 6D probe can be used.
+
+TURNED = np.deg2rad(1.0)  # no flange that works is off by more
+
+
+def check_orientations(survey: Measurements, arm: Arm) -> Measurements:
+    """Check measured orientations, base frame; what cannot be used is left out.
+
+    Without the probe's mounting they tell nothing of the flange that one point does
+    not, so that only their own errors would enter.
+
+    Raises:
+        MeasurementError: The declared mounting of the probe is not the measured one.
+    """
+    if survey.rotation is None or len(survey) == 0:
+        return survey
+    batch = ArmStates(arm, survey.states)
+    apart = Turns.of(batch, survey.rotation, None).typical
+    if apart > TURNED:
+        why = (
+            f"they scatter by {np.rad2deg(apart):.1f} deg about the arm's: not "
+            "R = Rx Ry Rz of a probe on the flange"
+        )
+    elif survey.mounting is None:
+        why = (
+            "the cell does not say how the probe is mounted: write euler_zyz_deg in "
+            "[survey]"
+        )
+    else:
+        apart = Turns.of(batch, survey.rotation, survey.mounting).typical
+        if apart > TURNED:
+            problem = f"the probe is mounted {np.rad2deg(apart):.1f} deg off"
+            cure = "Correct [survey] euler_zyz_deg in the cell file, or leave it out"
+            raise MeasurementError(survey.path, problem, cure)
+        return survey
+    told = f"measured orientations are not used: {why}"
+    return replace(survey, rotation=None, warnings=(*survey.warnings, told))

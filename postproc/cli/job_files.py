@@ -1,0 +1,173 @@
+"""Where what comes of a program goes: files, folders, standard output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from postproc.cli.common import write_stdout
+from postproc.compensation.outcome import Outcome
+from postproc.compensation.pages import OUTPUT
+from postproc.compensation.program_files import ProgramFiles
+from postproc.exceptions import OutputError
+from postproc.files import (
+    STREAM,
+    Content,
+    check_places,
+    is_stream,
+    is_variables,
+    variables_of,
+    write_all,
+)
+from postproc.report.json import report_pieces
+
+
+@dataclass(frozen=True)
+class Destination:
+    """Where the outputs of a program go.
+
+    Attributes:
+        given: The program and its files.
+        inputs: Further files that were read, which no output may be.
+    """
+
+    given: ProgramFiles
+    inputs: tuple[Path, ...] = ()
+
+    def write(
+        self,
+        outcome: Outcome,
+        output: Path | None = None,
+        report: Path | None = None,
+        html: Path | None = None,
+        values: Path | None = None,
+    ) -> list[Path]:
+        """Write the program, its variable file, the record and the reports.
+
+        A program from standard input or a pipe goes to standard output unless it is
+        told where to. One that goes to standard output, a pipe or a device has no
+        record, and files only where it is told to.
+
+        Args:
+            outcome: What came of the program.
+            output: Where the program goes.
+            report: Where the report goes, None for nowhere.
+            html: Where the report for a browser goes.
+            values: Where the variable file goes, changed or not; default: beside the
+                program, if it has changed.
+
+        Returns:
+            The files written.
+
+        Raises:
+            OutputError: An output is an input, cannot be written, or a part of the
+                program has no place to go to.
+        """
+        inputs = (*self.given.inputs, *self.inputs)
+        check_places([output, report, html, values], inputs)
+        files: dict[Path, Content] = {}
+        if report is not None and report != Path(STREAM):
+            files[report] = report_pieces(outcome)
+        if html is not None:
+            from postproc.report.html import program_report
+
+            files[html] = program_report(outcome).encode()
+        own = self.given.path
+        place = output or (None if own is None else default_output(own))
+        files |= self._results(outcome, place, values)
+        check_places(files, inputs)
+        write_all(files)
+        if place is None:
+            write_stdout(outcome.outputs[self.given.name])
+        return list(files)
+
+    def _results(
+        self, outcome: Outcome, target: Path | None, values: Path | None
+    ) -> dict[Path, Content]:
+        """Name what a compensation gives, the file that users wait for last.
+
+        Args:
+            outcome: The compensation.
+            target: Where the program goes, None for standard output.
+            values: Where its variable file goes, None for beside it.
+
+        Raises:
+            OutputError: A part of the program has no place to go to.
+        """
+        files: dict[Path, Content] = {}
+        for page in reversed(self.given.page_paths):
+            if page.name in outcome.outputs:
+                place = _page_place(page, _file_of(target, page))
+                files |= outcome.name_files({page.name: place}, place)
+        own = self._own_places(outcome, target, values)
+        variables = self.given.variables
+        if (
+            values
+            and variables is not None
+            and variables_of(self.given.name) not in own
+        ):
+            files[values] = variables
+        for places in _by_folder(own):
+            files |= outcome.name_files(places, list(places.values())[-1])
+        if target is not None and is_stream(target):
+            files[target] = outcome.outputs[self.given.name]
+        return files
+
+    def _own_places(
+        self, outcome: Outcome, target: Path | None, values: Path | None
+    ) -> dict[str, Path]:
+        """Tell where the program and its values go, where those are files."""
+        name = variables_of(self.given.name)
+        own: dict[str, Path] = {}
+        if name in outcome.outputs:
+            changed = self.given.variables_path or Path(name)
+            place = values or _file_of(target, changed)
+            beside = place.with_name(variables_of(place.name))
+            if place.suffix.isupper():  # JOB.PDL has JOB.LSV beside it
+                beside = beside.with_suffix(beside.suffix.upper())
+            own[name] = values or beside
+        if target is not None and not is_stream(target):
+            own[self.given.name] = target
+        return own
+
+
+def _file_of(target: Path | None, part: Path) -> Path:
+    """Return the file of a program, beside which a part of it may go.
+
+    Raises:
+        OutputError: The program goes to standard output, a pipe or a device.
+    """
+    if target is None or is_stream(target):
+        how = "--variables-out FILE, or " if is_variables(part.name) else ""
+        raise OutputError(
+            part,
+            "changes too, and nothing says where it goes",
+            f"Give {how}the program a file with -o",
+        )
+    return target
+
+
+def _by_folder(own: Mapping[str, Path]) -> list[dict[str, Path]]:
+    """Group files by their folder, in order: a record speaks of files beside it."""
+    found: dict[Path, dict[str, Path]] = {}
+    for name, place in own.items():
+        folder = place if is_stream(place) else place.parent.resolve()
+        found.setdefault(folder, {})[name] = place
+    return list(found.values())
+
+
+def _page_place(page: Path, target: Path) -> Path:
+    """Name the output of a page: beside that of its program."""
+    if target.parent.resolve() == page.parent.resolve():
+        return default_output(page)
+    return target.with_name(page.name)
+
+
+def default_output(program: Path) -> Path:
+    """Name the output of a program.
+
+    >>> default_output(Path("cell/job.pdl")).name
+    'job.compensated.pdl'
+    """
+    return program.with_name(f"{program.stem}{OUTPUT}{program.suffix}")

@@ -1,0 +1,257 @@
+"""What the windows of a program must agree on: their rounds, and what is at cuts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Bools, Floats, Indices, Ints
+from postproc.diagnostics import Reason
+from postproc.robot.backlash_operator import PlayOperator
+from postproc.robot.direction import NO_SIDES, FlankState
+
+# Rounds of correcting and planning again are the same for a whole program.
+#
+# Whether there is another one, and of what kind, is asked of all its targets. A window
+# says what its own would have; all windows together say what is done, and one that did
+# otherwise, where that matters to it, is worked through again.
+
+
+class Step(IntEnum):
+    """What comes behind a look at a proposal, the least first."""
+
+    READ_BACK = 0  # nothing is left to do: look at the numbers as they are written
+    AIM = 1  # correct for other sides
+    BEND = 2  # .. and for what rounded points are missed by
+
+
+@dataclass(frozen=True)
+class RoundVote:
+    """What a window did in one round.
+
+    Attributes:
+        step: What it did.
+        vote: What its own targets would have.
+        moved, missed: It had targets with other sides, and rounded points that are
+            missed by anything, among its own and those that are watched beyond.
+    """
+
+    step: Step
+    vote: Step
+    moved: bool
+    missed: bool
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What was proposed and looked at in one round, k visits (structure of arrays).
+
+    Attributes:
+        values: Numbers, (k, 6).
+        status, why: What was decided, (k,); `why` is an index into `reasons`.
+        reasons: See `Decisions`.
+        correction: (k, 3) [m].
+        aim: Sides that are corrected for, (k, 6).
+        bent, left: As in `SolverState`: (k, 3) [m]; held, swung, settled, (k, 3).
+        q, passed: Joint angles at the target and where it is passed, (k, 6) [rad].
+        aside: From the one to the other, (k, 3) [m].
+        slot: Branch, (k,).
+        side, lo, hi: Where joints lie in their play, and what is known of its state
+            [rad], (k, 6).
+    """
+
+    values: Floats
+    status: Indices
+    why: Ints
+    reasons: tuple[Reason, ...]
+    correction: Floats
+    aim: Floats
+    bent: Floats
+    left: Bools
+    q: Floats
+    passed: Floats
+    aside: Floats
+    slot: Ints
+    side: Floats
+    lo: Floats
+    hi: Floats
+
+    def __getitem__(self, rows: slice) -> Snapshot:
+        """Return some of the visits."""
+        arrays = {
+            f.name: np.array(getattr(self, f.name)[rows])
+            for f in fields(self)
+            if f.name != "reasons"
+        }
+        return Snapshot(reasons=self.reasons, **arrays)
+
+    @property
+    def to_dict(self) -> list[Reason]:
+        """Return the reason of every visit."""
+        return [self.reasons[k] for k in self.why.tolist()]
+
+    @property
+    def sides(self) -> FlankState:
+        """Return the sides alone."""
+        return FlankState(self.side, PlayOperator(self.lo, self.hi))
+
+
+Look = tuple[int, bool]  # a round; whether at the numbers as they are written
+
+
+@dataclass(frozen=True)
+class Glimpses:
+    """What was looked at, round by round, at some neighbouring visits.
+
+    Attributes:
+        looks: By round.
+    """
+
+    looks: Mapping[Look, Snapshot]
+
+    def at(self, look: Look) -> Snapshot:
+        """Return a look, or what stands for it.
+
+        A window that has come to rest does not take the rounds of the others: what was
+        the same by then stands for them. Written numbers are looked at by all windows
+        together, so that they stand for those of another round.
+        """
+        if look in self.looks:
+            return self.looks[look]
+        number, written = look
+        if written:
+            later = [k for k in self.looks if k[1] and k[0] > number]
+            if later:
+                return self.looks[min(later)]
+        for kind in (written, False):
+            before = [k for k in self.looks if k[1] == kind and k[0] <= number]
+            if before:
+                return self.looks[max(before)]
+        raise KeyError(look)
+
+    def __getitem__(self, rows: slice) -> Glimpses:
+        """Return what was looked at at some of the visits."""
+        return Glimpses({look: seen[rows] for look, seen in self.looks.items()})
+
+
+@dataclass
+class RoundLog:
+    """What a window did, and what was looked at at both of its ends.
+
+    Attributes:
+        own: Visits that vote.
+        left, right: Visits that are watched.
+        pace: What to do in the first rounds, whatever the votes.
+        taken: What was done.
+        begin, end: What was looked at at `left` and `right`.
+    """
+
+    own: slice = field(default_factory=lambda: slice(None))
+    left: slice = field(default_factory=lambda: slice(0, 0))
+    right: slice = field(default_factory=lambda: slice(0, 0))
+    pace: Sequence[Step] = ()
+    taken: list[RoundVote] = field(default_factory=list)
+    begin: dict[Look, Snapshot] = field(default_factory=dict)
+    end: dict[Look, Snapshot] = field(default_factory=dict)
+
+    def see(self, look: Look, seen: Snapshot) -> None:
+        """Keep what is watched of a look at all visits."""
+        for kept, rows in ((self.begin, self.left), (self.end, self.right)):
+            if rows.stop > rows.start:
+                kept[look] = seen[rows]
+
+    def take(self, moved: Bools, missed: Floats, far: Bools) -> Step:
+        """Decide on the step behind a look.
+
+        Args:
+            moved: Targets to be corrected for other sides, (n,).
+            missed: What rounded points are missed by, (n, 3) [m].
+            far: Those that are missed by too much, (n,).
+        """
+        vote = Step.AIM if moved[self.own].any() else Step.READ_BACK
+        if far[self.own].any():
+            vote = Step.BEND
+        number = len(self.taken)
+        step = self.pace[number] if number < len(self.pace) else vote
+        near = self.near
+        taken = RoundVote(step, vote, bool(moved[near].any()), bool(missed[near].any()))
+        self.taken.append(taken)
+        return step
+
+    @property
+    def near(self) -> slice:
+        """Return its own visits and those that are watched.
+
+        What lies farther out is decided by the windows there: where that reaches the
+        watched ones, both windows at the cut find different things at them.
+        """
+        return slice(self.left.start, self.right.stop or None)
+
+
+def common(trails: Sequence[RoundLog]) -> tuple[Step, ...]:
+    """Say what all windows together do, round by round."""
+    number = max(len(trail.taken) for trail in trails)
+    return tuple(
+        max(t.taken[k].vote for t in trails if k < len(t.taken)) for k in range(number)
+    )
+
+
+def fits(trail: RoundLog, steps: Sequence[Step]) -> bool:
+    """Tell whether a window comes out as if it had done all steps."""
+    last = len(trail.taken) - 1
+    for number, own in enumerate(trail.taken[:-1]):
+        alike = own.step == steps[number]
+        both = min(own.step, steps[number]) >= Step.AIM
+        if not (alike or (both and not own.missed)):
+            return False
+    own, rest = trail.taken[-1], steps[last:]
+    if all(step == Step.READ_BACK for step in rest):
+        return True
+    return not own.moved and not (own.missed and Step.BEND in rest)
+
+
+# What both windows at a cut find at the visits beside it.
+
+Array = NDArray[Any]
+
+SAME = 1e-9  # of any unit: more than sums in blocks of other lengths differ by
+
+
+def same_rows(a: Mapping[str, Array], b: Mapping[str, Array]) -> bool:
+    """Tell whether the same arrays say the same."""
+    return a.keys() == b.keys() and all(_same(a[name], b[name]) for name in a)
+
+
+def _same(a: Array, b: Array) -> bool:
+    if a.dtype.kind != "f":
+        return bool(np.array_equal(a, b))
+    return a.shape == b.shape and bool(
+        np.allclose(a, b, rtol=0.0, atol=SAME, equal_nan=True)
+    )
+
+
+def _same_glimpse(a: Snapshot, b: Snapshot) -> bool:
+    arrays = [
+        {f.name: getattr(seen, f.name) for f in fields(Snapshot)
+         if f.name not in ("why", "reasons")}
+        for seen in (a, b)
+    ]  # fmt: skip
+    return a.to_dict == b.to_dict and same_rows(arrays[0], arrays[1])
+
+
+def same_looks(a: Glimpses, b: Glimpses) -> bool:
+    """Tell whether the same was looked at, in all rounds."""
+    return all(_same_glimpse(a.at(look), b.at(look)) for look in {*a.looks, *b.looks})
+
+
+NO_GLIMPSES = Glimpses({})
+
+
+def lead_of(seen: Glimpses, look: Look) -> FlankState:
+    """Return what is known of the sides of the first visits in a look."""
+    return seen.at(look).sides if seen.looks else NO_SIDES

@@ -1,0 +1,783 @@
+"""Which targets move, where to, and why the others do not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Interned, Ints, any_in_rows
+from postproc.compensation.agreement import LEVER_MM, Agreement, agree
+from postproc.compensation.arc_angles import ASTRAY
+from postproc.compensation.continuity import (
+    PathCorrection,
+    keep_whole,
+    path_correction,
+)
+from postproc.compensation.eligibility import STRAYS, Reasons, find_strayed
+from postproc.compensation.inverse_model import (
+    Commands,
+    angles_astray,
+    change_mm,
+    new_numbers,
+    turns_in_file,
+)
+from postproc.compensation.options import Job, Options
+from postproc.compensation.outcome import Decisions, Status
+from postproc.compensation.program import ParsedProgram, PlannedProgram
+from postproc.compensation.shifts import absorb, own_shifts, shift_values
+from postproc.compensation.targets import move_targets
+from postproc.diagnostics import Code, Reason
+from postproc.language.visits import Meaning, Visits
+from postproc.motion.deviation import JointDeviation
+from postproc.motion.replan import IS_STEP
+from postproc.motion.targets import TargetKind
+from postproc.robot.arm import Arm
+from postproc.robot.cell import Cell, LimitSection
+from postproc.robot.pose import MM, has_unknown, lengths
+
+# Targets that the program computes from others: they move along with them.
+
+
+def dependants(visits: Visits, agreement: Agreement, among: Bools) -> tuple[Ints, Ints]:
+    """Find the visits that move along with a literal, and its row in the agreement."""
+    rows = np.flatnonzero((visits.follows >= 0) & among)
+    return rows, np.searchsorted(agreement.literal, visits.follows[rows])
+
+
+def would_worsen(
+    visits: Visits,
+    agreement: Agreement,
+    change_mm: Floats,
+    trusted: Bools,
+    agree_mm: float,
+    absorbing: Bools,
+) -> Bools:
+    """Tell which literals would carry a computed target farther off, (m,).
+
+    A target such as ``POS_SHIFT(p, ..)`` or ``NEAR p BY d`` needs a change of its own
+    and gets that of ``p``. What it is then off must be no more than what it is off now.
+    ``FOR d TO p`` only takes its direction from ``p``: it is a part of the way there.
+    A taught target needs none.
+
+    Args:
+        visits: n arrivals.
+        agreement: What the m literals would change by.
+        change_mm: The change that every visit needs, (n, 3) [mm].
+        trusted: The model can say what a visit needs, (n,).
+        agree_mm: Changes that differ less are the same.
+        absorbing: Their move makes up for what the literal changes by, (n,).
+    """
+    carries = ~absorbing & (visits.target != Meaning.FOR)
+    rows, at = dependants(visits, agreement, carries)
+    needed = np.where(find_taught(visits)[rows, None], 0.0, change_mm[rows])
+    moved = agreement.change_mm[at]
+    shifted = visits.shift[rows] >= 0
+    if shifted.any():
+        after = shift_values(
+            visits, agreement.literal, agreement.values, visits.values, own=False
+        )
+        own = rows[shifted]
+        moved[shifted] = (after - visits.values)[own, :3]
+    left = np.linalg.norm(moved - needed, axis=1)
+    allowed = np.maximum(np.linalg.norm(needed, axis=1), agree_mm)
+    worse = ~(trusted[rows] & (left <= allowed))
+    found = np.zeros(len(agreement.literal), dtype=bool)
+    found[at[worse]] = True
+    return found
+
+
+def find_taught(visits: Visits) -> Bools:
+    """Tell which visits have a literal that holds a taught target, (n,)."""
+    if len(visits.literals) == 0:
+        return np.zeros(len(visits), dtype=bool)
+    has = visits.literal >= 0
+    return np.asarray(has & visits.literals.taught[np.where(has, visits.literal, 0)])
+
+
+def move_dependants(
+    visits: Visits, agreement: Agreement, chosen: Bools, values: Floats
+) -> None:
+    """Move the computed targets along with the literals that change, in place.
+
+    Args:
+        visits: n arrivals.
+        agreement: What the m literals change by.
+        chosen: Literals that do change, (m,).
+        values: Numbers of every visit, (n, w).
+    """
+    rows, at = dependants(visits, agreement, visits.shift < 0)
+    rows, at = rows[chosen[at]], at[chosen[at]]
+    if len(rows) == 0:
+        return
+    direct = np.flatnonzero(visits.literal >= 0)
+    written = np.zeros((len(visits.literals), values.shape[1]))
+    written[visits.literal[direct]] = visits.values[direct]
+    values[rows] += agreement.values[at] - written[agreement.literal[at]]
+
+
+# Why targets stay where they are, whatever the model says of them.
+
+
+def pinned_targets(
+    visits: Visits,
+    agreement: Agreement,
+    change: Floats,
+    trusted: Bools,
+    cell: Cell,
+    absorbing: Bools,
+) -> dict[Reason, Bools]:
+    """Find literals that must keep their values for what else depends on them.
+
+    Args are those of `would_worsen`.
+
+    Returns:
+        The reasons, and which of the m literals of the agreement have each, (m,).
+    """
+    limit = cell.limits.conflict_mm
+    hurt = would_worsen(visits, agreement, change, trusted, limit, absorbing)
+    cloning = visits.dialect.terms.cloning
+    found = {Reason(Code.NUMBERS_USED_ELSEWHERE,
+                    f"{why}: give the move a point of its own ({cloning})"): rows
+             for why, pins in visits.literals.pins.items()
+             if (rows := np.isin(agreement.literal, pins)).any()}  # fmt: skip
+    text = f"a target computed from it would land farther off ({cloning})"
+    return found | {Reason(Code.DEPENDANT_WORSE, text): hurt}
+
+
+def mark_display(visits: Visits, planned: PlannedProgram, reasons: Reasons) -> Bools:
+    """Mark targets whose value is known only at run time, (n,)."""
+    holds = ~without_target(visits)
+    display = holds & ((visits.reason > 0) | (visits.literal < 0))
+    reasons.adopt(visits.reason, visits.reasons)
+    reasons.mark(display, NOT_WRITTEN)
+    return display
+
+
+def without_target(visits: Visits) -> Bools:
+    """Tell which moves go where no target of theirs says, (n,): $HOME, RELATIVE, .."""
+    none = np.array([one.code is Code.NO_TARGET for one in visits.reasons])
+    named = np.isin(
+        visits.target,
+        (Meaning.POSE, Meaning.JOINTS, Meaning.NEAR, Meaning.PARTIAL_POSE,
+         Meaning.PARTIAL_JOINTS, Meaning.UNKNOWN),
+    )  # fmt: skip
+    return np.asarray(~named | none[visits.reason])
+
+
+def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
+    """Mark moves without a target, taught points and shared variables, (n,)."""
+    empty = without_target(visits)
+    reasons.mark(empty, HOLDS_NONE)
+    has = visits.literal >= 0
+    literal = np.where(has, visits.literal, 0)
+    if len(visits.literals) == 0:
+        return empty
+    held = find_taught(visits)
+    reasons.mark(held, TAUGHT)
+    if not options.edit_exported:
+        shared = has & visits.literals.shared[literal]
+        reasons.mark(shared, EXPORTED)
+    return np.asarray(empty | held)
+
+
+def mark_disagreement(
+    visits: Visits,
+    agreement: Agreement,
+    stay: Mapping[Reason, Bools],
+    cell: Cell,
+    reasons: Reasons,
+) -> tuple[Bools, Bools]:
+    """Mark the visits of literals whose arrivals disagree, or that must stay.
+
+    Returns:
+        The literals that agree, (m,), and the visits that would be corrected if the
+        others at their literal agreed, (n,).
+    """
+    limit = cell.limits.conflict_mm
+    has = agreement.group >= 0
+    apart = ~(agreement.spread_mm <= limit)
+    stays = np.any([apart, *stay.values()], axis=0)
+    together = agreement.usable & ~stays
+    if len(together) == 0:
+        return together, np.zeros(len(visits), dtype=bool)
+    at = np.where(has, agreement.group, 0)
+    conflict = reasons.none & has & ~together[at]
+    differ = conflict & agreement.usable[at] & apart[at]
+    code = Code.ARRIVALS_DIFFER
+    apart_by = Reason(code, SHIFTED_APART.format(limit))
+    reasons.mark(differ & own_shifts(visits), apart_by)
+    text = f"its arrivals differ by more than conflict_mm = {limit:g}: "
+    alone = has & _by_one_move(visits, agreement.group, len(together))[at]
+    reasons.mark(differ & alone, Reason(code, f"{text}{_ONE_MOVE}"))
+    cloning = visits.dialect.terms.cloning
+    text += f"give each move a point of its own ({cloning})"
+    reasons.mark(differ, Reason(code, text))
+    for why, literals in stay.items():
+        reasons.mark(conflict & literals[at], why)
+    reasons.mark(conflict, OTHER_ARRIVAL)
+    return together, conflict
+
+
+HOLDS_NONE = Reason(Code.NO_TARGET, "this move holds no target")
+NOT_WRITTEN = Reason(Code.NUMBERS_NOT_OWN, "its numbers are not written in the program")
+TAUGHT = Reason(Code.TAUGHT_POINT, "a taught point already contains the arm's error")
+EXPORTED = Reason(
+    Code.EXPORTED_VARIABLE,
+    "other programs may read this variable too (see edit_exported)",
+)
+OTHER_ARRIVAL = Reason(
+    Code.DEPENDANT_WORSE, "another arrival at the same point cannot be corrected"
+)
+SEVERAL_MOVES = Reason(
+    Code.SHARED_POINT, "several moves go to this point (shared_points = leave)"
+)
+_ONE_MOVE = (
+    "one move makes them all, and --shared-points clone does not help: write it once "
+    "for every way to it, or for all frames that it is made with"
+)
+
+
+def _by_one_move(visits: Visits, group: Ints, count: int) -> Bools:
+    """Tell which literals a single move of the program goes to, (count,).
+
+    Args:
+        visits: The program.
+        group: Literal of every visit, (n,), -1 where it has none.
+        count: How many there are.
+    """
+    places = np.stack([group, visits.file, visits.line])[:, group >= 0]
+    own = np.unique(places, axis=1)[0]
+    return np.asarray(np.bincount(own, minlength=count) == 1)
+
+
+# Targets that move although no number of theirs is written anew.
+#
+# A computed target moves along with the literal that it is computed from, a step
+# (RELATIVE, AWAY, ..) with the place that it begins at.
+
+
+def find_bent_arcs(
+    visits: Visits, planned: PlannedProgram, cell: Cell, values: Floats, shift: Floats
+) -> Bools:
+    """Tell which targets must stay for every arc to stay what it is, (n,).
+
+    Args are those of `with_dependants`.
+    """
+    if not planned.targets.via.any():
+        return np.zeros(len(visits), dtype=bool)
+    moves = with_dependants(visits, planned, cell, values, shift)
+    step = cell.limits.correction_step_mm * MM
+    away = find_strayed(planned.targets, planned.plan, moves, step)
+    return with_origins(visits, planned, away)
+
+
+def with_dependants(
+    visits: Visits, planned: PlannedProgram, cell: Cell, values: Floats, shift: Floats
+) -> Floats:
+    """Tell what all targets move by, (n, 3) [m], base frame.
+
+    Args:
+        visits: n arrivals.
+        planned: Their plan.
+        cell: The robot's surroundings.
+        values: Numbers of every visit after the correction, (n, w).
+        shift: What those with numbers of their own move by, (n, 3) [m]; else 0.
+    """
+    moves = np.array(shift)
+    rows = np.flatnonzero((visits.follows >= 0) & any_in_rows(values != visits.values))
+    if len(rows):
+        moves[rows] = _dependant_shift(visits, planned, cell, values, rows)
+    for v, sources in _steps(planned):
+        source = sources[np.argmax(np.linalg.norm(moves[sources], axis=1))]
+        moves[v] = _carry_step(planned, v, int(source), moves)
+    return moves
+
+
+ALONG = 1e-6  # [m]: what moves by less stays
+WITH_POINT = "it moves along with the point that it is computed from"
+WITH_BEGIN = "it moves along with the target that it begins at"
+
+
+def with_what_moves_along(
+    visits: Visits, planned: PlannedProgram, cell: Cell, found: Decisions
+) -> Decisions:
+    """Say of targets that are left where they move all the same.
+
+    Args:
+        visits: n arrivals.
+        planned: Their plan.
+        cell: The robot's surroundings.
+        found: What was decided for them.
+    """
+    own = (found.status == Status.CORRECTED)[:, None]
+    values, shift = found.corrected, np.where(own, found.correction, 0.0)
+    moves = np.nan_to_num(with_dependants(visits, planned, cell, values, shift))
+    along = ~own[:, 0] & (lengths(moves) > ALONG)
+    told = np.isin(visits.target, (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS))
+    rows = np.flatnonzero(along & ~told)
+    if len(rows) == 0:
+        return found
+    why, reasons = np.array(found.why), Interned(found.reasons)
+    for v in rows.tolist():
+        how = WITH_POINT if visits.follows[v] >= 0 else WITH_BEGIN
+        why[v] = reasons[found.reasons[why[v]].within(f"{{}}; {how}")]
+    return replace(found, why=why, reasons=tuple(reasons))
+
+
+def _carry_step(planned: PlannedProgram, v: int, source: int, moves: Floats) -> Floats:
+    """Tell what a step moves by as the place that it begins at does, (3,) [m]."""
+    t, moved = planned.targets, np.asarray(moves[source])
+    if t.kind[v] == TargetKind.TOWARDS:
+        way = t.tcp[v, :3, 3] - planned.plan.tcp[source, :3, 3]
+        return moved + _turn_place(way, t.distance[v], moves[v] - moved)
+    if t.kind[v] == TargetKind.PARTIAL_POSE:  # along the axes of what is not written
+        axes = t.tcp[v, :3, :3][:, np.isnan(t.tcp[v, :3, 3])]
+        return np.asarray(axes @ (axes.T @ moved))
+    return moved
+
+
+def with_origins(visits: Visits, planned: PlannedProgram, found: Bools) -> Bools:
+    """Add to some targets, (n,), those along with which they move."""
+    found = np.array(found)
+    for v, sources in reversed([*_steps(planned)]):
+        found[sources] |= found[v]
+    literals = visits.follows[found & (visits.follows >= 0)]
+    return np.asarray(found | np.isin(visits.literal, literals))
+
+
+def _dependant_shift(
+    visits: Visits, planned: PlannedProgram, cell: Cell, values: Floats, rows: Ints
+) -> Floats:
+    """Tell what computed targets move by, (m, 3) [m]."""
+    now = move_targets(planned.targets, replace(visits, values=values), cell, rows).tcp[
+        rows
+    ]
+    return np.nan_to_num((now - planned.targets.tcp[rows])[:, :3, 3])
+
+
+def _turn_place(way: Floats, distance: float, by: Floats) -> Floats:
+    """Tell what a place at a distance on a way moves by as the end of the way does."""
+    length = np.linalg.norm(way)
+    if not 0.0 < distance <= length:  # so short a way is not known either
+        return np.zeros(3)
+    u = way / length
+    turned: Floats = (by - (by @ u) * u) * (distance / length)
+    return turned
+
+
+def _steps(planned: PlannedProgram) -> Iterator[tuple[int, Ints]]:
+    """Yield the moves by a step, in the program's order, and where they begin."""
+    t = planned.targets
+    for v in np.flatnonzero(IS_STEP[t.kind]).tolist():
+        sources = t.pred[t.pred_start[v] : t.pred_start[v + 1]]
+        sources = sources[sources >= 0]
+        if len(sources):
+            yield v, sources
+
+
+# When a correction is not trusted.
+
+SOLVED = 1e-6  # [m] model against wanted pose
+ROUNDING = 1e-9  # [rad] and [m]
+UNSOLVED = Reason(
+    Code.CORRECTION_UNREACHABLE, "the corrected pose is out of reach on its branch"
+)
+BEYOND = Reason(
+    Code.CORRECTION_BEYOND_LIMIT, "the corrected pose is beyond a joint limit"
+)
+FLIPPED = Reason(Code.ARM_SWINGS, "the correction would flip the wrist")
+NOT_CONVERGED = Reason(
+    Code.CORRECTION_UNREACHABLE, "the correction did not converge to 1 um"
+)
+
+
+def guard_solutions(
+    reasons: Reasons, arm: Arm, limits: LimitSection, q: Floats, solved: Floats
+) -> None:
+    """Mark corrected commands that the arm cannot or should not be given.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        arm: The arm.
+        limits: The cell's guards.
+        q: Joint angles of the original command, (n, 6) [rad].
+        solved: Joint angles of the corrected command, (n, 6) [rad], NaN where the
+            corrected pose has no solution.
+    """
+    with np.errstate(invalid="ignore"):
+        unsolved = has_unknown(solved)
+        lost = np.asarray(unsolved & ~has_unknown(q))
+        reasons.mark(lost, UNSOLVED)
+        over = ~arm.within_limits(solved) & ~unsolved
+        reasons.mark(over, BEYOND)
+        wrist = np.abs(q[:, 4]) < np.deg2rad(limits.wrist_deg)
+        wrist |= np.abs(solved[:, 4]) < np.deg2rad(limits.wrist_deg)
+        text = f"within {limits.wrist_deg:g} deg of the wrist singularity"
+        reasons.mark(wrist, Reason(Code.SINGULAR_WRIST, text))
+        flipped = np.sign(q[:, 4]) != np.sign(solved[:, 4])
+        reasons.mark(flipped & ~lost, FLIPPED)
+
+
+def guard_size(
+    reasons: Reasons, limits: LimitSection, correction: Floats, residual: Floats
+) -> None:
+    """Mark corrections that are too large or did not converge.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        limits: The cell's guards.
+        correction: Change of the commanded TCP, (n, 3) [m].
+        residual: Predicted landing against the wanted position, (n,) [m].
+    """
+    with np.errstate(invalid="ignore"):
+        size = lengths(correction) / MM
+        text = f"the correction exceeds correction_mm = {limits.correction_mm:g}"
+        too_large = Reason(Code.CORRECTION_TOO_LARGE, text)
+        reasons.mark(size > limits.correction_mm, too_large)
+        reasons.mark(~(residual <= SOLVED), NOT_CONVERGED)
+
+
+def guard_motion(reasons: Reasons, limits: LimitSection, moved: JointDeviation) -> None:
+    """Mark targets at which joints, elbow or wrist centre would swing too far.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        limits: The cell's guards.
+        moved: What the corrections do there, n visits.
+    """
+    for text, far in limit_violations(limits, moved).items():
+        reasons.mark(far, Reason(Code.ARM_SWINGS, f"corrected, {text}"))
+
+
+def limit_violations(limits: LimitSection, moved: JointDeviation) -> dict[str, Bools]:
+    """Say what is beyond the limits, and in which of n rows, (n,) each."""
+    found = {"the arm would stand on another branch": moved.branch}
+    with np.errstate(invalid="ignore"):
+        for j, most in enumerate(limits.joint_deg):
+            text = f"axis {j + 1} would turn by more than joint_deg = {most:g}"
+            found[text] = moved.joints[:, j] > np.deg2rad(most) + ROUNDING
+        for what, size, name, most_mm in (
+            ("elbow", moved.elbow, "elbow_mm", limits.elbow_mm),
+            ("wrist centre", moved.wrist_centre, "wrist_centre_mm",
+             limits.wrist_centre_mm),
+        ):  # fmt: skip
+            text = f"the {what} would move by more than {name} = {most_mm:g}"
+            found[text] = size > most_mm * MM + ROUNDING
+    return found
+
+
+def guard_turn(reasons: Reasons, limits: LimitSection, turn: Floats) -> None:
+    """Mark corrections that turn the tool too far.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        limits: The cell's guards.
+        turn: Rotation of the commanded tool, (n, 3) [rad].
+    """
+    with np.errstate(invalid="ignore"):
+        angle = np.rad2deg(lengths(turn))
+        text = f"the correction exceeds correction_deg = {limits.correction_deg:g}"
+        too_large = Reason(Code.CORRECTION_TOO_LARGE, text)
+        reasons.mark(angle > limits.correction_deg, too_large)
+
+
+# Which targets move, where to, and why the others do not.
+
+FLAG_MM = 1e6  # [mm] that a flag counts for where arrivals must agree
+NONE = np.empty((0, 3))
+KNOWN = 0.5  # part of its play that a joint must have left behind to be on a side
+HELD = Reason(
+    Code.DIRECTION_CHANGES, "its direction of arrival would change with the correction"
+)
+SWUNG = Reason(
+    Code.ARM_SWINGS,
+    "corrected, the way to it or on from it would swing a joint, the elbow or the "
+    "wrist centre by more than the cell's limits, or pass a singularity otherwise",
+)
+
+
+SHIFTED_APART = (
+    "its arrivals need numbers of its shift that differ by more than conflict_mm = "
+    "{:g}: give each a move of its own"
+)
+NOT_ABSORBED = Reason(
+    Code.ARRIVALS_DIFFER,
+    "the numbers of its shift cannot make up for how all of its points are corrected: "
+    "give each a move of its own",
+)
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What arrivals have in common, once it is known what makes up for what.
+
+    Attributes:
+        agreement: At m literals; the numbers of one that holds a shift are the shift's.
+        stay: Why literals must keep their values, and which of them have each reason,
+            (m,).
+        change: What had to agree at every visit, (n, k) [mm].
+    """
+
+    agreement: Agreement
+    stay: dict[Reason, Bools]
+    change: Floats
+
+    def together(self, agree_mm: float) -> Bools:
+        """Tell which literals can be given new numbers, (m,)."""
+        apart = ~(self.agreement.spread_mm <= agree_mm)
+        stays = np.any([apart, *self.stay.values()], axis=0)
+        return np.asarray(self.agreement.usable & ~stays)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Corrected numbers for the literals of a program.
+
+    Attributes:
+        edited: Literals that get new numbers, (m,).
+        values: Their numbers, (m, w) in the file's units.
+        corrected: Visits whose target moves, (n,).
+        decisions: What was decided for every visit.
+        usable: Visits that could be corrected if they had their points alone, (n,).
+        change_mm: What they would be corrected by, as arrivals at one point compare
+            it, (n, k) [mm].
+        fixed: Literals that must keep their values for what else depends on them, (k,).
+    """
+
+    edited: Ints
+    values: Floats
+    corrected: Bools
+    decisions: Decisions
+    usable: Bools
+    change_mm: Floats
+    fixed: Ints
+
+
+@dataclass(frozen=True)
+class Round:
+    """What is to be decided in a round: commands for all targets of a window.
+
+    Attributes:
+        reading: The program.
+        planned: Its plan, n visits.
+        solved: The corrected command of every visit.
+        departure: How far the commands lead the arm from where it was, n visits.
+        aside: From targets to where the corrected path passes them, (n, 3) [m].
+        held: Visits that must be left alone for the side they are reached from, (n,).
+        swung: .. for the ways to or from them, (n,).
+        setting: Guards and frames, and what the user asked for.
+    """
+
+    reading: ParsedProgram
+    planned: PlannedProgram
+    solved: Commands
+    departure: JointDeviation
+    aside: Floats
+    held: Bools
+    swung: Bools
+    setting: Job
+
+    @cached_property
+    def path(self) -> PathCorrection:
+        """How the correction changes along continuous paths."""
+        plan, setting = self.planned.plan, self.setting
+        return path_correction(
+            self.reading.visits, setting.cell.arm, plan.q, plan.tcp,
+            plan.tool[:, :3, 3], self.correction, self.solved.direction,
+            setting.gap, setting.cell.limits.correction_step_mm,
+        )  # fmt: skip
+
+    @cached_property
+    def correction(self) -> Floats:
+        """How far the commands move the TCP, base frame, (n, 3) [m]."""
+        moved: Floats = self.solved.command[:, :3, 3] - self.planned.plan.tcp[:, :3, 3]
+        return moved
+
+    @property
+    def shift(self) -> Floats:
+        """The same for where targets lie: a fly point also makes up for its corner."""
+        shift: Floats = self.correction - (self.aside - self.planned.plan.aside)
+        return shift
+
+    def propose(self) -> Proposal:
+        """Decide what moves, until no arc becomes quite another one by it.
+
+        Every round leaves more points alone.
+        """
+        strays = np.zeros(len(self.held), dtype=bool)
+        arcs = self.planned.targets.via.any()
+        while True:
+            found = self.decide(strays)
+            if not arcs:
+                return found
+            more = self._find_strayed(found) & ~strays
+            if not more.any():
+                return found
+            strays = strays | more
+
+    def _find_strayed(self, found: Proposal) -> Bools:
+        """Tell which targets must stay for every arc to stay what it is, (n,)."""
+        moves = np.where(found.corrected[:, None], self.shift, 0.0)
+        values = found.decisions.corrected
+        visits, planned = self.reading.visits, self.planned
+        return find_bent_arcs(visits, planned, self.setting.cell, values, moves)
+
+    def decide(self, strays: Bools) -> Proposal:
+        """Guard every solved visit, and compare the arrivals at every literal.
+
+        Args:
+            strays: Visits whose correction would make another arc, (n,).
+        """
+        visits, reasons = self.reading.visits, Reasons(len(self.reading.visits))
+        display = mark_display(visits, self.planned, reasons)
+        unchanged = mark_unchanged(visits, reasons, self.setting.options)
+        self._guard(reasons, strays)
+        usable = reasons.none
+        settled = self._settle(usable)
+        agreement, stay = settled.agreement, settled.stay
+        chosen, conflict = mark_disagreement(
+            visits, agreement, stay, self.setting.cell, reasons
+        )
+        status = np.where(reasons.none, Status.CORRECTED, Status.REJECTED)
+        status[conflict] = Status.CONFLICT
+        status[display] = Status.RUNTIME
+        status[unchanged] = Status.UNCHANGED
+        corrected = status == Status.CORRECTED
+        values = np.array(visits.values)
+        values[corrected] = agreement.values[agreement.group[corrected]]
+        move_dependants(visits, agreement, chosen, values)
+        literals, new = agreement.literal[chosen], agreement.values[chosen]
+        values = shift_values(visits, literals, new, values)
+        return Proposal(
+            literals,
+            new,
+            corrected,
+            self._decisions(status, reasons, values),
+            usable,
+            settled.change,
+            agreement.literal[np.any([*stay.values()], axis=0)],
+        )
+
+    def _guard(self, reasons: Reasons, strays: Bools) -> None:
+        """Mark the visits whose corrections are not trusted."""
+        solved, limits, q = self.solved, self.setting.cell.limits, self.planned.plan.q
+        visits, given = self.reading.visits, ~reasons.none
+        reasons.adopt(self.planned.reasons.index, self.planned.reasons.all)
+        for text, outside in solved.outside.items():
+            reasons.mark(outside, Reason(Code.OUTSIDE_SURVEY, text))
+        guard_solutions(reasons, self.setting.cell.arm, limits, q, solved.q)
+        guard_motion(reasons, limits, self.departure)
+        guard_turn(reasons, limits, solved.turn)
+        guard_size(reasons, limits, self.correction, solved.residual)
+        guard_size(reasons, limits, self.shift, solved.residual)
+        self._guard_flags(reasons)
+        reasons.mark(self.held, HELD)
+        reasons.mark(self.swung, SWUNG)
+        reasons.mark(strays, STRAYS)
+        astray = angles_astray(visits, self.planned.plan, solved, self.aside)
+        reasons.mark(astray, ASTRAY)
+        keep_whole(reasons, self.path, visits, given, limits.correction_step_mm)
+
+    def _guard_flags(self, reasons: Reasons) -> None:
+        """Mark corrections that end where flags are not sure."""
+        visits = self.reading.visits
+        near = visits.dialect.near_border(self.solved.q)
+        if near is None:
+            return
+        rows = visits.config_given & (visits.target == Meaning.POSE)
+        for axis, found in enumerate(near.T, start=1):
+            text = visits.dialect.terms.border.format(axis)
+            reasons.mark(rows & found, Reason(Code.CONFIGURATION_BORDER, text))
+
+    @property
+    def _is_trusted(self) -> Bools:
+        """Tell where the model may be believed, (n,)."""
+        left = self.held | self.swung
+        out: Bools = ~np.any([left, *self.solved.outside.values()], axis=0)
+        return out
+
+    def _settle(self, usable: Bools) -> Settled:
+        """Compare arrivals, until the shifts that make up for points do so for sure.
+
+        A shift that cannot moves along with its point, which may have to stay for it.
+        """
+        visits, limit = self.reading.visits, self.setting.cell.limits.conflict_mm
+        numbers, change, both = self._collect_needs()
+        points = agree(visits.literal, usable, numbers, both)
+        shifts, lost = own_shifts(visits), np.zeros(len(points.literal), dtype=bool)
+        absorbing = shifts & points.usable[points.group] if shifts.any() else shifts
+        while True:
+            stay = self._must_stay(points, change, absorbing)
+            found = Settled(points, stay, both)
+            if not shifts.any():
+                return found
+            stay |= {NOT_ABSORBED: lost} if lost.any() else {}
+            free = found.together(limit)
+            free[points.group[shifts]] = False  # what is left are points
+            own = absorb(visits, usable, numbers, both, points, free, limit)
+            found = Settled(own.agreement, stay | own.stay, own.change)
+            failed = absorbing & ~found.together(limit)[points.group]
+            if not failed.any():
+                return found
+            lost = np.array(lost)
+            lost[points.group[failed]] = True
+            absorbing = absorbing & ~failed
+
+    def _must_stay(
+        self, agreement: Agreement, change: Floats, absorbing: Bools
+    ) -> dict[Reason, Bools]:
+        """Find literals that must keep their values, see `pinned_targets`."""
+        visits, cell = self.reading.visits, self.setting.cell
+        stay = pinned_targets(
+            visits, agreement, change, self._is_trusted, cell, absorbing
+        )
+        if self.setting.options.shared_points == "leave":
+            count = len(agreement.literal)
+            stay[SEVERAL_MOVES] = ~_by_one_move(visits, agreement.group, count)
+        return stay
+
+    def _collect_needs(self) -> tuple[Floats, Floats, Floats]:
+        """Say what arrivals need, and what must agree.
+
+        Returns:
+            Corrected numbers, (n, w); what every visit would be corrected by, (n, 3)
+            [mm], and the same with turns beside it where tools are turned, (n, k) [mm].
+        """
+        visits, solved = self.reading.visits, self.solved
+        plan, arm = self.planned.plan, self.setting.cell.arm
+        numbers = new_numbers(visits, arm, plan, solved, self.aside)
+        change = change_mm(visits, numbers, self.correction)
+        both = change
+        if len(solved.turned):
+            turn = turns_in_file(visits, solved)
+            both = np.concatenate([change, turn * LEVER_MM], axis=1)
+        flags = list(visits.dialect.flag_columns)
+        if flags:  # arrivals with different flags have no mean
+            poses = (visits.target == Meaning.POSE)[:, None]
+            anew = np.where(poses, numbers[:, flags] - visits.values[:, flags], 0.0)
+            both = np.concatenate([both, anew * FLAG_MM], axis=1)
+        return numbers, change, both
+
+    def _decisions(self, status: Ints, reasons: Reasons, values: Floats) -> Decisions:
+        """Say what was decided for every visit, but for standard errors."""
+        side, moves = self.solved.direction, (status == Status.CORRECTED)[:, None]
+        turn = (
+            np.where(moves, self.solved.turn, 0.0)
+            if self.setting.options.orientation
+            else NONE
+        )
+        return Decisions(
+            status=status.astype(np.int8),
+            why=reasons.index,
+            reasons=reasons.all,
+            q=self.planned.plan.q,
+            direction=(side >= KNOWN).astype(np.int8) - (side <= -KNOWN),
+            side=side,
+            corrected=values,
+            correction=np.where(moves, self.correction, 0.0),
+            std_error=np.full_like(self.correction, np.nan),  # when all is settled
+            turn=turn,
+        )

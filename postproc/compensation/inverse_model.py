@@ -1,0 +1,503 @@
+"""Commands that would land where the program says, in the numbers of the file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Bools, Floats, Ints, take_rows
+from postproc.compensation.arc_angles import ArcAngles, points_to_write
+from postproc.compensation.payload import (
+    load_error,
+    load_reasons,
+    with_surveyed_load,
+)
+from postproc.compensation.program import PlannedProgram
+from postproc.compensation.targets import few_frames
+from postproc.exceptions import ModelError
+from postproc.language.visits import Meaning, Visits
+from postproc.model.kinematics import ArmStates
+from postproc.model.model import UNSURE, Model
+from postproc.motion.path import circles
+from postproc.motion.planner import Plan
+from postproc.robot.arm import Arm
+from postproc.robot.cell import Cell
+from postproc.robot.pose import (
+    MM,
+    cross,
+    has_unknown,
+    inverse,
+    is_unknown,
+    lengths,
+    products,
+    rotation_from_vector,
+    rotation_vector,
+    times,
+)
+from postproc.robot.state import States
+
+# The tool's rotation, as far as a model knows it.
+
+UNSURE_RAD = 3e-4  # [rad] 0.03 mm at 0.1 m from the TCP
+UNSURE_TURN = "the tool's rotation is not known well enough there to correct it"
+
+
+def turn(model: Model, arm: Arm, states: States) -> Floats:
+    """Predict the tool's rotation from nominal to actual.
+
+    Returns:
+        Rotation vectors in the base frame, (n, 3) [rad].
+    """
+    effects, values, _ = model.compensable()
+    return effects.turn(ArmStates(arm, states), values)
+
+
+def turn_std(model: Model, arm: Arm, states: States) -> Floats:
+    """Standard error of the predicted rotation per axis, (n, 3) [rad]."""
+    effects, values, covariance = model.compensable()
+    at = effects.at(ArmStates(arm, states), values)
+    X = effects.rotation_columns(at)
+    variance = np.einsum("nip,nip->ni", X @ covariance, X)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def is_turn_uncertain(model: Model, arm: Arm, states: States) -> Bools:
+    """Tell where the rotation is not known well enough to be corrected, (n,)."""
+    return np.asarray(np.linalg.norm(turn_std(model, arm, states), axis=1) > UNSURE_RAD)
+
+
+def refuse_unknown_rotations(model: Model) -> None:
+    """Refuse a model that tells where one point of the tool lands, not how it turns.
+
+    Raises:
+        ModelError: The survey does not show all rotations, or the method has none.
+    """
+    cure = "Leave orientation out, or fit a model with --method full from a survey "
+    if model.method != "full" or not len(model.covariance):
+        problem = f"the method {model.method} says nothing of the tool's rotation"
+        raise ModelError("orientation", problem, f"{cure}of three points")
+    if not model.ranges.see_all_rotations:
+        raise ModelError(
+            "orientation",
+            "the model was surveyed at one point of the tool: it does not know how "
+            "the tool is turned",
+            f"{cure}of three points that span a plane ([survey] points_mm in the cell "
+            "file), or of a 6D probe of known mounting",
+        )
+
+
+# Which command lands on the wanted pose.
+
+CLOSE = 2e-7  # [m] where iterating stops
+CLOSE_TURN = 2e-7  # [rad] likewise
+MOST = 5  # iterations
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Corrected commands of n targets.
+
+    Attributes:
+        q: Joint angles of the command, (n, 6) [rad], NaN where it cannot be reached.
+        command: TCP pose to command, base frame, (n, 4, 4).
+        residual: Distance of the predicted landing from the wanted place, (n,) [m].
+        iterations: How many were needed.
+    """
+
+    q: Floats
+    command: Floats
+    residual: Floats
+    iterations: int
+
+
+def solve(
+    model: Model,
+    arm: Arm,
+    wanted: Floats,
+    tool: Floats,
+    states: States,
+    orientation: bool = False,
+) -> Solution:
+    """Find the command whose predicted landing is the wanted place.
+
+    The branch stays as it is, and so does the commanded orientation unless it is to be
+    corrected too.
+
+    Args:
+        model: Predicts the error of a command.
+        arm: The arm.
+        wanted: TCP poses in the arm's base frame, (n, 4, 4).
+        tool: Tool in the flange frame, (4, 4) or (n, 4, 4).
+        states: The nominal states at the targets: angles, direction, loads.
+        orientation: Correct the orientation as well as the position.
+    """
+    n = len(wanted)
+    tool = np.broadcast_to(tool, (n, 4, 4))
+    states = states.with_(tool=tool[:, :3, 3])
+    from_tcp = inverse(tool)
+    command, q = np.array(wanted), np.array(states.q)
+    place = wanted[:, :3, 3]
+    branch = arm.branch(np.nan_to_num(q))
+    landing = place + model.error(arm, states)
+    turned, allowed = np.zeros((n, 3)), np.zeros((n, 3))  # [rad] found and allowed for
+    if orientation:
+        turned = turn(model, arm, states)
+    iterations = 0
+    while iterations < MOST:
+        off = _distance(landing, place) > CLOSE  # NaN is not far
+        if orientation:
+            off |= _distance(turned, allowed) > CLOSE_TURN
+        far = np.flatnonzero(off)
+        if len(far) == 0:
+            break
+        command[far, :3, 3] += (place - landing)[far]
+        if orientation:
+            command[far, :3, :3] = _rotate(wanted[far, :3, :3], -turned[far])
+            allowed[far] = turned[far]
+        own = None if branch is None else branch[far]
+        q[far] = _nearest(arm, times(command[far], from_tcp[far]), q[far], own)
+        moved = states[far].with_(q=np.array(q[far]))
+        landing[far] = command[far, :3, 3] + model.error(arm, moved)
+        if orientation:
+            turned[far] = turn(model, arm, moved)
+        iterations += 1
+    return Solution(q, command, _distance(landing, place), iterations)
+
+
+def _distance(a: Floats, b: Floats) -> Floats:
+    """Distance between points (n, 3), (n,) [m]."""
+    return lengths(a - b)
+
+
+def _rotate(rotation: Floats, by: Floats) -> Floats:
+    """Turn rotations (n, 3, 3) by rotation vectors (n, 3) [rad] in the base frame."""
+    return np.asarray(rotation_from_vector(by) @ rotation)
+
+
+def _nearest(
+    arm: Arm, flange: Floats, near: Floats, branch: NDArray[np.int64] | None
+) -> Floats:
+    """Solve for the joint angles next to given ones, in closed form or by Newton."""
+    if branch is not None:
+        return arm.nearest(flange, near, branch)
+    q = np.array(near)
+    for _ in range(4):
+        at = arm.flange(q)
+        turned = flange[:, :3, :3] @ np.swapaxes(at[:, :3, :3], 1, 2)
+        gap = np.concatenate(
+            [flange[:, :3, 3] - at[:, :3, 3], rotation_vector(turned)], axis=1
+        )
+        J = arm.jacobian(q, np.zeros(3))
+        q = q + np.linalg.solve(J + 1e-12 * np.eye(6), gap[:, :, None])[:, :, 0]
+    return q
+
+
+# Commands that would land where the program says, visit by visit.
+
+
+@dataclass(frozen=True)
+class Commands:
+    """Corrected commands of n visits, NaN where pose or joint angles are not known.
+
+    Attributes:
+        known: Visits that can be solved, (n,).
+        direction: Arrival direction that they are solved for, (n, 6).
+        q: Joint angles, (n, 6) [rad], NaN where the command cannot be reached.
+        command: TCP poses to command, base frame, (n, 4, 4) [m].
+        turn: Rotation of the commands against the targets, (n, 3) [rad].
+        residual: Predicted landing against the wanted position, (n,) [m].
+        std_error: Standard error of the model there, per axis, (n, 3) [m], as far as
+            that was asked for.
+        outside: Reasons why visits lie outside what was surveyed, (n,) each.
+    """
+
+    known: Bools
+    direction: Floats
+    q: Floats
+    command: Floats
+    turn: Floats
+    residual: Floats
+    std_error: Floats
+    outside: dict[str, Bools]
+
+    @cached_property
+    def turned(self) -> Ints:
+        """Visits whose command is known to turn the tool, ascending."""
+        some = (self.turn < 0.0) | (self.turn > 0.0)
+        return np.unique(np.nonzero(some)[0])
+
+
+def solve_visits(
+    model: Model,
+    cell: Cell,
+    planned: PlannedProgram,
+    states: States,
+    orientation: bool = False,
+) -> Commands:
+    """Solve every visit whose pose and joint angles are known.
+
+    Args:
+        model: The arm's error.
+        cell: The arm.
+        planned: The program's plan.
+        states: Planned states, with the directions to correct for.
+        orientation: Correct the orientation as well as the position.
+
+    Raises:
+        ModelError: The orientation is asked for, and the model does not know it.
+    """
+    if orientation:
+        refuse_unknown_rotations(model)
+    n, plan = len(states), planned.plan
+    known = ~(has_unknown(plan.q) | is_unknown(plan.tcp))
+    empty = Commands(
+        known=known,
+        direction=np.array(states.direction),
+        q=np.full((n, 6), np.nan),
+        command=np.full((n, 4, 4), np.nan),
+        turn=np.full((n, 3), np.nan),
+        residual=np.full(n, np.nan),
+        std_error=np.full((n, 3), np.nan),
+        outside=_outside_survey(model, cell, known, states),
+    )
+    everything = np.ones(n, dtype=bool)
+    return solve_again(empty, everything, model, cell, planned, states, orientation)
+
+
+def solve_again(
+    solved: Commands,
+    rows: Bools,
+    model: Model,
+    cell: Cell,
+    planned: PlannedProgram,
+    states: States,
+    orientation: bool = False,
+) -> Commands:
+    """Solve some visits anew, for the directions of `states`; keep the others.
+
+    Args:
+        solved: What is known.
+        rows: Visits to solve, (n,).
+        model: The arm's error.
+        cell: The arm.
+        planned: The program's plan.
+        states: Planned states, with the directions to correct for.
+        orientation: Correct the orientation as well as the position.
+    """
+    plan, known = planned.plan, np.flatnonzero(rows & solved.known)
+    here, wanted = states[known], planned.reference_poses(known)
+    tool = take_rows(plan.tool, known)
+    part = solve(model, cell.arm, wanted, tool, here, orientation)
+    out = replace(
+        solved,
+        direction=np.where(rows[:, None], states.direction, solved.direction),
+        q=np.array(solved.q),
+        command=np.array(solved.command),
+        turn=np.array(solved.turn),
+        residual=np.array(solved.residual),
+        std_error=np.array(solved.std_error),
+        outside=dict(solved.outside),
+    )
+    out.q[known], out.command[known] = part.q, part.command
+    out.turn[known] = _turns(part.command, plan.tcp[known])
+    out.residual[known] = part.residual
+    near = with_surveyed_load(model, cell, here)
+    std = model.std_on_flanks(cell.arm, near)
+    out.std_error[known] = np.hypot(std, load_error(model, cell, here))
+    _mark(out.outside, UNSURE, known, model.unsure(std), len(rows))
+    if orientation:
+        unsure = is_turn_uncertain(model, cell.arm, here)
+        _mark(out.outside, UNSURE_TURN, known, unsure, len(rows))
+    return out
+
+
+def std_errors(model: Model, cell: Cell, states: States, solved: Commands) -> Floats:
+    """Standard errors of the errors that visits are corrected for, per axis.
+
+    They are many times as costly as the errors: what solving has asked for is kept, the
+    others are wanted of the last round alone.
+
+    Returns:
+        (n, 3) [m], NaN where pose or joint angles are not known.
+    """
+    out = np.array(solved.std_error)
+    rows = np.flatnonzero(solved.known & np.isnan(out[:, 0]))
+    here = states.with_(direction=solved.direction)[rows]
+    near = with_surveyed_load(model, cell, here)
+    added = load_error(model, cell, here)
+    out[rows] = np.hypot(model.std_error(cell.arm, near), added)
+    return out
+
+
+def _turns(new: Floats, old: Floats) -> Floats:
+    """Return the rotation from old poses to new ones (n, 4, 4), (n, 3) [rad]."""
+    new, old, out = new[:, :3, :3], old[:, :3, :3], np.zeros((len(new), 3))
+    rows = np.unique(np.nonzero(new != old)[0])
+    lost = np.isnan(new[rows]).any(axis=(1, 2))
+    out[rows[lost]] = np.nan
+    rows = rows[~lost]
+    out[rows] = rotation_vector(new[rows] @ np.swapaxes(old[rows], 1, 2))
+    return out
+
+
+def _outside_survey(
+    model: Model, cell: Cell, known: Bools, states: States
+) -> dict[str, Bools]:
+    """Say which visits lie outside of what was surveyed, whatever their directions."""
+    rows, found = np.flatnonzero(known), dict[str, Bools]()
+    here, ranges = states[rows], replace(model.ranges, payload=None)
+    reasons = ranges.outside(here, model.needs, model.bent)
+    reasons |= load_reasons(model, cell, here)
+    for text, mask in reasons.items():
+        _mark(found, text, rows, mask, len(known))
+    return found
+
+
+def _mark(
+    outside: dict[str, Bools], text: str, rows: Ints, mask: Bools, n: int
+) -> None:
+    """Say anew of some of n visits whether they lie outside for a reason."""
+    if text in outside or mask.any():
+        marked = np.array(outside.get(text, np.zeros(n, dtype=bool)))
+        marked[rows] = mask
+        outside[text] = marked
+
+
+# Commands in the numbers of the file, and how far those change.
+
+
+def new_numbers(
+    visits: Visits, arm: Arm, plan: Plan, solved: Commands, aside: Floats
+) -> Floats:
+    """Express commands in the numbers of the file, (n, w).
+
+    P = inverse(UFRAME) . BASE . command. A fly point is moved so that the path passes
+    it where it should. An orientation that does not change keeps its written numbers.
+    Flags that small moves decide are those of the numbers as they are rounded.
+    """
+    numbers = np.array(visits.values)
+    joints = visits.target == Meaning.JOINTS
+    numbers[joints, :6] += np.rad2deg(solved.q[joints] - plan.q[joints])
+    poses = np.flatnonzero(visits.target == Meaning.POSE)
+    placed = base_in_uframe(visits, poses)
+    command = np.array(solved.command[:, :, 3])
+    command[:, :3] -= aside
+    arcs, via, end = _end_at_angles(visits, plan, command)
+    command[arcs.via, :3], command[arcs.end, :3] = via, end
+    point = np.einsum("nij,nj->ni", placed, command[poses])
+    numbers[poses, :3] = point[:, :3] / MM
+    rows, dialect = solved.turned, visits.dialect
+    rows = rows[visits.target[rows] == Meaning.POSE]
+    if len(rows):
+        by = rotation_from_vector(turns_in_file(visits, solved)[rows])
+        numbers[rows] = dialect.rotate(numbers[rows], by)
+    if dialect.reflags:
+        q = _solve_written(visits, arm, poses, numbers[poses], solved.q[poses])
+        numbers[poses] = dialect.rewrite_flags(numbers[poses], q, plan.q[poses])
+    return numbers
+
+
+def _end_at_angles(
+    visits: Visits, plan: Plan, command: Floats
+) -> tuple[ArcAngles, Floats, Floats]:
+    """Let arcs that end at an angle end where they should.
+
+    Args:
+        visits: n visits.
+        plan: Their plan.
+        command: Where the TCP should go, (n, 4) [m], base frame.
+
+    Returns:
+        k arcs, and what to write for the points on their ways and for their third
+        points, (k, 3) [m] each, base frame.
+    """
+    arcs = ArcAngles.of(visits)
+    arcs = arcs.among(arcs.start >= 0)
+    if len(arcs) == 0:
+        return arcs, np.empty((0, 3)), np.empty((0, 3))
+    ways = np.stack([arcs.start, arcs.via, arcs.end])
+    before = plan.tcp[ways, :3, 3] - plan.aside[ways]
+    pose = visits.dialect.poses(visits.values[arcs.end])
+    third = (inverse(base_in_uframe(visits, arcs.end)) @ pose)[:, :3, 3]
+    return arcs, *points_to_write(before, command[ways, :3], third)
+
+
+def angles_astray(visits: Visits, plan: Plan, solved: Commands, aside: Floats) -> Bools:
+    """Tell which points on the ways of arcs are missed by more than without us, (n,).
+
+    Start, end and angle tell an arc but for a turn about the line between both: where
+    the corrections there differ much from that of the point between, it is left aside.
+    """
+    out = np.zeros(len(visits), dtype=bool)
+    if not visits.via.any():
+        return out
+    command = np.array(solved.command[:, :, 3])
+    command[:, :3] -= aside
+    arcs, via, _ = _end_at_angles(visits, plan, command)
+    missed = _across(via - command[arcs.via, :3], plan, arcs)
+    size = lengths(solved.command[arcs.via, :3, 3] - plan.tcp[arcs.via, :3, 3])
+    out[arcs.via] = missed > size
+    return out
+
+
+def _across(off: Floats, plan: Plan, arcs: ArcAngles) -> Floats:
+    """Measure across arcs how far places lie from the points on their ways, (k,)."""
+    points = [plan.tcp[rows, :3, 3] for rows in (arcs.start, arcs.via, arcs.end)]
+    centre, normal, _ = circles(*points)
+    along = cross(normal, points[1] - centre)
+    along /= np.maximum(lengths(along), 1e-12)[:, None]
+    return lengths(off - (off * along).sum(1)[:, None] * along)
+
+
+def _solve_written(
+    visits: Visits, arm: Arm, rows: Ints, numbers: Floats, near: Floats
+) -> Floats:
+    """Solve the numbers (k, w) of some poses as they will be rounded, (k, 6) [rad].
+
+    Where they cannot be solved the joints `near` stay.
+    """
+    scale = 10.0 ** np.array(visits.dialect.pose_decimals)
+    pose = visits.dialect.poses(np.rint(numbers * scale) / scale)
+    from_tcp = inverse(few_frames(visits))[visits.tool[rows]]
+    flange = inverse(base_in_uframe(visits, rows)) @ pose @ from_tcp
+    found = np.array(near)
+    known = np.isfinite(near).all(axis=1) & np.isfinite(flange).all(axis=(1, 2))
+    own = arm.branch(near[known])
+    q = _nearest(arm, np.ascontiguousarray(flange[known]), near[known], own)
+    found[known] = np.where(np.isnan(q), near[known], q)
+    return found
+
+
+def base_in_uframe(visits: Visits, rows: Ints) -> Floats:
+    """Return the pose of the arm's base in the user frame, (k, 4, 4) [m]."""
+    if len(rows) == 0:
+        return np.empty((0, 4, 4))
+    frames = few_frames(visits)
+    return products(inverse(frames), frames, visits.uframe[rows], visits.base[rows])
+
+
+def turns_in_file(visits: Visits, solved: Commands) -> Floats:
+    """Give the commands' rotations in the frame of the numbers, (n, 3) [rad]."""
+    out = np.array(solved.turn)
+    poses = solved.turned[visits.target[solved.turned] == Meaning.POSE]
+    axes = base_in_uframe(visits, poses)[:, :3, :3]
+    out[poses] = np.einsum("nij,nj->ni", axes, out[poses])
+    return out
+
+
+def change_mm(visits: Visits, numbers: Floats, correction: Floats) -> Floats:
+    """Give the change that arrivals at one literal must agree on, (n, 3) [mm].
+
+    For a pose it is that of its numbers (the same literal may be reached in two user
+    frames), for joint angles that of the TCP.
+    """
+    poses = (visits.target == Meaning.POSE)[:, None]
+    moved = numbers[:, :3] - visits.values[:, :3]
+    near = np.flatnonzero(visits.target == Meaning.NEAR)
+    axes = base_in_uframe(visits, near)[:, :3, :3]
+    change = np.where(poses, moved, correction / MM)
+    change[near] = np.einsum("nij,nj->ni", axes, correction[near]) / MM
+    return change

@@ -1,0 +1,139 @@
+"""How play is taken up at a stop where a move begins.
+
+The drives of the joints that leave the other way than they came cross their gaps there,
+each by its own, and no link moves: the tool is commanded to turn a little too, as it
+would where the drives alone turned. Without that, a correction of its place alone moves
+all joints, and leaves some of them within their play.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.compensation.options import Job
+from postproc.compensation.paths.path_error import sides_on_move
+from postproc.language.visits import OrientationLaw, Visits
+from postproc.model.backlash_width import half_widths
+from postproc.motion.cycle_time import ProgramCycle
+from postproc.robot.pose import rotation_vector
+
+WHOLE = 0.999  # of half the play: a drive that lies there has crossed
+LEAVING = 5e-3  # [m] behind which a move is under way
+CROSSES = 0.3  # of half the play: a joint that goes so far will rest on that flank
+
+
+@dataclass(frozen=True)
+class BacklashPreload:
+    """What a stop that takes up play is meant to do.
+
+    Attributes:
+        side: Where each joint is to lie in its play behind it, (6,) from -1 to 1.
+        turn: What the tool turns by in its own frame, (3,) [rad].
+        crossing: Joints whose drives cross their gaps there, from 1.
+    """
+
+    side: Floats
+    turn: Floats
+    crossing: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class MeantSides:
+    """From which sides k points on a way are meant to be passed.
+
+    Attributes:
+        side: Where each joint is to lie in its play, (k, 6) from -1 to 1.
+        turn: What the tool turns by in its own frame, (k, 3) [rad].
+        between: Where it is to lie half way between a point and the one before, and
+            behind the last one, (k + 1, 6).
+    """
+
+    side: Floats
+    turn: Floats
+    between: Floats
+
+
+def cross_at_once(side: Floats) -> Floats:
+    """Let drives that cross their gaps on a way do so where they begin to, (k, 6).
+
+    Those too that turn back before they are across, and were under way: a link that is
+    to turn, and turn again, has to be pushed by one flank, and by the other. One that
+    rests on its way across, and goes on, is under way.
+
+    Args:
+        side: Where each joint lies in its play along the way, (k, 6) from -1 to 1.
+    """
+    out = np.array(side)
+    step = np.sign(np.diff(side, axis=0)) * (np.abs(np.diff(side, axis=0)) > 1e-9)
+    for joint in range(side.shape[1]):
+        sense = step[:, joint]
+        for a, b in pairwise(np.flatnonzero(sense).tolist()):
+            if sense[a] == sense[b]:
+                sense[a:b] = sense[a]
+        begins = np.flatnonzero(np.diff(sense, prepend=0.0) != 0)
+        ends = np.append(begins, len(sense))[1:]
+        for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
+            moves = sense[begin]
+            whole = moves * side[end, joint] > WHOLE
+            far = moves * (side[end, joint] - side[begin, joint]) > CROSSES
+            goes_on = end == len(sense) or sense[end] == -moves
+            if moves and (whole or (far and goes_on)):
+                out[begin + 1 : end + 1, joint] = moves
+    return out
+
+
+def take_up(
+    cycle: ProgramCycle, setting: Job, visits: Visits, v: int
+) -> BacklashPreload:
+    """Say how play is taken up where a move begins.
+
+    Args:
+        cycle: The program without such stops, compensated.
+        setting: What it is compensated with.
+        visits: The program.
+        v: The visit at the end of the move.
+    """
+    cell = setting.cell
+    way, sides = sides_on_move(cycle, cell, setting.model, v)
+    at = min(int(np.searchsorted(way, LEAVING)), len(way) - 1)
+    came, leaves = sides[0], cross_at_once(sides)[at]
+    crosses = (np.abs(leaves - came) > CROSSES) & (np.abs(leaves) > WHOLE)
+    crossing = tuple((np.flatnonzero(crosses) + 1).tolist())
+    side = np.where(crosses, np.sign(leaves), came)
+    q = cycle.path.q[int(cycle.ways[1][v])]
+    tool = cycle.targets.tool[v, :3, :3]
+    turn = find_drive_turns(setting, visits, v, tool, q[None], (side - came)[None])
+    return BacklashPreload(side, turn[0], crossing)
+
+
+def find_drive_turns(
+    setting: Job, visits: Visits, v: int, tool: Floats, q: Floats, crossed: Floats
+) -> Floats:
+    """Say what the tool has to turn by so that drives alone move.
+
+    Where a program does not say how the tool turns on the way it must not turn.
+
+    Args:
+        setting: What the program is compensated with.
+        visits: The program.
+        v: The visit at the end of the move.
+        tool: How the tool is mounted, (3, 3).
+        q: Joint angles at k places on its way, (k, 6) [rad].
+        crossed: What each drive has crossed there since the move began, of its play,
+            (k, 6) from -2 to 2.
+
+    Returns:
+        Rotation vectors in the tool's own frame, (k, 3) [rad].
+    """
+    cell, law = setting.cell, visits.orientation_law[v]
+    known = law in (OrientationLaw.UNSET, OrientationLaw.ONE_AXIS)
+    if setting.options.orientation or visits.wrist_joint[v] or not known:
+        return np.zeros((len(q), 3))
+    half = np.where(setting.gap > 0.0, half_widths(setting.model, cell.arm, q), 0.0)
+    behind = q + np.linalg.solve(cell.arm.coupling, (crossed * half).T).T
+    before, after = (cell.arm.flange(a)[:, :3, :3] @ tool for a in (q, behind))
+    return rotation_vector(np.swapaxes(before, 1, 2) @ after)

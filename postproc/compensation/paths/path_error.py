@@ -1,0 +1,478 @@
+"""How far the TCP leaves the programmed path between the targets, as the model says.
+
+On its way to a target every joint goes from the flank on which it arrived at the place
+before to that on which it arrives now: its drive crosses the gap while the joint rests.
+Along dense samples of the planned joint path the play operator tells where each joint
+lies in its play, and the model the error there. What is predicted is the systematic
+part of the path accuracy AT_p of ISO 9283, chapter 8: the largest distance from the
+programmed path, across it; what lags along the path is told apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
+from postproc.compensation.paths.arcs import NO_ARCS, WantedArcs
+from postproc.compensation.paths.path_samples import PathSamples, measure_along, ways_of
+from postproc.compensation.paths.path_states import (
+    CHANGED,
+    AlongWays,
+    ErrorAlong,
+    refine_at_reversals,
+)
+from postproc.model.backlash_width import SHARP, narrowest, on_the_way, widest
+from postproc.model.model import CONFIRMED, Model
+from postproc.motion.cycle_time import ProgramCycle
+from postproc.robot.cell import Cell
+from postproc.robot.pose import lengths
+from postproc.robot.trajectory import Motion
+
+UNSURE = 1e-3  # likewise: a side that is known
+NO_FLANK = 1e-6  # [m] no joint's flank makes so little a difference
+GIVES = 4.0  # gaps over which a flank goes that gives way before it carries
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """How a program leaves m paths (structure of arrays), s samples in all.
+
+    Attributes:
+        off: From the path to the TCP at the samples, (s, 3) [m].
+        across: Distance from the path there, (s,) [m].
+        along: How far the TCP is ahead along it, (s,) [m].
+        unsure: How much farther it may be where a joint's flank is not known, (s,) [m].
+        largest: Sample of the largest distance of each path, (m,).
+        joint: Joint (1 to 6) whose flank makes most of it there, (m,), 0: none.
+    """
+
+    off: Floats
+    across: Floats
+    along: Floats
+    unsure: Floats
+    largest: Ints
+    joint: Ints
+
+    @property
+    def sizes(self) -> Floats:
+        """Return the largest distance from each path, (m,) [m]."""
+        return self.across[self.largest]
+
+
+@dataclass(frozen=True)
+class PathAccuracy:
+    """Predicted path accuracy of m LINEAR and CIRCULAR moves (structure of arrays).
+
+    Attributes:
+        visit: The visit at the end of each, (m,).
+        first: Its samples are first[k] .. first[k + 1] - 1, (m + 1,).
+        way: Path length up to every sample since the move began, (s,) [m].
+        tangent: Directions of the programmed path there, (s, 3).
+        before, after: Deviations of the program as it was written and compensated.
+        unknown: Cartesian moves that nothing is predicted for.
+        crossing: Where joints of the compensated program change their flanks, (s, 6).
+        otherwise: Distance of the compensated program's path if such a joint had stayed
+            on one of its flanks, (s,) [m]; empty where nobody asked.
+        doubtful: The same of those joints alone that no measured path confirms, (s,).
+        giving: Distance of that path if these joints' flanks gave way, (s,) [m]; empty
+            where all are confirmed.
+        q, side: Joint angles [rad] of the program as it was written, and where each
+            joint lies in its play, (s, 6) each.
+    """
+
+    visit: Ints
+    first: Ints
+    way: Floats
+    tangent: Floats
+    before: Deviations
+    after: Deviations
+    unknown: int
+    crossing: Bools
+    otherwise: Floats
+    doubtful: Floats
+    giving: Floats
+    q: Floats
+    side: Floats
+
+    def __len__(self) -> int:
+        """Return the number of paths."""
+        return len(self.visit)
+
+    def samples(self, k: int) -> slice:
+        """Return the samples of a path."""
+        return slice(int(self.first[k]), int(self.first[k + 1]))
+
+    def samples_to(self, visit: int) -> slice:
+        """Return the samples of the path to a visit."""
+        return self.samples(self.row_of(visit))
+
+    def row_of(self, visit: int) -> int:
+        """Return which path leads to a visit."""
+        return int(np.searchsorted(self.visit, visit))
+
+    def join(self, owner: Ints) -> PathAccuracy:
+        """Take the ways to points that were inserted as parts of the source's moves.
+
+        Args:
+            owner: The move of the source that every visit belongs to, (n,).
+        """
+        lead, group = _groups(owner[self.visit])
+        length = self.way[self.first[1:] - 1]
+        begin = np.cumsum(length) - length
+        offset = begin - begin[lead][group]
+
+        def whole(told: Deviations) -> Deviations:
+            part = _largest_in(told.sizes, group, lead)
+            return replace(told, largest=told.largest[part], joint=told.joint[part])
+
+        return replace(
+            self,
+            visit=owner[self.visit][lead],
+            first=np.append(self.first[lead], self.first[-1]),
+            way=self.way + np.repeat(offset, np.diff(self.first)),
+            before=whole(self.before),
+            after=whole(self.after),
+        )
+
+
+def sizes_of(paths: PathAccuracy) -> dict[int, float]:
+    """How far each move of the compensated program leaves its path at the most [m]."""
+    return dict(zip(paths.visit.tolist(), paths.after.sizes.tolist(), strict=True))
+
+
+def predict_paths(
+    before: ProgramCycle,
+    after: ProgramCycle,
+    shift: Floats,
+    cell: Cell,
+    model: Model,
+    temperature: float,
+    owner: Ints | None = None,
+    arcs: WantedArcs = NO_ARCS,
+) -> PathAccuracy:
+    """Predict how far a program leaves its paths, as written and as compensated.
+
+    Args:
+        before: The program as it was written, n visits.
+        after: The same program, compensated.
+        shift: From where the controller takes every target to be to where it is,
+            (n, 3) [m]; see `PlannedProgram`.
+        cell: The arm, its play as wide as its gaps, and its payload.
+        model: The arm's error.
+        temperature: Of the arm [deg C], NaN where not known.
+        owner: The move of the source that every visit belongs to, (n,), where points
+            were inserted on its way; each move is then one path.
+        arcs: The arcs of the source that were cut.
+    """
+    cartesian = (before.targets.move != Motion.JOINT) & ~before.targets.curved
+    known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
+    rows = np.flatnonzero(known)
+    cycles, tools = (before, after), before.targets.tool[rows, :3, 3]
+    pair = _ways(cell, model, cycles, rows, tools)
+    runs = [AlongWays.of(cell, model, c, w) for c, w in zip(cycles, pair, strict=True)]
+    error = ErrorAlong(cell, model, temperature)
+    tools = tools[pair[0].way]
+    wanted, commanded = (cell.arm.tcp(w.q, tools) for w in pair)
+    way, tangent = measure_along(wanted, pair[0])
+    off = _shift(shift, pair[0], way)
+    moved = commanded - wanted - off
+    if owner is not None and len(rows):
+        moved += _off_the_arcs(arcs, owner, before, pair[0], wanted, way)
+    found = PathAccuracy(
+        rows, pair[0].first, way, tangent,
+        _deviations(runs[0], error, -off, tangent, way),
+        _deviations(runs[1], error, moved, tangent, way),
+        int((cartesian & ~known).sum()), runs[1].changes(), np.empty(0),
+        np.empty(0), np.empty(0), pair[0].q, runs[0].side,
+    )  # fmt: skip
+    if owner is None or not len(rows):
+        return found
+    lead, _ = _groups(owner[rows])
+    starts = pair[0].first[lead]
+    return _in_doubt(found, runs[1], error, moved, tangent, starts).join(owner)
+
+
+def _ways(
+    cell: Cell,
+    model: Model,
+    cycles: tuple[ProgramCycle, ...],
+    rows: Ints,
+    tools: Floats,
+) -> list[PathSamples]:
+    """Sample the ways to some visits before and after, at the same places."""
+    pair = [ways_of(cycle, rows) for cycle in cycles]
+    if not len(rows):
+        return pair
+    wanted, commanded = (cell.arm.tcp(w.q, tools[w.way]) for w in pair)
+    pair[1] = pair[1].as_many(pair[0], commanded, wanted)
+    return refine_at_reversals(cell, model, cycles, pair)
+
+
+def _in_doubt(
+    found: PathAccuracy,
+    run: AlongWays,
+    error: ErrorAlong,
+    moved: Floats,
+    tangent: Floats,
+    starts: Ints,
+) -> PathAccuracy:
+    """Add what the path would be if flanks were not as predicted.
+
+    Args:
+        found: What is predicted.
+        run: The compensated program.
+        error: The arm's error.
+        moved: From the wanted to the commanded places, (s, 3) [m].
+        tangent: Directions of the wanted path, (s, 3).
+        starts: The first sample of every move, (g,).
+    """
+    by_joint = _otherwise(run, error, moved, tangent, starts)
+    told = error.model.in_motion
+    open_ = np.array([told.get(str(joint)) != CONFIRMED for joint in range(1, 7)])
+    open_ |= narrowest(error.model) > SHARP
+    giving = found.after.across if open_.any() else np.empty(0)
+    gives = open_ & (widest(error.model) > SHARP)
+    if gives.any():
+        width = np.where(gives, np.minimum(widest(error.model), GIVES), 1.0)
+        soft = AlongWays.of(error.cell, error.model, run.cycle, run.ways, width)
+        lying = on_the_way(soft.side, width)
+        giving, _ = apart(moved + error(soft, slice(None), lying), tangent)
+    far, doubtful = by_joint.max(axis=1), (by_joint * open_).max(axis=1)
+    return replace(found, otherwise=far, doubtful=doubtful, giving=giving)
+
+
+def _off_the_arcs(
+    arcs: WantedArcs,
+    owner: Ints,
+    cycle: ProgramCycle,
+    ways: PathSamples,
+    wanted: Floats,
+    way: Floats,
+) -> Floats:
+    """Return how far pieces of arcs, not corrected, are from the arcs, (s, 3) [m].
+
+    That is what chords cut off, and what points are rounded by.
+
+    Args:
+        arcs: The arcs.
+        owner: As in `predict_paths`.
+        cycle: The program with points, not corrected.
+        ways: Its ways.
+        wanted: Where it leads, (s, 3) [m].
+        way: Path length up to every sample, (s,) [m].
+    """
+    whole = way[ways.first[1:] - 1][ways.way]
+    nearest = np.where(2 * way < whole, ways.source[ways.way], ways.visit[ways.way])
+    on_arc = arcs.pieces(owner, cycle.targets.fly)[nearest]
+    return arcs.off(wanted, owner[ways.visit][ways.way], on_arc)
+
+
+def _groups(owner: Ints) -> tuple[Ints, Ints]:
+    """Find where groups of equal neighbours begin, (g,), and each one's group, (m,)."""
+    begins = np.diff(owner, prepend=-1) != 0
+    return np.flatnonzero(begins), np.cumsum(begins) - 1
+
+
+def _largest_in(sizes: Floats, group: Ints, starts: Ints) -> Ints:
+    """Find the first of the largest values of every group, (g,)."""
+    if not len(starts):
+        return starts
+    top = np.maximum.reduceat(sizes, starts)[group]
+    hit = np.flatnonzero(sizes == top)
+    return np.asarray(hit[np.searchsorted(group[hit], np.arange(len(starts)))])
+
+
+def _otherwise(
+    run: AlongWays, error: ErrorAlong, moved: Floats, tangent: Floats, starts: Ints
+) -> Floats:
+    """Tell how far the path is if a joint that changes its flank did not, (s, 6) [m].
+
+    Whatever moment it changes at, it stands on one of its two flanks before and behind.
+
+    Args:
+        run: The program.
+        error: The arm's error.
+        moved: From the wanted to the commanded places, (s, 3) [m].
+        tangent: Directions of the wanted path, (s, 3).
+        starts: The first sample of every move, (g,).
+    """
+    count = np.diff(np.append(starts, len(moved)))
+    low, high = (
+        np.repeat(f.reduceat(sides, starts, axis=0), count, axis=0)
+        for f, sides in ((np.minimum, run.least), (np.maximum, run.most))
+    )
+    side, out = run.side, np.zeros((len(moved), 6))
+    for joint in range(6):
+        rows = np.flatnonzero(high[:, joint] - low[:, joint] > CHANGED)
+        for flank in (low, high):
+            other = np.array(side[rows])
+            other[:, joint] = flank[rows, joint]
+            far, _ = apart(moved[rows] + error(run, rows, other), tangent[rows])
+            out[rows, joint] = np.maximum(out[rows, joint], far)
+    return out
+
+
+def _shift(shift: Floats, ways: PathSamples, way: Floats) -> Floats:
+    """Interpolate what taught frames are off along ways, (s, 3) [m]."""
+    whole = way[ways.first[1:] - 1][ways.way]
+    u = np.where(whole > 0, way / np.maximum(whole, 1e-12), 1.0)[:, None]
+    begin, end = shift[ways.source][ways.way], shift[ways.visit][ways.way]
+    return np.asarray((1 - u) * begin + u * end)
+
+
+def _deviations(
+    run: AlongWays, error: ErrorAlong, moved: Floats, tangent: Floats, way: Floats
+) -> Deviations:
+    """Tell how far the TCP is from where it should be, as the model says.
+
+    Args:
+        run: The program.
+        error: The arm's error.
+        moved: From the wanted to the commanded places, (s, 3) [m].
+        tangent: Directions of the wanted path, (s, 3).
+        way: Its length up to every sample, (s,) [m].
+    """
+    side = run.side
+    off = moved + error(run, slice(None), side)
+    across, along = apart(off, tangent)
+    unsure, starts = _uncertain_share(run, error), run.ways.first[:-1]
+    if not len(starts):
+        return Deviations(off, across, along, unsure, starts, starts)
+    largest = _largest_in(across, run.ways.way, starts)
+    joints = _joints(run, error, largest, way)
+    return Deviations(off, across, along, unsure, largest, joints)
+
+
+def apart(off: Floats, tangent: Floats) -> tuple[Floats, Floats]:
+    """Tell what is across a path (s,) and along it (s,) [m] of what is off (s, 3)."""
+    along = np.einsum("si,si->s", off, tangent)
+    return lengths(off - along[:, None] * tangent), along
+
+
+def _uncertain_share(run: AlongWays, error: ErrorAlong) -> Floats:
+    """Half of what flanks that are not known make, all joints added up, (s,) [m]."""
+    out = np.zeros(len(run.least))
+    for joint in range(6):
+        open_ = run.most[:, joint] - run.least[:, joint] > UNSURE
+        rows = np.flatnonzero(open_)
+        if not len(rows):
+            continue
+        low, high = np.array([run.side[rows]] * 2)
+        low[:, joint], high[:, joint] = run.least[rows, joint], run.most[rows, joint]
+        out[rows] += lengths(error(run, rows, high) - error(run, rows, low)) / 2
+    return out
+
+
+def _joints(run: AlongWays, error: ErrorAlong, rows: Ints, way: Floats) -> Ints:
+    """Name the joint whose flank makes the most of what stands at samples (m,).
+
+    That is how much the error changes if the joint went from the side on which it
+    arrived at the place before to that on which it arrives evenly, as the corrections
+    of both places do.
+    """
+    ways, side = run.ways, run.side[rows]
+    last = ways.first[1:] - 1
+    u = (way[rows] / np.maximum(way[last], 1e-12))[:, None]
+    even = (1 - u) * run.side[ways.first[:-1]] + u * run.side[last]
+    here, size = error(run, rows, side), np.zeros((len(rows), 6))
+    for joint in range(6):
+        other = np.array(side)
+        other[:, joint] = even[:, joint]
+        size[:, joint] = lengths(here - error(run, rows, other))
+    told = size.argmax(axis=1)
+    return np.where(size.max(axis=1) > NO_FLANK, told + 1, 0)
+
+
+def sides_on_move(
+    cycle: ProgramCycle, cell: Cell, model: Model, v: int
+) -> tuple[Floats, Floats]:
+    """Tell where each joint lies in its play along a move.
+
+    Args:
+        cycle: The program.
+        cell: The arm, its play as wide as its gaps.
+        model: The arm's error.
+        v: The visit at the end of the move.
+
+    Returns:
+        The way up to k samples, (k,) [m], and the sides there, (k, 6).
+    """
+    ways = ways_of(cycle, np.array([v]))
+    run = AlongWays.of(cell, model, cycle, ways)
+    tool = np.broadcast_to(cycle.targets.tool[v, :3, 3], (len(ways.q), 3))
+    way, _ = measure_along(cell.arm.tcp(ways.q, tool), ways)
+    return way, run.side
+
+
+# The ways of a program as the arm should go them: to compare with what was measured.
+
+SPACING = 2e-3  # [m] between places on the way, about
+
+
+@dataclass(frozen=True)
+class PredictedWays:
+    """Where the tool goes on m moves, as the model says, s samples in all.
+
+    Attributes:
+        visit, source: The visits at both ends of each, (m,).
+        first: Its samples are first[k] .. first[k + 1] - 1, (m + 1,).
+        q: Joint angles, (s, 6) [rad].
+        side: Where every joint lies in its play, (s, 6), 0 in the middle.
+        sure: That is known of all joints, (s,).
+        place: TCP in the arm's base frame, (s, 3) [m].
+        flank: What the TCP moves by as each joint goes from its lower flank to its
+            upper one, (s, 6, 3) [m].
+    """
+
+    visit: Ints
+    source: Ints
+    first: Ints
+    q: Floats
+    side: Floats
+    sure: Bools
+    place: Floats
+    flank: Floats
+
+
+def predict_ways(
+    cycle: ProgramCycle, cell: Cell, model: Model, temperature: float
+) -> PredictedWays:
+    """Predict where a program leads the tool on all moves from known places.
+
+    Args:
+        cycle: The program that ran.
+        cell: The arm, its play as wide as its gaps, and its payload.
+        model: The arm's error.
+        temperature: Of the arm [deg C], NaN where not known.
+    """
+    rows = np.flatnonzero(cycle.ways[1] >= 0)
+    ways = _space_samples(cell, cycle, ways_of(cycle, rows))
+    (ways,) = refine_at_reversals(cell, model, (cycle,), [ways])
+    run = AlongWays.of(cell, model, cycle, ways)
+    error = ErrorAlong(cell, model, temperature)
+    tools = cycle.targets.tool[rows, :3, 3][ways.way]
+    place = cell.arm.tcp(ways.q, tools) + error(run, slice(None), run.side)
+    flank = np.empty((len(ways.q), 6, 3))
+    for joint in range(6):
+        ends = np.array([run.side, run.side])
+        ends[0, :, joint], ends[1, :, joint] = -1.0, 1.0
+        flank[:, joint] = error(run, slice(None), ends[1]) - error(
+            run, slice(None), ends[0]
+        )
+    sure = ~any_in_rows(run.most - run.least > UNSURE)
+    return PredictedWays(
+        rows, ways.source, ways.first, ways.q, run.side, sure, place, flank
+    )
+
+
+def _space_samples(cell: Cell, cycle: ProgramCycle, ways: PathSamples) -> PathSamples:
+    """Put samples on ways so that the TCP moves by little between them."""
+    tools = cycle.targets.tool[ways.visit, :3, 3][ways.way]
+    step = lengths(np.diff(cell.arm.tcp(ways.q, tools), axis=0, prepend=0.0))
+    step[ways.first[:-1]] = 0.0
+    parts = np.maximum(np.ceil(step / SPACING).astype(np.int64), 1)[1:]
+    after = np.repeat(np.arange(len(parts)), parts - 1)
+    share = (spans(np.ones_like(parts), parts - 1)) / np.repeat(parts, parts - 1)
+    return ways.refine(after, share)

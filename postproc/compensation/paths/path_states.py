@@ -1,0 +1,140 @@
+"""A program along its ways: where each joint lies in its play, and the error there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints, any_in_rows
+from postproc.compensation.paths.path_samples import PathSamples
+from postproc.model.backlash_width import half_widths
+from postproc.model.model import Model
+from postproc.motion.cycle_time import ProgramCycle
+from postproc.robot.cell import Cell
+from postproc.robot.direction import sides_along
+from postproc.robot.state import make_states
+
+FINE = 8  # parts of an interval in which a joint changes its flank
+CHANGED = 0.02  # of half the play: less between two samples is looked at no closer
+
+
+@dataclass(frozen=True)
+class AlongWays:
+    """A program along its ways.
+
+    Attributes:
+        cycle: The program.
+        ways: Its ways.
+        least, most: Sides of the joints' plays, see `sides_along`, (s, 6) each.
+    """
+
+    cycle: ProgramCycle
+    ways: PathSamples
+    least: Floats
+    most: Floats
+
+    @classmethod
+    def of(
+        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples,
+        width: Floats | float = 1.0,
+    ) -> AlongWays:  # fmt: skip
+        """Follow the joints' plays along the ways, each as wide as its gap there.
+
+        What is known of them where a way begins is what the way before it leaves, where
+        one leads there.
+
+        Args:
+            cell: The arm, its play as wide as its gaps.
+            model: The arm's error.
+            cycle: The program.
+            ways: Its ways.
+            width: Gaps over which each joint goes from flank to flank, (6,).
+        """
+        begins, alone = ways.begins, np.ones(len(ways.visit), dtype=bool)
+        alone[1:] = ways.source[1:] != ways.visit[:-1]
+        begins[ways.first[:-1]] = alone
+        play = cycle.arrived.past.play[ways.source[alone]]
+        half = width * half_widths(model, cell.arm, ways.q)
+        return cls(cycle, ways, *sides_along(cell.arm, ways.q, begins, play, half))
+
+    @property
+    def side(self) -> Floats:
+        """Where each joint lies in its play, the middle of what is known, (s, 6)."""
+        return (self.least + self.most) / 2
+
+    def changes(self) -> Bools:
+        """Tell behind which samples joints change their flanks, (s, 6)."""
+        moved = np.maximum(
+            np.abs(np.diff(self.least, axis=0, append=self.least[-1:])),
+            np.abs(np.diff(self.most, axis=0, append=self.most[-1:])),
+        )
+        return np.asarray(moved > CHANGED)
+
+
+@dataclass(frozen=True)
+class ErrorAlong:
+    """The error of the arm along ways.
+
+    Attributes:
+        cell: The arm and its payload.
+        model: The arm's error.
+        temperature: [deg C], NaN where not known.
+    """
+
+    cell: Cell
+    model: Model
+    temperature: float
+
+    def __call__(self, run: AlongWays, rows: Ints | slice, side: Floats) -> Floats:
+        """Predict it at samples (k,) with joints on some sides (k, 6): (k, 3) [m]."""
+        ways, targets = run.ways, run.cycle.targets
+        visit = ways.visit[ways.way[rows]]
+        states = make_states(
+            ways.q[rows],
+            side,
+            targets.tool[visit, :3, 3],
+            travel=_travel(run)[rows] if "travel" in self.model.needs else np.nan,
+            speed=targets.linear_speed[visit] * targets.override[visit],
+            temperature=self.temperature,
+            payload=self.cell.payload_mass,
+            payload_com=self.cell.payload_com,
+        )
+        return self.model.error(self.cell.arm, states)
+
+
+def _travel(run: AlongWays) -> Floats:
+    """Travel of every joint since its last reversal, along the ways, (s, 6) [rad]."""
+    ways, arrived = run.ways, run.cycle.arrived
+    moved = np.diff(ways.q, axis=0, prepend=ways.q[:1])
+    sense = np.sign(moved)
+    sense[ways.first[:-1]] = arrived.direction[ways.source]
+    rows = np.arange(len(sense))[:, None]
+    begin = ways.first[ways.way][:, None]
+    last = np.maximum.accumulate(np.where(sense != 0, rows, 0), axis=0)
+    sense = np.take_along_axis(sense, np.maximum(last, begin), axis=0)
+    turned = np.zeros(sense.shape, dtype=bool)
+    turned[1:] = sense[1:] != sense[:-1]
+    turned[ways.first[:-1]] = False
+    since = np.maximum.accumulate(np.where(turned, rows - 1, 0), axis=0)
+    here = since >= begin
+    place = np.take_along_axis(ways.q, np.maximum(since, begin), axis=0)
+    known = np.nan_to_num(arrived.travel[ways.source])[ways.way]
+    return np.asarray(np.abs(ways.q - place) + np.where(here, 0.0, known))
+
+
+def refine_at_reversals(
+    cell: Cell,
+    model: Model,
+    cycles: tuple[ProgramCycle, ...],
+    pair: list[PathSamples],
+) -> list[PathSamples]:
+    """Look closer where a joint changes its flank, before or after."""
+    changes = np.zeros(len(pair[0].q), dtype=bool)
+    for cycle, ways in zip(cycles, pair, strict=True):
+        own = any_in_rows(AlongWays.of(cell, model, cycle, ways).changes())
+        changes |= own | np.append(own[1:], False) | np.append(False, own[:-1])
+    changes &= ~np.append(pair[0].begins[1:], True)
+    after = np.repeat(np.flatnonzero(changes), FINE - 1)
+    share = np.tile(np.arange(1, FINE) / FINE, int(changes.sum()))
+    return [ways.refine(after, share) for ways in pair]

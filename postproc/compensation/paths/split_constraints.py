@@ -1,0 +1,138 @@
+"""Which moves may be split: what forbids points on their ways, and how close they lie.
+
+A point may not change what a program does besides where the tool is: nothing that is
+counted, timed or enabled along a move may depend on it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.outcome import Decisions, Status
+from postproc.compensation.paths.arcs import (
+    FLAT,
+    WantedArcs,
+    hindrances_of_arcs,
+    is_arc,
+)
+from postproc.language.language import ArcPiece, Splitter
+from postproc.language.source import CloneError
+from postproc.language.visits import Meaning, OrientationLaw, Visits
+from postproc.motion.cycle_time import ProgramCycle
+from postproc.robot.pose import MM, has_unknown
+from postproc.robot.trajectory import Motion
+
+CLOSEST = 1e-3  # [m] length of the shortest piece, however slow the move is
+CLEAR = 0.02  # [m] from a rounded end: how large its corner is depends on the moves
+LAST_FLATS = 2.0  # of `FLAT`: the sagitta of the last piece of an arc, no chord
+WIDEST = -99999.9  # no number of a point is longer as it is written
+ALIKE = 1e-6  # a tool whose axes turn by less keeps its orientation
+
+
+def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int, str]:
+    """Say why moves of a program must stay in one piece, by their visit."""
+    status, before = decisions.status, np.maximum(v.before, 0)
+    corrected = (status == Status.CORRECTED) | (status == Status.UNCHANGED)
+    ends = (v.literal >= 0) & (v.target == Meaning.POSE) & corrected
+    has = (v.literal >= 0) & (len(v.literals) > 0)
+    taught = np.zeros(len(v), dtype=bool)
+    taught[has] = v.literals.taught[v.literal[has]]
+    frames = [v.tool, v.base, v.uframe, v.config]
+    alike = np.all([column == column[before] for column in frames], axis=0)
+    found: dict[int, str] = {}
+    for rows, why in (
+        (v.motion == Motion.JOINT, "it is no line and no arc"),
+        (v.before < 0, "where it comes from is not one known place"),
+        (_several(v), "it is reached several times"),
+        (
+            taught | taught[before],
+            "an end of it is taught: it contains the arm's error",
+        ),
+        (~(ends & ends[before]), "its ends are not both corrected poses"),
+        (v.shift >= 0, "its end is shifted from a point"),
+        (v.weaves, "it weaves, or may: what is counted along it would begin anew"),
+        (v.load > 0, "the program states what the arm carries on it"),
+        (~alike, "it begins with other frames or configuration flags"),
+        (~np.isnan(v.aux).all(axis=1), "auxiliary axes move along"),
+        (v.tool_remote, "the arm holds the part"),
+        *hindrances_of_arcs(v, alike),
+        (_turns_otherwise(v, before), "how the tool turns on its way is not sure"),
+        (has_unknown(cycle.targets.linear_speed[:, None]), "its speed is not known"),
+        (v.reason > 0, "it is left"),
+    ):
+        for row in np.flatnonzero(rows).tolist():
+            found.setdefault(row, why)
+    for via in np.flatnonzero(v.via).tolist():  # an arc is cut as a whole
+        for one, other in ((via, via + 1), (via + 1, via)):
+            if one in found:
+                found.setdefault(other, found[one])
+    return found
+
+
+def unwritable(splitter: Splitter, visits: Visits, v: int, file: int, line: int) -> str:
+    """Say what in the text of a move hinders points on its way, "" for nothing."""
+    widest = np.full((1, visits.dialect.width), WIDEST)
+    config = visits.configs[visits.config[v]]
+    try:
+        said = splitter.hinders(file, line)
+        if not said and is_arc(visits, v):
+            pieces = [ArcPiece(widest[0], widest[0], last) for last in (True, False)]
+            splitter.arc(file, line, pieces, widest[0], config, False)
+        elif not said:
+            splitter.points(file, line, widest, config, False)
+    except CloneError as problem:
+        return str(problem)
+    return said
+
+
+def _several(visits: Visits) -> Bools:
+    """Tell which moves are reached more than once, (n,)."""
+    rows = np.stack([visits.file, visits.line, visits.via])
+    _, at, count = np.unique(rows, axis=1, return_inverse=True, return_counts=True)
+    return np.asarray(count[at.ravel()] > 1)
+
+
+def _turns_otherwise(visits: Visits, before: Ints) -> Bools:
+    """Tell where the tool may turn otherwise than about one axis, (n,)."""
+    law = visits.orientation_law
+    known = (law == OrientationLaw.UNSET) | (law == OrientationLaw.ONE_AXIS)
+    turn = visits.dialect.poses(visits.values)[:, :3, :3]
+    same = np.abs(turn - turn[before]).max(axis=(1, 2)) < ALIKE
+    return np.asarray((~known | visits.wrist_joint) & ~same)
+
+
+def shortest_pieces(
+    visits: Visits, cycle: ProgramCycle, shortest: float
+) -> list[tuple[float, float, float]]:
+    """Return the shortest piece of every move, and what stays clear at its ends [m].
+
+    Beside a rounded end a piece is longer than the corner, which must stay as it is.
+
+    Args:
+        visits: The program.
+        cycle: .. in time.
+        shortest: What a piece lasts at the programmed speed, at least [s].
+    """
+    speed = np.nan_to_num(cycle.targets.linear_speed)
+    least: Floats = np.maximum(shortest * speed, CLOSEST)
+    size = np.maximum(2 * np.nan_to_num(np.abs(visits.zone_mm) * MM), CLEAR)
+    flown = visits.fly & ~visits.via  # the point on the way of an arc is no corner
+    round_ = np.where(flown, np.maximum(size, least), least)
+    clear = np.where(visits.before >= 0, round_[np.maximum(visits.before, 0)], least)
+    round_ = np.maximum(round_, _last_pieces(visits, cycle))
+    columns = least, np.maximum(clear, least), np.maximum(round_, least)
+    return list(zip(*(column.tolist() for column in columns), strict=True))
+
+
+def _last_pieces(visits: Visits, cycle: ProgramCycle) -> Floats:
+    """Return how long the last piece of an arc has to be to bend enough, (n,) [m].
+
+    No more than `CLEAR`; 0 where a move is no arc.
+    """
+    via, out = np.flatnonzero(visits.via), np.zeros(len(visits))
+    if len(via):
+        radius = WantedArcs.of(cycle, visits.before, via.tolist()).radius[::2]
+        bends = np.sqrt(8.0 * radius * LAST_FLATS * FLAT)
+        out[via + 1] = np.minimum(bends, CLEAR)
+    return out

@@ -1,0 +1,360 @@
+"""Points put on the ways of moves: their numbers, their text, and that no more changed.
+
+They lie on the programmed path; what corrects them is what corrects all targets.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.equivalence import equivalent
+from postproc.compensation.inverse_model import base_in_uframe
+from postproc.compensation.paths.arcs import Chords, CutArc, is_arc
+from postproc.compensation.paths.backlash_preload import BacklashPreload, MeantSides
+from postproc.compensation.paths.insertion_report import Points
+from postproc.compensation.program import ParsedProgram, read_program
+from postproc.compensation.rewrite import VerificationError
+from postproc.compensation.windowing import SHARED
+from postproc.language.language import Splitter
+from postproc.language.languages import language_of
+from postproc.language.source import Edit, Source, apply, compose
+from postproc.language.symbol_column import NameColumn
+from postproc.language.visits import Literals, Visits
+from postproc.robot.cell import Cell
+from postproc.robot.pose import MM, lengths, rotation_from_vector, rotation_vector
+from postproc.robot.trajectory import Motion
+
+ROUNDED = 2e-6  # [m] that a point on a way may move where it is written anew
+TURNED = 2e-3  # [rad] .. and the tool turn: what drives turn it by is a tenth of that
+
+
+def insert(
+    reading: ParsedProgram,
+    points: Points,
+    stops: Mapping[int, BacklashPreload],
+    splitter: Splitter,
+    cell: Cell,
+    chords: Chords = (),
+    approaches: Mapping[int, Floats] = MappingProxyType({}),
+    meant: Mapping[int, MeantSides] = MappingProxyType({}),
+) -> tuple[ParsedProgram, Ints]:
+    """Put points on the ways of a program.
+
+    Args:
+        reading: The program, n visits.
+        points: Where.
+        stops: Moves whose first point is a stop, where play is taken up.
+        splitter: Its files.
+        cell: What holds at program start.
+        chords: Pieces of arcs that are chords.
+        approaches: Stops from which targets are approached anew, by visit, (w,) each.
+        meant: From which sides points of lines are meant to be passed, by visit.
+
+    Returns:
+        The program with points, proven to make the same moves otherwise, and those of
+        its visits that the source makes, (n,).
+
+    Raises:
+        VerificationError: It would make other moves.
+        CloneError: A point cannot be written.
+    """
+    edits = _edits(reading, points, stops, splitter, cell, chords, meant)
+    lines, visits = lines_in_files(reading, cell), reading.visits
+    for visit, numbers in approaches.items():
+        config = visits.configs[visits.config[visit]]
+        file, line = int(visits.file[visit]), int(lines[visit])
+        edits[file].append(splitter.approach(file, line, numbers, config))
+    edits = [sorted(own, key=lambda edit: edit.span) for own in edits]
+    sources = [
+        Source(source.name, apply(source.data, own))
+        for source, own in zip(reading.sources, edits, strict=True)
+    ]
+    again = read_program({s.name: s.data for s in sources}, cell)
+    found = _find_inserted(again.visits, sources, edits)
+    new = points_on_ways(again.visits, sources, found)
+    count = sum(map(len, points.values())) + len(approaches)
+    _prove(reading.visits, again.visits, found, new, count)
+    cloned = tuple(
+        tuple(compose(one, own))
+        for one, own in zip(reading.cloned or [()] * len(edits), edits, strict=True)
+    )
+    given = reading.given or reading.sources
+    with_points = replace(again, cloned=cloned, given=given, missed=reading.missed)
+    own = np.flatnonzero(~new)
+    aims = _aims(visits, again.visits.via, own, points, stops, meant)
+    told = replace(with_points, diagnostics=reading.diagnostics, aims=aims)
+    return told, own
+
+
+def _edits(
+    reading: ParsedProgram,
+    points: Points,
+    stops: Mapping[int, BacklashPreload],
+    splitter: Splitter,
+    cell: Cell,
+    chords: Chords,
+    meant: Mapping[int, MeantSides],
+) -> list[list[Edit]]:
+    """Write the points, file by file."""
+    visits, found = reading.visits, defaultdict[int, list[Edit]](list)
+    lines = lines_in_files(reading, cell)
+    for visit in sorted(points):
+        config = visits.configs[visits.config[visit]]
+        file, line = int(visits.file[visit]), int(lines[visit])
+        if visits.via[visit]:
+            turns = {v: _turns(v, points, stops, meant) for v in (visit, visit + 1)}
+            arc = CutArc.of(visits, points, visit, chords, turns)
+            pieces, via = arc.pieces()
+            found[file] += splitter.arc(file, line, pieces, via, config, visit in stops)
+        elif not is_arc(visits, visit):
+            numbers = between(visits, visit, np.array(points[visit]))
+            numbers = _rotate_tool(visits, numbers, _turns(visit, points, stops, meant))
+            found[file].append(
+                splitter.points(file, line, numbers, config, visit in stops)
+            )
+    return [found[k] for k in range(len(reading.sources))]
+
+
+def _turns(
+    visit: int,
+    points: Points,
+    stops: Mapping[int, BacklashPreload],
+    meant: Mapping[int, MeantSides],
+) -> Floats:
+    """Return what the tool turns by at the points of a move, (k, 3) [rad]."""
+    found = np.zeros((len(points.get(visit, ())), 3))
+    if visit in meant:
+        found[:] = meant[visit].turn
+    if visit in stops:
+        found[0] = stops[visit].turn
+    return found
+
+
+def lines_in_files(reading: ParsedProgram, cell: Cell) -> Ints:
+    """Return the lines of visits in the files as they are, clones included, (n,)."""
+    if not reading.cloned:
+        return reading.visits.line
+    return read_program({s.name: s.data for s in reading.sources}, cell).visits.line
+
+
+def between(visits: Visits, visit: int, share: Floats) -> Floats:
+    """Write points on the line that leads to a visit.
+
+    The tool turns about one axis that stands still.
+
+    Args:
+        visits: The program.
+        visit: Where the line ends.
+        share: Of the way, (k,).
+
+    Returns:
+        Their numbers, (k, w).
+    """
+    ends = visits.values[[visits.before[visit], visit]]
+    turn = visits.dialect.poses(ends)[:, :3, :3]
+    axis = rotation_vector((turn[1] @ turn[0].T)[None])[0]
+    out = np.tile(ends[0], (len(share), 1))
+    out[:, :3] += share[:, None] * (ends[1, :3] - ends[0, :3])
+    return visits.dialect.rotate(out, rotation_from_vector(share[:, None] * axis))
+
+
+def _rotate_tool(visits: Visits, numbers: Floats, turn: Floats) -> Floats:
+    """Turn the tool at places (k, w) by rotation vectors (k, 3) of its own [rad]."""
+    tool = visits.dialect.poses(numbers)[:, :3, :3]
+    axis = np.einsum("kij,kj->ki", tool, turn)
+    return visits.dialect.rotate(numbers, rotation_from_vector(axis))
+
+
+def _aims(
+    visits: Visits,
+    via: Bools,
+    own: Ints,
+    points: Points,
+    stops: Mapping[int, BacklashPreload],
+    meant: Mapping[int, MeantSides],
+) -> Floats:
+    """Tell from which sides m visits are meant to be reached, (m, 6), NaN: any."""
+    out = np.full((len(via), 6), np.nan)
+    for visit, sides in meant.items():
+        rows = np.arange(own[visit - 1] + 1 if visit else 0, own[visit] + 1)
+        ends = rows[~via[rows]][: len(points[visit])]
+        out[ends] = sides.side[: len(ends)]
+        piece = np.cumsum(~via[rows])[via[rows]]
+        out[rows[via[rows]]] = sides.between[piece]
+    for visit, taken in stops.items():
+        arc = bool(visits.via[visit])
+        first = own[visit - 1] + 1 if arc else own[visit] - len(points[visit])
+        out[first] = taken.side
+    return out
+
+
+def numbers_at(visits: Visits, visit: int, pose: Floats) -> Floats:
+    """Write a TCP pose (4, 4) [m] in the arm's base as numbers of a visit, (w,)."""
+    numbers = np.array(visits.values[[visit]])
+    pose = base_in_uframe(visits, np.array([visit]))[0] @ pose
+    turn = pose[:3, :3] @ visits.dialect.poses(numbers)[0, :3, :3].T
+    numbers[0, :3] = pose[:3, 3] / MM
+    return np.asarray(visits.dialect.rotate(numbers, turn[None])[0])
+
+
+# The proof that a program with points makes the same moves otherwise.
+
+
+def _find_inserted(
+    visits: Visits, sources: Sequence[Source], edits: Sequence[Sequence[Edit]]
+) -> Bools:
+    """Tell which visits of a program with points are those points, (m,)."""
+    found = np.zeros(len(visits), dtype=bool)
+    for file, (source, own) in enumerate(zip(sources, edits, strict=True)):
+        size = np.array([len(edit.new) for edit in own], dtype=np.int64)
+        old = np.array([e.span.end - e.span.start for e in own], dtype=np.int64)
+        begin = np.array([e.span.start for e in own], dtype=np.int64)
+        begin += np.cumsum(size - old) - (size - old)
+        lines = source.line_starts[visits.line - 1]
+        at = np.searchsorted(begin, lines, side="right") - 1
+        inside = (at >= 0) & (visits.file == file)
+        if len(own):
+            inside &= lines < (begin + size)[at]
+        found |= inside
+    return found
+
+
+def points_on_ways(visits: Visits, sources: Sequence[Source], inserted: Bools) -> Bools:
+    """Tell which visits the source does not make, (m,).
+
+    Where an arc is cut, the point on its way has become the end of a piece, and what
+    stands in its place in the move is new.
+
+    Args:
+        visits: The program with points.
+        sources: Its files.
+        inserted: Visits on lines that are points, (m,).
+    """
+    new = np.array(inserted)
+    language = language_of(sources[0].name)
+    for row in np.flatnonzero(inserted & ~visits.via).tolist():
+        source = sources[visits.file[row]]
+        text = source.line_text(int(visits.line[row])).encode("latin-1")
+        if language.ends_at_via(text):
+            later = np.flatnonzero(visits.via[row:] & ~inserted[row:])
+            if len(later):
+                new[row], new[row + later[0]] = False, True
+    return new
+
+
+def _prove(
+    before: Visits, after: Visits, inserted: Bools, new: Bools, count: int
+) -> None:
+    """Hold a program with points to be the same but for them.
+
+    Args:
+        before: The program.
+        after: .. with points.
+        inserted: Visits on lines that are points, (m,).
+        new: Visits that the source does not make, (m,).
+        count: How many points were put in.
+
+    Raises:
+        VerificationError: It is not.
+    """
+    found = inserted & ~after.via
+    problem = f"{int(found.sum())} of {count} points are found again"
+    if int(found.sum()) == count and len(after) - int(new.sum()) == len(before):
+        nothing = np.zeros(0, dtype=np.int64)
+        ends = inserted & ~new  # of pieces, which were points on ways
+        motion = np.where(ends, Motion.CIRCULAR, after.motion)
+        old = replace(after, via=after.via | ends, motion=motion)
+        same = renumber_literals(before, without(old, new))
+        cut = np.flatnonzero(ends[~new])  # there the tool may be turned a little
+        if are_near(before, same, cut):
+            values = np.array(same.values)
+            values[cut] = before.values[cut]
+            same = replace(same, values=values)
+        problem = equivalent(before, same, nothing, before.values)
+    if problem:
+        raise VerificationError(
+            f"{before.files[0]}: points on the ways would change what the program "
+            f"does ({problem}); nothing is written"
+        )
+
+
+def are_near(before: Visits, after: Visits, rows: Ints) -> bool:
+    """Tell whether some visits are the same but for how the tool is turned there."""
+    poses = [v.dialect.poses(v.values[rows])[:, :3] for v in (before, after)]
+    off = np.swapaxes(poses[0][:, :, :3], 1, 2) @ poses[1][:, :, :3]
+    far = lengths(poses[1][:, :, 3] - poses[0][:, :, 3])
+    turned = lengths(rotation_vector(off))
+    return bool((far < ROUNDED).all() and (turned < TURNED).all())
+
+
+def without(visits: Visits, rows: Bools) -> Visits:
+    """Leave out visits that are reached from one place each, and their numbers.
+
+    Args:
+        visits: A program, m visits.
+        rows: Which of them, (m,).
+    """
+    own, number = np.flatnonzero(~rows), np.cumsum(~rows) - 1
+    values: dict[str, Any] = {
+        f.name: _some(getattr(visits, f.name), own)
+        for f in fields(Visits)
+        if f.name not in SHARED
+    }
+    count = np.diff(visits.pred_start)
+    pred = visits.pred[np.repeat(~rows, count)]
+    while len(at := np.flatnonzero((pred >= 0) & rows[pred])):
+        pred[at] = visits.pred[visits.pred_start[pred[at]]]
+    gone = np.zeros(len(visits.literals) + 1, dtype=bool)
+    gone[visits.literal[rows]] = True
+    gone[-1] = False  # that is no literal
+    for name in ("literal", "follows"):
+        values[name] -= np.cumsum(gone)[values[name]] * (values[name] >= 0)
+    return replace(
+        visits,
+        **values,
+        pred_start=np.append(0, np.cumsum(count[own])),
+        pred=np.where(pred >= 0, number[pred], pred),
+        literals=_take_literals(visits.literals, np.flatnonzero(~gone[:-1])),
+    )
+
+
+def renumber_literals(before: Visits, after: Visits) -> Visits:
+    """Number the literals of a program as those of another one, where that is possible.
+
+    They are numbered as they stand in the files, and the point on the way of an arc
+    that is cut stands in front of the arc's end, not behind it.
+    """
+    has = (before.literal >= 0) & (after.literal >= 0)
+    number = np.arange(len(after.literals))
+    number[after.literal[has]] = before.literal[has]
+    if not np.array_equal(np.sort(number), np.arange(len(number))):
+        return after
+    number = np.append(number, -1)  # that is no literal
+    return replace(
+        after,
+        literal=number[after.literal],
+        follows=number[after.follows],
+        literals=_take_literals(after.literals, np.argsort(number[:-1])),
+    )
+
+
+def _take_literals(literals: Literals, rows: Ints) -> Literals:
+    """Take some literals."""
+    own = {f.name: _some(getattr(literals, f.name), rows) for f in fields(Literals)}
+    return Literals(**own)
+
+
+def _some(column: Any, rows: Ints) -> Any:
+    """Take some rows of a column, which is an array, or a sequence of names."""
+    if isinstance(column, NameColumn):
+        return column.take(rows)
+    if isinstance(column, Sequence):
+        return tuple(column[k] for k in rows.tolist())
+    return column[rows]

@@ -1,0 +1,277 @@
+"""A program as it was written and as it is compensated, run in time and compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.approach_advice import advise
+from postproc.compensation.options import Job
+from postproc.compensation.paths.arcs import NO_ARCS, WantedArcs
+from postproc.compensation.paths.corner_error import RoundOff, predict_corners
+from postproc.compensation.paths.insertion_report import Insertions
+from postproc.compensation.paths.path_error import PathAccuracy, predict_paths
+from postproc.compensation.program import ParsedProgram
+from postproc.compensation.targets import targets_from_visits
+from postproc.diagnostics import Code
+from postproc.language.visits import Diagnostic, Visits
+from postproc.motion.cycle_time import ProgramCycle, run
+from postproc.motion.directions_from_trajectory import disagreements
+from postproc.motion.targets import CODE, LIMITS, PATH_LIMITS
+from postproc.robot.arm import Arm
+from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
+
+MOST_SLOWER = 0.03  # of the cycle time
+FEW = 5  # lines that a finding names
+_LIMITS = [CODE[one] for one in (*LIMITS, *PATH_LIMITS)]
+
+
+@dataclass(frozen=True)
+class InTime:
+    """n visits, run once.
+
+    Attributes:
+        before, after: The program as it was written, and as it is compensated.
+        paths: How far it leaves its paths, as the model says.
+        guessed: Which limits of the joints the arm file guesses.
+        other_side: Where a joint arrives otherwise in time than along the path, (n, 6).
+        arm: The arm.
+        inserted: The points that were put on its ways; None where nobody asked.
+        in_motion: What a measured path says of the joints, see `Model.in_motion`.
+    """
+
+    before: ProgramCycle
+    after: ProgramCycle
+    paths: PathAccuracy
+    guessed: tuple[str, ...]
+    other_side: Bools
+    arm: Arm
+    inserted: Insertions | None = None
+    in_motion: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def own(self) -> Ints:
+        """The visits of the compensated program that the source makes, (n,)."""
+        told = self.inserted
+        return np.arange(len(self.before)) if told is None else told.own
+
+    def source(self, rows: Ints) -> Ints:
+        """Return the visits of the source that those of the compensated one lead to."""
+        return np.where(rows < 0, rows, np.searchsorted(self.own, rows))
+
+    def corners(self, visits: Visits) -> RoundOff:
+        """Predict how far rounded corners of the program are passed."""
+        return predict_corners(visits, self.before, self.paths)
+
+    def summary(self, visits: Visits) -> str:
+        """Say in one line how long it takes, and how well it keeps to its paths."""
+        if not self.before.seconds:
+            return "no move leads from one known place to another: no time to tell"
+        said = f"cycle {self.before.seconds:.1f} -> {self.after.seconds:.1f} s"
+        if self.guessed:
+            said += f" (from guessed limits: {', '.join(self.guessed)})"
+        if not len(self.paths):
+            return said
+        before, after = self.paths.before.sizes / MM, self.paths.after.sizes / MM
+        return (
+            f"{said}; predicted path accuracy AT_p (systematic part) mean "
+            f"{before.mean():.3f} -> {after.mean():.3f} mm, max {before.max():.3f} -> "
+            f"{after.max():.3f} mm over {len(before)} moves"
+            + _round_off(self.corners(visits))
+        )
+
+    @property
+    def falls_short(self) -> bool:
+        """Tell whether it does not run as it did, or keeps not to its paths as asked.
+
+        It is slower than it was, leaves a limit that it kept, or leaves a path farther
+        than was asked for.
+        """
+        return self._is_slower or len(self._beyond) > 0 or len(self._too_far) > 0
+
+    @property
+    def _too_far(self) -> Ints:
+        """The paths that are left farther than was asked for, the worst first."""
+        if self.inserted is None:
+            return np.empty(0, dtype=np.int64)
+        sizes = self.paths.after.sizes
+        order = np.argsort(-sizes, kind="stable")
+        return np.asarray(order[sizes[order] > self.inserted.tolerance])
+
+    @property
+    def _is_slower(self) -> bool:
+        return self.after.seconds > (1 + MOST_SLOWER) * self.before.seconds
+
+    @property
+    def _beyond(self) -> Ints:
+        """Visits at which a joint comes beyond a limit that it kept before."""
+        before, after = (
+            np.isin(c.path.reason, _LIMITS) for c in (self.before, self.after)
+        )
+        return self.source(np.flatnonzero(after & ~before[self.source(_all(after))]))
+
+    def advice(self, rows: Ints) -> dict[int, str]:
+        """Say how to approach some visits so that the sides of all joints are known."""
+        found = advise(self.arm, self.after, self.own[rows])
+        return {int(self.source(np.array([v]))[0]): text for v, text in found.items()}
+
+    def findings(self, visits: Visits) -> Iterator[Diagnostic]:
+        """Say where the program does not run as it did, and where it cannot."""
+        if self._is_slower:
+            text = (
+                f"the compensated program takes {self.after.seconds:.1f} s instead of "
+                f"{self.before.seconds:.1f} s"
+            )
+            yield Diagnostic(visits.files[0], 1, Code.CYCLE_TIME_INCREASED, text)
+        for v in self._beyond.tolist():
+            text = "a joint comes beyond its limit, which the original program keeps"
+            file = visits.files[visits.file[v]]
+            yield Diagnostic(file, int(visits.line[v]), Code.JOINT_LIMIT_EXCEEDED, text)
+        yield from self._report_slowed(visits)
+        if self.inserted is not None:
+            yield from self._points(visits, self.inserted)
+        yield from self._other_sides(visits)
+
+    def _points(self, visits: Visits, told: Insertions) -> Iterator[Diagnostic]:
+        """Say what was put on the ways, and which moves still leave their paths."""
+        said = (
+            (Code.PATH_POINTS, told.points, f"{told.count} points are put on the ways "
+             f"of {len(told.points)} moves; {describe_verification(self.in_motion)}"),
+            (Code.BACKLASH_PRELOAD_SKIPPED, told.unconfirmed,
+             "play is not taken up before "
+             f"{len(told.unconfirmed)} moves: neither reversals (survey --reversals) "
+             "nor a measured path (diagnose --path) confirm how joints change their "
+             "flanks there"),
+            (Code.REAPPROACH_INSERTED, told.approaches,
+             f"{len(told.approaches)} targets "
+             "are approached anew, from a stop on the way already travelled"),
+        )  # fmt: skip
+        for code, moves, text in said:
+            if moves:
+                first = min(moves)
+                place = visits.files[visits.file[first]], int(visits.line[first])
+                yield Diagnostic(*place, code, text)
+        for k in self._too_far.tolist():
+            v = int(self.paths.visit[k])
+            far = self.paths.after.sizes[k] / MM
+            why = told.left.get(v, "more points on its way do not help")
+            text = f"the move is predicted to leave its path by {far:.3f} mm: {why}"
+            place = visits.files[visits.file[v]], int(visits.line[v])
+            yield Diagnostic(*place, Code.PATH_TOLERANCE_EXCEEDED, text)
+
+    def _other_sides(self, visits: Visits) -> Iterator[Diagnostic]:
+        """Say where joints arrive otherwise in time than along the path."""
+        for v in np.flatnonzero(self.other_side.any(axis=1)).tolist():
+            joints = (np.flatnonzero(self.other_side[v]) + 1).tolist()
+            text = (
+                f"joint {' and '.join(map(str, joints))} arrives from the other side "
+                "in the trajectory in time than along the path; the correction is "
+                "that of the path"
+            )
+            file = visits.files[visits.file[v]]
+            yield Diagnostic(file, int(visits.line[v]), Code.DIRECTION_DISAGREES, text)
+
+    def _report_slowed(self, visits: Visits) -> Iterator[Diagnostic]:
+        """Say where the joints cannot follow the programmed speed."""
+        slowed = self.after.slow_moves
+        if not len(slowed):
+            return
+        rows = self.source(slowed)
+        lines = dict.fromkeys(visits.line[rows].tolist())
+        more = f" and {len(lines) - FEW} more" if len(lines) > FEW else ""
+        worst = slowed[self.after.clock.allowed[slowed].argmin()]
+        least = 100 * self.after.clock.allowed[worst]
+        joint = int(self.after.clock.velocity[worst].argmax()) + 1
+        text = (
+            f"the joints reach {least:.0f} % of the programmed speed at the least, "
+            f"axis {joint} turning the fastest for its limits: the "
+            "controller slows down or stops there, near a singularity as a rule "
+            f"(lines {', '.join(map(str, [*lines][:FEW]))}{more})"
+        )
+        place = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
+        yield Diagnostic(*place, Code.SPEED_NOT_REACHED, text)
+
+
+def _round_off(corners: RoundOff) -> str:
+    """Say how far rounded corners are passed, "" where there are none."""
+    if not len(corners):
+        return ""
+    before, after = corners.before.max() / MM, corners.after.max() / MM
+    return (
+        f"; cornering round-off CR (systematic part) max {before:.3f} -> "
+        f"{after:.3f} mm at {len(corners)} corners"
+    )
+
+
+def _all(column: Bools) -> Ints:
+    return np.arange(len(column))
+
+
+def run_in_time(
+    reading: ParsedProgram,
+    again: ParsedProgram,
+    position: Floats,
+    setting: Job,
+    owner: Ints | None = None,
+    arcs: WantedArcs = NO_ARCS,
+) -> InTime:
+    """Run a program in time, as it was written and as it is compensated.
+
+    Args:
+        reading: The program.
+        again: The output, parsed again.
+        position: Where the program wants the TCP, (n, 3) [m]; see `WindowResult`.
+        setting: What it was compensated with.
+        owner: The move of the source that every visit belongs to, (n,), where points
+            were put on ways.
+        arcs: The arcs of the source that were cut.
+    """
+    cell = setting.cell
+    before, after = (_run(part.visits, cell) for part in (reading, again))
+    passed = cell.arm.tcp(before.path.q, before.targets.tool[:, :3, 3])
+    shift = np.nan_to_num(position + before.path.aside - passed)
+    paths = predict_paths(
+        before, after, shift, cell, setting.model, setting.temperature, owner, arcs
+    )
+    guessed, other = list_guessed_limits(cell.arm), disagreements(cell.arm, after)
+    told = setting.model.in_motion
+    return InTime(before, after, paths, guessed, other, cell.arm, in_motion=told)
+
+
+def describe_verification(in_motion: Mapping[str, str]) -> str:
+    """Say whether a measured path has shown what the model says of joints in motion.
+
+    >>> verified({"1": "confirmed", "2": "refuted"})
+    'a measured path confirms the flanks of joint 1, not those of 2'
+    """
+    if not in_motion:
+        return (
+            "a model that was fitted at stops is unverified in motion until a "
+            "measured path confirms it (diagnose --path)"
+        )
+    joints = {word: [j for j, said in in_motion.items() if said == word]
+              for word in set(in_motion.values())}  # fmt: skip
+    good = ", ".join(joints.pop("confirmed", [])) or "none"
+    rest = ", ".join(sorted(j for some in joints.values() for j in some))
+    said = f"a measured path confirms the flanks of joint {good}"
+    return f"{said}, not those of {rest}" if rest else said
+
+
+def _run(visits: Visits, cell: Cell) -> ProgramCycle:
+    targets, _ = targets_from_visits(visits, cell)
+    return run(cell.arm, targets)
+
+
+def list_guessed_limits(arm: Arm) -> tuple[str, ...]:
+    """Name the limits of the joints that the arm file guesses, or does not tell."""
+    told = arm.file.joints
+    absent = {
+        "acceleration": told.acceleration_deg_s2 is None,
+        "jerk": told.jerk_deg_s3 is None,
+    }
+    more = (name for name in absent if absent[name] and name not in told.guessed)
+    return (*told.guessed, *more)

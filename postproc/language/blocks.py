@@ -1,0 +1,156 @@
+"""Blocks of a text: every head has its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from postproc.diagnostics import Code
+from postproc.exceptions import ProgramError
+from postproc.language.control_flow import HeadedRows
+from postproc.language.ir import SourceStatement
+from postproc.language.source import Source
+from postproc.language.statement_table import StatementText
+from postproc.language.visits import Diagnostic
+
+
+@dataclass(frozen=True)
+class BlockWords:
+    """The words that blocks of a language end with.
+
+    Attributes:
+        ends: From a word to the kind of block that it ends.
+        within: From a word to the kind of block that it divides.
+        scopes: Kinds of modules, routines and records.
+        outer: Those of them that hold others.
+    """
+
+    ends: Mapping[str, str]
+    within: Mapping[str, str]
+    scopes: Collection[str]
+    outer: Collection[str]
+
+
+@dataclass
+class Outline:
+    """Modules, routines, records and blocks of a file, as they are met.
+
+    Attributes:
+        text: Its statements.
+        words: The words of the language.
+        scopes: Modules, routines and records by kind, as they end.
+        diagnostics: Blocks that do not close.
+    """
+
+    text: StatementText[Any]
+    words: BlockWords
+    scopes: dict[str, list[HeadedRows]] = field(default_factory=dict)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    _open: list[tuple[str, int, SourceStatement]] = field(default_factory=list)
+
+    def of(self, *kinds: str) -> list[HeadedRows]:
+        """Return the scopes of some kinds, in the order of their ends."""
+        found = [scope for kind in kinds for scope in self.scopes.get(kind, [])]
+        return sorted(found, key=lambda scope: scope.last)
+
+    def name(self, *kinds: str) -> str:
+        """Return the name of the innermost open scope of some kinds."""
+        heads = (said for kind, _, said in reversed(self._open) if kind in kinds)
+        return getattr(next(heads, None), "name", "")
+
+    def begin(self, kind: str, row: int, said: SourceStatement) -> None:
+        """Open a scope: routines and records stand in outer ones only."""
+        kinds = [kind for kind, _, _ in self._open]
+        if kind in self.words.outer:
+            self._close_until(0, row - 1)
+        elif any(one not in self.words.outer for one in kinds):
+            around = sum(one in self.words.outer for one in kinds)
+            self._close_until(around, row - 1)
+        self.open(kind, row, said)
+
+    def open(self, kind: str, row: int, said: SourceStatement) -> None:
+        """Open a block."""
+        self._open.append((kind, row, said))
+
+    def word(self, word: str, row: int) -> None:
+        """Divide or end a block."""
+        kinds = [kind for kind, _, _ in self._open]
+        if word in self.words.within:
+            if kinds[-1:] != [self.words.within[word]]:
+                self._complain(row, f"stands in no {self.words.within[word].upper()}")
+        elif word in self.words.ends:
+            self._end(word, row, kinds)
+
+    def close(self) -> None:
+        """Close what the file leaves open."""
+        self._close_until(0, len(self.text) - 1)
+
+    def _end(self, word: str, row: int, kinds: Sequence[str]) -> None:
+        kind, scopes = self.words.ends[word], self.words.scopes
+        inner = kinds if kind in scopes else kinds[self._last_scope(kinds) :]
+        if kind not in inner:
+            self._complain(row, f"ends no {kind.upper()}")
+            return
+        at = len(kinds) - 1 - list(reversed(kinds)).index(kind)
+        self._close_until(at + 1, row - 1)
+        self._close(self._open.pop(), row)
+
+    def _last_scope(self, kinds: Sequence[str]) -> int:
+        """Return the place behind the innermost module, routine or record."""
+        scopes = self.words.scopes
+        return max((k + 1 for k, kind in enumerate(kinds) if kind in scopes), default=0)
+
+    def _close_until(self, depth: int, row: int) -> None:
+        """Close what stands open deeper than a depth, with a message."""
+        words = {kind: word for word, kind in self.words.ends.items()}
+        while len(self._open) > depth:
+            kind, begun, said = self._open.pop()
+            self._complain(begun, f"has no {words[kind].upper()}")
+            self._close((kind, begun, said), row, ended=False)
+
+    def _close(
+        self, block: tuple[str, int, SourceStatement], row: int, ended: bool = True
+    ) -> None:
+        kind, begun, said = block
+        if kind in self.words.scopes:
+            scope = HeadedRows(said, begun, row, ended)
+            self.scopes.setdefault(kind, []).append(scope)
+
+    def _complain(self, row: int, what: str) -> None:
+        message = f"{self.text.quote(row)} {what}"
+        self.diagnostics.append(self.text.diagnostic(row, Code.OPEN_BLOCK, message))
+
+
+class StatementFile(Protocol):
+    """A file that was read: its statements, and what is not understood."""
+
+    @property
+    def text(self) -> StatementText[Any]:
+        """Its statements."""
+
+    @property
+    def diagnostics(self) -> Sequence[Diagnostic]:
+        """What is not understood."""
+
+
+File = TypeVar("File", bound=StatementFile)
+
+
+def read_once(
+    source: Source, known: Sequence[File], read: Callable[[Source], File]
+) -> File:
+    """Read a file, unless it was read before.
+
+    Raises:
+        ProgramError: Its blocks do not close: what runs when is not known.
+    """
+    for file in known:
+        if file.text.source == source:
+            return file
+    file = read(source)
+    for found in file.diagnostics:
+        if found.code == Code.OPEN_BLOCK:
+            cure = "Close it: what runs when is not known without"
+            raise ProgramError(source.name, found.message, cure, line=found.line)
+    return file

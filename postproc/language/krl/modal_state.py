@@ -1,0 +1,621 @@
+"""What moves are carried out with: frames, speeds, blending, orientation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from typing import Any
+
+from postproc.diagnostics import Code, Reason
+from postproc.language.interpreter import Scope
+from postproc.language.krl import syntax as said
+from postproc.language.krl.abstract_state import (
+    CORRECTION_FRAMES,
+    NOTHING_SET,
+    PERHAPS,
+    SWITCHES,
+    TABLES,
+    KrlStore,
+    entry_name,
+)
+from postproc.language.krl.frames import NUMBERS, ZERO, FrameReader, KrlFrame, no_frame
+from postproc.language.krl.program import whole
+from postproc.language.krl.symbols import (
+    KrlRecord,
+    KrlTask,
+    KrlValue,
+    is_word,
+    parts_of,
+)
+from postproc.language.visits import OrientationLaw
+from postproc.robot.pose import MM
+
+UNKNOWN = -1.0  # a number that is not known
+CELL_LOAD: tuple[float, ...] = ()
+LOST_LOAD: tuple[float, ...] = (-1.0,)
+LOST_FRAME = no_frame(
+    "which $TOOL and $BASE hold here is not known: set them anew behind what is not "
+    "followed, or on every way here",
+)
+
+
+@dataclass(frozen=True)
+class KrlModes:
+    """What holds until another statement changes it.
+
+    Attributes:
+        tool, base: ``$TOOL`` and ``$BASE``.
+        interpolation: ``$IPO_MODE``: #base, #tcp or "" where not known.
+        speed: ``$VEL.CP`` [m/s].
+        share: Of the speed of joints, by ``$VEL_AXIS``.
+        distance: ``$APO.CDIS`` [mm].
+        overlap: ``$APO.CPTP`` [%].
+        orientation: ``$ORI_TYPE``: #var, #constant, #joint or "" where not known.
+        through: Arcs of the spline planner take the tool through the orientation of
+            their points (``$CIRC_MODE``).
+        ahead: ``$ADVANCE`` is not 0; None where that is not known.
+        fdat, pdat, ldat: ``FDAT_ACT``, ``PDAT_ACT`` and ``LDAT_ACT``.
+        halted: The arm has stopped since the last move; None where that is not known.
+        goes_on: ``CONTINUE`` stands before.
+        load: What the arm carries, as the program states it: mass [kg], and its centre
+            in the flange frame [m] where that is known; `CELL_LOAD` where it states
+            nothing, `LOST_LOAD` where what it states is not known.
+        store: What the program has set of tables, corrections and switches.
+        perhaps: The next statement is skipped where an error comes up in it.
+        declared: Interrupts that may move the arm or end its moves, by number, and why
+            targets are left while one of them is on.
+        active: Those of them that may be on.
+        blocked: Why no target can be compensated; more than one reason.
+    """
+
+    tool: KrlFrame
+    base: KrlFrame
+    interpolation: str = "#base"
+    speed: float = UNKNOWN
+    share: float = UNKNOWN
+    distance: float = UNKNOWN
+    overlap: float = UNKNOWN
+    orientation: str = "#var"
+    through: bool = False
+    ahead: bool | None = True
+    fdat: KrlValue | None = None
+    pdat: KrlValue | None = None
+    ldat: KrlValue | None = None
+    halted: bool | None = False
+    goes_on: bool = False
+    load: tuple[float, ...] = CELL_LOAD
+    store: KrlStore = NOTHING_SET
+    perhaps: bool = False
+    declared: frozenset[tuple[int, Reason]] = frozenset()
+    active: frozenset[tuple[int, Reason]] = frozenset()
+    blocked: frozenset[Reason] = frozenset()
+
+    def join(self, other: KrlModes) -> KrlModes:
+        """Keep what is the same on another way here."""
+        differing = {
+            f.name: getattr(LOST, f.name)
+            for f in fields(self)
+            if getattr(self, f.name) != getattr(other, f.name)
+        }
+        differing["store"] = self.store.join(other.store)
+        for name in ("declared", "active", "blocked"):
+            differing[name] = getattr(self, name) | getattr(other, name)
+        return replace(self, **differing)
+
+    def forget(self) -> KrlModes:
+        """Forget all but why targets cannot be compensated."""
+        return replace(
+            LOST, declared=self.declared, active=self.active, blocked=self.blocked
+        )
+
+    def with_(self, **changed: Any) -> KrlModes:
+        """Return it with other values."""
+        return replace(self, **changed)
+
+    def beside(self, task: KrlTask) -> KrlModes:
+        """Return it where submit programs may change what they set at any time."""
+        changed, why = _find_unsettled(task.beside, task.called_beside)
+        if not (changed or why):
+            return self
+        return replace(self, **changed, blocked=self.blocked | why)
+
+    @property
+    def law(self) -> OrientationLaw:
+        """Return how the tool turns on lines."""
+        return _LAWS.get(self.orientation, OrientationLaw.UNKNOWN)
+
+
+LOST = KrlModes(
+    tool=LOST_FRAME,
+    base=LOST_FRAME,
+    interpolation="",
+    orientation="",
+    ahead=None,
+    halted=None,
+    load=LOST_LOAD,
+)
+_LAWS = {
+    "#var": OrientationLaw.ONE_AXIS,
+    "#constant": OrientationLaw.ONE_AXIS,  # the end is not what is written: see collect
+    "#joint": OrientationLaw.WRIST_JOINTS,
+}
+_BOOLS = ("true", "false")
+_SWITCHED_OFF: Sequence[tuple[str, object]] = (
+    *((name, False) for name in sorted(SWITCHES)),
+    *((name, ZERO) for name in sorted(CORRECTION_FRAMES)),
+)
+_KEPT_ON = "tool_corr_on"  # old controllers take the frame back, but not the switch
+BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
+"""Commands of BAS that change neither frames nor blending nor speed."""
+NO_LOAD = Reason(
+    Code.LOAD_UNKNOWN,
+    "which $LOAD holds here is not known: set it again on every way here",
+)
+SOFT = Reason(Code.SOFT_AXIS, "an axis is soft ($SOFT_PLCL)")
+GENERATOR = Reason(
+    Code.SETTING_UNTRACKED, "a function generator ($TECH) moves the tool off its path"
+)
+AXIS_LOAD = Reason(
+    Code.SETTING_UNTRACKED, "the program sets a load on an axis ($LOAD_A1 to $LOAD_A3)"
+)
+IGNORED = Reason(
+    Code.EXTERNAL_AXES, "the track need not go where targets say ($EX_AX_IGNORE)"
+)
+MOVED_BASE = Reason(Code.SETTING_UNTRACKED, "$ROBROOT or $WORLD is set by the program")
+# System variables that change nothing of where targets are and from which side they are
+# reached; those in the first list do not stop what is planned ahead either.
+PLANNED = frozenset(
+    """
+    $vel $vel_axis $vel_extax $acc $acc_axis $acc_extax $jerk $apo $ori_type $circ_type
+    $circ_mode $ipo_mode $tool $base $load $advance $bwdstart $gear_jerk $act_tool
+    $act_base $act_tool_c $act_base_c $collmon_tol_pro $act_ex_ax $h_pos $ov_pro
+    $ov_app $torqmon $torqmon_def $torqmon_com $torqmon_com_def $tech $red_vel $spl_tech
+    $load_a1 $load_a2 $load_a3 $cp_vel_type $cp_statmon $nullframe $world $ex_ax_ignore
+    $spl_ori_joint_auto $eko_mode $gear_jerk_def $abs_accur $abs_convert
+    $deactivate_abs_accur $suppress_abs_accur
+    """.split()
+)
+_SETTING = frozenset(
+    """
+    $load $ipo_mode $ori_type $circ_mode $tech $tech_c $load_a1 $load_a2 $load_a3 $world
+    $nullframe
+    """.split()
+)  # of those that are planned, what targets are left for where its value is not known
+HALTING = frozenset("$out $anout $in $anin $pos_act $axis_act $axis_act_meas".split())
+HARMLESS = frozenset(
+    """
+    $timer $timer_stop $timer_flag $flag $cycflag $loop_msg $loop_cont $msg_t $data_ok
+    $err $stopmess $mode_op $pro_state $pro_mode $pro_ip $pal_mode $notaus $user_saf
+    $alarm_stop $interpreter $date $rob_timer $techpar $techval $cmd $home_pos
+    $in_home $axis_home $pos_ret $axis_ret $pos_int $axis_int $pos_for $axis_for
+    $pos_back $axis_back $pos_act_mes $dist_next $motion $tsys $distance $vel_act
+    $torque_axis_act $curr_act $serv_off $move_enable $accu_state $outc
+    """.split()
+)
+
+
+SUBMIT = "a submit program may set {} at any time"
+_TRACK_BESIDE = Reason(Code.BESIDE_PROGRAM, "a submit program may move external axes")
+_SENSOR_BESIDE = Reason(
+    Code.BESIDE_PROGRAM, "a submit program may switch on a sensor that moves the arm"
+)
+OF_TRACK = frozenset([IGNORED, _TRACK_BESIDE])
+"""Reasons that count where the cell has a track."""
+_ASYNCHRONOUS = frozenset("asyptp asycont asycancel asystop".split())
+_BAS_SETS = frozenset(["$tool", "$base"])  # without them nothing else counts
+_FIELDS: Mapping[str, Mapping[str, Any]] = {
+    "$tool": {"tool": no_frame(SUBMIT.format("$TOOL"), Code.BESIDE_PROGRAM)},
+    "$base": {"base": no_frame(SUBMIT.format("$BASE"), Code.BESIDE_PROGRAM)},
+    "$vel": {"speed": UNKNOWN},
+    "$vel_axis": {"share": UNKNOWN},
+    "$apo": {"distance": UNKNOWN, "overlap": UNKNOWN},
+    "$advance": {"ahead": None},
+}
+"""What is not known of modes where something beside the program sets a variable."""
+
+
+@cache
+def _find_unsettled(
+    written: frozenset[str], called: frozenset[str]
+) -> tuple[Mapping[str, Any], frozenset[Reason]]:
+    """Return the modes that submit programs unsettle, and why targets are left.
+
+    Args:
+        written: Names of data that they may change.
+        called: Names that they call.
+    """
+    if "bas" in called:
+        written |= _BAS_SETS
+    changed, why = dict[str, Any](), set[Reason]()
+    for name in sorted(n for n in written if n.startswith("$")):
+        if name in _FIELDS:
+            changed |= _FIELDS[name]
+        elif name == "$ex_ax_ignore":
+            why.add(IGNORED)
+        elif name in _SETTING or name not in PLANNED | HALTING | HARMLESS:
+            text = SUBMIT.format(name.upper())
+            why.add(Reason(Code.BESIDE_PROGRAM, text))
+    why |= {_TRACK_BESIDE} if called & _ASYNCHRONOUS else set()
+    senses = any(n.startswith("rsi_") or n == "touchsense" for n in called)
+    return changed, frozenset(why | ({_SENSOR_BESIDE} if senses else set()))
+
+
+@dataclass(frozen=True)
+class ModeReader:
+    """Carries out what changes how the moves after it are made.
+
+    Attributes:
+        task: The files of the job.
+        row, here: Where the statement stands.
+    """
+
+    task: KrlTask
+    row: int
+    here: Scope
+
+    def assign(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
+        """Carry out ``$name = value``, None where nobody knows what that does."""
+        found = self._assign(modes, one)
+        return None if found is None else found.beside(self.task)
+
+    def _assign(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
+        """Carry an assignment out where nothing runs beside the program."""
+        own = self._own_function(one.value)
+        if own:
+            one = replace(one, value=said.FunctionCall(f"{own} of the files", ()))
+        name, value = one.target.name, one.value
+        match name:
+            case "$tool" | "$base":
+                return self._frame(modes, one)
+            case "$ipo_mode":
+                return replace(modes, interpolation=self._word(value, "ipo_frame"))
+            case "$ori_type":
+                return replace(modes, orientation=self._word(value, "ori_typ"))
+            case "$circ_mode":
+                return replace(modes, through=self._goes_through(one))
+            case "$vel" | "$vel_axis" | "$apo":
+                return self._speed(modes, one)
+            case "$advance":
+                number = self._number(value)
+                ahead = None if math.isnan(number) else number > 0
+                return replace(modes, ahead=ahead)
+            case "$load":
+                return self._load(modes, one)
+            case "$soft_plcl" | "$softn":
+                return replace(modes, blocked=modes.blocked | {SOFT})
+            case "$tech" | "$tech_c":
+                return replace(modes, blocked=modes.blocked | {GENERATOR})
+            case "$load_a1" | "$load_a2" | "$load_a3":
+                return replace(modes, blocked=modes.blocked | {AXIS_LOAD})
+            case "$ex_ax_ignore":
+                off = self._number(value) == 0.0
+                rest = modes.blocked - {IGNORED}
+                return replace(modes, blocked=rest if off else rest | {IGNORED})
+            case "$robroot" | "$world":
+                return replace(modes, blocked=modes.blocked | {MOVED_BASE})
+            case "fdat_act" | "pdat_act" | "ldat_act":
+                return self._hold_component(modes, one)
+            case _ if name in TABLES:
+                return replace(modes, store=self._entry(modes, one))
+            case _ if name in CORRECTION_FRAMES | SWITCHES:
+                return replace(modes, store=self._correction(modes, one))
+        known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
+        return modes if known else None
+
+    def _own_function(self, operand: said.Operand) -> str:
+        """Name a function of the files that gives a value; it is not followed."""
+        parts = parts_of([operand])
+        called = (one.name for one in parts if isinstance(one, said.FunctionCall))
+        return next((name for name in called if name in self.task.routines), "")
+
+    def _frame(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+        """``$TOOL = ..``, ``$BASE = ..``; of a component: nobody knows all of it."""
+        which = one.target.name[1:]
+        if one.target.steps:
+            why = f"a component of {one.target.name.upper()} is set by the program"
+            return modes.with_(**{which: no_frame(why)})
+        found = self.frames(modes).frame(one.value)
+        return modes.with_(**{which: found})
+
+    def frames(self, modes: KrlModes) -> FrameReader:
+        """Return what reads frames here."""
+        return FrameReader(
+            self.task, self.row, self.here, modes.tool, modes.base, modes.store
+        )
+
+    def _entry(self, modes: KrlModes, one: said.Assignment) -> KrlStore:
+        """``BASE_DATA[20] = {..}``: known where the entry and all of it are known."""
+        table, store = one.target.name, modes.store
+        index = None
+        if one.target.steps:
+            index = self.task.index(one.target.steps[0], self.row, self.here)
+        if index is None or len(index) != 1:
+            return store.without(table)
+        whole_of_it = len(one.target.steps) == 1
+        known = whole_of_it and self.task.is_global(table, self.here)
+        value = self._entry_value(modes, one) if known else None
+        return store.with_(entry_name(table, index[0]), value)
+
+    def _entry_value(self, modes: KrlModes, one: said.Assignment) -> object | None:
+        """Read the frame that an entry gets, or the mass of a load."""
+        if one.target.name == "load_data":
+            load = load_of(self._record(one.value))
+            return None if load == LOST_LOAD else load
+        found = self.frames(modes).frame(one.value)
+        taught = found.taught or one.target.name in self.task.taught
+        return None if found.why or not found.pose else replace(found, taught=taught)
+
+    def _correction(self, modes: KrlModes, one: said.Assignment) -> KrlStore:
+        """``M_BASE_CORR = {..}``, ``M_BAS_COR_ON = TRUE``."""
+        name, value = one.target.name, None
+        if one.target.steps or not self.task.is_global(name, self.here):
+            return modes.store.with_(name, None)
+        if name in SWITCHES:
+            value = next((w == "true" for w in _BOOLS if is_word(one.value, w)), None)
+            return modes.store.with_(name, value)
+        found = self.frames(modes).frame(one.value)
+        return modes.store.with_(name, None if found.why else found)
+
+    def _hold_component(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+        """``FDAT_ACT = FP1``; of a component: the others stay what they were."""
+        name = one.target.name.removesuffix("_act")
+        own = not self.task.is_global(one.target.name, self.here)
+        if one.target.steps or own or one.target.name in self.task.beside:
+            return modes.with_(**{name: None})
+        found = self.task.value(one.value, self.row, self.here)
+        return modes.with_(**{name: found})
+
+    def _number(self, operand: said.Operand | None) -> float:
+        return self.task.number(operand, self.row, self.here)
+
+    def _argument(self, operand: said.Operand, at: int = 0) -> said.Operand | None:
+        """Return an argument of a function, None where it is not there."""
+        if not isinstance(operand, said.FunctionCall):
+            return None
+        given = operand.arguments
+        return given[at].value if at < len(given) else None
+
+    def _record(self, operand: said.Operand | None) -> KrlRecord:
+        found = self.task.value(operand, self.row, self.here)
+        return found if isinstance(found, KrlRecord) else KrlRecord((), whole=False)
+
+    def _word(self, operand: said.Operand, field: str) -> str:
+        """Read ``#BASE``, or what ``SIPO_MODE(FP1.IPO_FRAME)`` gives, "" if unknown."""
+        found = self.task.value(operand, self.row, self.here)
+        if isinstance(operand, said.FunctionCall):
+            inside = self._argument(operand)
+            found = self.task.value(inside, self.row, self.here)
+            if isinstance(found, KrlRecord):
+                found = found.get(field)
+        return found.lower() if isinstance(found, str) else ""
+
+    def _goes_through(self, one: said.Assignment) -> bool:
+        """Tell whether both points of an arc have the orientation that they say."""
+        found = self._record(one.value)
+        if one.target.steps:
+            return False
+        ways = [found.get(name) for name in ("aux_pt", "target_pt")]
+        return all(
+            isinstance(way, KrlRecord) and way.get("ori") == "#interpolate"
+            for way in ways
+        )
+
+    def _speed(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+        """``$VEL.CP``, ``$VEL_AXIS[i]``, ``$APO.CDIS``, all of ``$VEL`` or ``$APO``."""
+        name, step = one.target.name, (*one.target.steps, "")[0]
+        number = number_or_unknown(self._number(one.value))
+        match name, step:
+            case "$vel", "cp":
+                return replace(modes, speed=number)
+            case "$vel", "":
+                return replace(modes, speed=self._path_speed(one.value))
+            case "$vel_axis", said.ElementStep():
+                inside = self._argument(one.value)
+                percent = (
+                    number
+                    if inside is None
+                    else number_or_unknown(self._number(inside))
+                )
+                return replace(modes, share=percent / 100.0 if percent > 0 else UNKNOWN)
+            case "$apo", "cdis":
+                return replace(modes, distance=number)
+            case "$apo", "cptp":
+                return replace(modes, overlap=number)
+            case "$apo", "":
+                return self._blending(modes, one.value)
+        return modes
+
+    def _path_speed(self, operand: said.Operand) -> float:
+        """Read ``SVEL_CP(2, , LCPDAT1)`` or ``{CP 2.0, ..}`` [m/s]."""
+        if isinstance(operand, said.FunctionCall):
+            return number_or_unknown(self._number(self._argument(operand)))
+        return number_or_unknown(self._record(operand).number("cp"))
+
+    def _blending(self, modes: KrlModes, operand: said.Operand) -> KrlModes:
+        """Read ``SAPO(LCPDAT1)``, ``SAPO_PTP(PPDAT1)`` or ``{CDIS 5.0, ..}``."""
+        if isinstance(operand, said.FunctionCall):
+            held = self._record(self._argument(operand))
+            return replace(modes, distance=number_or_unknown(held.number("apo_dist")))
+        found = self._record(operand)
+        return replace(
+            modes,
+            distance=number_or_unknown(found.number("cdis")),
+            overlap=number_or_unknown(found.number("cptp")),
+        )
+
+    def _load(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+        """``$LOAD = LOAD_DATA[n]``, ``$LOAD = SLOAD(n)``, ``$LOAD.M = 50``."""
+        operand: said.Operand | None = one.value
+        match one.target.steps, operand:
+            case ("m",), _:
+                mass, centre = self._number(operand), modes.load[1:]
+                return replace(modes, load=_load_of(mass, centre))
+            case ("cm",), _:
+                centre = _centre_of(self._record(operand))
+                known = centre and modes.load and modes.load != LOST_LOAD
+                load = (modes.load[0], *centre) if known else LOST_LOAD
+                return replace(modes, load=load)
+            case ("cm", *_), _:
+                return replace(modes, load=LOST_LOAD)
+            case (), said.FunctionCall(name="sload"):
+                return self.take_load(modes, self._number(self._argument(operand)))
+            case (), said.DataObject(
+                name="load_data", steps=(said.ElementStep() as step,)
+            ):
+                index = self.task.index(step, self.row, self.here) or (math.nan,)
+                return self.take_load(modes, index[0])
+            case (), _:
+                return replace(modes, load=load_of(self._record(operand)))
+        return modes
+
+    def take_load(self, modes: KrlModes, number: float) -> KrlModes:
+        """Take the load of a tool's number, as BAS and SLOAD do."""
+        entry = whole(number)
+        if entry is None:
+            return replace(modes, load=LOST_LOAD)
+        held = modes.store.get(entry_name("load_data", entry))
+        if isinstance(held, tuple) and "load_data" not in self.task.beside:
+            return replace(modes, load=held)
+        if not self.task.is_steady("load_data", entry):
+            return replace(modes, load=LOST_LOAD)
+        found = self.task.datum("load_data", self.here, (entry,))
+        if entry <= 0 or found is None:
+            return replace(modes, load=CELL_LOAD)
+        file, datum = found
+        there = Scope(file, self.task.files[file].name, "")
+        value = self.task.value(datum.value, datum.row, there)
+        load = load_of(value) if isinstance(value, KrlRecord) else LOST_LOAD
+        return replace(modes, load=load)
+
+    # BAS(#command, value), as the controller's bas.src carries it out.
+
+    def bas(self, modes: KrlModes, arguments: Sequence[said.Argument]) -> KrlModes:
+        """Carry out ``BAS(#command, value)``."""
+        return self._bas(modes, arguments).beside(self.task)
+
+    def _bas(self, modes: KrlModes, arguments: Sequence[said.Argument]) -> KrlModes:
+        """Carry a command out where nothing runs beside the program."""
+        command = arguments[0].value if arguments else None
+        word = command.name if isinstance(command, said.EnumValue) else ""
+        value = self._number(arguments[1].value) if len(arguments) > 1 else math.nan
+        match word:
+            case "#initmov":
+                return self._initial(modes)
+            case "#frames":
+                return self._frames(modes)
+            case "#tool" | "#base":
+                name = f"${word[1:]}"
+                found = self.frames(modes).read_numbered(name, value)
+                modes = self.take_load(modes, value) if word == "#tool" else modes
+                return modes.with_(**{word[1:]: found})
+            case "#vel_ptp":
+                return replace(modes, share=_share(value))
+            case "#vel_cp":
+                return replace(modes, speed=number_or_unknown(value))
+            case "#ptp_dat":
+                return self._joint_data(modes)
+            case "#cp_dat":
+                return self._path_data(modes)
+            case "#ptp_params":
+                changed = self._frames(self._joint_data(modes))
+                return replace(changed, share=_share(value))
+            case "#cp_params":
+                changed = self._frames(self._path_data(modes))
+                return replace(changed, speed=number_or_unknown(value))
+        return modes if word in BAS_HARMLESS else modes.forget()
+
+    def _initial(self, modes: KrlModes) -> KrlModes:
+        """Set what ``INITMOV`` of ``bas.src`` sets: no base, the first tool, no links.
+
+        Speeds and distances are those of ``$config.dat``. The load stays what it is.
+        """
+        store = modes.store
+        linked = store.get(_KEPT_ON) in (True, PERHAPS)
+        for name, value in _SWITCHED_OFF:
+            store = store.with_(name, value)
+        if linked:
+            store = store.with_(_KEPT_ON, PERHAPS)
+        modes = replace(modes, store=store)
+        reader, given = self.frames(modes), self._default
+        advance = given("def_advance")
+        return replace(
+            modes,
+            tool=reader.entry("tool_data", 1),
+            base=reader.read_numbered("$base", 0),
+            interpolation="#base",
+            speed=UNKNOWN,
+            share=_share(given("def_vel_ptp")),
+            distance=number_or_unknown(given("def_apo_cdis")),
+            overlap=number_or_unknown(given("def_apo_cptp")),
+            orientation="#var",
+            through=False,
+            ahead=math.isnan(advance) or advance > 0,
+        )
+
+    def _default(self, name: str) -> float:
+        """Return a number of ``$config.dat``, NaN where it is not known."""
+        return self._number(said.DataObject(name))
+
+    def _frames(self, modes: KrlModes) -> KrlModes:
+        """Take the frames of FDAT_ACT, and the load of its tool."""
+        held = modes.fdat if isinstance(modes.fdat, KrlRecord) else KrlRecord(())
+        reader = self.frames(modes)
+        found = {
+            name[1:]: reader.read_numbered(name, held.number(field))
+            for name, field in NUMBERS.items()
+        }
+        word = held.get("ipo_frame")
+        modes = self.take_load(modes, held.number("tool_no"))
+        frame = word if isinstance(word, str) else ""
+        if frame != "#base":
+            found = {name: replace(one, remote=True) for name, one in found.items()}
+        return modes.with_(interpolation=frame, **found)
+
+    def _joint_data(self, modes: KrlModes) -> KrlModes:
+        """Take the blending of PDAT_ACT."""
+        held = modes.pdat if isinstance(modes.pdat, KrlRecord) else KrlRecord(())
+        size = number_or_unknown(held.number("apo_dist"))
+        if held.get("apo_mode") == "#cdis":
+            return replace(modes, distance=size, overlap=UNKNOWN)
+        return replace(modes, overlap=size)
+
+    def _path_data(self, modes: KrlModes) -> KrlModes:
+        """Take blending and orientation of LDAT_ACT."""
+        held = modes.ldat if isinstance(modes.ldat, KrlRecord) else KrlRecord(())
+        word = held.get("ori_typ")
+        return replace(
+            modes,
+            distance=number_or_unknown(held.number("apo_dist")),
+            orientation=word if isinstance(word, str) else "",
+        )
+
+
+def load_of(record: KrlRecord) -> tuple[float, ...]:
+    """Return the load that a record states, see `KrlModes.load`."""
+    centre = record.get("cm")
+    known = _centre_of(centre) if isinstance(centre, KrlRecord) else ()
+    return _load_of(record.number("m"), known)
+
+
+def _load_of(mass: float, centre: tuple[float, ...]) -> tuple[float, ...]:
+    """Return a load; a negative mass states none, and stands for the arm's default."""
+    if math.isnan(mass):
+        return LOST_LOAD
+    return (mass, *centre) if mass >= 0 else CELL_LOAD
+
+
+def _centre_of(record: KrlRecord) -> tuple[float, ...]:
+    """Return a centre of mass [m], () where it is not known."""
+    found = tuple(record.number(name) * MM for name in ("x", "y", "z"))
+    return () if any(map(math.isnan, found)) else found
+
+
+def number_or_unknown(value: float) -> float:
+    """Return a number from 0 on, -1 for what is not known."""
+    return value if value >= 0 else UNKNOWN
+
+
+def _share(percent: float) -> float:
+    return percent / 100.0 if percent > 0 else UNKNOWN

@@ -1,0 +1,201 @@
+"""What the numbers of a position mean: X, Y, Z, A, B, C, and the bits of S and T."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.language.comment_directives import Comments
+from postproc.language.pose_encoding import Dialect, Terms
+from postproc.robot.pose import MM
+
+MM_DECIMALS, ANGLE_DECIMALS, JOINT_DECIMALS = 3, 4, 5
+COMMENTS = Comments(";", '"')
+HEADS = tuple("XYZABCST")
+COMPONENTS = tuple(name.lower() for name in HEADS)
+WIDTH = len(HEADS)
+ANGLES, STATUS, TURN = slice(3, 6), 6, 7
+AXES = np.arange(6)
+NOT_WRITTEN = -1.0  # value of S or T where the position has none
+MEASURED, UNKNOWN_STATUS = 16, 32  # bit 4 of S, and the first value that is none
+# [rad] around 0 where the bit of an axis may be either: axes at 0 are common, and a
+# wrong bit turns an axis by 360 deg.
+BORDER = np.deg2rad(0.02)
+SURE = np.deg2rad(0.0005)  # [rad] more than the last digits of a target move an axis by
+
+_FLAGS_SAY = "S or T say another configuration, or other turns, than the move ends with"
+TERMS = Terms(
+    tool="$TOOL",
+    base="$ROBROOT",
+    uframe="$BASE",
+    tool_remote="$IPO_MODE = #TCP: the tool stands still, the arm holds the part",
+    blend=(
+        "C_DIS",
+        "moves overlapping by {:g} % ($APO.CPTP)",
+        "distances of {:g} mm ($APO.CDIS)",
+        "blending that begins at its distance",
+    ),
+    corner="as $APO says: it is corrected for where the path passes; to hit it, leave "
+    "C_DIS out",
+    branch_stops=_FLAGS_SAY,
+    branch_may_stop=_FLAGS_SAY,
+    turn_stops=_FLAGS_SAY,
+    turn_may_stop=_FLAGS_SAY,
+    branch="S says another configuration than the arm is in ({})",
+    nearest="T says another turn than the nearest ({}, {})",
+    wrist="on a line with $ORI_TYPE = #JOINT the wrist may end otherwise",
+    overruled="the path arrives in another configuration than S and T say",
+    law_unknown="how the tool turns on the way is not known here ($ORI_TYPE, "
+    "$CIRC_TYPE)",
+    angles="how the tool turns on the way is not sure: {}",
+    arc="how the tool turns on this arc is not sure ({}): turn it in smaller steps",
+    laws=("", "#VAR", "$CIRC_TYPE, $CIRC_MODE", "", "", "$ORI_TYPE = #JOINT"),
+    border="axis {} ends within 0.02 deg of 0, where T is not sure: a wrong one turns "
+    "it by 360 deg",
+)
+
+
+@dataclass(frozen=True)
+class KrlNumbers(Dialect):
+    """Position [mm], angles [deg], S and T of a position, or six joint angles."""
+
+    terms: Terms = TERMS
+    heads: tuple[str, ...] = HEADS
+    reflags: bool = True
+    flag_columns: tuple[int, ...] = (STATUS, TURN)
+    pose_decimals: tuple[int, ...] = (
+        *(MM_DECIMALS,) * 3,
+        *(ANGLE_DECIMALS,) * 3,
+        *(0,) * 2,
+    )
+    joint_decimals: tuple[int, ...] = (JOINT_DECIMALS,) * WIDTH
+
+    def poses(self, values: Floats) -> Floats:
+        """Return the poses (k, 4, 4) [m] that numbers (k, 8) say."""
+        values = np.asarray(values, dtype=float)
+        T = np.zeros((*values.shape[:-1], 4, 4))
+        T[..., :3, :3] = rotation_from_abc(np.deg2rad(values[..., ANGLES]))
+        T[..., :3, 3] = values[..., :3] * MM
+        T[..., 3, 3] = 1.0
+        return T
+
+    def rotate(self, values: Floats, by: Floats) -> Floats:
+        """Turn targets (k, 8) by rotations; angles stay next to what is written."""
+        out, written = np.array(values), np.deg2rad(values[:, ANGLES])
+        new = abc_from_rotation(by @ rotation_from_abc(written), written)
+        out[:, ANGLES] = np.rad2deg(new)
+        return out
+
+    def shift_rotations(self, angles: Floats) -> Floats:
+        """Return the rotations of A, B, C (k, 3) [deg], see `Dialect`."""
+        return rotation_from_abc(np.deg2rad(angles))
+
+    def shift_angles(self, rotations: Floats, near: Floats) -> Floats:
+        """Return A, B, C of rotations, see `Dialect`."""
+        return np.rad2deg(abc_from_rotation(rotations, np.deg2rad(near)))
+
+    def flags(
+        self, config: Ints, configs: tuple[str, ...], values: Floats
+    ) -> tuple[Ints, Floats]:
+        """Read S and T, see `Dialect.flags`.
+
+        Bit 0 of S: the wrist centre is behind axis 1; bit 1: the elbow. On which side
+        axis 5 is, bit 4 of T says: sources disagree on bit 2 of S. A sign is half a
+        turn: the axis lies around 180 or -180 deg, 0.02 deg beyond 0 at the most.
+        """
+        s, bits = _whole(values[:, STATUS]), turn_bits(values[:, TURN])
+        slot = (bits[:, 4] << 2) | ((s & 1) << 1) | (1 - ((s >> 1) & 1))
+        half = 0.5 - BORDER / (2 * np.pi)
+        turns = np.full((len(values), 3), np.nan)
+        for column, axis in enumerate((3, 5)):
+            turns[:, column] = np.where(bits[:, axis] > 0, -half, half)
+        return slot, turns
+
+    def flag_words(self, config: str, values: Floats) -> str:
+        """Spell S and T as flags, see `Dialect.flag_words`."""
+        slot, turns = self.flags(np.zeros(1, dtype=np.int64), (config,), values[None])
+        words = [w for w, bit in (("S", 2), ("E", 1), ("W", 4)) if slot[0] & bit]
+        signs = ["<" if turn < 0 else ">" for turn in turns[0, :2].tolist()]
+        said = [f"T{k}:{sign}0" for k, sign in enumerate(signs, start=1)]
+        return " ".join([*words, *said])
+
+    def rewrite_flags(self, values: Floats, q: Floats, before: Floats) -> Floats:
+        """Write T anew for axes that have passed 0, see `Dialect`.
+
+        S says the branch, which no correction leaves. A bit that was not that of its
+        axis before is kept where it is not clearly wrong because of the correction.
+        """
+        out = np.array(values)
+        bits = turn_bits(values[:, TURN])
+        off = _beyond(bits, q, SURE)
+        off &= ~_beyond(bits, before, SURE) | (
+            _beyond(bits, q) & ~_beyond(bits, before)
+        )
+        new = np.where(off, 1 - bits, bits)
+        changed = off.any(axis=1) & (values[:, TURN] >= 0)
+        high = values[:, TURN] - (bits << AXES).sum(axis=1)
+        out[changed, TURN] = ((new << AXES).sum(axis=1) + high)[changed]
+        return out
+
+    def misses(self, values: Floats, q: Floats) -> Bools:
+        """Tell where signs of T are not those of joints (k, 6) [rad], (k,)."""
+        return np.asarray(_beyond(turn_bits(values[:, TURN]), q).any(axis=1))
+
+    def near_border(self, q: Floats) -> Bools:
+        """Tell which joints (k, 6) [rad] are so near 0 that T may be wrong, (k, 6)."""
+        return np.asarray(np.abs(q) <= BORDER)
+
+
+KRL_DIALECT = KrlNumbers()
+
+
+def _whole(values: Floats) -> Ints:
+    """Return whole numbers from 0 on, 0 for what is none, (k,)."""
+    known = (values >= 0) & (values < 2**31) & (values == np.round(values))
+    return np.where(known, values, 0).astype(np.int64)
+
+
+def turn_bits(values: Floats) -> Ints:
+    """Return the six bits of T, (k, 6): axis i + 1 is negative."""
+    return np.asarray((_whole(values)[:, None] >> AXES) & 1)
+
+
+def _beyond(bits: Ints, q: Floats, by: float = BORDER) -> Bools:
+    """Tell which joints (k, 6) [rad] are on the other side of 0 than bits say."""
+    return np.asarray(np.where(bits > 0, q > by, q < -by))
+
+
+def rotation_from_abc(angles: Floats) -> Floats:
+    """Convert A, B, C (.., 3) [rad] to rotations Rz(A) Ry(B) Rx(C), (.., 3, 3)."""
+    a, b, c = np.moveaxis(np.asarray(angles, dtype=float), -1, 0)
+    ca, sa, cb, sb, cc, sc = (f(x) for x in (a, b, c) for f in (np.cos, np.sin))
+    R = np.empty((*a.shape, 3, 3))
+    R[..., 0, 0], R[..., 1, 0], R[..., 2, 0] = ca * cb, sa * cb, -sb
+    R[..., 0, 1], R[..., 0, 2] = ca * sb * sc - sa * cc, ca * sb * cc + sa * sc
+    R[..., 1, 1], R[..., 1, 2] = sa * sb * sc + ca * cc, sa * sb * cc - ca * sc
+    R[..., 2, 1], R[..., 2, 2] = cb * sc, cb * cc
+    return R
+
+
+def abc_from_rotation(R: Floats, near: Floats) -> Floats:
+    """Convert rotations (k, 3, 3) to the A, B, C next to others, (k, 3) [rad].
+
+    Where B is 90 deg only a difference of A and C is told: A stays.
+    """
+    cosine = np.hypot(R[:, 0, 0], R[:, 1, 0])
+    b = np.arctan2(-R[:, 2, 0], cosine)
+    a = np.arctan2(R[:, 1, 0], R[:, 0, 0])
+    a = np.where(cosine < 1e-9, near[:, 0], a)
+    # With A known the rest is a turn about x.
+    x = np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=1)
+    c = np.arctan2(
+        -np.einsum("ki,ki->k", x, R[:, :, 2]), np.einsum("ki,ki->k", x, R[:, :, 1])
+    )
+    one = np.stack([a, b, c], axis=1)
+    other = np.stack([a + np.pi, np.pi - b, c + np.pi], axis=1)
+    both = np.stack([one, other])
+    both -= 2 * np.pi * np.round((both - near) / (2 * np.pi))
+    gap = np.abs(both - near).max(axis=2)
+    return np.asarray(np.where((gap[0] <= gap[1])[:, None], both[0], both[1]))

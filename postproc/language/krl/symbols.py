@@ -1,0 +1,674 @@
+"""All files of a KRL job: what its names mean, and which data never change."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from postproc.diagnostics import Code
+from postproc.language.control_flow import HeadedRows
+from postproc.language.interpreter import Scope
+from postproc.language.krl import syntax as said
+from postproc.language.krl.abstract_state import TABLES
+from postproc.language.krl.external_routines import package_routines
+from postproc.language.krl.pose_encoding import COMMENTS
+from postproc.language.krl.program import KrlDatum, KrlFile, whole
+
+CONFIG = "$config"
+ANY = -1  # an entry of a table whose number is not known
+POSITIONS = ("pos", "e6pos")  # types
+DEEPEST = 20  # names that stand for names
+_WORD = re.compile(r"\$?\w+")
+
+
+@dataclass(frozen=True)
+class KrlNumber:
+    """A number: its value, and where it is written.
+
+    Attributes:
+        value: Its value.
+        file, slot: Where it stands; slot -1 where it is computed.
+    """
+
+    value: float
+    file: int = -1
+    slot: int = -1
+
+
+@dataclass(frozen=True)
+class KrlRecord:
+    """The components of an aggregate by name, those that are known.
+
+    Attributes:
+        fields: Names and values.
+        whole: All that are written are known.
+    """
+
+    fields: tuple[tuple[str, KrlValue], ...]
+    whole: bool = True
+
+    def get(self, name: str) -> KrlValue | None:
+        """Return a component, None where it is not there."""
+        return next((value for key, value in self.fields if key == name), None)
+
+    def number(self, name: str) -> float:
+        """Return a component that is a number, NaN where it is none."""
+        found = self.get(name)
+        return found.value if isinstance(found, KrlNumber) else math.nan
+
+
+KrlValue = KrlNumber | KrlRecord | str
+
+# Routines and functions that do not move; of these, those that change what they get.
+STILL = frozenset(
+    """
+    ir_stopm pulse clear_pulse cread cwrite sread swrite copen cclose cioctl cast_to
+    cast_from varstate strlen strdeclen strclear stradd strcomp strcopy strfind
+    msgnotify msgquit msgstate msgdialog msgloop set_kuka_msg clear_kuka_msg
+    exists_kuka_msg set_krlmsg clear_krlmsg exists_krlmsg set_krldlg exists_krldlg
+    mbx_rec on_error_proceed err_clear err_raise timer_limit delete_backward_buffer
+    rob_timer get_decl_place m_comment setinfo lock unlock
+    eki_init eki_open eki_close eki_clear eki_clearbuffer eki_checkbuffer eki_send
+    eki_lock eki_unlock eki_setint eki_setreal eki_setbool eki_setstring eki_setframe
+    eki_getint eki_getreal eki_getbool eki_getstring eki_getframe eki_getintarray
+    eki_getrealarray eki_getboolarray eki_getframearray
+    """.split()
+)
+WRITING = frozenset(
+    """
+    cread sread cast_from mbx_rec strcopy strclear stradd eki_getint eki_getreal
+    eki_getbool eki_getstring eki_getframe eki_getintarray eki_getrealarray
+    eki_getboolarray eki_getframearray exists_krldlg
+    """.split()
+)
+FUNCTIONS = frozenset(
+    """
+    abs sqrt sin cos tan acos atan2 frand round trunc b_not inverse forward inv_pos
+    strlen strdeclen strcomp strfind varstate cast_from_bits get_system_data
+    stool stool2 sbase sipo_mode sload svel_cp svel_joint sacc_cp sacc_joint sapo
+    sapo_ptp sori_typ scirc_typ sjerk sgear_jerk use_cm_pro_values exists_kuka_msg
+    ek lk ey euler mat_to_rpy rpy_to_mat scirc_m s_exax_ign s_exax_ign2 k_root k_type
+    k_offs lk_offs k_addr k_name k_shift sync arcgetdelay arcgetpath
+    """.split()
+)
+KEEPING = ((STILL - WRITING) | FUNCTIONS | package_routines().keys()) | {"bas"}
+"""Routines that change nothing of what they get."""
+
+
+@dataclass
+class KrlTask:
+    """The files of a job.
+
+    Attributes:
+        files: The source first.
+        taught: Lower-case names of data that were taught with the arm, by the cell.
+    """
+
+    files: Sequence[KrlFile]
+    taught: Collection[str] = frozenset()
+    _own: dict[tuple[str, str, str], dict[tuple[int, ...], tuple[int, KrlDatum]]] = (
+        field(default_factory=lambda: defaultdict(dict))
+    )
+    _shared: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+
+    def __post_init__(self) -> None:
+        """Index data by the scopes that declare them."""
+        for number, file in enumerate(self.files):
+            for datum in file.data:
+                place = self._own[file.name, datum.routine, datum.name]
+                if datum.index in place and place[datum.index][1].value is not None:
+                    if datum.value is None:
+                        continue
+                place[datum.index] = number, datum
+                if not datum.routine and (datum.shared or file.name == CONFIG):
+                    self._shared[datum.name].add(file.name)
+
+    # Names.
+
+    @cached_property
+    def routines(self) -> Mapping[str, list[tuple[int, HeadedRows, bool]]]:
+        """Routines by name: file, place, and whether other files know each."""
+        found = defaultdict(list)
+        for number, file in enumerate(self.files):
+            for k, scope in enumerate(() if file.is_submit else file.routines):
+                shared = k == 0 or scope.head.shared
+                found[scope.head.name].append((number, scope, shared))
+        return found
+
+    def routine(self, name: str, here: Scope) -> tuple[int, str, HeadedRows] | None:
+        """Find the routine that a name means, None where it is not sure."""
+        known = self.routines.get(name, [])
+        own = [one for one in known if one[0] == here.file]
+        found = own or [one for one in known if one[2]]
+        if len(found) != 1:
+            return None
+        file, scope, _ = found[0]
+        return file, self.files[file].name, scope
+
+    def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
+        """Return where the statements of a routine stand."""
+        given = frozenset(getattr(routine.head, "parameters", ()))
+        return Scope(file, module, routine.head.name, given)
+
+    def place(self, name: str, here: Scope) -> tuple[str, str] | None:
+        """Find the file and the routine whose data a name means."""
+        if name in here.parameters:
+            return None
+        for place in ((here.module, here.routine), (here.module, "")):
+            if (*place, name) in self._own:
+                return place
+        shared = self._shared.get(name, set())
+        return (next(iter(shared)), "") if len(shared) == 1 else None
+
+    def datum(
+        self, name: str, here: Scope, index: tuple[int, ...] = ()
+    ) -> tuple[int, KrlDatum] | None:
+        """Find data, or an element of an array, None where nothing sure is known."""
+        place = self.place(name, here)
+        return None if place is None else self._own[(*place, name)].get(index)
+
+    def declared(
+        self, place: tuple[str, str, str]
+    ) -> Mapping[tuple[int, ...], tuple[int, KrlDatum]]:
+        """Return data by their index: the file, the routine and the name of them."""
+        return self._own.get(place, {})
+
+    def explain_unknown(self, name: str, here: Scope) -> tuple[Code, str]:
+        """Say why a name stands for no known value; the text goes behind the name."""
+        code = Code.RUNTIME_VALUE
+        if name in here.parameters:
+            return code, "is a parameter: what is given for it is not followed"
+        if self.place(name, here) is None:
+            text = "is declared in no file at hand, or in several of them"
+            return Code.UNDECLARED_VARIABLE, text
+        if name in self.written:
+            text = "may be changed by the program: it is known only when that runs"
+            return code, text
+        return Code.NO_VALUE, "has no value that is known before the program runs"
+
+    @cached_property
+    def written(self) -> frozenset[str]:
+        """Names of data that something may change."""
+        return self._uses[0]
+
+    @cached_property
+    def assigned(self) -> frozenset[str]:
+        """Names of data that statements other than loops may change."""
+        programs = (file for file in self.files if file.routines)
+        said_ones = (one for file in programs for one in file.text.said)
+        changed = (
+            data for one in said_ones for data in list_changes(one, self.routines)
+        )
+        return frozenset(data.name for data in changed) | self.beside
+
+    @cached_property
+    def counted(self) -> Counter[str]:
+        """Names of the variables of loops, and how many loops count each."""
+        found = Counter[str]()
+        for file in self.files:
+            rows = np.bincount(file.text.shape, minlength=len(file.text.said.shapes))
+            for one, count in zip(file.text.said, rows.tolist(), strict=False):
+                if isinstance(one, said.ForLoop):
+                    found[one.name] += count
+        return found
+
+    def is_global(self, name: str, here: Scope) -> bool:
+        """Return True if a name means data that all programs share."""
+        if name in here.parameters:
+            return False
+        place = self.place(name, here)
+        return place is None or place[0] == CONFIG
+
+    def is_steady(self, table: str, number: int) -> bool:
+        """Return True if no statement of the files may change an entry of a table."""
+        return not ({number, ANY} & self._entries_written[table])
+
+    @cached_property
+    def _entries_written(self) -> Mapping[str, frozenset[int]]:
+        """Collect the entries of tables that statements may change."""
+        found: dict[str, set[int]] = {table: set() for table in TABLES}
+        for number, file in enumerate(self.files):
+            here = Scope(number, file.name, "")
+            for row in range(len(file.text)):
+                for target in list_changes(file.text.statement(row), self.routines):
+                    given = not (file.routines or _is_of_part(target))
+                    if target.name in found and not given:
+                        found[target.name].add(self._entry(target, row, here))
+        return {table: frozenset(numbers) for table, numbers in found.items()}
+
+    def _entry(self, target: said.DataObject, row: int, here: Scope) -> int:
+        """Return the number of an entry, ANY where it is not known."""
+        index = self.index(target.steps[0], row, here) if target.steps else None
+        return index[0] if index is not None and len(index) == 1 else ANY
+
+    def initial_switch(self, name: str) -> bool | None:
+        """Return a switch that the program has not set so far, None if not known.
+
+        A switch that no file sets is FALSE, unless a list declares it TRUE: what ran
+        before may have left it so.
+        """
+        own = [
+            datum for file in self.files for datum in file.data if datum.name == name
+        ]
+        values = [one.value for one in own if one.value is not None]
+        off = all(is_word(value, "false") for value in values)
+        return False if off and name not in self.written else None
+
+    @cached_property
+    def read(self) -> frozenset[str]:
+        """Names of data that something but the destination of a move takes."""
+        return self._uses[1]
+
+    @cached_property
+    def beside(self) -> frozenset[str]:
+        """Names of data that submit programs may change at any time."""
+        return self._uses_beside[0]
+
+    @cached_property
+    def called_beside(self) -> frozenset[str]:
+        """Names that submit programs call, and words of what is not understood."""
+        return frozenset().union(*(part.find_calls for part in self._beside))
+
+    @cached_property
+    def _beside(self) -> list[_Beside]:
+        """Read submit programs, and the routines at hand that they call."""
+        found = [_Beside.of_file(file) for file in self.files if file.is_submit]
+        waiting, seen = {name for part in found for name in part.find_calls}, set[str]()
+        while waiting:
+            seen.add(name := min(waiting))
+            for number, scope, _ in self.routines.get(name, ()):
+                found.append(_Beside.of_routine(self.files[number], scope))
+                waiting |= found[-1].find_calls
+            waiting -= seen
+        return found
+
+    @cached_property
+    def _uses_beside(self) -> tuple[frozenset[str], frozenset[str]]:
+        """Collect the names that submit programs may change, and those they take."""
+        written, read = set[str](), set[str]()
+        for part in self._beside:
+            uses = _Uses(self.routines, self._points)
+            for one in part.said:
+                uses.note(one)
+            written |= (uses.written | part.words) - part.own
+            read |= uses.read - part.own
+        return frozenset(written), frozenset(read)
+
+    @cached_property
+    def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
+        uses = _Uses(self.routines, self._points)
+        for file in (f for f in self.files if not f.is_submit):
+            lists = file.routines == ()
+            for one in file.text.said:
+                if not (lists and isinstance(one, said.Assignment)):
+                    uses.note(one)
+                    continue
+                uses.take(one.value)
+                if _is_of_part(one.target):
+                    uses.written.add(one.target.name)
+        written, read = self._uses_beside
+        return written | uses.written, read | written | uses.read
+
+    @cached_property
+    def _points(self) -> frozenset[str]:
+        """Names of data that are positions."""
+        data = (datum for file in self.files for datum in file.data)
+        return frozenset(one.name for one in data if one.type in POSITIONS)
+
+    @cached_property
+    def _taught_lines(self) -> list[frozenset[int]]:
+        return [COMMENTS.list_taught(file.text.source) for file in self.files]
+
+    def is_taught(self, name: str, file: int, row: int) -> bool:
+        """Tell whether data of a statement were taught, by the cell or a comment."""
+        line = self.files[file].text.line(row)
+        return name in self.taught or line in self._taught_lines[file]
+
+    # Values.
+
+    def number(self, operand: said.Operand | None, row: int, here: Scope) -> float:
+        """Evaluate a number, NaN where it is not known before the program runs."""
+        found = self.value(operand, row, here)
+        return found.value if isinstance(found, KrlNumber) else math.nan
+
+    def value(
+        self, operand: said.Operand | None, row: int, here: Scope, depth: int = 0
+    ) -> KrlValue | None:
+        """Evaluate an operand, None where it is not known."""
+        if depth > DEEPEST:
+            return None
+        match operand:
+            case said.Num(slot=slot):
+                text = self.files[here.file].text
+                at = int(text.first[row]) + slot
+                value = float(text.value[at])
+                return KrlNumber(value, here.file, at) if math.isfinite(value) else None
+            case said.EnumValue(name=name):
+                return name
+            case said.StringLiteral(text=written):
+                return written
+            case said.KrlAggregate(fields=fields):
+                return self._aggregate(fields, row, here, depth)
+            case said.Operation(operator=operator, operands=operands):
+                parts = [self.value(one, row, here, depth + 1) for one in operands]
+                return _compute(operator, parts)
+            case said.DataObject(name=name, steps=steps):
+                return self._data(name, steps, row, here, depth)
+            case _:
+                return None
+
+    def _aggregate(
+        self, fields: Sequence[said.NamedField], row: int, here: Scope, depth: int
+    ) -> KrlRecord:
+        """Read components; what one is that is written twice is not known."""
+        times = Counter(f.name for f in fields)
+        once = [f for f in fields if times[f.name] == 1]
+        pairs = [(f.name, self.value(f.value, row, here, depth + 1)) for f in once]
+        known = tuple((name, value) for name, value in pairs if value is not None)
+        return KrlRecord(known, len(known) == len(fields))
+
+    def _data(
+        self,
+        name: str,
+        steps: Sequence[str | said.ElementStep],
+        row: int,
+        here: Scope,
+        depth: int,
+    ) -> KrlValue | None:
+        """Evaluate data by name, and what the steps behind it lead to."""
+        loops, rest = dict(here.loops), list(steps)
+        if name in loops:
+            return None if rest else KrlNumber(loops[name])
+        index: tuple[int, ...] | None = ()
+        if rest and isinstance(rest[0], said.ElementStep):
+            index = self.index(rest.pop(0), row, here)
+        if index is None or name in self.written or name.startswith("$"):
+            return None
+        found = self.datum(name, here, index)
+        if found is None or found[1].value is None:
+            return None
+        file, datum = found
+        there = Scope(file, self.files[file].name, datum.routine)
+        value = self.value(datum.value, datum.row, there, depth + 1)
+        for step in rest:
+            if not (isinstance(step, str) and isinstance(value, KrlRecord)):
+                return None
+            value = value.get(step)
+        return value
+
+    def index(
+        self, step: said.ElementStep | str, row: int, here: Scope
+    ) -> tuple[int, ...] | None:
+        """Return the index of an element, None where it is not known."""
+        if isinstance(step, str):
+            return None
+        values = [whole(self.number(one, row, here)) for one in step.subscripts]
+        known = tuple(k for k in values if k is not None)
+        return known if len(known) == len(values) and known else None
+
+
+def _compute(operator: str, parts: Sequence[KrlValue | None]) -> KrlNumber | None:
+    """Compute what an operator gives, None where that is no known number."""
+    numbers = [part.value for part in parts if isinstance(part, KrlNumber)]
+    found = math.nan
+    if len(numbers) == len(parts):
+        found = _result(operator, numbers)
+    return KrlNumber(found) if math.isfinite(found) else None
+
+
+def _result(operator: str, numbers: Sequence[float]) -> float:
+    """Compute with numbers; whole ones divide otherwise than others: that is left."""
+    match operator, numbers:
+        case "-", [a]:
+            return -a
+        case "+", [a]:
+            return a
+        case "+", [a, b]:
+            return a + b
+        case "-", [a, b]:
+            return a - b
+        case "*", [a, b]:
+            return a * b
+    return math.nan
+
+
+# What runs beside the program.
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """What runs in a submit program, or in a routine that one calls.
+
+    Attributes:
+        said: Its statements.
+        own: Names of data that nothing else knows.
+        words: Names in what is not understood: each may be set there, or called.
+    """
+
+    said: Sequence[said.SourceStatement]
+    own: frozenset[str]
+    words: frozenset[str]
+
+    @classmethod
+    def of_file(cls, file: KrlFile) -> _Beside:
+        """Read a submit program."""
+        own = frozenset(datum.name for datum in file.data if not datum.shared)
+        return cls._of_rows(file, range(len(file.text)), own)
+
+    @classmethod
+    def of_routine(cls, file: KrlFile, scope: HeadedRows) -> _Beside:
+        """Read a routine."""
+        own = (d.name for d in file.data if d.routine == scope.head.name)
+        return cls._of_rows(file, range(scope.first + 1, scope.last), frozenset(own))
+
+    @classmethod
+    def _of_rows(cls, file: KrlFile, rows: range, own: frozenset[str]) -> _Beside:
+        statements = [file.text.statement(row) for row in rows]
+        odd = [
+            r for r in rows if isinstance(file.text.statement(r), said.NotUnderstood)
+        ]
+        words = (_WORD.findall(file.text.text(row).lower()) for row in odd)
+        return cls(statements, own, frozenset().union(*words))
+
+    @property
+    def find_calls(self) -> frozenset[str]:
+        """Names of routines that it may call."""
+        found = {name for one in self.said for name in list_calls(one)}
+        return self.words | found
+
+
+def list_calls(one: said.SourceStatement) -> Iterator[str]:
+    """Yield the names of the routines that a statement calls, also later."""
+    match one:
+        case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
+            yield from list_calls(action)
+        case said.Instruction(name=name):
+            yield name
+    for part in parts_of(operands_of(one)):
+        if isinstance(part, said.FunctionCall):
+            yield part.name
+
+
+# What statements take and change.
+
+
+@dataclass
+class _Uses:
+    """Names that statements may change, and those that they take.
+
+    Attributes:
+        own: Names of the routines of the job.
+        points: Names of positions.
+    """
+
+    own: Collection[str]
+    points: Collection[str]
+    written: set[str] = field(default_factory=set)
+    read: set[str] = field(default_factory=set)
+
+    def note(self, one: said.SourceStatement) -> None:
+        """Note what a statement takes and changes."""
+        match one:
+            case said.Assignment(target=target, value=value):
+                self.written.add(target.name)
+                self._subscripts(target)
+                self.take(value)
+            case said.ForLoop(name=name):
+                self.written.add(name)
+            case said.Instruction(name=name, arguments=arguments):
+                self._call(name, arguments)
+            case said.KrlMove(to=to, via=via, settings=settings):
+                for end in (to, via):
+                    self._destination(end)
+                for setting in settings:
+                    self.take(setting.value)
+            case (
+                said.InterruptDeclared(action=action) | said.PathTrigger(action=action)
+            ):
+                self.note(action)
+        if not isinstance(one, said.Assignment | said.KrlMove | said.Instruction):
+            for operand in operands_of(one):
+                self.take(operand)
+
+    def take(self, operand: said.Operand | None) -> None:
+        """Note what an operand takes, and what its functions may change."""
+        match operand:
+            case said.DataObject(name=name):
+                self.read.add(name)
+                self._subscripts(operand)
+            case said.FunctionCall(name=name, arguments=arguments):
+                self._call(name, arguments)
+            case said.Operation(operands=operands):
+                for one in operands:
+                    self.take(one)
+            case said.KrlAggregate(fields=fields):
+                for part in fields:
+                    self.take(part.value)
+
+    def _subscripts(self, target: said.DataObject) -> None:
+        for step in target.steps:
+            if isinstance(step, said.ElementStep):
+                for one in step.subscripts:
+                    self.take(one)
+
+    def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
+        """Note arguments: a routine may change them, unless it is known not to."""
+        changed = _list_changed_arguments(name, arguments, self.own)
+        self.written |= {one.name for one in changed}
+        for argument in arguments:
+            self.take(argument.value)
+
+    def _destination(self, operand: said.Operand | None) -> None:
+        """Note what a destination takes besides the point itself."""
+        match operand:
+            case said.DataObject():
+                self._subscripts(operand)
+            case said.Operation(operator=":", operands=(first, second)):
+                point, shift = point_and_shift(first, second, self.points)
+                self._destination(point)
+                self.take(shift)
+            case _:
+                self.take(operand)
+
+
+def point_and_shift(
+    first: said.Operand, second: said.Operand, points: Collection[str]
+) -> tuple[said.Operand, said.Operand]:
+    """Tell which operand of ``first : second`` is the point that is shifted.
+
+    It is the first where that is a position, else the second.
+    """
+    behind = isinstance(first, said.DataObject) and first.name in points
+    return (first, second) if behind else (second, first)
+
+
+def list_changes(
+    one: said.SourceStatement, own: Collection[str] = ()
+) -> Iterator[said.DataObject]:
+    """Yield data that a statement may change, also what it does later.
+
+    Args:
+        one: The statement.
+        own: Names of the routines of the job.
+    """
+    match one:
+        case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
+            yield from list_changes(action, own)
+        case said.Assignment(target=target):
+            yield target
+        case said.Instruction(name=name, arguments=arguments):
+            yield from _list_changed_arguments(name, arguments, own)
+    for part in parts_of(operands_of(one)):
+        if isinstance(part, said.FunctionCall):
+            yield from _list_changed_arguments(part.name, part.arguments, own)
+
+
+def _list_changed_arguments(
+    name: str, arguments: Sequence[said.Argument], own: Collection[str]
+) -> Iterator[said.DataObject]:
+    """Yield the arguments that a routine may change: all, unless it is known."""
+    if name in KEEPING and name not in own:
+        return
+    for argument in arguments:
+        if isinstance(argument.value, said.DataObject):
+            yield argument.value
+
+
+def _is_of_part(target: said.DataObject) -> bool:
+    """Return True if a component is meant: a list that sets one is not followed."""
+    return any(isinstance(step, str) for step in target.steps)
+
+
+def is_word(operand: said.Operand | None, word: str) -> bool:
+    """Return True if an operand is a word such as TRUE."""
+    return operand == said.DataObject(word)
+
+
+def operands_of(one: said.SourceStatement) -> Sequence[said.Operand | None]:
+    """Return the values that a statement takes."""
+    match one:
+        case said.KrlDeclaration(items=items):
+            return [item.value for item in items]
+        case said.Assignment(target=target, value=value):
+            return [target, value]
+        case said.Branch(values=values):
+            return values
+        case said.ForLoop(first=first, last=last, step=step):
+            return [first, last, step]
+        case said.Leave(value=value) | said.Waiting(value=value):
+            return [value]
+        case said.Instruction(arguments=arguments):
+            return [argument.value for argument in arguments]
+        case said.KrlMove(to=to, via=via, angle=angle, settings=settings):
+            return [to, via, angle, *(one.value for one in settings)]
+        case said.SplineBlock(settings=settings):
+            return [one.value for one in settings]
+        case said.PathTrigger(values=values):
+            return values
+        case _:
+            return []
+
+
+def parts_of(operands: Sequence[said.Operand | None]) -> Iterator[said.Operand]:
+    """Yield operands with all that is in them."""
+    waiting = list(operands)
+    while waiting:
+        match one := waiting.pop():
+            case said.FunctionCall(arguments=arguments):
+                waiting += [argument.value for argument in arguments]
+            case said.Operation(operands=inside):
+                waiting += inside
+            case said.KrlAggregate(fields=fields):
+                waiting += [f.value for f in fields]
+            case said.DataObject(steps=steps):
+                for step in steps:
+                    if isinstance(step, said.ElementStep):
+                        waiting += step.subscripts
+        if one is not None:
+            yield one

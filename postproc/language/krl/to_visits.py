@@ -1,0 +1,282 @@
+"""From the arrivals of a KRL job to `Visits`."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language import to_visits
+from postproc.language.krl.interpreter import KrlMachine
+from postproc.language.krl.modal_state import (
+    LOST_LOAD,
+    NO_LOAD,
+    OF_TRACK,
+    UNKNOWN,
+    KrlModes,
+    ModeReader,
+)
+from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
+from postproc.language.krl.pose_encoding import COMMENTS, KRL_DIALECT
+from postproc.language.krl.syntax import SplineBlock
+from postproc.language.to_visits import (
+    Conditions,
+    FoundGoal,
+    Pose,
+    cell_pose,
+    not_reached,
+)
+from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
+from postproc.robot.trajectory import Motion
+
+STOP, PASS, MAYBE = "stop", "pass", "maybe"
+_IPO = Reason(Code.FRAME_UNKNOWN, "$IPO_MODE is not known here")
+_STATUS = Reason(
+    Code.CONFIGURATION_UNKNOWN,
+    "bit 2 of S and bit 4 of T disagree, otherwise than at the other points",
+)
+_STILL_TOOL = Reason(
+    Code.ORIENTATION_LAW,
+    "$ORI_TYPE = #CONSTANT: the tool keeps the orientation it comes with",
+)
+_NOT_TURNED = {
+    "#constant": _STILL_TOOL,
+    "#ignore": Reason(
+        Code.ORIENTATION_LAW,
+        "$ORI_TYPE = #IGNORE: the tool does not turn to the point",
+    ),
+}
+_MAY_NOT_TURN = Reason(
+    Code.ORIENTATION_LAW,
+    "which orientation the tool takes is not known here ($ORI_TYPE)",
+)
+TURNING = ("#var", "#joint")  # ways to the orientation of a point
+_SWAPPED = Reason(
+    Code.FRAME_UNKNOWN,
+    "$TOOL and $BASE were set with IPO_FRAME #TCP, which swaps them on some "
+    "controllers: set them anew with #BASE",
+)
+_NOT_SET = "an inline setting (WITH) is not known"
+
+
+def visits_of(machine: KrlMachine) -> Visits:
+    """Put the arrivals into the order of the program, as columns."""
+    found: Sequence[KrlVisit] = machine.visits
+    _keep_orientation(machine, found)
+    _follow_partial(machine, found)
+    ends, odd = _ends(found), _odd_status(found)
+    base = cell_pose(machine.start.base)
+    number = {id(v): k for k, v in enumerate(found)}
+
+    def conditions(v: KrlVisit) -> Conditions:
+        at = number[id(v)]
+        early = machine.early.get(at, frozenset())
+        return _conditions(machine, v, base, ends[at], at in odd, early)
+
+    moves = {k: file.moves for k, file in enumerate(machine.task.files)}
+    return to_visits.visits_of(machine, KRL_DIALECT, conditions, COMMENTS, moves)
+
+
+def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, Reason]:
+    """Add what a move sets for itself; say where that is not known."""
+    modes: KrlModes = v.modes
+    given = [(v.row, one) for one in v.move.settings]
+    if v.begin >= 0:
+        block = machine.texts[v.scope.file].statement(v.begin)
+        assert isinstance(block, SplineBlock)
+        given = [(v.begin, one) for one in block.settings] + given
+    for row, setting in given:
+        reader = ModeReader(machine.task, row, v.scope)
+        after = reader.assign(modes, setting)
+        if after is None:
+            text = f"{_NOT_SET}: {setting.target.name.upper()}"
+            return modes, Reason(Code.SETTING_UNTRACKED, text)
+        modes = after
+    return modes, NO_REASON
+
+
+@dataclass(frozen=True)
+class _Blending:
+    """How a point is passed: see `Conditions`."""
+
+    zone_mm: float = math.nan
+    overlap: float = math.nan
+    exact: bool = False
+    unsized: bool = False
+
+
+_UNSIZED = _Blending(unsized=True)
+
+
+def _conditions(
+    machine: KrlMachine,
+    v: KrlVisit,
+    base: Pose,
+    end: str,
+    odd: bool,
+    early: frozenset[Reason],
+) -> Conditions:
+    """Say what an arrival is carried out with."""
+    modes, unset = _effective(machine, v)
+    joint = v.motion == Motion.JOINT
+    blending = _blending(v, modes, end)
+    active = {why for _, why in modes.active}
+    blocked = modes.blocked | active | machine.everywhere | early
+    if "track" not in machine.start.aux.values():
+        blocked -= OF_TRACK
+    given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
+    if v.goal.target != Meaning.JOINTS:
+        given += (modes.base.why, NO_REASON if modes.interpolation else _IPO)
+        given += (_explain_swapped(modes),)
+    given += (_STATUS if odd else NO_REASON,)
+    given += (NO_LOAD if modes.load == LOST_LOAD else NO_REASON,)
+    return Conditions(
+        tool=modes.tool.pose,
+        base=base,
+        uframe=modes.base.pose,
+        taught=(modes.tool.taught, modes.base.taught),
+        remote=modes.interpolation == "#tcp",
+        reasons=given,
+        flags=Switch.ON if joint else Switch.OFF,
+        flagged=joint and v.goal.target == Meaning.POSE,
+        law=_law(v, modes),
+        zone_mm=blending.zone_mm,
+        speed=modes.speed if modes.speed > 0 else math.nan,
+        wrist=modes.law == OrientationLaw.WRIST_JOINTS and not joint,
+        override=modes.share if joint else 1.0,
+        overlap=blending.overlap,
+        exact=blending.exact,
+        unsized=blending.unsized,
+        load=_load(modes),
+    )
+
+
+def _load(modes: KrlModes) -> tuple[float, ...]:
+    """Return what the program states that the arm carries, see `Conditions.load`."""
+    unknown = not modes.load or modes.load == LOST_LOAD
+    return () if unknown else (*modes.load, *(math.nan,) * 3)[:4]
+
+
+def _explain_swapped(modes: KrlModes) -> Reason:
+    """Return why frames that were set for a fixed tool hold for no other move."""
+    remote = modes.tool.remote or modes.base.remote
+    return _SWAPPED if remote and modes.interpolation != "#tcp" else NO_REASON
+
+
+def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
+    """Tell how the tool turns on the way."""
+    if v.motion != Motion.CIRCULAR or modes.orientation != "#var":
+        return modes.law
+    through = modes.through and v.by_spline_planner
+    return OrientationLaw.ONE_AXIS if through else OrientationLaw.ALONG_PATH
+
+
+def _blending(v: KrlVisit, modes: KrlModes, end: str) -> _Blending:
+    """Tell how a point is passed."""
+    if v.inner and not v.via:
+        return _Blending(exact=True)
+    if v.via or not v.blends or end == STOP or modes.ahead is False:
+        return _Blending()
+    if end == MAYBE or modes.ahead is None:
+        return _UNSIZED
+    words = v.move.words
+    by_share = "c_ptp" in words and "c_dis" not in words
+    if by_share:
+        if modes.overlap == UNKNOWN:
+            return _UNSIZED
+        return _Blending(overlap=modes.overlap)
+    by_distance = "c_dis" in words or "c_spl" in words
+    if not by_distance or modes.distance == UNKNOWN:
+        return _UNSIZED
+    return _Blending(zone_mm=modes.distance)
+
+
+# What stands behind a point decides whether it is passed.
+
+
+def _ends(found: Sequence[KrlVisit]) -> Sequence[str]:
+    """Tell of every visit whether the arm stops there, as far as what follows tells.
+
+    The old planner and that of splines do not blend into each other, statements that
+    wait for what runs ahead stop the arm, and so does the end of the program.
+    """
+    after: dict[int, list[KrlVisit]] = defaultdict(list)
+    for v in found:
+        for origin in v.origins:
+            after[origin].append(v)
+    return [_end(v, after[k]) for k, v in enumerate(found)]
+
+
+def _end(v: KrlVisit, after: Sequence[KrlVisit]) -> str:
+    """Tell whether the arm stops at a visit, by those behind it."""
+    stops = [
+        True if one.by_spline_planner != v.by_spline_planner else _find_halt(v, one)
+        for one in after
+    ]
+    if all(stop is True for stop in stops):
+        return STOP
+    return PASS if all(stop is False for stop in stops) else MAYBE
+
+
+def _find_halt(v: KrlVisit, after: KrlVisit) -> bool | None:
+    """Return whether the program waits between two moves, None if not known."""
+    if after.modes.ahead != v.modes.ahead and not after.modes.halted:
+        return None
+    halted: bool | None = after.modes.halted
+    return halted
+
+
+def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
+    """Forget targets whose orientation the tool does not take."""
+    for v in found:
+        modes, _ = _effective(machine, v)
+        if modes.orientation not in TURNING and v.motion != Motion.JOINT:
+            v.goal = not_reached(v.goal, v.goal.why or _not_turned(modes))
+
+
+def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
+    """Forget where missing numbers lead that are not sure to be those before.
+
+    They are not where X, Y, Z were commanded in other frames, or behind an arc that
+    ends elsewhere than at the point that is written.
+    """
+    partial = (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS)
+    for v in (v for v in found if v.goal.target in partial):
+        before = [found[k] for k in v.origins if k >= 0]
+        lost = any(one.move.angle is not None for one in before)
+        if v.goal.target == Meaning.PARTIAL_POSE:
+            own = _frames(machine, v)
+            lost |= own is None or any(_frames(machine, one) != own for one in before)
+        if lost:
+            v.goal = FoundGoal(Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, why=PARTIAL)
+
+
+def _not_turned(modes: KrlModes) -> Reason:
+    """Say why the tool need not turn to a point; frames that are lost come first."""
+    lost = modes.tool.why or modes.base.why
+    return _NOT_TURNED.get(modes.orientation, lost or _MAY_NOT_TURN)
+
+
+def _frames(machine: KrlMachine, v: KrlVisit) -> tuple[Pose, Pose, str] | None:
+    """Return tool, base and kind of interpolation of a move, None where not known."""
+    modes, unset = _effective(machine, v)
+    tool, base, kind = modes.tool, modes.base, modes.interpolation
+    known = tool.pose and base.pose and kind
+    return (tool.pose, base.pose, kind) if known and not (unset or base.why) else None
+
+
+def _odd_status(found: Sequence[KrlVisit]) -> set[int]:
+    """Find joint moves whose S says another side of axis 5 than T does.
+
+    What bit 2 of S means is told by most of the program's own points; where they do
+    not agree at all, all are odd.
+    """
+    agree: Mapping[bool, set[int]] = {True: set(), False: set()}
+    for k, v in enumerate(found):
+        if v.motion == Motion.JOINT and v.goal.target == Meaning.POSE:
+            s, t = v.goal.values[6:]
+            agree[bool(int(s) & 4) == bool(int(t) & 16)].add(k)
+    more, less = sorted(agree.values(), key=len, reverse=True)
+    return more | less if len(more) == len(less) else less

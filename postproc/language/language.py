@@ -1,0 +1,339 @@
+"""What a language does for all else: files to visits, and back; one class each."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from postproc.arrays import Floats, Ints
+from postproc.language.archive import Archive
+from postproc.language.number_edits import Skeleton
+from postproc.language.pose_encoding import Dialect
+from postproc.language.source import Edit, Source
+from postproc.language.visits import Diagnostic, Literals, Visits
+
+Record = tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the cell says about the moment at which the program starts.
+
+    Attributes:
+        tool, base, uframe: Position records (6,) [mm, deg], None where unknown.
+        routines: Outside routine to ``motionless``, ``moves`` or ``sets-frames``.
+        motionless: Patterns of outside routines, ``name`` or ``program.name``, that
+            neither move the arm nor set frames.
+        constant: Patterns of exported variables, ``name`` or ``program.name``, that no
+            other program changes.
+        payload_kg: What the arm carries, NaN where that is not known.
+        assume_motion: The shipped list of such routines does not count.
+        frame_tables: Outside routine to arguments (``"1,2"``) to the records of the
+            frames (``tool``, ``base``, ``uframe``) that it sets.
+        aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
+        taught: Names of points that were taught with the robot.
+        arm: Number of our arm.
+        source: The cell file, for messages.
+    """
+
+    tool: Record = (0.0,) * 6
+    base: Record = (0.0,) * 6
+    uframe: Record = (0.0,) * 6
+    routines: Mapping[str, str] = field(default_factory=dict)
+    motionless: tuple[str, ...] = ()
+    assume_motion: bool = False
+    constant: tuple[str, ...] = ()
+    payload_kg: float = math.nan
+    frame_tables: Mapping[str, Mapping[str, Mapping[str, Record]]] = field(
+        default_factory=dict
+    )
+    aux: Mapping[int, str] = field(default_factory=dict)
+    taught: Collection[str] = frozenset()
+    arm: int = 1
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        """No language tells cases apart: keep names in lower case."""
+        lower = {name.lower(): said for name, said in self.routines.items()}
+        object.__setattr__(self, "routines", lower)
+        object.__setattr__(self, "motionless", tuple(map(str.lower, self.motionless)))
+        object.__setattr__(self, "constant", tuple(map(str.lower, self.constant)))
+        tables = {name.lower(): table for name, table in self.frame_tables.items()}
+        object.__setattr__(self, "frame_tables", tables)
+        taught = frozenset(name.lower() for name in self.taught)
+        object.__setattr__(self, "taught", taught)
+
+    @property
+    def records(self) -> frozenset[Record]:
+        """Return all frames that the cell gives."""
+        tables = [e for table in self.frame_tables.values() for e in table.values()]
+        given = [record for entry in tables for record in entry.values()]
+        return frozenset([self.tool, self.base, self.uframe, *given])
+
+
+@dataclass(frozen=True)
+class JobReading:
+    """The files of a job as its language understands them.
+
+    Attributes:
+        texts: Every file as it was read, in the order of `Visits.files`.
+        visits: Every arrival at a target.
+        diagnostics: What else was found.
+        programs: What was parsed of the files, as `read` takes it for `known`.
+        missed: Lines of moves that are never reached, by file.
+        untouched: Names of files that are read, and never rewritten.
+    """
+
+    texts: tuple[Skeleton, ...]
+    visits: Visits
+    diagnostics: tuple[Diagnostic, ...]
+    programs: tuple[Any, ...] = ()
+    missed: Mapping[str, Ints] = field(default_factory=dict)
+    untouched: frozenset[str] = frozenset()
+
+
+class NamedPoint(Protocol):
+    """A variable that a move names as its destination."""
+
+    @property
+    def key(self) -> str:
+        """Return a text that tells variables apart."""
+
+    @property
+    def name(self) -> str:
+        """Return its name as it is written."""
+
+
+class Cloner(ABC):
+    """The files of a job, to give variables of their own to moves that share one."""
+
+    @abstractmethod
+    def target(self, file: int, line: int, via: bool, name: str) -> NamedPoint:
+        """Find the variable that a move goes to, as far as it can be cloned.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            via: Its VIA point is meant, not its end.
+            name: Owner of the value that it goes to.
+
+        Raises:
+            CloneError: The move names no variable that can be.
+        """
+
+    @abstractmethod
+    def find_declaration(self, named: NamedPoint) -> int:
+        """Return the 1-based line that declares a variable."""
+
+    @abstractmethod
+    def clone(
+        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
+    ) -> tuple[str, list[tuple[int, Edit]]]:
+        """Give some moves a variable of their own with the value of the one they share.
+
+        Args:
+            literals: Where the values stand.
+            named: Where the moves name the old variable; all mean the same one.
+            rows: Literals that it may hold there.
+
+        Returns:
+            The new name, and edits with the index of their file.
+
+        Raises:
+            CloneError: A value stands where it cannot be given twice.
+        """
+
+
+@dataclass(frozen=True)
+class ArcPiece:
+    """A piece of an arc that is cut, from where the piece before it ends.
+
+    Attributes:
+        end: Numbers of its end, (w,); None: as the move has them.
+        via: Numbers of the point on its own way, (w,); None: it is a chord.
+        at_via: Whether it ends at the point on the way of the arc.
+    """
+
+    end: Floats | None
+    via: Floats | None
+    at_via: bool = False
+
+
+class Splitter(ABC):
+    """The files of a job, to put points on the ways of its moves."""
+
+    @abstractmethod
+    def hinders(self, file: int, line: int) -> str:
+        """Say what in the text of a move forbids points on its way, "" for nothing.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+        """
+
+    @abstractmethod
+    def stops(self, file: int, line: int) -> bool:
+        """Tell whether the arm may stop once more before a move.
+
+        Nothing that may begin a process stands between it and the move before.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+        """
+
+    @abstractmethod
+    def points(
+        self, file: int, line: int, numbers: Floats, config: str, stop: bool
+    ) -> Edit:
+        """Write moves to points in front of a LINEAR move, which they lead up to.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            numbers: Of the points, one behind the other, (k, w).
+            config: Their configuration flags.
+            stop: The arm stops at the first of them.
+
+        Raises:
+            CloneError: They cannot be written there.
+        """
+
+    @abstractmethod
+    def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
+        """Write a stop in front of a LINEAR move, from where it leads to its target.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            numbers: Of the stop, (w,).
+            config: Its configuration flags.
+
+        Raises:
+            CloneError: It cannot be written there.
+        """
+
+    @abstractmethod
+    def arc(
+        self,
+        file: int,
+        line: int,
+        pieces: Sequence[ArcPiece],
+        via: Floats,
+        config: str,
+        stop: bool,
+    ) -> list[Edit]:
+        """Write pieces in front of a CIRCULAR move, which becomes the last of them.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            pieces: The pieces; one ends at the point on the way of the arc.
+            via: Numbers of the point on the way that the move has from then on, (w,).
+            config: Configuration flags of all points.
+            stop: The arm stops where the first piece ends.
+
+        Raises:
+            CloneError: They cannot be written there.
+        """
+
+
+class Language(ABC):
+    """A language of robot programs.
+
+    Attributes:
+        name: As its users call it.
+        controller: Whose controllers run it, as arm files and cells name them.
+        suffixes: Of program files, in lower case, the usual one first.
+        comment: What a comment begins with.
+        dialect: What the numbers of its targets mean.
+        tells_accuracy: Programs or controllers show whether the controller compensates
+            on its own; else the cell must say so itself.
+        names_numbers: Positions stand in braces, with a name before every number.
+    """
+
+    name: str
+    controller: str
+    suffixes: tuple[str, ...]
+    comment: str
+    dialect: Dialect
+    tells_accuracy: bool = True
+    names_numbers: bool = False
+
+    @abstractmethod
+    def recognises(self, text: bytes) -> bool:
+        """Tell whether a text without a name begins as programs of this language do."""
+
+    @abstractmethod
+    def read(
+        self, sources: Sequence[Source], start: Start, known: Sequence[Any] = ()
+    ) -> JobReading:
+        """Parse the files of a job and resolve its visits.
+
+        Args:
+            sources: First the program itself, then those that belong to it.
+            start: What the cell says.
+            known: What was parsed before: what files say that are the same, or the
+                same but for numbers of targets, need not be worked out again.
+
+        Raises:
+            ProgramError: A file is no program text, or the program is another arm's.
+        """
+
+    @abstractmethod
+    def cloner(self, sources: Sequence[Source]) -> Cloner:
+        """Parse the files of a job to clone variables in them."""
+
+    def splitter(self, sources: Sequence[Source]) -> Splitter | None:
+        """Parse the files of a job to put points on ways, None where nobody knows how.
+
+        Only where the language passes them for certain.
+        """
+        return None
+
+    def is_inserted(self, line: bytes) -> bool:
+        """Tell whether a line is a point that a `Splitter` wrote."""
+        return False
+
+    def is_approach(self, line: bytes) -> bool:
+        """Tell whether such a line is a stop from which a target is approached."""
+        return False
+
+    def ends_at_via(self, line: bytes) -> bool:
+        """Tell whether such a line leads to the point on the way of an arc."""
+        return False
+
+    def holds_joints(self, line: str) -> bool:
+        """Tell whether the numbers of a line are joint angles, as far as it shows."""
+        return False
+
+    @abstractmethod
+    def target_names(
+        self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
+    ) -> Iterator[str]:
+        """Name the targets on some lines of a file, "" for those without a name.
+
+        Args:
+            file: Its name.
+            lines: All of them.
+            wanted: 1-based lines, ascending but for 0: those that it does not have.
+        """
+
+    def read_archive(self, folder: Path) -> Archive | None:
+        """Return what the archive of a controller gives, None for any other folder."""
+        return None
+
+    def reads(self, program: Path) -> tuple[Path, ...]:
+        """Return files of an archive that a program reads and that stay as they are."""
+        return ()
+
+    def list_placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
+        """Return the arms of an archive, and their poses (4, 4) [m] in the world."""
+        return ()
+
+    def prepare(self) -> None:  # noqa: B027 - most have nothing to load
+        """Load what reading the first program takes."""

@@ -1,0 +1,125 @@
+"""Lines of a file, but for their numbers, comments and numbered names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from postproc import _native
+from postproc.arrays import Bools, Floats, Indices
+from postproc.language.source import NumberSpans
+from postproc.language.symbol_column import NameColumn
+
+# A *mask* is the code of a line in which every number is one NUL (no program holds
+# any), the comment is gone and idle blanks are dropped. In its *form* every numbered
+# name (``WP_12``, ``p1``) is one mark, too: lines of one form are parsed once.
+
+NUMBER_MARK = "\0"
+NAME_MARK = "\x01"  # a numbered name, in a form
+UNREADABLE = NAME_MARK * 2  # begins the form of a line that holds such a mark itself
+WHOLE = b"\n"  # begins the mask of such a line: no other mask holds it
+
+BLANKS = "".join(chr(c) for c in (*range(1, 33), 127) if chr(c) not in "\r\n")
+
+
+@dataclass(frozen=True)
+class ScannedLines:
+    """The n physical lines of a file with m numbers and p numbered names.
+
+    Attributes:
+        masks: Their distinct masks, names taken out; that of a line which holds the
+            mark of a name itself begins with `WHOLE`, and its names stay.
+        shape: Index into `masks`, (n,).
+        comment: Byte offset of each line's comment, (n,), -1 where there is none.
+        first: CSR offsets into the numbers, (n + 1,).
+        name_first: CSR offsets into the names, (n + 1,).
+        numbers: Where each number stands, its sign included, (m,).
+        value: What it is worth, NaN where it cannot be read, (m,).
+        names: The distinct names, in the order of appearance.
+        name: Index into `names`, (p,).
+        unterminated: Lines (from 0) with a string that does not end.
+    """
+
+    masks: tuple[bytes, ...]
+    shape: Indices
+    comment: Indices
+    first: Indices
+    name_first: Indices
+    numbers: NumberSpans
+    value: Floats
+    names: NameColumn
+    name: Indices
+    unterminated: tuple[int, ...]
+
+
+def scan_lines(data: bytes, line_starts: Indices) -> ScannedLines:
+    """Mask every physical line of a text and take its numbered names out.
+
+    Args:
+        data: The text; a byte order mark is as good as blanks.
+        line_starts: Offset of every line, ascending from 0, (n,).
+    """
+    masks, by_line, numbers, names, unterminated = _native.scan_lines(data, line_starts)
+    places, value = numbers
+    return ScannedLines(
+        tuple(masks), *by_line, NumberSpans(*places), value, *names, tuple(unterminated)
+    )
+
+
+@dataclass(frozen=True)
+class RescannedLines:
+    """A text whose n lines are those of another, but for what m numbers are worth.
+
+    Attributes:
+        added: Line (from 0) of comment alone that the other one has not, -1: none.
+        numbers, value: As in `ScannedLines`.
+        changed: Which numbers are written otherwise, (m,).
+    """
+
+    added: int
+    numbers: NumberSpans
+    value: Floats
+    changed: Bools
+
+
+def rescan_lines(
+    before: tuple[bytes, Indices], after: tuple[bytes, Indices], count: int
+) -> RescannedLines | None:
+    """Scan a text that should differ from another in numbers alone.
+
+    Args:
+        before: The other text, and the offset of every line.
+        after: The text, likewise.
+        count: How many numbers the other one holds.
+
+    Returns:
+        What is in it, None where a mask or a comment differs, or a string has no end.
+    """
+    found = _native.rescan_lines(*before, *after, count)
+    if found is None:
+        return None
+    added, places, value, changed = found
+    return RescannedLines(added, NumberSpans(*places), value, changed)
+
+
+def form_of(mask: str) -> tuple[str, tuple[str, ...]]:
+    r"""Take the numbered names out of the mask of a line.
+
+    Returns:
+        Its form and the names.
+
+    >>> form_of("MOVE TO WP_1 WITH CONDITION[spot('g2', x3)]")
+    ("MOVE TO \x01 WITH CONDITION[spot('g2', \x01)]", ('WP_1', 'x3'))
+    """
+    form, names = _native.form_of(mask.encode("latin-1"))
+    if form[:1] == WHOLE:
+        return UNREADABLE + mask, ()
+    return form.decode("latin-1"), tuple(names)
+
+
+def mask_of(form: str, names: tuple[str, ...]) -> str:
+    """Fill the names into a form again."""
+    if not names:
+        return form.removeprefix(UNREADABLE)
+    parts = form.split(NAME_MARK)
+    pairs = zip(parts, names, strict=False)
+    return "".join([text for pair in pairs for text in pair]) + parts[-1]

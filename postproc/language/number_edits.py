@@ -1,0 +1,200 @@
+"""New numbers into old text: edits of the numbers of targets, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc import _native
+from postproc.arrays import Floats, Indices, Ints, chunks, floats
+from postproc.exceptions import ProgramError
+from postproc.language.logical_lines import Lines, read_lines
+from postproc.language.pose_encoding import Dialect
+from postproc.language.source import NumberSpans, Replacements, Source, apply, as_texts
+from postproc.language.templates import Shapes
+from postproc.language.visits import Literals
+
+# What new numbers must leave alone: the shapes of lines and where numbers stand.
+
+AT_ONCE = 200_000  # numbers compared: what that takes is small beside two texts
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """A text as it was read: n lines of code with m numbers.
+
+    It is kept while a program is worked on.
+
+    Attributes:
+        source: The text.
+        shapes: The distinct masks of its lines.
+        shape: Index into `shapes`, (n,).
+        line: 1-based physical lines, (n,).
+        numbers: Where the numbers stand, (m,).
+        reread: Reads another text of the same language.
+    """
+
+    source: Source
+    shapes: Shapes
+    shape: Indices
+    line: Indices
+    numbers: NumberSpans
+    reread: Callable[[Source], Skeleton] | None = None
+
+    @classmethod
+    def of(cls, lines: Lines) -> Skeleton:
+        """Take over what the lines of a text tell."""
+        return cls(lines.source, lines.shapes, lines.shape, lines.line, lines.numbers)
+
+    @classmethod
+    def read(cls, source: Source) -> Skeleton:
+        """Read a text.
+
+        Raises:
+            ProgramError: A string does not end on its line.
+        """
+        return cls.of(read_lines(source))
+
+
+def difference(
+    before: Source | Skeleton,
+    after: Source | Skeleton,
+    allowed: Replacements,
+    stamp: int = 0,
+) -> str:
+    """Say where a text differs from its origin otherwise than by the edits meant.
+
+    Its bytes must be those of the edited original. Read by itself, every line must
+    have the shape it had, every edit must replace one whole number, and every number
+    must stand where the edits move it to.
+
+    Args:
+        before: The original; it is read where it has not been yet.
+        after: The rewritten text, likewise.
+        allowed: The edits of numbers that were meant.
+        stamp: Bytes of the stamp line that the rewritten text begins with.
+
+    Returns:
+        What is wrong, "" where all is well.
+    """
+    old, new = (s.source if isinstance(s, Skeleton) else s for s in (before, after))
+    if not allowed.reproduces(old.data, new.data, stamp):
+        return _first_difference(apply(old.data, allowed), new, stamp)
+    try:
+        a = before if isinstance(before, Skeleton) else Skeleton.read(before)
+        b = after if isinstance(after, Skeleton) else (a.reread or Skeleton.read)(after)
+    except ProgramError as problem:
+        return str(problem)
+    if len(a.shape) != len(b.shape) or len(a.numbers) != len(b.numbers):
+        return "the rewritten text has other lines or numbers than the original"
+    if a.shapes != b.shapes or (a.shape != b.shape).any():
+        row = int(np.flatnonzero(a.shape != b.shape)[:1].sum())
+        return f"line {a.line[row]}: the rewritten line has another shape"
+    return _part_of_a_number(a, allowed) or _number_elsewhere(a, b, allowed, stamp)
+
+
+def _part_of_a_number(before: Skeleton, allowed: Replacements) -> str:
+    """Say which edit does not replace one whole number."""
+    done, wrong = 0, np.empty(0, dtype=np.int32)
+    for rows in chunks(len(before.numbers), AT_ONCE):
+        start, end = before.numbers.starts(rows), before.numbers.ends(rows)
+        some = allowed[done : np.searchsorted(allowed.start, start[-1], side="right")]
+        at = np.searchsorted(start, some.start)
+        whole = (start[at] == some.start) & (end[at] == some.end)
+        wrong, done = np.append(wrong, some.start[~whole]), done + len(some)
+    wrong = np.append(wrong, allowed.start[done:])
+    if not len(wrong):
+        return ""
+    line = before.source.line_of(int(wrong[0]))
+    return f"line {line}: an edit does not replace one whole number"
+
+
+def _number_elsewhere(
+    before: Skeleton, after: Skeleton, allowed: Replacements, stamp: int
+) -> str:
+    """Say which number does not stand where the edits move it to."""
+    shift = stamp + np.cumsum(np.append(np.int32(0), allowed.growth), dtype=np.int32)
+    for rows in chunks(len(before.numbers), AT_ONCE):
+        start, end = before.numbers.starts(rows), before.numbers.ends(rows)
+        edits = np.searchsorted(allowed.start, start)  # before the number
+        wrong = after.numbers.starts(rows) != start + shift[edits]
+        edits = np.searchsorted(allowed.start, start, side="right")  # and its own
+        wrong |= after.numbers.ends(rows) != end + shift[edits]
+        if wrong.any():
+            line = before.source.line_of(int(start[wrong][0]))
+            return f"line {line}: a number stands elsewhere than it should"
+    return ""
+
+
+def _first_difference(meant: bytes, after: Source, stamp: int) -> str:
+    length = min(len(meant), len(after.data) - stamp)
+    pairs = zip(meant, after.data[stamp:], strict=False)
+    at = next((i for i, (a, b) in enumerate(pairs) if a != b), length)
+    line = after.line_of(min(at + stamp, max(len(after.data) - 1, 0)))
+    return f"line {line}: the text is not what was meant"
+
+
+# The edits, file by file.
+
+Texts = NDArray[np.bytes_]
+MOST_DIGITS = 1_000  # of a number that is written again
+
+
+def edits(
+    literals: Literals,
+    sources: Sequence[Source],
+    rows: Ints | Sequence[int],
+    new_values: Floats | Sequence[Floats],
+    dialect: Dialect,
+) -> tuple[Replacements, ...]:
+    """Return the edits that give literals new values, file by file.
+
+    A number is edited only where it changes by more than half of its last digit as it
+    will be written; a plus that it began with stays.
+
+    Args:
+        literals: Where the numbers stand.
+        sources: The files that `literals.file` means.
+        rows: Literals to change, (r,).
+        new_values: Their new numbers, (r, w).
+        dialect: How many decimals they have.
+
+    Raises:
+        ValueError: A new value is not finite.
+        ProgramError: A number has more digits than can be written.
+    """
+    new_values = np.asarray(new_values, dtype=float).reshape(-1, dialect.width)
+    if not np.isfinite(new_values).all():
+        raise ValueError("a new value of a target is not finite")
+    rows = np.asarray(rows, dtype=np.int64)
+    found = []
+    for file, source in enumerate(sources):
+        mine = np.flatnonzero(literals.file[rows] == file)
+        places = literals.places[rows[mine]]
+        start, end = places.start, places.end
+        joints = literals.joints[rows[mine], None]
+        least = np.where(joints, dialect.joint_decimals, dialect.pose_decimals)
+        written = start >= 0
+        order = np.argsort(start[written], kind="stable")
+        start, end = start[written][order], end[written][order]
+        _check_lengths(source, start, end)
+        values, least = new_values[mine][written][order], least[written][order]
+        changed, new = _native.rewrite_numbers(
+            source.data, start.astype(np.int64), end.astype(np.int64),
+            floats(values), least.astype(np.int64),
+        )  # fmt: skip
+        found.append(Replacements(start[changed], end[changed], as_texts(new)))
+    return tuple(found)
+
+
+def _check_lengths(source: Source, start: Ints, end: Ints) -> None:
+    """Check that the numbers of targets can be written with as many decimals again."""
+    long = np.flatnonzero(end - start > MOST_DIGITS)
+    if len(long):
+        line = source.line_of(int(start[long[0]]))
+        problem = f"a number of the target has more than {MOST_DIGITS:,} digits"
+        cure = "Write it with 15 digits at most: a controller reads no more"
+        raise ProgramError(source.name, problem, cure, line=line)

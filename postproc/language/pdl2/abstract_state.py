@@ -1,0 +1,252 @@
+"""The abstract store: what variables hold, and where the arm came from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from postproc.diagnostics import Code
+from postproc.language.pdl2.values import Nothing, Value, add_unknown, join
+
+# A mapping that is cheap to copy and to compare: what copies share stays shared.
+
+T = TypeVar("T")
+_COUNT = 256
+
+
+class CowMap(Generic[T]):
+    """Values by key on 256 shelves; a copy shares a shelf until one side writes to it.
+
+    An analysis keeps one copy for every place of a program, and merges copies that
+    differ in a few keys of thousands: both cost what differs, not what is held.
+    """
+
+    __slots__ = ("_mine", "_shelves")
+
+    def __init__(self) -> None:
+        self._shelves: list[dict[str, T]] = [{}] * _COUNT
+        self._mine: set[int] | None = set()  # None: not even the row of shelves is
+
+    def copy(self) -> CowMap[T]:
+        """Return a mapping that can change on its own."""
+        other: CowMap[T] = CowMap.__new__(CowMap)
+        other._shelves = self._shelves
+        other._mine = self._mine = None
+        return other
+
+    def get(self, key: str) -> T | None:
+        """Return what a key holds, None where it holds nothing."""
+        return self._shelves[hash(key) % _COUNT].get(key)
+
+    def __setitem__(self, key: str, value: T) -> None:
+        """Let a key hold a value."""
+        self._own(hash(key) % _COUNT)[key] = value
+
+    def __delitem__(self, key: str) -> None:
+        """Let a key hold nothing."""
+        self._own(hash(key) % _COUNT).pop(key, None)
+
+    def _own(self, at: int) -> dict[str, T]:
+        if self._mine is None:
+            self._shelves, self._mine = self._shelves.copy(), set()
+        if at not in self._mine:
+            self._shelves[at] = self._shelves[at].copy()
+            self._mine.add(at)
+        return self._shelves[at]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the keys."""
+        for shelf in self._shelves:
+            yield from shelf
+
+    def differing(self, other: CowMap[T]) -> list[str]:
+        """Return the keys that may hold other values in another mapping."""
+        found: list[str] = []
+        for mine, theirs in zip(self._shelves, other._shelves, strict=True):
+            if mine is not theirs:
+                found += [k for k, v in mine.items() if theirs.get(k) is not v]
+                found += [k for k in theirs if k not in mine]
+        return found
+
+
+# The abstract store: what variables hold, and where the arm came from.
+
+Settings = Mapping[str, Value]
+
+Log = tuple[str, "Log | None"]
+"""A key that was given a value, and those before it: copies share what they share."""
+
+MANY = -3  # origin: one of so many visits that they are not told apart
+MOST_ORIGINS = 500
+
+NEVER_SET = Nothing(
+    "it has no value in the program or its variable file", code=Code.NO_VALUE
+)
+
+
+@dataclass
+class Store:
+    """What is known at one point of a program.
+
+    Keys are ``program/name`` or ``program:routine/name``, followed by constant indices
+    and record fields: ``job/tab[3].place``. Only what the program has assigned is kept;
+    the rest is what it was when the program started.
+
+    Attributes:
+        values: Assigned values. A Nothing at ``job/tab`` hides its elements.
+        settings: Frames and motion variables; replaced, never changed.
+        last: Visits the arm may come from; START, ELSEWHERE or MANY.
+        logs: Elements and fields that a key has been given since it was forgotten,
+            by key; some of them may hold nothing any more.
+        compound: Keys that ever had elements or fields; shared by all copies.
+        changing: Variables, by key, that another program may write at any time.
+        exposed: Those of them that hold what this program has given them.
+    """
+
+    initial: Callable[[str], Value | None]
+    values: CowMap[Value] = field(default_factory=CowMap)
+    logs: CowMap[Log] = field(default_factory=CowMap)
+    settings: Settings = field(default_factory=dict)
+    last: frozenset[int] = frozenset()
+    compound: set[str] = field(default_factory=set)
+    changing: frozenset[str] = frozenset()
+    exposed: frozenset[str] = frozenset()
+
+    def copy(self) -> Store:
+        """Return a store that can change on its own."""
+        return Store(
+            self.initial,
+            self.values.copy(),
+            self.logs.copy(),
+            self.settings,
+            self.last,
+            self.compound,
+            self.changing,
+            self.exposed,
+        )
+
+    def read(self, key: str) -> Value:
+        """Return what a key holds."""
+        found = self.get_assigned(key)
+        if found is None:
+            found = self.initial(key)
+        return NEVER_SET if found is None else found
+
+    def get_assigned(self, key: str) -> Value | None:
+        """Return what the program has given a key, None where it has not."""
+        found = self.values.get(key)
+        if found is not None:
+            return found
+        hidden = self._find_hidden(key)
+        return None if hidden is None else add_unknown(hidden, self.initial(key))
+
+    def _find_hidden(self, key: str) -> Nothing | None:
+        """Return the unknown array or record that an element belongs to."""
+        for whole in wholes(key):
+            found = self.values.get(whole)
+            if isinstance(found, Nothing):
+                return found
+        return None
+
+    def write(self, key: str, value: Value) -> None:
+        """Let a key hold a value."""
+        if self.changing and (root := root_of(key)) in self.changing:
+            self.exposed |= {root}
+        if self.values.get(key) is None:
+            self._log(key)
+        self.values[key] = value
+
+    def _log(self, key: str) -> None:
+        """Enter a new key with all that it is an element or a field of."""
+        for whole in wholes(key):
+            self.logs[whole] = (key, self.logs.get(whole))
+            self.compound.add(whole)
+
+    def parts(self, key: str) -> list[str]:
+        """Return the keys of elements and fields that a key has."""
+        found: dict[str, None] = {}
+        log = self.logs.get(key)
+        while log is not None:
+            part, log = log
+            if self.values.get(part) is not None:
+                found[part] = None
+        return [*reversed(found)]
+
+    def drop(self, key: str) -> None:
+        """Let a key and all its elements and fields hold nothing."""
+        self._drop_parts(key)
+        del self.values[key]
+
+    def _drop_parts(self, key: str) -> None:
+        for part in self.parts(key):
+            del self.values[part]
+            del self.logs[part]
+        del self.logs[key]
+
+    def forget(self, key: str, unknown: Nothing) -> None:
+        """What a variable and all its elements hold is no longer known."""
+        held = self.read(key)
+        self._drop_parts(key)
+        self.write(key, add_unknown(unknown, held))
+
+    def set(self, **settings: Value) -> None:
+        """Change frames or motion variables (names without ``$``)."""
+        self.settings = {**self.settings, **settings}
+
+    def merge(self, other: Store) -> bool:
+        """Take in what may hold too; tell whether anything changed."""
+        changed = False
+        if MANY not in self.last and not other.last <= self.last:
+            self.last = _merge_origins(self.last, other.last)
+            changed = True
+        if other.settings is not self.settings and other.settings != self.settings:
+            merged = _merge_settings(self.settings, other.settings)
+            changed |= merged != self.settings
+            self.settings = merged
+        for key, mine, before, after in self._join(other):
+            if mine is None or after is not mine:
+                changed |= after != before
+                self.write(key, after)
+        return changed
+
+    def _join(self, other: Store) -> list[tuple[str, Value | None, Value, Value]]:
+        """Return what keys are given here, what they hold and what they may hold.
+
+        All is read before anything is written: an array hides its elements.
+        """
+        found = []
+        for key in self.values.differing(other.values):
+            mine, theirs = self.values.get(key), other.values.get(key)
+            before = self.read(key) if mine is None else mine
+            after = join(before, other.read(key) if theirs is None else theirs)
+            found.append((key, mine, before, after))
+        return found
+
+
+def root_of(key: str) -> str:
+    """Return the key of the variable that a key belongs to."""
+    return key.partition("[")[0].partition(".")[0]
+
+
+def wholes(key: str) -> Iterator[str]:
+    """Yield the keys of what a key is an element or a field of, the innermost first.
+
+    >>> list(wholes("job/tab[3].place"))
+    ['job/tab[3]', 'job/tab']
+    """
+    at = len(key)
+    while (at := max(key.rfind("[", 0, at), key.rfind(".", 0, at))) > 0:
+        yield key[:at]
+
+
+def _merge_origins(a: frozenset[int], b: frozenset[int]) -> frozenset[int]:
+    """Unite two sets of origins; the sum of their sizes stays linear in the program."""
+    both = a | b
+    many = MANY in both or len(both) > MOST_ORIGINS
+    return frozenset({MANY}) if many else both
+
+
+def _merge_settings(a: Settings, b: Settings) -> Settings:
+    unset = Nothing("it is set on one way only")
+    return {name: join(a.get(name, unset), b.get(name, unset)) for name in {**a, **b}}

@@ -1,0 +1,114 @@
+"""Routines that the files at hand do not hold: what they do to arm and frames."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from fnmatch import fnmatchcase
+from functools import cache, lru_cache
+from pathlib import Path
+
+from postproc.diagnostics import Code
+from postproc.files import base_name
+from postproc.language.pdl2.job import World
+from postproc.language.pdl2.program import Program
+
+_LIST = Path(__file__).with_name("still_routines.txt")
+
+_BUILT_IN = frozenset(
+    "act_post array_dim1 array_dim2 bit_flip cond_disable cond_dsbl_all cond_enable "
+    "cond_enbl_all dir_get dir_set dv_state eof err_post err_str err_str_prog err_trap "
+    "fl_bytes_left fl_get_pos fl_set_pos fl_state ip_to_str key_lock "
+    "mem_space node_get_name node_set_name pos_in_range prog_state random "
+    "sensor_get_data sensor_get_ofst str_get_int str_get_real str_num str_strip "
+    "str_to_ip str_token table_add table_del var_info "
+    "win_attr win_clear win_color win_create win_del win_display win_get_crsr "
+    "win_line win_load win_popup win_remove win_save win_sel win_set_crsr win_size "
+    "win_state scrn_add scrn_clear scrn_create scrn_del scrn_get scrn_remove "
+    "scrn_set".split()
+)
+"""Built-in routines that no cell needs to speak of: they change their arguments."""
+
+TRACKING = "sensor_trk"
+"""Built-in routine that lets a sensor lead the arm, or ends that."""
+
+
+class RoutineEffect(StrEnum):
+    """What a routine that is not at hand does."""
+
+    STILL = "motionless"  # it neither moves the arm nor sets frames
+    KNOWN = "known"  # likewise, says the list that is shipped
+    MOVES = "moves"
+    SETS_FRAMES = "sets-frames"
+    TABLE = "table"  # the cell file has a table of the frames that it sets
+    TRACKS = "tracks"  # a sensor leads the arm, or does no more
+    UNKNOWN = "unknown"
+
+
+@cache
+def list_motionless() -> frozenset[str]:
+    """Return the names of the shipped list.
+
+    >>> "spot" in known_still(), "tf" in known_still()
+    (True, False)
+    """
+    lines = (line.partition("#")[0] for line in _LIST.read_text("ascii").splitlines())
+    return frozenset(filter(None, map(str.strip, lines)))
+
+
+def effect_of(world: World, program: Program, name: str) -> RoutineEffect:
+    """Tell what a routine, or a program, that the job does not hold does.
+
+    What the cell says of a routine holds; what it says by pattern comes after what it
+    says by name, and the shipped list last, unless calls are taken strictly.
+
+    Args:
+        world: The files of the job.
+        program: The one that calls it.
+        name: In lower case.
+    """
+    start = world.start
+    if name in start.frame_tables:
+        return RoutineEffect.TABLE
+    full = _full_names(program, name)
+    for said in (start.routines.get(one) for one in (name, *full)):
+        if said is not None:
+            return RoutineEffect(said)
+    if matches(start.motionless, (name, *full[:1])):
+        return RoutineEffect.STILL
+    if name == TRACKING:
+        return RoutineEffect.TRACKS
+    if name in _BUILT_IN:
+        return RoutineEffect.STILL
+    known = not start.assume_motion and name in list_motionless()
+    return RoutineEffect.KNOWN if known else RoutineEffect.UNKNOWN
+
+
+def _full_names(program: Program, name: str) -> tuple[str, ...]:
+    """Return ``program.routine`` where one program can hold it, else nothing."""
+    exporter = program.outside.get(name)
+    holders = [exporter] if exporter else [*map(base_name, program.imports)]
+    return (f"{holders[0]}.{name}",) if len(set(holders)) == 1 else ()
+
+
+@lru_cache(maxsize=8192)
+def matches(patterns: tuple[str, ...], names: tuple[str, ...]) -> bool:
+    """Tell whether a pattern with ``*``, ``?`` means one of some names."""
+    return any(fnmatchcase(name, pattern) for name in names for pattern in patterns)
+
+
+def stays_still(world: World, program: Program, name: str) -> bool:
+    """Tell whether a routine that is not at hand does nothing to arm and frames."""
+    return effect_of(world, program, name) in (RoutineEffect.STILL, RoutineEffect.KNOWN)
+
+
+def report_unknown_routine(world: World, program: Program, row: int, name: str) -> None:
+    """Say, once for each routine, what to put into the cell file about it."""
+    text = (
+        f"{name} is not in the files at hand and may move the arm and set frames: "
+        "targets after it are left as they are until these are set again. To have them "
+        "compensated, paste under [routines] in the cell file: "
+        f'{name} = "motionless" if it does neither, {name} = "moves" if it moves; if '
+        f"it sets frames, under [frames.routines.{name}] a row for each call: "
+        '"1,2" = { tool = [x, y, z, a, e, r], uframe = [x, y, z, a, e, r] }'
+    )
+    world.report_once(program, row, Code.UNKNOWN_ROUTINE, name, text)

@@ -1,0 +1,238 @@
+"""Points on the way of a move: MOVEFLY statements before it, laid out as it is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.language.language import ArcPiece, Splitter
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.clones import code_of
+from postproc.language.pdl2.pose_encoding import (
+    AT_APPROACH,
+    AT_VIA,
+    DEGREE_DECIMALS,
+    INSERTED,
+    MM_DECIMALS,
+)
+from postproc.language.pdl2.program import Program
+from postproc.language.source import CloneError, Edit, Source, Span, check_length
+
+_EVENT = re.compile(r"\b(AT|TIME|DISTANCE|PERCENT|SEGMENT|EVENT)\b", re.I)
+_ENABLE = re.compile(r"\bENABLE\b(?!\s+CONDITION\s*\[\s*\d+\s*\])", re.I)
+_ENABLED = re.compile(r"\bENABLE\s+CONDITION\b", re.I)
+_ADVANCE = re.compile(r"\bADVANCE\b", re.I)
+_WITH = re.compile(r"\bWITH\b.*", re.I)
+_VIA = re.compile(r"\bVIA\s+(POS\s*\([^()]*\))", re.I)
+_HEAD = re.compile(r"(\s*)MOVE(?:FLY)?\s+(ARM\s*\[\s*\d+\s*\]\s+)?", re.I)
+
+_MOTION = frozenset(
+    "$lin_spd $rot_spd $spd_opt $arm_spd_ovr $prog_spd_ovr $fly_type $fly_per "
+    "$fly_dist $fly_traj $stress_per $term_type $move_type $ornt_type $cnfg_care "
+    "$turn_care $jnt_mturn".split()
+)
+
+
+@dataclass(frozen=True)
+class Pdl2Splitter(Splitter):
+    """The program files of a job, to put points on the ways of moves.
+
+    Attributes:
+        programs: The files, parsed.
+    """
+
+    programs: Sequence[Program]
+
+    def hinders(self, file: int, line: int) -> str:
+        """Say why a move must stay in one piece, see `Splitter.hinders`."""
+        if self._events:
+            return self._events
+        program = self.programs[file]
+        row = int(np.searchsorted(program.lines.line, line))
+        move = program.statement(row)
+        if not isinstance(move, ast.Move) or int(program.lines.line[row]) != line:
+            return "it does not stand alone on its line"
+        for problem, hinders in (
+            ("it ends on a condition (TIL)", move.til is not None),
+            ("a condition is enabled along it (WITH CONDITION)", move.conditions),
+            ("another arm moves along (SYNCMOVE)", move.sync),
+            ("it does not go TO a place", move.how != "TO" or len(move.where) != 1),
+        ):
+            if hinders:
+                return problem
+        return _in_its_text(program, row)
+
+    @cached_property
+    def _events(self) -> str:
+        """Why no move may be split: what may count the segments of a motion."""
+        handled = any(_has_events(program) for program in self.programs)
+        if handled:
+            return "a condition on events along a move may be enabled"
+        if any(_enables_others(program) for program in self.programs):
+            return "a condition that these files do not define may be enabled"
+        return ""
+
+    def stops(self, file: int, line: int) -> bool:
+        """Tell whether the arm may stop once more, see `Splitter.stops`."""
+        program = self.programs[file]
+        row = int(np.searchsorted(program.lines.line, line)) - 1
+        while row >= 0 and _is_setting(program.statement(row)):
+            row -= 1
+        return row >= 0 and isinstance(program.statement(row), ast.Move)
+
+    def points(
+        self, file: int, line: int, numbers: Floats, config: str, stop: bool
+    ) -> Edit:
+        """Write moves to points before another one, see `Splitter.points`."""
+        form = _Form.of(self.programs[file], line)
+        text = ""
+        for number, own in enumerate(numbers):
+            way = f"LINEAR TO {_place(own, config)}"
+            text += form.line(way, stop and number == 0)
+        return form.before(text)
+
+    def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
+        """Write a stop to approach a target from, see `Splitter.approach`."""
+        form = _Form.of(self.programs[file], line)
+        way = f"LINEAR TO {_place(numbers, config)}"
+        return form.before(form.line(way, True, AT_APPROACH))
+
+    def arc(
+        self,
+        file: int,
+        line: int,
+        pieces: Sequence[ArcPiece],
+        via: Floats,
+        config: str,
+        stop: bool,
+    ) -> list[Edit]:
+        """Write pieces of an arc before its move, see `Splitter.arc`."""
+        form = _Form.of(self.programs[file], line)
+        old = _VIA.search(form.code)
+        if old is None:
+            raise CloneError("the point on its way does not stand in the move")
+        text = ""
+        for number, piece in enumerate(pieces):
+            end = old[1] if piece.end is None else _place(piece.end, config)
+            way = f"LINEAR TO {end}"
+            if piece.via is not None:
+                way = f"CIRCULAR TO {end} VIA {_place(piece.via, config)}"
+            mark = AT_VIA if piece.at_via else ""
+            text += form.line(way, stop and number == 0, mark)
+        start = form.start + old.start(1)
+        new = _place(via, config)
+        check_length(form.source, len(form.code) + len(new) - len(old[1]))
+        span = Span(start, start + len(old[1]))
+        return [form.before(text), Edit(span, new.encode("latin-1"))]
+
+
+@dataclass(frozen=True)
+class _Form:
+    """How a move is laid out: what the points in front of it look like.
+
+    Attributes:
+        source: Its file.
+        start: Offset of its line there.
+        code: Its line, without the comment.
+        indent, arm, settings: What begins the line, names the arm, and is set.
+    """
+
+    source: Source
+    start: int
+    code: str
+    indent: str
+    arm: str
+    settings: str
+
+    @classmethod
+    def of(cls, program: Program, line: int) -> _Form:
+        """Look at a move.
+
+        Raises:
+            CloneError: It is not understood.
+        """
+        source, code = program.lines.source, code_of(program, line).rstrip()
+        head, settings = _HEAD.match(code), _WITH.search(code)
+        if head is None:
+            raise CloneError("the move is not understood")
+        rest = f" {settings[0]}" if settings else ""
+        start = int(source.line_starts[line - 1])
+        return cls(source, start, code, head[1], head[2] or "", rest)
+
+    def line(self, way: str, stops: bool, mark: str = "") -> str:
+        """Write a move; a way is told by its trajectory and its points."""
+        word, advance = ("MOVE", "") if stops else ("MOVEFLY", " ADVANCE")
+        one = f"{word} {self.arm}{way}{advance}{self.settings}"
+        new = f"{self.indent}{one} {INSERTED}{mark}"
+        check_length(self.source, len(new))
+        return new + self.source.newline.decode("ascii")
+
+    def before(self, text: str) -> Edit:
+        """Put lines in front of the move."""
+        return Edit(Span(self.start, self.start), text.encode("latin-1"))
+
+
+def _place(numbers: Floats, config: str) -> str:
+    """Write a position, its numbers (6,)."""
+    told = ", ".join(
+        f"{x:.{MM_DECIMALS if k < 3 else DEGREE_DECIMALS}f}"
+        for k, x in enumerate(numbers.tolist())
+    )
+    return f"POS({told}, '{config}')"
+
+
+def _is_setting(statement: ast.Statement) -> bool:
+    """Tell whether a statement only sets how the arm moves: a port begins more."""
+    return isinstance(statement, ast.Assign) and statement.target.name in _MOTION
+
+
+def _in_its_text(program: Program, row: int) -> str:
+    """Say what in the text of a move hinders, "" where nothing does."""
+    lines = program.lines
+    line = int(lines.line[row])
+    code = code_of(program, line)
+    if _HEAD.match(code) is None or code.rstrip().endswith(","):
+        return "it stands on several lines"
+    settings = _WITH.search(code)
+    if settings and "(" in settings[0]:
+        return "a routine may be called for its settings (WITH)"
+    if _ADVANCE.search(code):
+        after = program.statement(row + 1) if row + 1 < len(lines) else None
+        if not isinstance(after, ast.Move):
+            return "the program goes on while it moves (ADVANCE)"
+    return ""
+
+
+def _code(program: Program, rows: range) -> str:
+    """Return the text of rows, without comments."""
+    lines = program.lines
+    first = int(lines.line[rows.start])
+    after = int(lines.line[rows.stop]) if rows.stop < len(lines) else None
+    last = len(lines.source.line_starts) + 1 if after is None else after
+    return "\n".join(code_of(program, line) for line in range(first, last))
+
+
+def _has_events(program: Program) -> bool:
+    """Tell whether a condition handler of a program may look at segments."""
+    bodies = (program.main, *program.routines.values())
+    return any(
+        _EVENT.search(_code(program, range(opener, end)))
+        for body in bodies
+        if body is not None
+        for opener, end in body.blocks.handlers
+    )
+
+
+def _enables_others(program: Program) -> bool:
+    """Tell whether a program enables conditions that it does not define itself."""
+    bodies = [b for b in (program.main, *program.routines.values()) if b is not None]
+    if not len(program.lines):
+        return False
+    code = _code(program, range(len(program.lines)))
+    own = any(body.blocks.handlers for body in bodies)
+    return bool(_ENABLE.search(code)) or bool(_ENABLED.search(code) and not own)

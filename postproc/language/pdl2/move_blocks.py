@@ -1,0 +1,530 @@
+"""Blocks of moves to known places, run a thousand at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import islice
+
+import numpy as np
+
+from postproc.arrays import Bools, Ints
+from postproc.language.logical_lines import Lines
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.calls import call_statement, calls_in_expressions
+from postproc.language.pdl2.external_routines import stays_still
+from postproc.language.pdl2.job import Place, World
+from postproc.language.pdl2.machine import (
+    HELD,
+    WRITTEN,
+    Execution,
+    Goal,
+    Machine,
+    MoveForm,
+    MoveRun,
+)
+from postproc.language.pdl2.moves import UNSURE, from_value, motion_of
+from postproc.language.pdl2.side_effects import (
+    CHANGING,
+    PURE,
+    invocations,
+    references,
+)
+from postproc.language.pdl2.values import Nothing
+from postproc.language.symbol_column import NameColumn
+from postproc.language.templates import alike, name_index, number_in_order
+from postproc.robot.trajectory import Motion
+
+# Lines that are run a thousand at a time: moves to known places, idle calls.
+#
+# Such a line changes the store, if at all, in the same way however often it is run, and
+# reads nothing that another one changes: running one line of every variant runs them
+# all. Whether a line is quiet is told by the text alone, so that a stretch of them is
+# the same stretch each time that the analysis comes to it.
+
+_POINTS = ("position", "xtndpos", "jointpos")
+_NOT_WITH = ("$move_type", "$tool", "$base", "$uframe")
+
+
+@dataclass(frozen=True)
+class PointVariable:
+    """A variable that moves go to.
+
+    Attributes:
+        key: Where it is stored; of an array's elements the beginning.
+        index: Number slots of an element's index.
+    """
+
+    key: str
+    index: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class PlainMoves:
+    """The quiet lines of a body.
+
+    Attributes:
+        first: Row of the first line that `variant` tells of.
+        variant: Index into `statements` of every row, (n,), -1 where it is not quiet.
+        statements: What the lines of each variant say, but for numbers and points.
+        forms: What moves of each variant have in common, but for their trajectory;
+            None for calls.
+        calls: Which of them call something.
+        named: Which of them are moves to points.
+        points: The point that lines of a shape go to, unless `name` tells it.
+        prefix: What keys of the program's own variables begin with.
+        names: Names, in lower case, of the program's own variables that lines go to.
+        rows: Their rows in the variable file, -1 where it tells none.
+        name: Index into `names` for every row, (n,), -1 for none.
+        ends: Rows at which stretches end, ascending.
+    """
+
+    first: int
+    variant: Ints
+    statements: tuple[ast.Statement, ...]
+    forms: tuple[MoveForm | None, ...]
+    calls: tuple[bool, ...]
+    named: tuple[bool, ...]
+    points: Mapping[int, PointVariable]
+    prefix: str
+    names: NameColumn
+    rows: Ints
+    name: Ints
+    ends: Ints
+
+    def end(self, row: int) -> int:
+        """Return the row after the stretch of a move, the row itself if none."""
+        at = self.variant[row - self.first] if self.first <= row else -1
+        if at < 0 or not isinstance(self.statements[at], ast.Move):
+            return row
+        return int(self.ends[np.searchsorted(self.ends, row, side="right")])
+
+
+def find_plain_moves(
+    world: World, place: Place, volatile: frozenset[str], may_be: Bools
+) -> PlainMoves:
+    """Find the quiet lines of a body.
+
+    Args:
+        world: The files of the job.
+        place: The body.
+        volatile: Names that condition handlers change.
+        may_be: Which shapes of the program may be those of quiet lines, (k,).
+    """
+    program, body = place.program, place.body
+    first = body.first + 1
+    used, own = np.unique(program.lines.shape[first : body.last], return_inverse=True)
+    variants = _Variants(world, place, volatile, used)
+    of_shape = np.full(len(used), -1, dtype=np.int64)
+    shapes = used[may_be[used]]
+    forms = program.statements.form[shapes]
+    kinds, begins = np.unique(np.sort(forms), return_index=True)
+    groups = np.split(shapes[np.argsort(forms, kind="stable")], begins[1:])
+    for form, mine in zip(kinds.tolist(), groups, strict=False):
+        of_shape[np.searchsorted(used, mine)] = variants.add(form, mine)
+    variant = of_shape[own]
+    joins = np.array(sorted(body.blocks.joins), dtype=np.int64)
+    ends = np.concatenate([first + np.flatnonzero(variant < 0), joins, [body.last]])
+    said = variants.statements
+    return PlainMoves(
+        first,
+        variant,
+        tuple(said),
+        tuple(_form(one) if isinstance(one, ast.Move) else None for one in said),
+        tuple(any(_calls(world, place, one)) for one in said),
+        tuple(_goes_to_point(one) for one in said),
+        variants.points,
+        variants.prefix,
+        variants.names,
+        world.initial.rows(variants.prefix, variants.names),
+        variants.name[own],
+        np.unique(ends),
+    )
+
+
+def _may_be_plain(said: ast.Statement) -> bool:
+    if isinstance(said, ast.Call):
+        return not said.program
+    return isinstance(said, ast.Move) and _is_plain(said)
+
+
+def _is_plain(move: ast.Move) -> bool:
+    """Tell whether a move goes to numbers or a variable; WITH may set numbers."""
+    if move.how != "TO" or move.trajectory not in ("JOINT", "LINEAR", ""):
+        return False
+    if move.arm or move.via or move.til is not None or move.sync:
+        return False
+    for reference, value in move.settings:
+        plain = reference.name.startswith("$") and not reference.steps
+        if not (plain and isinstance(value, ast.Number)) or reference.name in _NOT_WITH:
+            return False
+    match move.where[0]:
+        case ast.Invoke("pos", (*items, ast.Text(_))) | ast.Aggregate(items):
+            return _six_numbers(items)
+        case ast.Invoke("pos", items):
+            return _six_numbers(items)
+        case ast.Reference(name, () | (ast.Index(_),)):
+            return not name.startswith("$")
+    return False
+
+
+def _goes_to_point(said: ast.Statement) -> bool:
+    return isinstance(said, ast.Move) and isinstance(said.where[0], ast.Reference)
+
+
+def _form(move: ast.Move) -> MoveForm:
+    """Return what moves of a variant have in common, but for their trajectory."""
+    slots: tuple[int, ...] = ()
+    items, where = _literal_items(move.where[0]), move.where[0]
+    if not isinstance(where, ast.Reference):
+        slots = tuple(i.slot for i in items[:6] if isinstance(i, ast.Number))
+    config = items[6] if len(items) > 6 else None
+    return MoveForm(
+        Motion.JOINT,
+        fly=move.fly,
+        slots=slots,
+        joints=isinstance(where, ast.Aggregate),
+        config=config.value if isinstance(config, ast.Text) else None,
+        overrides=tuple(
+            (reference.name.lstrip("$"), value.slot)
+            for reference, value in move.settings
+            if isinstance(value, ast.Number)
+        ),
+    )
+
+
+def _literal_items(literal: ast.Expression) -> tuple[ast.Expression | None, ...]:
+    """Return what stands between the brackets of ``{..}`` or ``POS(..)``."""
+    if isinstance(literal, ast.Aggregate):
+        return literal.items
+    return literal.arguments if isinstance(literal, ast.Invoke) else ()
+
+
+def _six_numbers(items: object) -> bool:
+    assert isinstance(items, tuple | list)
+    return len(items) == 6 and all(isinstance(i, ast.Number) for i in items)
+
+
+@dataclass
+class _Variants:
+    """The variants of quiet lines of a body, as they are found."""
+
+    world: World
+    place: Place
+    volatile: frozenset[str]
+    shapes: Ints  # of the body, ascending
+
+    def __post_init__(self) -> None:
+        self.statements: list[ast.Statement] = []
+        self.points: dict[int, PointVariable] = {}
+        self._known: dict[tuple[int, tuple[str, ...]], int] = {}
+        self._parameters = {p.name for p in self.place.body.parameters}
+        self.prefix = f"{self.place.program.name}/"
+        self.names = NameColumn()
+        self.name = np.full(len(self.shapes), -1, dtype=np.int64)
+
+    def add(self, form: int, shapes: Ints) -> Ints:
+        """Return the variants of shapes of one form, -1 where one is not quiet."""
+        said = self.place.program.statements
+        one = said.said[form]
+        where = one.where[0] if isinstance(one, ast.Move) else None
+        if len(shapes) == 1:
+            return np.array([self._add_one(int(shapes[0]), where)])
+        names = said.shapes.names_at(shapes)
+        if not isinstance(where, ast.Reference):
+            return self._variants(shapes, names)
+        index, at = _number_slots(where.steps), name_index(where.name)
+        variants = np.full(len(shapes), -1)
+        if index is None:
+            return variants
+        goal, which = NameColumn([where.name]), np.zeros(len(shapes), dtype=np.int64)
+        if at >= 0:
+            used, which = np.unique(names[:, at], return_inverse=True)
+            goal = said.shapes.names.take(used.astype(np.int64)).lower()
+            names = np.delete(names, at, axis=1)
+        quiet = self._points(shapes, goal, which, index, array=bool(where.steps))
+        variants[quiet] = self._variants(shapes[quiet], names[quiet])
+        return variants
+
+    def _add_one(self, shape: int, where: ast.Expression | None) -> int:
+        """Return the variant of the one shape of a form: not worth an array pass."""
+        names = self.place.program.lines.shapes.names_of(shape)
+        if isinstance(where, ast.Reference):
+            index, at = _number_slots(where.steps), name_index(where.name)
+            name = names[at].lower() if at >= 0 else where.name
+            if index is None or not self._is_point(name, array=bool(where.steps)):
+                return -1
+            self.points[shape] = PointVariable(self.world.root(self.place, name), index)
+            names = names[:at] + names[at + 1 :] if at >= 0 else names
+        return self._variant(shape, names)
+
+    def _points(
+        self,
+        shapes: Ints,
+        goal: NameColumn,
+        which: Ints,
+        index: tuple[int, ...],
+        array: bool,
+    ) -> Bools:
+        """Enter where shapes go, and tell which of them go to a point, (m,).
+
+        Args:
+            shapes: Shapes of one form, (m,).
+            goal: Names that they go to.
+            which: The one of each, (m,).
+            index: Number slots of an element's index.
+            array: Whether there is any.
+        """
+        place = self.place
+        declared = place.program.variables
+        points = declared.passing(goal, lambda said: _is_point(said.type, array))
+        alone = ~declared.passing(goal, lambda said: bool(said.exported))
+        alone &= not array and not any(mark in self.prefix for mark in "[.")
+        hidden = NameColumn(sorted(place.body.own_names | self.volatile)).find(goal)
+        for k in np.flatnonzero(hidden >= 0).tolist():
+            points[k], alone[k] = self._is_point(goal[k], array), False
+        own = np.flatnonzero((points & alone)[which])
+        at = np.searchsorted(self.shapes, shapes[own])
+        self.name[at] = len(self.names) + which[own]
+        self.names.extend(goal)
+        for k in np.flatnonzero((points & ~alone)[which]).tolist():
+            key = self.world.root(place, goal[which[k]])
+            self.points[int(shapes[k])] = PointVariable(key, index)
+        found: Bools = points[which]
+        return found
+
+    def _variants(self, shapes: Ints, names: Ints) -> Ints:
+        """Return the variants of shapes of one form with some names, (m,)."""
+        ends = names.shape[1] * np.arange(1, len(shapes) + 1)
+        kind = alike(names.ravel(), ends - names.shape[1], ends)
+        texts = self.place.program.lines.shapes.names
+        found = [
+            self._variant(int(shapes[k]), tuple([texts[i] for i in names[k].tolist()]))
+            for k in number_in_order(kind)[1].tolist()
+        ]
+        return np.array(found, dtype=np.int64)[kind]
+
+    def _variant(self, shape: int, names: tuple[str, ...]) -> int:
+        """Return the variant of a shape, which its form and some names tell."""
+        said = self.place.program.statements
+        key = int(said.form[shape]), names
+        variant = self._known.get(key)
+        if variant is None:
+            variant = -1
+            if self._is_quiet(said[shape]):
+                variant = len(self.statements)
+                self.statements.append(said[shape])
+            self._known[key] = variant
+        return variant
+
+    def _is_point(self, name: str, array: bool) -> bool:
+        """Tell whether a name is a variable whose value no call changes unseen."""
+        if name in self._parameters or name in self.volatile:
+            return False
+        return _is_point(self.world.type_of(self.place, name), array)
+
+    def _is_quiet(self, said: ast.Statement) -> bool:
+        return all(self._does_nothing(c) for c in _calls(self.world, self.place, said))
+
+    def _does_nothing(self, call: ast.Invoke) -> bool:
+        """Tell whether a call neither moves the arm nor sets what moves depend on."""
+        name = call.name
+        if self.world.find_routine(self.place.program, name) is not None:
+            return False
+        bare = name not in CHANGING and name not in PURE
+        if bare and not stays_still(self.world, self.place.program, name):
+            return False
+        return all(self._keeps(a, bare) for a in call.arguments)
+
+    def _keeps(self, argument: ast.Expression | None, bare: bool) -> bool:
+        """Tell whether nothing that moves depend on is known by an argument's name."""
+        match argument:
+            case None | ast.Number() | ast.Text() | ast.Unary(_, ast.Number()):
+                return True
+            case ast.Reference(name, ()):
+                type_ = self.world.type_of(self.place, name)
+                safe = type_ is None or (
+                    type_.name not in _POINTS and not type_.array and not type_.path
+                )
+                known = name.startswith("$") or name in self._parameters
+                return bare and safe and not known
+        return False
+
+
+def _is_point(type_: ast.Type | None, array: bool) -> bool:
+    """Tell whether a type is that of a point, or of an array of them."""
+    if type_ is None or type_.name not in _POINTS or type_.path:
+        return False
+    return type_.array == array
+
+
+def _number_slots(steps: tuple[str | ast.Index, ...]) -> tuple[int, ...] | None:
+    """Return the slots of an index that is written in numbers, None for any other."""
+    index = [
+        i for step in steps if isinstance(step, ast.Index) for i in step.subscripts
+    ]
+    slots = tuple(i.slot for i in index if isinstance(i, ast.Number))
+    return slots if len(slots) == len(index) else None
+
+
+def _calls(world: World, place: Place, said: ast.Statement) -> list[ast.Invoke]:
+    """List the calls in a line, those by a function's name alone too."""
+    found = [c for c in invocations(said) if c.name not in PURE]
+    names = {r.name for r in references(said) if not r.steps}
+    found += [ast.Invoke(n, ()) for n in names if world.is_function(place, n)]
+    if isinstance(said, ast.Call):
+        found.append(ast.Invoke(said.name, said.arguments))
+    return found
+
+
+# Run a stretch of quiet lines at once.
+
+_NO_INDEX = Nothing("its index is known only at run time")
+
+
+@dataclass
+class MoveBlocks:
+    """The stretches of quiet lines of a job, found when a body is first come to."""
+
+    machine: Machine
+    quiet: dict[int, PlainMoves] = field(default_factory=dict)
+    _may_be: dict[int, Bools] = field(default_factory=dict)
+    _written: dict[tuple[int, int], MoveRun] = field(default_factory=dict)
+
+    def run(self, here: Execution) -> bool:
+        """Run the stretch that begins at a row; tell whether there is one.
+
+        Where a condition handler may move the arm at any time there is none: every
+        move may then come from elsewhere. Nor is there where the moves may be another
+        arm's.
+        """
+        if self.machine.interrupted or here.other_default():
+            return False
+        quiet = self._quiet(here)
+        end = quiet.end(here.row)
+        if end == here.row:
+            return False
+        first = (id(here.place.body), here.row)
+        run = self._written.get(first)
+        if run is None or run.settings is not here.store.settings:
+            rows = np.arange(here.row, end)
+            variant = quiet.variant[rows - quiet.first]
+            run = self._run_all(here, quiet, rows, variant)
+            calls = np.array(quiet.calls)[variant].any()
+            if not calls and (run.point == WRITTEN).all():
+                self._written[first] = run
+        self._record(here, run)
+        here.row = end
+        return True
+
+    def _run_all(
+        self, here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
+    ) -> MoveRun:
+        """Run the lines of a stretch; return its moves."""
+        forms = self._run_one_of_each(here, quiet, rows, variant)
+        moves = np.isin(variant, np.array([*forms], dtype=np.int64))
+        rows, variant = rows[moves], variant[moves]
+        here.row = int(rows[0])
+        point, goals = _points(here, quiet, rows, variant)
+        settings, nowhere = here.store.settings, frozenset[int]()
+        return MoveRun(
+            here.place, rows, variant, forms, nowhere, settings, point, goals
+        )
+
+    def _quiet(self, here: Execution) -> PlainMoves:
+        program, body = here.place.program, here.place.body
+        if id(program) not in self._may_be:
+            self._may_be[id(program)] = program.statements.which(_may_be_plain)
+        if id(body) not in self.quiet:
+            self.quiet[id(body)] = find_plain_moves(
+                here.world, here.place, here.volatile, self._may_be[id(program)]
+            )
+        return self.quiet[id(body)]
+
+    def _run_one_of_each(
+        self, here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
+    ) -> dict[int, MoveForm]:
+        """Let the first line of every variant have its effects.
+
+        Returns:
+            The forms of the moves, with their trajectories, by variant.
+        """
+        found, first = np.unique(variant, return_index=True)
+        forms = {}
+        for at in np.argsort(first).tolist():
+            here.row = int(rows[first[at]])
+            number = int(found[at])
+            statement, form = quiet.statements[number], quiet.forms[number]
+            if quiet.calls[number]:
+                calls_in_expressions(self.machine, here, statement)
+            if isinstance(statement, ast.Call):
+                call_statement(self.machine, here, statement)
+            elif isinstance(statement, ast.Move) and form is not None:
+                motion, reason = motion_of(here, statement, here.store.settings)
+                forms[number] = replace(form, motion=motion, reason=reason)
+        return forms
+
+    def _record(self, here: Execution, run: MoveRun) -> None:
+        """Record moves and let the arm stand at the end of the last.
+
+        Moves to written numbers are the same ones again under the same settings: what
+        differs is where the arm comes from.
+        """
+        here.row = int(run.rows[0])
+        come = self.machine.predecessors(here)
+        run = replace(run, predecessors=come, reason=here.reason)
+        base = self.machine.record(here, 0, run)
+        here.store.last = frozenset({base + len(run) - 1})
+
+
+def _points(
+    here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
+) -> tuple[Ints, dict[int, Goal]]:
+    """Look up the variables that moves go to, see `MoveRun`."""
+    program, initial = here.place.program, here.world.initial
+    point = np.full(len(rows), WRITTEN, dtype=np.int64)
+    goals: dict[int, Goal] = {}
+    named = np.flatnonzero(np.array(quiet.named, dtype=bool)[variant])
+    shapes = program.lines.shape[rows[named]]
+    own = quiet.name[rows[named] - quiet.first]
+    point[named] = HELD
+    point[named[own >= 0]] = quiet.rows[own[own >= 0]]
+    asked = (point[named] < 0) | _find_assigned(here, quiet, own)
+    some = (named[asked], shapes[asked], own[asked])
+    for at, shape, name in zip(*(column.tolist() for column in some), strict=True):
+        if name >= 0:
+            key = quiet.prefix + quiet.names[name]
+        else:
+            key = _key(program.lines, quiet.points[shape], int(rows[at]))
+        value = here.store.get_assigned(key) if key else _NO_INDEX
+        point[at] = initial.point(key) if value is None else HELD
+        if point[at] < 0:
+            value = value or here.store.read(key)
+            if isinstance(value, Nothing):
+                here.world.pin(value, UNSURE)
+            point[at], goals[at] = HELD, from_value(value)
+    return point, goals
+
+
+def _find_assigned(here: Execution, quiet: PlainMoves, names: Ints) -> Bools:
+    """Tell which of the program's own variables it has given a value itself, (m,)."""
+    values, found = here.store.values, np.zeros(len(names), dtype=bool)
+    own, prefix = np.flatnonzero(names >= 0), quiet.prefix
+    given = [*islice(values, len(own))]
+    if len(given) < len(own):  # all that there are
+        known = NameColumn(k[len(prefix) :] for k in given if k.startswith(prefix))
+        found[own] = (known.find(quiet.names) >= 0)[names[own]]
+    else:
+        keys = (prefix + quiet.names[name] for name in names[own].tolist())
+        found[own] = [values.get(key) is not None for key in keys]
+    return found
+
+
+def _key(lines: Lines, point: PointVariable, row: int) -> str:
+    """Return where the point of a move is stored, "" where its index is not known."""
+    if not point.index:
+        return point.key
+    index = [float(lines.value[lines.first[row] + slot]) for slot in point.index]
+    if not all(number.is_integer() for number in index):
+        return ""
+    return f"{point.key}[{','.join(str(int(number)) for number in index)}]"

@@ -1,0 +1,430 @@
+"""What a statement, a routine or a call may do, read off the text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import get_args
+
+import numpy as np
+
+from postproc.arrays import Ints
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.external_routines import (
+    TRACKING,
+    RoutineEffect,
+    effect_of,
+    report_unknown_routine,
+)
+from postproc.language.pdl2.job import Place, World
+from postproc.language.pdl2.program import Body, Program
+from postproc.language.visits import Visits
+
+# What a statement or a routine may do, read off its text.
+
+PURE = frozenset(
+    "pos vec jnt pos_shift pos_inv pos_frame pos_mir pos_xtrt jntp_to_pos arm_pos "
+    "arm_jntp arm_xtnd pos_comp_idl pos_idl_comp abs sqrt sin cos tan asin acos atan2 "
+    "ln exp round trunc ord chr str_len str_loc str_sub str_coding clock date "
+    "var_uninit bit_test array_dim1 array_dim2 path_len sys_call dv_cntrl".split()
+)
+"""Built-in functions: they change no argument and move nothing."""
+
+CHANGING = frozenset(
+    "pos_to_jntp pos_set_loc pos_set_rpy pos_set_norm pos_set_ornt pos_set_appr "
+    "pos_set_cnfg pos_get_loc pos_get_rpy pos_get_norm pos_get_ornt pos_get_appr "
+    "pos_get_cnfg str_cat str_ins str_del str_ovs str_xtrt bit_set bit_clear "
+    "bit_assign node_app node_del node_ins err_trap_on err_trap_off".split()
+)
+"""Built-in routines: they may change their arguments, nothing else."""
+
+
+FRAMES = ("tool", "base", "uframe")
+CANCELLING = (ast.CancelMove, ast.ExitCycle)
+
+# What text may do that is not understood.
+
+_WORD = re.compile(r"\$?[A-Za-z_]\w*")
+_CALL = re.compile(r"(?<![\w$.])([A-Za-z_]\w*)\s*\(")
+_HARMLESS = re.compile(
+    r"(?:(?:IF|ELSE|ENDIF|SELECT|CASE|ENDSELECT|FOR|ENDFOR|WHILE|ENDWHILE|REPEAT|UNTIL|"
+    r"WAIT|SIGNAL|DELAY|PULSE|WRITE|READ|ENCODE|DECODE|OPEN|CLOSE|ENABLE|DISABLE)\b|"
+    r"\$?\w+(?:\[[^\]]*\]|\.\$?\w+)*\s*:=)",
+    re.I,
+)
+_MOVING = re.compile(r"\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b|\$ARM_DATA\b", re.I)
+_NO_CALLS = frozenset(
+    "if select case for while until wait write read encode decode open and or not div "
+    "mod then do of to downto step xor condition event".split()
+)
+
+
+def words_in(text: str) -> frozenset[str]:
+    """Return the names in a text, in lower case, system variables with ``$``."""
+    return frozenset(word.lower() for word in _WORD.findall(text))
+
+
+def is_harmless(text: str) -> bool:
+    """Tell whether a statement that is not understood does nothing to the arm.
+
+    It must begin like one that cannot move the arm or set frames (an assignment sets
+    what it names), and call nothing but built-in functions.
+
+    >>> is_harmless("WAIT FOR $DIN[1] ?? 3"), is_harmless("WAIT FOR f(1) ?? 3")
+    (True, False)
+    >>> is_harmless("n := abs(3 3)"), is_harmless("FROBNICATE p WITH 3")
+    (True, False)
+    """
+    if not _HARMLESS.match(text) or _MOVING.search(text):
+        return False
+    called = {name.lower() for name in _CALL.findall(text)}
+    return called <= PURE | CHANGING | _NO_CALLS
+
+
+@dataclass(frozen=True)
+class Effects:
+    """What running a routine, and all it calls in its file, may do.
+
+    Attributes:
+        moves: It holds a move, or text that is not understood.
+        assigned: Names of variables and settings (with ``$``) it may change.
+        read: Names of variables and settings that occur in it.
+        calls: Names it calls that its file does not hold.
+        cancels: Statements of it that end moves on their way.
+    """
+
+    moves: bool
+    assigned: frozenset[str]
+    read: frozenset[str]
+    calls: frozenset[str]
+    cancels: frozenset[ast.CancelMove | ast.ExitCycle] = frozenset()
+
+
+def invocations(node: object) -> Iterator[ast.Invoke]:
+    """Yield the function calls in a statement or expression, inner ones first."""
+    return (part for part in _parts(node) if isinstance(part, ast.Invoke))
+
+
+def references(node: object) -> Iterator[ast.Reference]:
+    """Yield the variables in a statement or expression."""
+    return (part for part in _parts(node) if isinstance(part, ast.Reference))
+
+
+_LEAVES = (str, int, float, type(None))
+_NODES = (ast.Statement, *get_args(ast.Expression), ast.Index)
+
+
+def _parts(node: object) -> list[object]:
+    """List a statement or expression with all that is in it, inner ones first."""
+    found: list[object] = []
+    _add_parts(node, found)
+    return found
+
+
+def _add_parts(node: object, found: list[object]) -> None:
+    if isinstance(node, tuple):
+        for part in node:
+            _add_parts(part, found)
+    elif isinstance(node, _NODES):
+        for name in node.__slots__:
+            part = getattr(node, name)
+            if not isinstance(part, _LEAVES):
+                _add_parts(part, found)
+        found.append(node)
+
+
+def list_changed_arguments(
+    arguments: tuple[ast.Expression | None, ...],
+) -> list[ast.Reference]:
+    """Return the arguments that go by reference: variables by themselves."""
+    return [a for a in arguments if isinstance(a, ast.Reference)]
+
+
+def body_effects(program: Program, body: Body) -> Effects:
+    """Return what a body may do, with all routines of its file that it reaches."""
+    return rows_effects(program, body.first, body.last)
+
+
+def rows_effects(program: Program, first: int, last: int) -> Effects:
+    """Return what the statements of rows first to last - 1 may do."""
+    own, names = _reach(program, _shapes(program, first, last))
+    return _unite(program, own, names)
+
+
+def _own_effects(program: Program, first: int, last: int) -> Effects:
+    """Return what the statements of rows do, without the routines that they call."""
+    own = [_direct(program.statements[s]) for s in _shapes(program, first, last)]
+    return _unite(program, own, frozenset().union(*(e.calls for e in own)))
+
+
+def _unite(program: Program, own: list[Effects], names: frozenset[str]) -> Effects:
+    return Effects(
+        any(e.moves for e in own),
+        frozenset().union(*(e.assigned for e in own)),
+        frozenset().union(*(e.read for e in own)),
+        frozenset(n for n in names if n not in program.routines),
+        frozenset().union(*(e.cancels for e in own)),
+    )
+
+
+def _shapes(program: Program, first: int, last: int) -> tuple[int, ...]:
+    return tuple(np.unique(program.lines.shape[first:last]).tolist())
+
+
+def _reach(
+    program: Program, shapes: tuple[int, ...]
+) -> tuple[list[Effects], frozenset[str]]:
+    found = [_direct(program.statements[s]) for s in shapes]
+    waiting = [n for e in found for n in e.calls | e.read]
+    done: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        if name in done:
+            continue
+        done.add(name)
+        body = program.routines.get(name)
+        if body is not None:
+            for shape in _shapes(program, body.first, body.last):
+                effects = _direct(program.statements[shape])
+                found.append(effects)
+                waiting += effects.calls | effects.read
+    named = frozenset().union(*(e.calls for e in found))
+    return found, frozenset(done) & named
+
+
+@lru_cache(maxsize=8192)
+def _direct(statement: ast.Statement) -> Effects:
+    assigned: set[str] = set()
+    calls = {i.name for i in invocations(statement)}
+    moves = False
+    action = ast.action(statement)
+    cancels = frozenset([action] if isinstance(action, CANCELLING) else [])
+    match statement:
+        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
+            if then is not None:
+                inner = _direct(then)
+                moves, assigned = inner.moves, set(inner.assigned)
+                calls |= inner.calls
+        case ast.Move():
+            moves = True
+        case ast.Unknown(text):
+            moves, assigned = True, set(words_in(text))
+            if not is_harmless(text):
+                assigned |= {f"${frame}" for frame in FRAMES}
+        case ast.Assign(target):
+            assigned.add(_name_assigned(target))
+        case ast.For(name):
+            assigned.add(name)
+        case ast.Transfer(word, operands) if word != "WRITE":
+            assigned |= {_name_assigned(o) for o in list_changed_arguments(operands)}
+        case ast.Call(name, arguments):
+            calls.add(name)
+            assigned |= {_name_assigned(a) for a in list_changed_arguments(arguments)}
+    for call in invocations(statement):
+        if call.name not in PURE:
+            changed = list_changed_arguments(call.arguments)
+            assigned |= {_name_assigned(a) for a in changed}
+    if TRACKING in calls:
+        assigned.add(f"${TRACKING}")
+    read = frozenset(reference.name for reference in references(statement))
+    called = frozenset(calls - PURE - CHANGING)
+    return Effects(moves, frozenset(assigned), read, called, cancels)
+
+
+def _name_assigned(reference: ast.Reference) -> str:
+    if reference.name == "$arm_data" and len(reference.steps) >= 2:
+        return f"${str(reference.steps[1]).lstrip('$')}"
+    return reference.name
+
+
+# What a call or a handler may do, through all files of the job.
+
+
+@dataclass(frozen=True)
+class LiveRows:
+    """Rows that may run: those of one body, or some of them.
+
+    Attributes:
+        place: Where they stand.
+        effects: What they may do themselves; what they call are parts of their own.
+    """
+
+    place: Place
+    effects: Effects
+
+
+@dataclass(frozen=True)
+class CallGraph:
+    """All that may run because something runs.
+
+    Attributes:
+        parts: What runs first, then what it calls, in any file of the job.
+        moves: It may move the arm, itself or by a routine that the job does not hold.
+        frames: A routine that the job does not hold may set frames.
+    """
+
+    parts: tuple[LiveRows, ...]
+    moves: bool
+    frames: bool
+
+    @property
+    def cancels(self) -> frozenset[ast.CancelMove | ast.ExitCycle]:
+        """Statements that end moves on their way."""
+        return frozenset().union(*(part.effects.cancels for part in self.parts))
+
+    @property
+    def assigned(self) -> frozenset[str]:
+        """Names of variables and settings (with ``$``) that may change."""
+        names = frozenset().union(*(part.effects.assigned for part in self.parts))
+        return names | {f"${frame}" for frame in FRAMES if self.frames}
+
+
+def call_graph_of(world: World, place: Place) -> CallGraph:
+    """Follow a body into all that it calls; remembered for each body."""
+    key = id(place.body)
+    if key not in world.reached:
+        world.reached[key] = live_rows(world, place, place.body.first, place.body.last)
+    found = world.reached[key]
+    assert isinstance(found, CallGraph)
+    return found
+
+
+def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
+    """Follow rows first to last - 1 of a body into all that they call."""
+    parts = [LiveRows(place, _own_effects(place.program, first, last))]
+    done, waiting = {id(place.body)}, list(_list_called(world, place, first, last))
+    if (first, last) != (place.body.first, place.body.last):
+        done.clear()  # the rest of the body may be called from these rows
+    while waiting:
+        one = waiting.pop()
+        if id(one.body) not in done:
+            done.add(id(one.body))
+            rows = (one.body.first, one.body.last)
+            parts.append(LiveRows(one, _own_effects(one.program, *rows)))
+            waiting += _list_called(world, one, *rows)
+    outside = {effect for part in parts for effect in _outside(world, part)}
+    moves = {RoutineEffect.MOVES, RoutineEffect.TRACKS, RoutineEffect.UNKNOWN}
+    return CallGraph(
+        tuple(parts),
+        any(part.effects.moves for part in parts) or not outside.isdisjoint(moves),
+        not outside.isdisjoint(
+            {RoutineEffect.SETS_FRAMES, RoutineEffect.TABLE, RoutineEffect.UNKNOWN}
+        ),
+    )
+
+
+def _outside(world: World, part: LiveRows) -> Iterator[RoutineEffect]:
+    """Yield what the routines do that some rows call and the job does not hold."""
+    program = part.place.program
+    for name in sorted(part.effects.calls):
+        inside = world.find_routine(program, name) or world.find_program(program, name)
+        if inside is None:
+            effect = effect_of(world, program, name)
+            if effect is RoutineEffect.UNKNOWN:
+                report_unknown_routine(world, program, part.place.body.first, name)
+            yield effect
+
+
+def _list_called(world: World, place: Place, first: int, last: int) -> Iterator[Place]:
+    """Yield the bodies that rows name, as calls or in expressions."""
+    lines = place.program.lines
+    for shape in np.unique(lines.shape[first:last]).tolist():
+        for name, whole in _names(place.program.statements[shape]):
+            find = world.find_program if whole else world.find_routine
+            found = find(place.program, name)
+            if found is not None:
+                yield found
+
+
+def circles(world: World) -> frozenset[int]:
+    """Return the bodies (by id) that may call themselves, and those between such.
+
+    Bodies that call none that is left are taken out, then those that none calls.
+    """
+    calls: dict[int, set[int]] = {}
+    for program in world.programs():
+        for body in filter(None, (program.main, *program.routines.values())):
+            called = _list_called(world, Place(program, body), body.first, body.last)
+            calls[id(body)] = {id(one.body) for one in called}
+    callers = _reverse_edges(_without_sinks(calls))
+    return frozenset(_without_sinks(callers))
+
+
+def _without_sinks(edges: Mapping[int, set[int]]) -> dict[int, set[int]]:
+    """Take out, again and again, what leads to nothing that is left."""
+    back, count = _reverse_edges(edges), {one: len(to) for one, to in edges.items()}
+    waiting = [one for one, left in count.items() if not left]
+    gone: set[int] = set()
+    while waiting:
+        sink = waiting.pop()
+        gone.add(sink)
+        for one in back[sink]:
+            count[one] -= 1
+            if not count[one]:
+                waiting.append(one)
+    return {one: to - gone for one, to in edges.items() if one not in gone}
+
+
+def _reverse_edges(edges: Mapping[int, set[int]]) -> dict[int, set[int]]:
+    """Turn the edges of a graph round."""
+    back: dict[int, set[int]] = {one: set() for one in edges}
+    for one, to in edges.items():
+        for other in to:
+            back[other].add(one)
+    return back
+
+
+def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
+    """Yield names that may be called, and whether each is that of a program."""
+    match statement:
+        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
+            if then is not None:
+                yield from _names(then)
+        case ast.Call(name, _, program):
+            yield name, program
+    for call in invocations(statement):
+        yield call.name, False
+    for reference in references(statement):
+        if not reference.steps:
+            yield reference.name, False
+
+
+# Moves that a program never comes to: their targets keep their values.
+
+
+def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
+    """Return the lines of moves that no way leads to, by file, (k,) ascending.
+
+    Args:
+        programs: The files of a job.
+        visits: Every arrival in them.
+    """
+    found = {}
+    for program in programs:
+        name = program.lines.source.name
+        moves = program.statements.which(_has_target)
+        lines = program.lines.line[moves[program.lines.shape]]
+        own = visits.file == visits.files.index(name)
+        missed = lines[~np.isin(lines, visits.line[own])]
+        if len(missed):
+            found[name] = missed
+    return found
+
+
+def _has_target(statement: ast.Statement) -> bool:
+    """Tell whether a line moves to a target, and not to a system variable.
+
+    A move that names its arm may be one of another arm, and does not count.
+    """
+    move = ast.action(statement)
+    return isinstance(move, ast.Move) and not move.arm and goes_to_target(move)
+
+
+def goes_to_target(move: ast.Move) -> bool:
+    """Tell whether a move goes to a place that is no system variable."""
+    if move.how != "TO":
+        return False
+    where = move.where[0] if move.where else None
+    return not (isinstance(where, ast.Reference) and where.name.startswith("$"))

@@ -1,0 +1,177 @@
+"""What the numbers and flags of a language's targets mean, and the words it uses."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+
+
+@dataclass(frozen=True)
+class Terms:
+    """How a language names what messages speak of.
+
+    Attributes:
+        tool, base, uframe: Its frames.
+        tool_remote: Says that the arm holds the part.
+        blend: Names of `Blend.OVERLAP`, its percentage, the zone's size and its rule,
+            with the values that are assumed where nothing is set.
+        corner: What decides how far a point is passed, and how to hit it.
+        branch_stops, branch_may_stop: Why a controller stops, or may, where a path
+            arrives on another branch than the flags say.
+        turn_stops, turn_may_stop: .. on another turn.
+        branch, nearest: Why flags that need not count are doubtful; the settings are
+            filled in.
+        wrist: .. on a line whose wrist turns joint by joint.
+        overruled: Says that flags are kept which the path does not follow.
+        law_unknown, angles, arc: Why the way between is not sure; the law's name is
+            filled in.
+        laws: Names of the `OrientationLaw` members, by their number.
+        border: Why flags of a joint so near a border must not be trusted; its number is
+            filled in.
+        cloning: Whether `--shared-points clone` writes a point of its own.
+    """
+
+    tool: str
+    base: str
+    uframe: str
+    tool_remote: str
+    blend: tuple[str, str, str, str]
+    corner: str
+    branch_stops: str
+    branch_may_stop: str
+    turn_stops: str
+    turn_may_stop: str
+    branch: str
+    nearest: str
+    wrist: str
+    overruled: str
+    law_unknown: str
+    angles: str
+    arc: str
+    laws: tuple[str, ...] = ()
+    border: str = ""
+    cloning: str = "see --shared-points clone"
+
+
+class Dialect(ABC):
+    """What the w numbers of a target mean.
+
+    The first three of a pose are its position [mm]. The first six of a joint target are
+    the joint angles [deg], the others count for nothing.
+
+    Attributes:
+        terms: Its words.
+        reflags: Flags depend on small moves, and are written anew.
+        flag_columns: Which numbers of a pose are flags.
+        heads: What tables head the numbers of a pose with, w words.
+        pose_decimals, joint_decimals: Least decimals of every written number, w each.
+    """
+
+    terms: Terms
+    heads: tuple[str, ...]
+    reflags: bool = False
+    flag_columns: tuple[int, ...] = ()
+    pose_decimals: tuple[int, ...]
+    joint_decimals: tuple[int, ...]
+
+    @property
+    def width(self) -> int:
+        """Return how many numbers a target has."""
+        return len(self.pose_decimals)
+
+    @abstractmethod
+    def poses(self, values: Floats) -> Floats:
+        """Return the poses (k, 4, 4) [m] that numbers (k, w) say."""
+
+    @abstractmethod
+    def rotate(self, values: Floats, by: Floats) -> Floats:
+        """Turn targets, and write them next to what is written.
+
+        Args:
+            values: Numbers of poses, (k, w).
+            by: Rotations in the frame of the numbers, (k, 3, 3).
+        """
+
+    def shift_rotations(self, angles: Floats) -> Floats:
+        """Return the rotations (k, 3, 3) that the angles (k, 3) [deg] of shifts say.
+
+        About x, about y as it is turned then, and about z likewise.
+        """
+        a, b, c = np.moveaxis(np.deg2rad(angles), -1, 0)
+        ca, sa, cb, sb, cc, sc = (f(x) for x in (a, b, c) for f in (np.cos, np.sin))
+        R = np.empty((*a.shape, 3, 3))
+        R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cb * cc, -cb * sc, sb
+        R[..., 1, 0], R[..., 1, 1] = sa * sb * cc + ca * sc, ca * cc - sa * sb * sc
+        R[..., 2, 0], R[..., 2, 1] = sa * sc - ca * sb * cc, ca * sb * sc + sa * cc
+        R[..., 1, 2], R[..., 2, 2] = -sa * cb, ca * cb
+        return R
+
+    def shift_angles(self, rotations: Floats, near: Floats) -> Floats:
+        """Return the angles of rotations (k, 3, 3) next to others (k, 3) [deg]."""
+        R = rotations
+        b = np.arctan2(R[:, 0, 2], np.hypot(R[:, 0, 0], R[:, 0, 1]))
+        a, c = np.arctan2(-R[:, 1, 2], R[:, 2, 2]), np.arctan2(-R[:, 0, 1], R[:, 0, 0])
+        one = np.rad2deg(np.stack([a, b, c], axis=1))
+        other = np.array([180.0, 180.0, 180.0]) + one * np.array([1.0, -1.0, 1.0])
+        both = np.stack([one, other])
+        both -= 360.0 * np.round((both - near) / 360.0)
+        gap = np.abs(both - near).max(axis=2)
+        return np.asarray(np.where((gap[0] <= gap[1])[:, None], both[0], both[1]))
+
+    @abstractmethod
+    def flags(
+        self, config: Ints, configs: tuple[str, ...], values: Floats
+    ) -> tuple[Ints, Floats]:
+        """Read the configuration flags of targets.
+
+        Args:
+            config: Index into `configs`, (n,).
+            configs: Configuration strings.
+            values: Numbers of the targets, (n, w).
+
+        Returns:
+            Slots 4 W + 2 S + E, (n,), and turns of axes 4, 6 and 3, (n, 3), NaN where
+            not written: the angle is within half a turn of so many turns.
+        """
+
+    @abstractmethod
+    def flag_words(self, config: str, values: Floats) -> str:
+        """Spell the flags of one target as ``S E W T1:0 T2:-1 T3:0``, unsaid ones not.
+
+        Where only the sign of an axis is said, that is ``T1:>0`` or ``T1:<0``.
+
+        Args:
+            config: Its configuration string.
+            values: Its numbers, (w,).
+        """
+
+    def rewrite_flags(self, values: Floats, q: Floats, before: Floats) -> Floats:
+        """Write the flags anew of poses (k, w) that the arm reaches with joints (k, 6).
+
+        Flags that go on being as true as they were, or that do not depend on small
+        moves, are kept.
+
+        Args:
+            values: Numbers of the poses.
+            q: Joints that reach them as they are rounded [rad].
+            before: Joints that the source reaches them with.
+        """
+        return values
+
+    def misses(self, values: Floats, q: Floats) -> Bools | None:
+        """Tell which poses (k, w) say other flags than joints (k, 6) [rad] have.
+
+        None where branch and turns say all that the flags do.
+        """
+        return None
+
+    def near_border(self, q: Floats) -> Bools | None:
+        """Tell which joints (k, 6) [rad] are too near a border of flags, (k, 6).
+
+        None where flags there do no harm.
+        """
+        return None

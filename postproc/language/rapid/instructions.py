@@ -1,0 +1,131 @@
+"""Instructions of RAPID by name: which move, and what their arguments are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from postproc.language.rapid.syntax import Argument, Operand
+
+INSTRUCTIONS = Path(__file__).parent / "instructions.txt"
+
+
+@dataclass(frozen=True)
+class Signature:
+    """Where the positions stand among an instruction's arguments that go by place.
+
+    Attributes:
+        to: The destination.
+        via: The point that an arc leads through, -1 where there is none.
+        joints: The destination is a jointtarget.
+        reaches: The move ends at its destination, not where a signal comes.
+        given: Data that the instruction writes where a search ends, -1 for none.
+    """
+
+    to: int = 0
+    via: int = -1
+    joints: bool = False
+    reaches: bool = True
+    given: int = -1
+
+    def find_written(self, arguments: Sequence[Argument]) -> Operand | None:
+        """Return the data that the instruction writes, None where there are none."""
+        placed = [one.value for one in arguments if not one.name]
+        return placed[self.given] if 0 <= self.given < len(placed) else None
+
+    def operands(self, arguments: Sequence[Argument]) -> tuple[Operand | None, ...]:
+        """Return destination and via point, None where one is missing."""
+        placed = [one.value for one in arguments if not one.name]
+        return tuple(
+            placed[at] if 0 <= at < len(placed) else None for at in (self.to, self.via)
+        )
+
+
+POINT, ARC = Signature(), Signature(to=1, via=0)
+JOINTS = Signature(joints=True)
+SEARCH = Signature(to=2, reaches=False, given=1)  # signal, where it came, destination
+ARC_SEARCH = Signature(to=3, via=2, reaches=False, given=1)
+
+_KINDS: Mapping[Signature, str] = {
+    POINT: """
+        MoveJ MoveL MoveJDO MoveLDO MoveJAO MoveLAO MoveJGO MoveLGO MoveJSync MoveLSync
+        TriggJ TriggL TriggJIOs TriggLIOs
+        ArcL ArcLStart ArcLEnd ArcMoveJ ArcMoveL
+        ArcL1 ArcL1Start ArcL1End ArcL2 ArcL2Start ArcL2End
+        CalibJ CalibL NutJ NutL
+        SpotJ SpotL SpotMJ SpotML PaintL DispL CapL
+    """,
+    ARC: """
+        MoveC MoveCDO MoveCAO MoveCGO MoveCSync TriggC
+        ArcC ArcCStart ArcCEnd ArcMoveC
+        ArcC1 ArcC1Start ArcC1End ArcC2 ArcC2Start ArcC2End PaintC DispC CapC
+    """,
+    JOINTS: "MoveAbsJ TriggAbsJ ArcMoveAbsJ",
+    Signature(joints=True, reaches=False): "MoveExtJ ArcMoveExtJ",  # the arm stays
+    SEARCH: "SearchL",
+    ARC_SEARCH: "SearchC",
+    Signature(to=2, joints=True, reaches=False, given=1): "SearchExtJ",
+}
+MOTIONS: Mapping[str, Signature] = {
+    name.lower(): signature
+    for signature, names in _KINDS.items()
+    for name in names.split()
+}
+
+
+@cache
+def read_known_instructions() -> Mapping[str, str]:
+    """Return the instructions that do not move, and of what kind each is.
+
+    Returns:
+        By name in lower case: ``still`` changes nothing of a move, ``modal`` changes
+        how the moves after it are carried out, ``left`` is not followed: it may move.
+
+    >>> known_instructions()["tpwrite"], known_instructions()["pdispon"]
+    ('still', 'modal')
+    """
+    found: dict[str, str] = {}
+    for line in INSTRUCTIONS.read_text(encoding="utf-8").splitlines():
+        kind, _, names = line.partition(":")
+        if not line.startswith("#"):
+            found |= dict.fromkeys(names.lower().split(), kind)
+    return found
+
+
+READING = frozenset(
+    """
+    tperase tpwrite uimsgwrite set reset setdo setgo setao setdosync pulsedo invertdo
+    waittime waitdi waitdo waitai waitao waitgi waitgo waituntil waitrob errlog errwrite
+    confj confl singarea cirpathmode accset velset speedrefresh worldacclim pathacclim
+    motionsup pdispon pdispset pdispoff eoffson eoffsset eoffsoff gripload
+    mechunitload actunit deactunit softact softdeact stopmove startmove
+    corrcon corrdiscon write open close isleep iwatch idelete
+    """.split()
+)
+"""Instructions that change none of the data that they are given, but by `ANSWERS`."""
+
+ANSWERS = frozenset(
+    ["timeflag", "valueattimeout", "taskno", "mectaskno", "errornumber"]
+)
+"""Options that instructions and functions answer in."""
+
+BUILT_IN_FUNCTIONS = frozenset(
+    """
+    abs acos asin atan atan2 cos sin tan exp pow round sqrt trunc dim
+    offs reltool distance dotprod normalize posemult poseinv posevect orientzyx eulerzyx
+    defframe defdframe mirpos crobt cjointt cpos ctool cwobj calcrobt
+    calcjointt numtostr strlen strpart valtostr ctime cdate clkread gettime
+    doutput dinput goutput testdi valid present ispers isvar opmode runmode execlevel
+    isstopmoveact isstopstateevent ismechunitactive bitand bitor bitxor bitneg bitcheck
+    stringmatch strfind strmap strmatch strorder gettaskname robos
+    """.split()
+)
+"""Functions that neither move nor change what they are given, but by `ANSWERS`."""
+
+STILL_FUNCTIONS = BUILT_IN_FUNCTIONS | {"strtoval", "defaccframe"}
+"""Functions that do not move."""
+
+BY_STRING = frozenset(["setdataval", "setalldataval"])
+"""Instructions that change data whose names they are given in strings."""

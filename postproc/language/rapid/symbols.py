@@ -1,0 +1,651 @@
+"""All modules of a task: what its names mean, and which data never change."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from postproc.files import task_beside
+from postproc.language.control_flow import HeadedRows
+from postproc.language.interpreter import Scope
+from postproc.language.rapid import syntax as said
+from postproc.language.rapid.instructions import (
+    ANSWERS,
+    BUILT_IN_FUNCTIONS,
+    BY_STRING,
+    MOTIONS,
+    READING,
+)
+from postproc.language.rapid.pose_encoding import COMMENTS
+from postproc.language.rapid.program import Datum, RapidFile
+from postproc.language.rapid.targets import operands_of
+
+TARGETS = ("robtarget", "jointtarget")
+SHIFTS = ("offs", "reltool")  # functions whose first argument is a target
+CONSTANTS = {"true": 1.0, "false": 0.0, "pi": 3.141592653589793}
+
+
+@dataclass(frozen=True)
+class WrittenNumber:
+    """A number of a record: its value, and where it is written.
+
+    Attributes:
+        value: Its value.
+        file, slot: Where it stands; slot -1 where it is computed.
+    """
+
+    value: float
+    file: int = -1
+    slot: int = -1
+
+
+Nested = WrittenNumber | str | tuple["Nested", ...]
+
+
+@dataclass
+class RapidTask:
+    """The modules of a task.
+
+    Attributes:
+        files: Its files, the one with the main routine first.
+        taught: Lower-case names of data that were taught with the arm, by the cell.
+        others: Tasks that run at the same time.
+    """
+
+    files: Sequence[RapidFile]
+    taught: Collection[str] = frozenset()
+    others: Sequence[RapidTask] = ()
+    _moved: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _local: dict[tuple[int, str, str], dict[str, Datum]] = field(default_factory=dict)
+    _global: dict[str, list[tuple[int, Datum]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Index data by the scopes that declare them."""
+        for number, file in enumerate(self.files):
+            for datum in file.data:
+                place = number, datum.module, datum.routine
+                self._local.setdefault(place, {})[datum.declared.name] = datum
+                if not datum.routine and datum.declared.scope != "local":
+                    known = self._global.setdefault(datum.declared.name, [])
+                    known.append((number, datum))
+
+    @cached_property
+    def routines(self) -> Mapping[str, list[tuple[int, str, HeadedRows]]]:
+        """Routines by name: file, module and place of each."""
+        found: dict[str, list[tuple[int, str, HeadedRows]]] = defaultdict(list)
+        for number, file in enumerate(self.files):
+            for scope in file.routines:
+                around = (m for m in file.modules if m.first < scope.first < m.last)
+                module = next((m.head.name for m in around), "")
+                found[scope.head.name].append((number, module, scope))
+        return found
+
+    @cached_property
+    def taught_lines(self) -> list[frozenset[int]]:
+        """Lines of every file that a comment marks as taught."""
+        return [COMMENTS.list_taught(file.text.source) for file in self.files]
+
+    def is_taught(self, name: str, found: Nested | None) -> bool:
+        """Tell whether data were taught, by the cell or a comment on their line.
+
+        Args:
+            name: Of the data, with an index where it has one; "" for numbers in a move.
+            found: What they hold.
+        """
+        if name.split("{")[0].strip().lower() in self.taught:
+            return True
+        one = found
+        while isinstance(one, tuple) and one:
+            one = next((part for part in one if isinstance(part, tuple)), one[0])
+        if not isinstance(one, WrittenNumber) or one.slot < 0:
+            return False
+        text, lines = self.files[one.file].text, self.taught_lines[one.file]
+        return not lines.isdisjoint(text.lines(text.row_of(one.slot)))
+
+    def routine(self, name: str, here: Scope) -> tuple[int, str, HeadedRows] | None:
+        """Find the routine that a name means, None where it is not sure."""
+        known = self.routines.get(name, [])
+        own = [one for one in known if one[:2] == (here.file, here.module)]
+        if own:
+            return own[0] if len(own) == 1 else None
+        shared = [one for one in known if not getattr(one[2].head, "local", False)]
+        return shared[0] if len(shared) == 1 else None
+
+    def datum(self, name: str, here: Scope) -> tuple[int, Datum] | None:
+        """Find the data that a name means, None where nothing sure is known."""
+        if name in here.parameters:
+            return None
+        for routine in (here.routine, ""):
+            found = self._local.get((here.file, here.module, routine), {}).get(name)
+            if found is not None:
+                return here.file, found
+        shared = self._global.get(name, [])
+        return shared[0] if len(shared) == 1 else None
+
+    def constant(self, name: str, here: Scope) -> tuple[int, Datum] | None:
+        """Find data that hold what they were declared with for as long as it runs."""
+        found = self.datum(name, here)
+        if found is None or found[1].declared.value is None:
+            return None
+        if name in self.loop_variables:  # it may hide the data
+            return None
+        changed = name in self.written or bool(BY_STRING & self.find_calls)
+        changed = changed and found[1].declared.kind != "const"
+        return None if changed or self.is_changed_beside(*found) else found
+
+    # What other tasks do: global persistents of one name are the same data.
+
+    def is_changed_beside(self, file: int, datum: Datum) -> bool:
+        """Return True if another task may change data, or begin with other values."""
+        key = file, datum.row
+        if key not in self._moved:
+            self._moved[key] = _is_shared(datum)  # while it is worked out
+            own = self._first_value(file, datum)
+            self._moved[key] = _is_shared(datum) and any(
+                other.may_set(datum.declared.name, own) for other in self.others
+            )
+        return self._moved[key]
+
+    def is_used_beside(self, name: str, here: Scope) -> bool:
+        """Return True if another task has the data that a name means, too."""
+        found = self.datum(name, here)
+        if found is None or not _is_shared(found[1]):
+            return False
+        return any(name in other.persistents | other.strange for other in self.others)
+
+    def may_set(self, name: str, value: Nested | None) -> bool:
+        """Return True if a persistent may come to hold another value by this task."""
+        if name in self.changes:
+            return True
+        shared = (one for one in self._global.get(name, ()) if _is_shared(one[1]))
+        found = (self._first_value(*one) for one in shared)
+        return any(one is None or one != value for one in found)
+
+    @cached_property
+    def persistents(self) -> frozenset[str]:
+        """Names of data that tasks share with others that declare them too."""
+        data = (one for found in self._global.values() for _, one in found)
+        return frozenset(one.declared.name for one in data if _is_shared(one))
+
+    @cached_property
+    def strange(self) -> frozenset[str]:
+        """Names that it takes or changes and does not declare: shared modules do."""
+        return (self.written | self.read | self._odd_words) - self.declared
+
+    @cached_property
+    def changes(self) -> frozenset[str]:
+        """Names of data of several tasks that this one may change."""
+        by_name = self.persistents if BY_STRING & self.find_calls else frozenset()
+        written = self.written | self._odd_words
+        return by_name | (written & (self.persistents | self.strange))
+
+    @cached_property
+    def _odd_words(self) -> frozenset[str]:
+        """Words of what is not understood: each may name what is set there."""
+        texts = [
+            file.text.text(row)
+            for file in self.files
+            for row in range(len(file.text))
+            if isinstance(file.text.statement(row), said.NotUnderstood)
+        ]
+        return frozenset(w for text in texts for w in _WORD.findall(text.lower()))
+
+    def _first_value(self, file: int, datum: Datum) -> Nested | None:
+        """Return what data hold at first, without where it is written."""
+        there = Scope(file, datum.module, datum.routine)
+        return _bare(self.record(datum.declared.value, datum.row, there))
+
+    @cached_property
+    def find_calls(self) -> frozenset[str]:
+        """Names of all instructions."""
+        found = (inside(one) for file in self.files for one in file.text.said.said)
+        return frozenset(o.name for o in found if isinstance(o, said.Instruction))
+
+    @cached_property
+    def loop_variables(self) -> frozenset[str]:
+        """Names of all variables of loops."""
+        found = (one for file in self.files for one in file.text.said.said)
+        return frozenset(o.name for o in found if isinstance(o, said.ForLoop))
+
+    @cached_property
+    def written(self) -> frozenset[str]:
+        """Names of data that something may change."""
+        return self._uses[0]
+
+    @cached_property
+    def read(self) -> frozenset[str]:
+        """Names of data that something but the destination of a move takes."""
+        return self._uses[1]
+
+    @cached_property
+    def declared(self) -> frozenset[str]:
+        """Names of all data."""
+        return frozenset(d.declared.name for file in self.files for d in file.data)
+
+    @cached_property
+    def twins(self) -> frozenset[str]:
+        """Names of points beside which the controller keeps their originals."""
+        pairs = {name for name in self.declared if f"o_{name}" in self.declared}
+        return frozenset(pairs | {f"o_{name}" for name in pairs})
+
+    @cached_property
+    def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
+        uses = _NamesUsed(self.routines)
+        for file in self.files:
+            for statement in file.text.said:
+                uses.note(statement)
+        uses.pass_on()
+        return frozenset(uses.written), frozenset(uses.read)
+
+    def scope_of(self, number: int, module: str, routine: HeadedRows) -> Scope:
+        """Return where the statements of a routine stand."""
+        given = frozenset(one.name for one in parameters_of(routine))
+        return Scope(number, module, routine.head.name, given)
+
+    # What routines are called with.
+
+    def bind(
+        self, scope: Scope, routine: HeadedRows, call: said.Instruction,
+        row: int, there: Scope,
+    ) -> Scope:  # fmt: skip
+        """Add what a routine is called with to where its statements stand.
+
+        A parameter that something may change has no value that is known.
+
+        Args:
+            scope: Where the statements of the routine stand.
+            routine: The routine.
+            call: The call.
+            row: Its row.
+            there: Where it stands.
+        """
+        if BY_STRING & self.find_calls:
+            return scope
+        pairs = match_arguments(parameters_of(routine), call.arguments) or ()
+        given = tuple(
+            (parameter.name, argument.value, row, there)
+            for parameter, argument in pairs
+            if argument.value is not None and parameter.name not in self.written
+        )
+        return replace(scope, given=given)
+
+    def behind(
+        self, operand: said.Operand | None, row: int, here: Scope
+    ) -> tuple[said.Operand | None, int, Scope]:
+        """Return what stands behind a parameter, where that is known, and its place."""
+        while isinstance(operand, said.DataObject) and not operand.steps:
+            if operand.name in dict(here.loops):
+                break
+            found = (one for one in here.given if one[0] == operand.name)
+            given = next(found, None)
+            if given is None:
+                break
+            _, operand, row, here = given
+        return operand, row, here
+
+    # Values.
+
+    def number(self, operand: said.Operand | None, row: int, here: Scope) -> float:
+        """Evaluate a number, NaN where it is not known before the program runs."""
+        match operand:
+            case said.Num(slot=slot):
+                text = self.files[here.file].text
+                return _finite(float(text.value[int(text.first[row]) + slot]))
+            case said.Operation(operator=operator, operands=operands):
+                parts = [self.number(one, row, here) for one in operands]
+                return _finite(_compute(operator, parts))
+            case said.DataObject(name=name, steps=()):
+                loops = dict(here.loops)
+                if name in loops:
+                    return loops[name]
+                other, at, there = self.behind(operand, row, here)
+                if other is not operand:
+                    return self.number(other, at, there)
+                found = self.constant(name, here)
+                if found is None:
+                    return CONSTANTS.get(name, float("nan"))
+                return self._number_of_declaration(*found)
+            case _:
+                return float("nan")
+
+    def _number_of_declaration(self, file: int, datum: Datum) -> float:
+        if datum.declared.dimensions:
+            return float("nan")
+        there = Scope(file, datum.module, datum.routine)
+        value = datum.declared.value
+        if isinstance(value, said.DataObject) and value.name == datum.declared.name:
+            return float("nan")
+        return self.number(value, datum.row, there)
+
+    def record(
+        self, operand: said.Operand | None, row: int, here: Scope, depth: int = 0
+    ) -> Nested | None:
+        """Evaluate a record or array, None where it is not known."""
+        operand, row, here = self.behind(operand, row, here)
+        match operand:
+            case said.Composite(items=items):
+                parts = [self.record(one, row, here, depth) for one in items]
+                known = tuple(part for part in parts if part is not None)
+                return known if len(known) == len(parts) else None
+            case said.StringLiteral(text=text):
+                return text
+            case said.Num(slot=slot):
+                file = self.files[here.file].text
+                at = int(file.first[row]) + slot
+                value = _finite(float(file.value[at]))
+                return WrittenNumber(value, here.file, at) if value == value else None
+            case said.DataObject(name=name, steps=steps) if name not in CONSTANTS:
+                return self._data_object(name, steps, row, here, depth)
+            case _:
+                value = self.number(operand, row, here)
+                return None if value != value else WrittenNumber(value)
+
+    def _data_object(
+        self,
+        name: str,
+        steps: Sequence[str | said.ElementStep],
+        row: int,
+        here: Scope,
+        depth: int,
+    ) -> Nested | None:
+        loops = dict(here.loops)
+        if name in loops and not steps:
+            return WrittenNumber(loops[name])
+        found = self.constant(name, here)
+        if found is None or depth > DEEPEST:
+            return None
+        file, datum = found
+        there = Scope(file, datum.module, datum.routine)
+        value = self.record(datum.declared.value, datum.row, there, depth + 1)
+        for step in steps:
+            indices = self._indices(step, row, here)
+            for index in indices or [-1]:
+                if not isinstance(value, tuple) or not 0 <= index < len(value):
+                    return None
+                value = value[index]
+        return value
+
+    def _indices(
+        self, step: str | said.ElementStep, row: int, here: Scope
+    ) -> list[int]:
+        """Return the indices from 0 of a step, nothing where they are not known."""
+        if isinstance(step, str):
+            return []  # what a record holds where is for its type to say
+        values = [self.number(one, row, here) for one in step.subscripts]
+        whole = [v for v in values if v == v and v == int(v)]
+        return [int(v) - 1 for v in whole] if len(whole) == len(values) else []
+
+
+DEEPEST = 20  # names that stand for names
+_WORD = re.compile(r"[a-z_]\w*")
+
+
+def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
+    """Group the files of tasks that run beside a program, by the names of files."""
+    tasks: dict[str, list[RapidFile]] = {}
+    for file in files:
+        tasks.setdefault(task_beside(file.text.source.name), []).append(file)
+    return [RapidTask(own) for own in tasks.values()]
+
+
+def _is_shared(datum: Datum) -> bool:
+    """Return True if data are those of every task that declares them likewise."""
+    declared = datum.declared
+    return declared.kind == "pers" and not (declared.scope or datum.routine)
+
+
+def _bare(found: Nested | None) -> Nested | None:
+    """Return values without where they are written."""
+    if isinstance(found, tuple):
+        parts = [_bare(one) for one in found]
+        return tuple(one for one in parts if one is not None)
+    return WrittenNumber(found.value) if isinstance(found, WrittenNumber) else found
+
+
+def parameters_of(routine: HeadedRows) -> tuple[said.RoutineParameter, ...]:
+    """Return the parameters of a routine."""
+    head = routine.head
+    return head.parameters if isinstance(head, said.RoutineHead) else ()
+
+
+def match_arguments(
+    parameters: Sequence[said.RoutineParameter], arguments: Sequence[said.Argument]
+) -> list[tuple[said.RoutineParameter, said.Argument]] | None:
+    """Pair parameters with arguments; None where the call does not fit."""
+    placed = [one for one in arguments if not one.name]
+    required = [one for one in parameters if not one.optional]
+    optional = {one.name: one for one in parameters if one.optional}
+    named = [one for one in arguments if one.name]
+    if len(placed) != len(required) or any(a.name not in optional for a in named):
+        return None
+    pairs = [(optional[a.name], a) for a in named if not a.passed_on]
+    return [*zip(required, placed, strict=True), *pairs]
+
+
+def _finite(value: float) -> float:
+    """Return a number, NaN for one that is too large for any."""
+    return value if math.isfinite(value) else math.nan
+
+
+def _compute(operator: str, parts: Sequence[float]) -> float:
+    """Compute what an operator gives, NaN where that is no number."""
+    match operator, parts:
+        case "-", [a]:
+            return -a
+        case "+", [a]:
+            return a
+        case "+", [a, b]:
+            return a + b
+        case "-", [a, b]:
+            return a - b
+        case "*", [a, b]:
+            return a * b
+        case "/", [a, b] if b:
+            return a / b
+    return float("nan")
+
+
+# What statements take and change.
+
+
+@dataclass
+class _NamesUsed:
+    """Names that statements may change, and those that they take.
+
+    Attributes:
+        own: Routines of the task by name: what else has their names is hidden.
+        passed: Data and the parameter that they are given to, and whether the routine
+            may change them through it.
+        parts: Names of which moves go to elements or components.
+    """
+
+    own: Mapping[str, Sequence[tuple[int, str, HeadedRows]]]
+    written: set[str] = field(default_factory=set)
+    read: set[str] = field(default_factory=set)
+    passed: set[tuple[str, str, bool]] = field(default_factory=set)
+    parts: set[str] = field(default_factory=set)
+
+    def pass_on(self) -> None:
+        """Note of data what is noted of the parameters that they are given to.
+
+        Which of the points in them a move takes is not followed.
+        """
+        self.read |= self.parts & {parameter for _, parameter, _ in self.passed}
+        before = -1
+        while before != len(self.written) + len(self.read):
+            before = len(self.written) + len(self.read)
+            for name, parameter, by_reference in self.passed:
+                if parameter in self.read | self.written:
+                    self.read.add(name)
+                if parameter in self.written and by_reference:
+                    self.written.add(name)
+
+    def note(self, one: said.RapidStatement) -> None:
+        """Note the names that a statement may change, and those that it takes."""
+        match one:
+            case said.DataDeclaration(value=value, dimensions=dimensions):
+                for operand in (value, *dimensions):
+                    self._operand(operand)
+            case said.Assignment(target=target, value=value):
+                self.written.add(target.name)
+                self._operand(value)
+            case said.Branch(values=values):
+                for operand in values:
+                    self._operand(operand)
+            case said.CompactIf(condition=condition, statement=inside):
+                self._operand(condition)
+                self.note(inside)
+            case said.ForLoop(name=name, first=first, last=last, step=step):
+                self.written.add(name)
+                for operand in (first, last, step):
+                    self._operand(operand)
+            case said.Leave(value=value):
+                self._operand(value)
+            case said.ConnectTrap(interrupt=interrupt):
+                self.written.add(interrupt.name)
+            case said.Instruction(name=name, arguments=arguments):
+                self._call(name, arguments)
+            case said.LateCall(arguments=arguments):
+                self._arguments(arguments)
+            case said.NotUnderstood():
+                pass  # what it may change is said with it: nothing is known behind it
+
+    def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
+        pairs = self._fitting(name, arguments)
+        if pairs is not None:
+            for parameter, argument in pairs:
+                self._give(parameter, argument.value)
+            return
+        signature = None if name in self.own else MOTIONS.get(name)
+        if signature is not None:
+            ends, given = (
+                signature.operands(arguments),
+                signature.find_written(arguments),
+            )
+            for argument in arguments:
+                if any(argument.value is end for end in ends):
+                    self._destination(argument.value)
+                elif argument.value is given:
+                    self._arguments([argument])
+                else:
+                    self._operand(argument.value)
+        elif name in READING and name not in self.own:
+            for argument in arguments:
+                self._read(argument)
+        else:
+            self._arguments(arguments)
+
+    def _read(self, argument: said.Argument) -> None:
+        """Note an argument that is only read, unless it is an option that answers."""
+        if argument.name in ANSWERS:
+            self._arguments([argument])
+        else:
+            self._operand(argument.value)
+
+    def _fitting(
+        self, name: str, arguments: Sequence[said.Argument]
+    ) -> list[tuple[said.RoutineParameter, said.Argument]] | None:
+        """Pair the arguments of a call of the only routine of a name, else None.
+
+        A local one need not be what is called.
+        """
+        found = self.own.get(name, ())
+        if len(found) != 1 or any(one.passed_on for one in arguments):
+            return None
+        if getattr(found[0][2].head, "local", False):
+            return None
+        return match_arguments(parameters_of(found[0][2]), arguments)
+
+    def _give(
+        self, parameter: said.RoutineParameter, operand: said.Operand | None
+    ) -> None:
+        """Note what a routine of the task is called with."""
+        if isinstance(operand, said.DataObject):
+            by_reference = parameter.by_reference
+            self.passed.add((operand.name, parameter.name, by_reference))
+            self._steps(operand.steps)
+        else:
+            self._operand(operand)
+
+    def _destination(self, operand: said.Operand | None) -> None:
+        """Note what the destination of a move takes besides the point itself."""
+        match operand:
+            case said.DataObject(name=name, steps=steps):
+                self.parts |= {name} if steps else set()
+                self._steps(steps)
+            case said.FunctionCall(name=name, arguments=arguments) if (
+                name in SHIFTS and name not in self.own
+            ):
+                if arguments:  # the point that is shifted
+                    self._destination(arguments[0].value)
+                for argument in arguments[1:]:
+                    self._operand(argument.value)
+            case _:
+                self._operand(operand)
+
+    def _steps(self, steps: Sequence[str | said.ElementStep]) -> None:
+        for step in steps:
+            if isinstance(step, said.ElementStep):
+                for subscript in step.subscripts:
+                    self._operand(subscript)
+
+    def _arguments(self, arguments: Sequence[said.Argument]) -> None:
+        """Note arguments that a routine may change."""
+        for argument in arguments:
+            if isinstance(argument.value, said.DataObject):
+                self.written.add(argument.value.name)
+            self._operand(argument.value)
+
+    def _operand(self, operand: said.Operand | None) -> None:
+        match operand:
+            case said.DataObject(name=name, steps=steps):
+                self.read.add(name)
+                self._steps(steps)
+            case said.Composite(items=items) | said.Operation(operands=items):
+                for item in items:
+                    self._operand(item)
+            case said.FunctionCall(name=name, arguments=arguments):
+                if name in BUILT_IN_FUNCTIONS and name not in self.own:
+                    for argument in arguments:
+                        self._read(argument)
+                else:
+                    self._arguments(arguments)
+
+
+def inside(one: said.RapidStatement) -> said.RapidStatement:
+    """Return the statement behind a condition, the statement itself without one."""
+    while isinstance(one, said.CompactIf):
+        one = one.statement
+    return one
+
+
+def functions_in(one: said.RapidStatement) -> Iterator[str]:
+    """Yield the names of the functions that a statement calls."""
+    match one:
+        case said.Branch(values=values):
+            operands: Sequence[said.Operand | None] = values
+        case said.CompactIf(condition=condition, statement=inside):
+            operands = (condition, *operands_of(inside))
+        case said.ForLoop(first=first, last=last, step=step):
+            operands = (first, last, step)
+        case said.Leave(value=value):
+            operands = (value,)
+        case said.Assignment(target=target, value=value):
+            operands = (target, value)
+        case _:
+            operands = operands_of(one)
+    waiting = list(operands)
+    while waiting:
+        match waiting.pop():
+            case said.FunctionCall(name=name, arguments=arguments):
+                yield name
+                waiting += [argument.value for argument in arguments]
+            case said.DataObject(steps=steps):
+                for at in steps:
+                    waiting += at.subscripts if isinstance(at, said.ElementStep) else ()
+            case said.Composite(items=items) | said.Operation(operands=items):
+                waiting += items

@@ -1,0 +1,111 @@
+"""From the arrivals of a RAPID task to `Visits`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language import to_visits
+from postproc.language.rapid.interpreter import RapidMachine
+from postproc.language.rapid.modal_state import NO_SHIFT, UNKNOWN_SHIFT
+from postproc.language.rapid.moves import (
+    UNKNOWN_ZONE,
+    FrameOfMove,
+    RapidVisit,
+    pose_of_numbers,
+)
+from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
+from postproc.language.to_visits import Conditions, Pose, cell_pose, compose_poses
+from postproc.language.visits import Meaning, Visits
+from postproc.robot.pose import MM
+from postproc.robot.trajectory import Motion
+
+_GRIP = Reason(Code.LOAD_UNKNOWN, "what the arm carries is not known here (GripLoad)")
+_PART_ALONE = Reason(
+    Code.LOAD_UNKNOWN,
+    "GripLoad states a part, and the tool states no mass of its own: what the arm "
+    "carries in all is not known. State the mass in tooldata",
+)
+_SHIFT = Reason(
+    Code.FRAME_UNKNOWN, "the program displacement (PDispOn, PDispSet) is not known here"
+)
+
+
+def visits_of(machine: RapidMachine) -> Visits:
+    """Put the arrivals into the order of the program, as columns."""
+    base = cell_pose(machine.start.base)
+    placed: dict[tuple[FrameOfMove, Pose], Pose] = {}
+
+    def conditions(v: RapidVisit) -> Conditions:
+        key = v.wobj, v.modes.shift
+        if key not in placed:
+            placed[key] = _displace(*key)
+        return _conditions(v, base, placed[key])
+
+    files = enumerate(machine.task.files)
+    moves = {k: [move.row for move in file.moves] for k, file in files}
+    return to_visits.visits_of(machine, RAPID_DIALECT, conditions, COMMENTS, moves)
+
+
+def _conditions(v: RapidVisit, base: Pose, uframe: Pose) -> Conditions:
+    """Say what an arrival is carried out with."""
+    joint = v.motion == Motion.JOINT
+    return Conditions(
+        tool=v.tool.pose,
+        base=base,
+        uframe=uframe,
+        taught=(v.tool.taught, v.wobj.taught),
+        remote=not v.tool.held or v.wobj.held,
+        reasons=_reasons(v),
+        flags=v.modes.confj if joint else v.modes.confl,
+        flagged=v.goal.target == Meaning.POSE,
+        law=v.modes.arc_law if v.motion == Motion.CIRCULAR else v.modes.law,
+        zone_mm=v.zone_mm,
+        unsized=v.zone_mm == UNKNOWN_ZONE,
+        speed=v.speed,
+        wrist=bool(v.modes.wrist) and not joint,
+        override=v.modes.override,
+        load=_load(v),
+    )
+
+
+def _load(v: RapidVisit) -> tuple[float, ...]:
+    """Return what the program states that the arm carries, see `Conditions.load`."""
+    if v.total:
+        mass, *centre = v.total
+        return mass, *(x * MM for x in centre)
+    if not v.tool.load or not v.modes.grip or not v.tool.pose:
+        return ()
+    mass, *own = v.tool.load
+    carried, *part = v.modes.grip
+    at = np.array(v.tool.pose).reshape(4, 4) @ np.array([*(x * MM for x in part), 1.0])
+    centre = (mass * MM * np.array(own) + carried * at[:3]) / (mass + carried)
+    return mass + carried, *centre.tolist()
+
+
+def _displace(wobj: FrameOfMove, shift: tuple[float, ...]) -> Pose:
+    """Place a work object with the program displacement in it."""
+    if shift == UNKNOWN_SHIFT or not wobj.pose:
+        return ()
+    if shift == NO_SHIFT:
+        return wobj.pose
+    return compose_poses(wobj.pose, pose_of_numbers(shift))
+
+
+def _explain_unknown_load(v: RapidVisit) -> Reason:
+    """Say why it is not known what the arm carries."""
+    if v.total:
+        return NO_REASON
+    if not v.modes.grip:
+        return _GRIP
+    alone = v.modes.grip[0] and not v.tool.load
+    return _PART_ALONE if alone else NO_REASON
+
+
+def _reasons(v: RapidVisit) -> tuple[Reason, ...]:
+    """Say why a visit cannot be compensated."""
+    given = (*sorted(v.modes.blocked), v.why, v.goal.why, v.tool.why)
+    if v.goal.target == Meaning.JOINTS:
+        return (*given, _explain_unknown_load(v))
+    shift = _SHIFT if v.modes.shift == UNKNOWN_SHIFT else NO_REASON
+    return (*given, v.wobj.why, shift, _explain_unknown_load(v))

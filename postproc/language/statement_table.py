@@ -1,0 +1,141 @@
+"""Statements of a file: forms and numbers as arrays, no object per statement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from postproc.arrays import Floats, Indices
+from postproc.diagnostics import Code
+from postproc.exceptions import ProgramError
+from postproc.language.number_edits import Skeleton
+from postproc.language.source import NumberSpans, Source, Span
+from postproc.language.templates import ParsedShapes, find_shapes, parse_shapes
+from postproc.language.visits import Diagnostic
+
+SHOWN = 60  # characters of a statement in a message
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class StatementText(Generic[T]):
+    """The n statements of a file (structure of arrays).
+
+    Attributes:
+        source: The text.
+        said: What the distinct statements say.
+        shape: Index into `said`, (n,).
+        begin, end: Byte offsets of every statement, (n,).
+        first: CSR offsets into the numbers, (n + 1,).
+        start, stop: Byte offsets of each number, its sign included, (m,).
+        value: What it is worth, NaN where it cannot be read or is infinite, (m,).
+    """
+
+    source: Source
+    said: ParsedShapes[T]
+    shape: Indices
+    begin: Indices
+    end: Indices
+    first: Indices
+    start: Indices
+    stop: Indices
+    value: Floats
+
+    def __len__(self) -> int:
+        """Return the number of statements."""
+        return len(self.shape)
+
+    def statement(self, row: int) -> T:
+        """Return what a statement says."""
+        return self.said[int(self.shape[row])]
+
+    def line(self, row: int) -> int:
+        """Return the 1-based line that a statement begins on."""
+        return self.source.line_of(int(self.begin[row]))
+
+    def lines(self, row: int) -> range:
+        """Return the 1-based lines that a statement stands on."""
+        begin, end = self.span(row)
+        return range(self.line(row), self.source.line_of(max(end - 1, begin)) + 1)
+
+    def row_of(self, slot: int) -> int:
+        """Return the statement that a number stands in."""
+        return int(np.searchsorted(self.first, slot, side="right")) - 1
+
+    def span(self, row: int) -> Span:
+        """Return the bytes of a statement."""
+        return Span(int(self.begin[row]), int(self.end[row]))
+
+    def text(self, row: int) -> str:
+        """Return a statement as it is written."""
+        start, end = self.span(row)
+        return self.source.text[start:end]
+
+    def quote(self, row: int) -> str:
+        """Quote the beginning of a statement, on one line."""
+        words = " ".join(self.text(row).split())
+        return words if len(words) <= SHOWN else f"{words[:SHOWN]} .."
+
+    def diagnostic(self, row: int, code: Code, message: str) -> Diagnostic:
+        """Say something of a statement."""
+        return Diagnostic(self.source.name, self.line(row), code, message)
+
+    def skeleton(self, reread: Callable[[Source], Skeleton]) -> Skeleton:
+        """Take over what the statements tell, for comparing the text with another.
+
+        Args:
+            reread: Reads another text of the same language.
+        """
+        starts = self.source.line_starts
+        line = np.searchsorted(starts, self.begin, side="right").astype(np.int32)
+        return Skeleton(
+            self.source,
+            self.said.shapes,
+            self.shape,
+            line,
+            NumberSpans.of(self.start, self.stop),
+            reread=reread,
+        )
+
+
+def read_text(
+    source: Source,
+    scan: Callable[[bytes], tuple[Any, ...]],
+    parse: Callable[[str], T],
+) -> StatementText[T]:
+    """Read the statements of a file.
+
+    Args:
+        source: The file.
+        scan: Cuts its bytes into statements, in the core.
+        parse: Says what the form of a statement says.
+
+    Raises:
+        ProgramError: A string or a header does not end.
+    """
+    forms, by_statement, numbers, names, unterminated = scan(source.data)
+    form, begin, end, first, name_first = by_statement
+    if unterminated:
+        raise _open_end_error(source, unterminated[0])
+    at_names = np.asarray(name_first[:-1])
+    shapes, shape = find_shapes(forms, form, at_names, names[1], names[0])
+    said = parse_shapes(shapes, parse)
+    start, stop, value = numbers
+    value = np.where(np.isfinite(value), value, np.nan)
+    return StatementText(
+        source, said, shape.astype(np.int32), begin, end, first, start, stop, value
+    )
+
+
+def _open_end_error(source: Source, at: int) -> ProgramError:
+    """Say what does not end at an offset."""
+    header = source.data[at : at + 1] == b"%"
+    return ProgramError(
+        source.name,
+        "the header does not end" if header else "a string is not terminated",
+        "Close it with %%%." if header else "Close it with a quote on its line.",
+        line=source.line_of(at),
+    )

@@ -1,0 +1,86 @@
+"""From the form of one statement to what a language makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+import lark
+
+from postproc.language.grammars import line_parser
+from postproc.language.ir import Num
+from postproc.language.lexer import NAME_MARK, UNREADABLE
+from postproc.language.templates import open_name
+
+Children = Sequence[Any]
+
+
+class Word(str):
+    """A token: text with the name of its terminal."""
+
+    kind: str
+
+    def __new__(cls, text: str, kind: str) -> Word:
+        """Remember the terminal beside the text."""
+        word = super().__new__(cls, text)
+        word.kind = kind
+        return word
+
+
+class DeeperError(Exception):
+    """A statement holds more operators within each other than any program does."""
+
+
+class ReservedWordError(Exception):
+    """A word of the language stands where a name must."""
+
+
+@dataclass(frozen=True)
+class FormParser:
+    """Parses forms with a grammar, and builds what its rules say.
+
+    Attributes:
+        grammar: Its name; statements are its start symbol.
+        rules: What each rule makes of what its children gave.
+        reserved: Words that name nothing.
+        longest: Characters of a form, at the most.
+        deepest: Operators or brackets within each other; followed by recursion.
+    """
+
+    grammar: str
+    rules: Mapping[str, Callable[[Children], Any]]
+    reserved: Collection[str]
+    longest: int
+    deepest: int
+
+    def parse(self, form: str) -> object | None:
+        """Build what a form says, None where the grammar cannot read it."""
+        if form.startswith(UNREADABLE) or len(form) > self.longest:
+            return None
+        try:
+            return self._build(line_parser(self.grammar, "statement").parse(form))
+        except (lark.exceptions.LarkError, DeeperError, ReservedWordError):
+            return None
+
+    def _build(self, tree: lark.Tree[lark.Token]) -> object:
+        """Build what a tree says, counting its names and its numbers."""
+        names, slots = count(), count()
+
+        def walk(node: lark.Tree[lark.Token] | lark.Token, depth: int = 0) -> object:
+            if depth > self.deepest:
+                raise DeeperError
+            if isinstance(node, lark.Token):
+                if node.type == "NUMBER":
+                    return Num(next(slots))
+                text = str(node)
+                if node.type == "NAME" and text.lower() in self.reserved:
+                    raise ReservedWordError
+                if NAME_MARK in text:
+                    text = text.replace(NAME_MARK, open_name(next(names)))
+                return Word(text, node.type)
+            children = [walk(child, depth + 1) for child in node.children]
+            return self.rules[str(node.data)](children)
+
+        return walk(tree)

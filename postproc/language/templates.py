@@ -1,0 +1,379 @@
+"""Lines that differ in numbers or numbered names only are parsed once."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from operator import itemgetter
+from typing import Any, Generic, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Bools, Indices, Interned, Ints
+from postproc.language.lexer import NAME_MARK, WHOLE, form_of, mask_of
+from postproc.language.symbol_column import NameColumn
+
+# Rows that are alike, numbered in the order in which they appear.
+
+_SHORT = 12  # longer sequences are told apart in Python
+
+
+def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
+    """Number sequences of whole numbers so that equal ones have the same number, (k,).
+
+    Args:
+        values: The numbers, (m,).
+        first: Every sequence is values[first:last], (k,).
+        last: See there.
+
+    >>> alike(np.array([7, 8, 7, 8, 9]), np.array([0, 2, 2]), np.array([2, 4, 5]))
+    array([0, 0, 1])
+    """
+    length = last - first
+    if int(length.max(initial=0)) <= _SHORT:
+        return _by_columns(values, first, length)
+    data = np.ascontiguousarray(values, dtype=np.int32).tobytes()
+    ends = zip((4 * first).tolist(), (4 * last).tolist(), strict=True)
+    return Interned[bytes]().of([data[a:b] for a, b in ends])
+
+
+def _by_columns(values: AnyInts, first: AnyInts, length: AnyInts) -> Ints:
+    """Number sequences: first by their lengths, then by one value after the other."""
+    kind, rows = number_in_order(length)[0], np.arange(len(first))
+    size = int(values.max(initial=0)) + 1
+    for at in range(int(length.max(initial=0))):
+        rows = rows[length[rows] > at]
+        others = int(kind.max()) + 1
+        pairs = kind[rows] * size + values[first[rows] + at]
+        kind[rows] = others + number_in_order(pairs)[0]
+    return number_in_order(kind)[0]
+
+
+def number_in_order(keys: AnyInts) -> tuple[Ints, Ints]:
+    """Number keys in the order in which they appear.
+
+    Args:
+        keys: Whole numbers from 0 on, (n,).
+
+    Returns:
+        The number of every row, (n,), and the first row of every number.
+
+    >>> numbered_in_order(np.array([5, 2, 5]))
+    (array([0, 1, 0]), array([0, 1]))
+    """
+    if len(keys) == 0:
+        none = np.zeros(0, dtype=np.int64)
+        return none, none
+    if int(keys.max()) <= 2 * len(keys) + 1000:
+        rows = np.arange(len(keys))[::-1]
+        at = np.full(int(keys.max()) + 1, -1)
+        at[keys[::-1]] = rows  # the last one that is written stays: the first row
+        first = np.sort(at[at >= 0])
+        rank = np.empty_like(at)
+        rank[keys[first]] = np.arange(len(first))
+        return rank[keys], first
+    _, example, which = np.unique(keys, return_index=True, return_inverse=True)
+    order = np.argsort(example)
+    ranks = np.empty(len(order), dtype=np.int64)
+    ranks[order] = np.arange(len(order))
+    return ranks[which.ravel()], example[order]
+
+
+# The shapes of the lines of a file: few forms, with many names filled in.
+
+AnyInts = NDArray[np.signedinteger[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes(Sequence[str]):
+    """k distinct masks of lines; the text of one is made when it is asked for.
+
+    Attributes:
+        texts: The distinct forms: masks with their numbered names marked.
+        form: Index into `texts`, (k,).
+        first: CSR offsets into `name`, (k + 1,).
+        name: Index into `names`, (p,).
+        names: Distinct names, as they are written.
+    """
+
+    texts: tuple[str, ...]
+    form: Indices
+    first: Indices
+    name: Indices
+    names: NameColumn
+
+    def __len__(self) -> int:
+        """Return the number of shapes."""
+        return len(self.form)
+
+    @overload
+    def __getitem__(self, shape: int) -> str: ...
+    @overload
+    def __getitem__(self, shape: slice) -> Sequence[str]: ...
+    def __getitem__(self, shape: int | slice) -> str | Sequence[str]:
+        """Return the mask of a shape."""
+        if isinstance(shape, slice):
+            return [self[k] for k in range(*shape.indices(len(self)))]
+        if not 0 <= shape < len(self):
+            raise IndexError(shape)
+        return mask_of(self.texts[self.form[shape]], self.names_of(shape))
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the masks."""
+        return (self[k] for k in range(len(self)))
+
+    def __eq__(self, other: object) -> bool:
+        """Tell whether the masks are those of other shapes."""
+        if not isinstance(other, Shapes):
+            return NotImplemented
+        return (
+            self.texts == other.texts
+            and np.array_equal(self.form, other.form)
+            and np.array_equal(self.first, other.first)
+            and self._same_names(other)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _same_names(self, other: Shapes) -> bool:
+        if self.names == other.names:
+            return np.array_equal(self.name, other.name)
+        pairs = zip(self.name.tolist(), other.name.tolist(), strict=True)
+        return all(self.names[a] == other.names[b] for a, b in pairs)
+
+    def names_of(self, shape: int) -> tuple[str, ...]:
+        """Return the names in a shape."""
+        own = self.name[self.first[shape] : self.first[shape + 1]].tolist()
+        return tuple([self.names[k] for k in own])
+
+    def names_at(self, shapes: Indices) -> Indices:
+        """Return the names of shapes of one form, (m, c), as indices into `names`."""
+        count = self.first[shapes[:1] + 1] - self.first[shapes[:1]]
+        width = int(count[0]) if len(count) else 0
+        found: Indices = self.name[self.first[shapes][:, None] + np.arange(width)]
+        return found
+
+
+def find_shapes(
+    texts: Sequence[bytes],
+    text: AnyInts,
+    at: AnyInts,
+    name: Ints,
+    names: NameColumn,
+) -> tuple[Shapes, Ints]:
+    """Find the distinct shapes of lines, in the order of appearance.
+
+    Args:
+        texts: Masks with their names marked, or `WHOLE` and the mask.
+        text: Index into `texts` of every line, (n,).
+        at: Index into `name` of the first name of every line, (n,).
+        name: Index into `names` of all names in order.
+        names: The distinct ones; those that only whole masks hold are not among them.
+
+    Returns:
+        The shapes, and that of every line, (n,).
+    """
+    forms, whole = Interned[str](), any(one[:1] == WHOLE for one in texts)
+    entered = NameColumn(names) if whole else names
+    form = np.zeros(len(texts), dtype=np.int64)
+    count = np.zeros(len(texts), dtype=np.int64)
+    own = np.full(len(texts), -1, dtype=np.int64)
+    more: list[int] = []
+    for k in text[number_in_order(text)[1]].tolist():
+        one = texts[k].decode("latin-1")
+        found: tuple[str, ...] = ()
+        if texts[k][:1] == WHOLE:
+            one, found = form_of(one[1:])
+            own[k], count[k] = len(name) + len(more), len(found)
+            more += entered.of(found).tolist()
+        else:
+            count[k] = one.count(NAME_MARK)
+        form[k] = forms[one]
+    name = np.append(name, np.array(more, dtype=np.int64))
+    entered.settle()
+    begin = np.where(own[text] >= 0, own[text], at).astype(np.int64)
+    shape, example = _number_lines(form[text], begin, count[text], name, len(entered))
+    kept = text[example]
+    first = np.append(np.int32(0), np.cumsum(count[kept], dtype=np.int32))
+    steps = np.arange(first[-1]) - np.repeat(first[:-1], count[kept])
+    own_names = name[np.repeat(begin[example], count[kept]) + steps]
+    short = form[kept].astype(np.int32), first, own_names.astype(np.int32)
+    return Shapes(tuple(forms), *short, entered), shape
+
+
+def _number_lines(
+    form: Ints, begin: Ints, count: Ints, name: Ints, names: int
+) -> tuple[Ints, Ints]:
+    """Number lines by their forms and their names; as `number_in_order`."""
+    if not len(form) or not count.any():
+        return number_in_order(form)
+    said = np.zeros(len(form), dtype=np.int64)
+    one, many = np.flatnonzero(count == 1), np.flatnonzero(count > 1)
+    said[one] = 1 + name[begin[one]]
+    said[many] = 1 + names + alike(name, begin[many], (begin + count)[many])
+    return number_in_order(form * (int(said.max()) + 1) + said)
+
+
+# What forms say.
+#
+# Programs name points ``p1`` to ``p3000``: every line has a shape of its own, but all
+# have one form. What a form says is built once, with its names left open; what a line
+# says is that with the line's names filled in, when somebody asks.
+
+T = TypeVar("T")
+Filler = Callable[[Sequence[str]], object]
+
+OPEN = "\x01"  # no program text holds it
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_PLACE = re.compile(rf"{OPEN}(aa|aA|AA)(\d+){OPEN}", re.ASCII)
+
+
+def open_name(index: int) -> str:
+    """Return what stands for the name of an index until it is filled in.
+
+    Its letters remember whether a rule has made the name lower or upper case.
+    """
+    return f"{OPEN}aA{index}{OPEN}"
+
+
+def name_index(text: str) -> int:
+    """Return which name a text stands for, -1 where it is no open name.
+
+    >>> name_index(open_name(2).lower()), name_index("weld")
+    (2, -1)
+    """
+    found = _PLACE.fullmatch(text)
+    return int(found[2]) if found else -1
+
+
+def fill_names(part: object, names: Sequence[str]) -> object:
+    """Fill names into a part of what a form says.
+
+    >>> filled(("move", open_name(0).lower()), ["Weld_1"])
+    ('move', 'weld_1')
+    """
+    fill = filler(part)
+    return fill(names) if fill is not None else part
+
+
+def filler(part: object) -> Filler | None:
+    """Return what fills names into a part, None where none is open in it."""
+    if isinstance(part, str):
+        return _text_filler(part)
+    if isinstance(part, tuple):
+        at = [name_index(one) if isinstance(one, str) else -1 for one in part]
+        if len(part) > 1 and part == tuple(map(open_name, at)):
+            return itemgetter(*at)  # a list of names, as they are written
+        return _all_filler(tuple, part)
+    own = getattr(part, "__match_args__", None)
+    if own is None:
+        return None
+    made = type(part)
+    return _all_filler(lambda parts: made(*parts), [getattr(part, n) for n in own])
+
+
+def _all_filler(
+    made: Callable[[list[object]], object], parts: Sequence[object]
+) -> Filler | None:
+    """Return what fills names into some parts and makes something of them."""
+    pairs = [(filler(part), part) for part in parts]
+    if all(fill is None for fill, _ in pairs):
+        return None
+    return lambda names: made(
+        [part if fill is None else fill(names) for fill, part in pairs]
+    )
+
+
+def _text_filler(part: str) -> Filler | None:
+    if part[:1] == OPEN == part[-1:] and part.count(OPEN) == 2:
+        index, letters = int(part[3:-1]), part[1:3]
+        return lambda names: _match_case(names[index], letters)
+    if _PLACE.search(part) is None:
+        return None
+    return lambda names: _PLACE.sub(
+        lambda at: _match_case(names[int(at[2])], at[1]), part
+    )
+
+
+def _match_case(name: str, letters: str) -> str:
+    if letters == "aa":
+        return name.lower()
+    return name.upper() if letters == "AA" else name
+
+
+@dataclass(frozen=True, eq=False)
+class ParsedShapes(Sequence[T], Generic[T]):
+    """What each of k shapes says, made from its form when it is asked for.
+
+    Attributes:
+        said: What each form says, its names open.
+        shapes: The shapes.
+    """
+
+    said: tuple[T, ...]
+    shapes: Shapes
+    _made: dict[int, T] = field(default_factory=dict)
+    _fillers: dict[int, Filler | None] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Return the number of shapes."""
+        return len(self.shapes)
+
+    @overload
+    def __getitem__(self, shape: int) -> T: ...
+    @overload
+    def __getitem__(self, shape: slice) -> Sequence[T]: ...
+    def __getitem__(self, shape: int | slice) -> T | Sequence[T]:
+        """Return what a shape says."""
+        if isinstance(shape, slice):
+            return [self[k] for k in range(*shape.indices(len(self)))]
+        made = self._made.get(shape)
+        if made is None:
+            made = self._made[shape] = self.once(shape)
+        return made
+
+    def once(self, shape: int) -> T:
+        """Make what a shape says for who asks for it once alone."""
+        form, names = int(self.form[shape]), self.shapes.names_of(shape)
+        made = self.said[form]
+        if not names:
+            return made
+        if form not in self._fillers:
+            self._fillers[form] = filler(made)
+        fill = self._fillers[form]
+        return made if fill is None else fill(names)  # type: ignore[return-value]
+
+    def __iter__(self) -> Iterator[T]:
+        """Go through the shapes."""
+        return (self[k] for k in range(len(self)))
+
+    @property
+    def form(self) -> Indices:
+        """Return the form of every shape, as an index into `said`, (k,)."""
+        return self.shapes.form
+
+    def tell(self, names: NameColumn) -> Bools:
+        """Tell which names, in lower case, are words in the shapes, (m,)."""
+        found: Bools = self.shapes.names.lower().find(names) >= 0
+        words = {*_WORD.findall("\n".join(self.shapes.texts).lower())}
+        rest = np.flatnonzero(~found)
+        found[rest] = [names[k] in words for k in rest.tolist()]
+        return found
+
+    def which(self, test: Callable[[T], bool]) -> Bools:
+        """Tell which shapes pass a test that no name in them decides, (k,)."""
+        passed = np.array([test(one) for one in self.said], dtype=bool)
+        found: Bools = passed[self.form]
+        return found
+
+
+def parse_shapes(shapes: Shapes, parse: Callable[[str], T]) -> ParsedShapes[T]:
+    """Parse the form of every shape.
+
+    Args:
+        shapes: Masks of lines.
+        parse: Says what a form says.
+    """
+    return ParsedShapes(tuple(map(parse, shapes.texts)), shapes)

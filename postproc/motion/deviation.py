@@ -1,0 +1,189 @@
+"""How far a changed program leads the arm from where it was, move by move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints, any_in_rows, largest_in_rows, spans
+from postproc.motion.joint_path import STRAIGHT, Trace
+from postproc.robot.arm import Arm
+from postproc.robot.trajectory import Motion
+
+# A cell feels elbow and wrist as well as the tool: near a singularity a small step of
+# the tool is a large one of the joints.
+
+
+@dataclass(frozen=True)
+class JointDeviation:
+    """Of n joint angles, or the largest on the ways to n targets; NaN: not known.
+
+    Attributes:
+        joints: Change of every joint, (n, 6) [rad], but for constant offsets.
+        elbow: Distance of the elbow from where it was, (n,) [m].
+        wrist_centre: .. of the wrist centre, (n,) [m].
+        tcp: .. of the TCP, (n,) [m].
+        branch: It is on another branch, (n,).
+    """
+
+    joints: Floats
+    elbow: Floats
+    wrist_centre: Floats
+    tcp: Floats
+    branch: Bools
+
+    @property
+    def joint(self) -> Floats:
+        """The largest change of a joint, (n,) [rad]."""
+        return largest_in_rows(self.joints)
+
+    @property
+    def sizes(self) -> Floats:
+        """Joint [rad], elbow, wrist centre and TCP [m], (n, 4)."""
+        return np.column_stack([self.joint, self.elbow, self.wrist_centre, self.tcp])
+
+    def with_rows(self, rows: Ints, new: JointDeviation) -> JointDeviation:
+        """Return it with other values in some rows, (k,)."""
+        found = {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
+        for name, values in found.items():
+            values[rows] = getattr(new, name)
+        return JointDeviation(**found)
+
+
+def departure(
+    arm: Arm, old: Floats, new: Floats, tool: Floats, offset: Floats
+) -> JointDeviation:
+    """Compare joint angles.
+
+    Args:
+        arm: The arm.
+        old: Joint angles, (n, 6) [rad], NaN where not known.
+        new: Those that they become.
+        tool: TCP in the flange frame, (n, 3) [m].
+        offset: Change of every joint that is constant for this arm (zero errors that
+            are compensated), (6,) [rad]: all of it or a part swings nothing, though it
+            moves elbow and wrist.
+    """
+    joints = _measure_excess(new - old, offset)
+    known = ~any_in_rows(np.isnan(old) | np.isnan(new))
+    out = np.full((len(old), 3), np.nan)
+    rows = np.flatnonzero(known)
+    out[rows] = _measure_displacement(arm, old[rows], new[rows], tool[rows])
+    branch = np.zeros(len(old), dtype=bool)
+    branch[rows] = other_branch(arm, old[rows], new[rows])
+    return JointDeviation(joints, out[:, 0], out[:, 1], out[:, 2], branch)
+
+
+def _measure_excess(change: Floats, offset: Floats) -> Floats:
+    """Tell how far changes (n, 6) lie outside of 0 to their offsets (6,) [rad]."""
+    low, high = np.minimum(offset, 0.0), np.maximum(offset, 0.0)
+    return np.maximum(np.maximum(low - change, change - high), 0.0)
+
+
+def _measure_displacement(arm: Arm, old: Floats, new: Floats, tool: Floats) -> Floats:
+    """Tell how far elbow, wrist centre and TCP move, (n, 3) [m]."""
+    a, b = arm.landmarks(old, tool), arm.landmarks(new, tool)
+    return np.asarray(np.linalg.norm(b - a, axis=2))
+
+
+def other_branch(arm: Arm, old: Floats, new: Floats) -> Bools:
+    """Tell where joint angles (n, 6) [rad] lie on different branches, (n,).
+
+    A straight wrist lies on both of its own.
+    """
+    differ = arm.branch(old) ^ arm.branch(new)
+    straight = np.abs(np.minimum(old[:, 4] * new[:, 4], 0.0)) < STRAIGHT**2
+    return np.asarray((differ & ~np.where(straight, 4, 0)) != 0)
+
+
+# The same along the ways: both programs at the same parts of every way.
+
+ON_JOINT_MOVES = 4  # places looked at on a JOINT move, its end among them
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """k places on the ways to n targets.
+
+    Attributes:
+        visit: The target of each, (k,).
+        old, new: Joint angles, (k, 6) [rad].
+    """
+
+    visit: Ints
+    old: Floats
+    new: Floats
+
+
+def path_departure(
+    arm: Arm, move: Ints, tool: Floats, old: Trace, new: Trace, offset: Floats
+) -> JointDeviation:
+    """Compare the joint paths of two programs that differ in their targets alone.
+
+    Args:
+        arm: The arm.
+        move: `Motion` of n moves, (n,).
+        tool: TCP in the flange frame at each, (n, 3) [m].
+        old: Where one leads.
+        new: Where the other does.
+        offset: See `departure`.
+
+    Returns:
+        The largest on the ways to every target, itself included. Displacements inside
+        of ways are looked at only where they may be the largest there.
+    """
+    at = departure(arm, old.q, new.q, tool, offset)
+    some = _samples(move, old, new)
+    if len(some.visit) == 0:
+        return at
+    joints, branch = np.array(at.joints), np.array(at.branch)
+    np.fmax.at(joints, some.visit, _measure_excess(some.new - some.old, offset))
+    way = move[some.visit] != Motion.JOINT  # joints may pass a singularity as they like
+    other = other_branch(arm, some.old[way], some.new[way])
+    branch[some.visit[way][other]] = True
+    sizes = np.column_stack([at.elbow, at.wrist_centre, at.tcp])
+    farthest = np.abs(some.new - some.old) @ _levers(arm, tool)
+    rows = np.flatnonzero(~(farthest <= np.nan_to_num(sizes[some.visit].min(axis=1))))
+    inside = _measure_displacement(
+        arm, some.old[rows], some.new[rows], tool[some.visit[rows]]
+    )
+    np.fmax.at(sizes, some.visit[rows], inside)
+    return JointDeviation(joints, sizes[:, 0], sizes[:, 1], sizes[:, 2], branch)
+
+
+def _levers(arm: Arm, tool: Floats) -> Floats:
+    """Bound how far a turn of every joint can move the TCP, (6,) [m/rad]."""
+    length = np.abs(arm.dh.a) + np.abs(arm.dh.d)
+    beyond: Floats = np.cumsum(length[::-1])[::-1] + np.nan_to_num(
+        np.linalg.norm(tool, axis=1)
+    ).max(initial=0.0)
+    return beyond
+
+
+def _samples(move: Ints, old: Trace, new: Trace) -> _Samples:
+    """Find the places inside of the ways that both programs are known to go."""
+    visit = np.repeat(np.arange(len(move)), np.diff(old.edges.first))
+    known = (old.edges.source >= 0) & (new.edges.source == old.edges.source)
+    edge = np.flatnonzero(known)
+    count = np.diff(old.edges.start)[edge]
+    count = np.where(move[visit[edge]] == Motion.JOINT, ON_JOINT_MOVES, count) - 1
+    of = np.repeat(edge, count)
+    step = spans(np.ones(len(edge), dtype=np.int64), count)
+    part = step / np.repeat(count + 1, count)
+    both = [_along(trace, of, part) for trace in (old, new)]
+    good = ~any_in_rows(np.isnan(both[0] + both[1]))
+    return _Samples(visit[of[good]], both[0][good], both[1][good])
+
+
+def _along(trace: Trace, edge: Ints, part: Floats) -> Floats:
+    """Give joint angles at a part of the way along edges, (k, 6) [rad]."""
+    edges = trace.edges
+    place = part * np.diff(edges.start)[edge]
+    before = np.floor(place).astype(np.int64)
+    at = edges.start[edge] + before
+    begin = np.where(
+        (before > 0)[:, None], edges.path[at - 1], trace.q[edges.source[edge]]
+    )
+    inner = (place - before)[:, None]
+    return np.asarray(begin + inner * (edges.path[at] - begin))

@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.calibration.pose_design import design_survey, joint_box, usable
+from postproc.exceptions import PostprocError
+from tests.calibration.simulator import NJ, PLATE, TOOL
+
+
+def test_poses_respect_limits_and_points_take_turns() -> None:
+    d = design_survey(NJ, PLATE, 60, seed=1)
+    low, high = joint_box(NJ)
+    assert d.q.shape == (60, 6)
+    assert (d.q >= low).all() and (d.q <= high).all()
+    assert NJ.within_limits(d.q + 0.05).all() and NJ.within_limits(d.q - 0.05).all()
+    assert d.probe.tolist() == [k % 3 for k in range(60)]
+    assert (np.abs(d.side) == 1).all() and (d.side.sum(axis=0) == 0).all()
+    assert usable(NJ, d.q, PLATE[d.probe], None).all()
+    again = design_survey(NJ, PLATE, 60, seed=1)
+    np.testing.assert_array_equal(d.q, again.q)
+
+
+def test_each_joint_covers_its_range() -> None:
+    d = design_survey(NJ, TOOL[None], 300)
+    low, high = joint_box(NJ)
+    for j in range(6):
+        count, _ = np.histogram(d.q[:, j], 5, (low[j], high[j]))
+        assert count.min() > 15, j
+
+
+def test_the_tracker_sees_every_pose() -> None:
+    tracker = np.array([4.0, 1.0, 1.2])
+    d = design_survey(NJ, TOOL[None], 40, tracker=tracker)
+    T = NJ.flange(d.q)
+    tcp = T[:, :3, 3] + T[:, :3, :3] @ TOOL
+    beam = tracker - tcp
+    beam /= np.linalg.norm(beam, axis=1)[:, None]
+    assert np.einsum("ni,ni->n", T[:, :3, 2], beam).min() > 0.25
+
+
+def test_optimal_poses_tell_more() -> None:
+    lhs = design_survey(NJ, TOOL[None], 25, "lhs", seed=3).observability
+    for mode in ("optimal", "d-optimal"):
+        best = design_survey(NJ, TOOL[None], 25, mode, seed=3).observability
+        assert best.rank >= lhs.rank
+        assert best.o1 > lhs.o1
+    assert "condition number" in design_survey(NJ, TOOL[None], 20).summary()
+
+
+def test_wrong_wishes_are_refused() -> None:
+    with pytest.raises(PostprocError, match="no survey mode 'best'"):
+        design_survey(NJ, TOOL[None], 10, "best")
+    with pytest.raises(PostprocError, match="0 poses"):
+        design_survey(NJ, TOOL[None], 0)

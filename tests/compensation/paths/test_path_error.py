@@ -1,0 +1,242 @@
+"""The predicted path accuracy is what the virtual arm does, and a slow loop says."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.cli.simulate import setup_of, visits_of
+from postproc.compensation.options import DEFAULT_OPTIONS, Clock, Job, no_progress
+from postproc.compensation.program import plan_visits, prepare_cell, read_program
+from postproc.compensation.timing_comparison import InTime, run_in_time
+from postproc.language.visits import Visits
+from postproc.model.model import load_model
+from postproc.robot.cell import load_cell
+from postproc.robot.pose import MM
+from postproc.robot.state import make_states
+from postproc.robot.trajectory import Motion
+from postproc.simulation import DEFAULT, virtual_arm
+from postproc.simulation.path import _tracks
+from tests.written import cli
+
+ROOT = Path(__file__).parents[3]
+CELL = ROOT / "programs/cell.toml"
+SEED = 41  # of the virtual arm
+LINES = 12
+START = (
+    "MOVE JOINT TO {4.0, -6.0, -84.0, 9.0, 53.0, -12.0}",
+    "MOVE JOINT TO {0.0, 0.0, -90.0, 0.0, 60.0, 0.0}",
+)
+
+
+def pos(place: np.ndarray, turn: np.ndarray) -> str:
+    return f"POS({', '.join(f'{v:.4f}' for v in (*place, *turn))}, '')"
+
+
+def drawn() -> list[tuple[str, ...]]:
+    """Draw moves to a place and on from there: lines of 200 to 500 mm, then arcs."""
+    rng, moves = np.random.default_rng(3), []
+    for k in range(60):
+        begin, way = rng.uniform((-250, -300, 0), (250, 150, 300)), rng.normal(size=3)
+        way *= rng.uniform(200, 500) / np.linalg.norm(way)
+        turn = rng.uniform((65, 155, -50), (115, 168, 50))
+        on = f"LINEAR TO {pos(begin + way, turn)}"
+        if k >= 45:
+            aside = np.cross(way, (0.0, 0.0, 1.0)) / 3
+            via = pos(begin + way / 2 + aside, turn)
+            on = f"CIRCULAR TO {pos(begin + way, turn)} VIA {via}"
+        moves.append((f"  MOVE JOINT TO {pos(begin, turn)}", f"  MOVE {on}"))
+    return moves
+
+
+@cache
+def job(lines: int = LINES) -> str:
+    """Write lines and arcs with stops that the arm can reach."""
+    kept: dict[str, list[str]] = {"LINEAR": [], "CIRCULAR": []}
+    for moves in drawn():
+        text = "\r\n".join(["PROGRAM job", "BEGIN", *START, *moves, "END job", ""])
+        visits = read_program({"job.pdl": text.encode()}, load_cell(CELL)).visits
+        if not plan_visits(visits, load_cell(CELL)).plan.reason.any():
+            kept[moves[1].split()[1]] += moves
+    moves = [*kept["LINEAR"][: 2 * lines], *kept["CIRCULAR"][:4]]
+    return "\r\n".join(["PROGRAM job", "BEGIN", *START, *moves, "END job", ""])
+
+
+def done(*arguments: object) -> None:
+    found = cli(*arguments)
+    assert found.exit_code in (0, 1), found.stderr
+
+
+@pytest.fixture(scope="module")
+def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An arm surveyed, and a job compensated for it."""
+    folder = tmp_path_factory.mktemp("paths")
+    (folder / "job.pdl").write_text(job())
+    survey, model = folder / "survey.pdl", folder / "model.json"
+    done("survey", "--cell", CELL, "--poses", 250, "--seed", 9, "-o", survey)
+    measured = folder / "survey.csv"
+    done("simulate", survey, "--cell", CELL, "--seed", SEED, "-o", measured)
+    done("fit", measured, "--cell", CELL, "-o", model)
+    done("compensate", folder / "job.pdl", "--cell", CELL, "--model", model,
+         "-o", folder / "out.pdl", "--report", folder / "report.json")  # fmt: skip
+    for name in ("job", "out"):
+        done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+             "--reference", folder / "job.pdl", "--path",
+             "--json", folder / f"{name}.json")  # fmt: skip
+    return folder
+
+
+@pytest.fixture(scope="module")
+def ran(shop: Path) -> tuple[InTime, Job]:
+    """The job in time, before and after."""
+    model, given = load_model(shop / "model.json"), load_cell(CELL)
+    cell = prepare_cell(given, model, DEFAULT_OPTIONS)
+    readings = [
+        read_program({"job.pdl": (shop / name).read_bytes()}, cell)
+        for name in ("job.pdl", "out.pdl")
+    ]
+    setting = Job(cell, model, DEFAULT_OPTIONS, Clock(no_progress))
+    position = np.full((len(readings[0].visits), 3), np.nan)
+    return run_in_time(*readings, position, setting), setting
+
+
+def test_it_is_what_the_virtual_arm_does(shop: Path) -> None:
+    report = json.loads((shop / "report.json").read_bytes())
+    assert len(report["path"]) == LINES + 4  # an arc is two paths
+    for key, name in (("before", "job"), ("after", "out")):
+        truth = json.loads((shop / f"{name}.json").read_bytes())
+        real = {move["visit"]: move for move in truth["path"]}
+        pairs = [(p["max_mm"][key], real[p["visit"]]["max_mm"]) for p in report["path"]]
+        told, found = np.array(pairs).T
+        assert np.abs(told - found).mean() < 0.02 and np.abs(told - found).max() < 0.06
+        along = [
+            abs(p["along_mm"][key] - real[p["visit"]]["along_mm"])
+            for p in report["path"]
+        ]
+        assert np.mean(along) < 0.03
+        assert truth["path_accuracy"]["max_mm"] == pytest.approx(found.max(), abs=1e-5)
+    before, after = (report["path_accuracy"][key] for key in ("before", "after"))
+    assert after["mean_mm"] < 0.5 * before["mean_mm"]
+    assert 0.05 < after["max_mm"]  # right at its ends, and not between them
+
+
+# Rounded corners.
+
+ZONE = 8.0  # [mm]
+CORNERS = ((0, -200, 150), (0, 100, 150), (150, 100, 250), (150, -150, 250))
+
+
+def rounded() -> str:
+    """Write lines between stops at both ends, flown through with zones."""
+    turn, places = np.array([100.0, 160.0, 0.0]), np.array(CORNERS, dtype=float)
+    moves = [f"  MOVE LINEAR TO {pos(places[0], turn)}"]
+    moves += [f"  MOVEFLY LINEAR TO {pos(p, turn)} ADVANCE" for p in places[1:-1]]
+    head = ("$LIN_SPD := 0.1", "$FLY_TYPE := FLY_CART", "$FLY_TRAJ := FLY_FROM",
+            f"$FLY_DIST := {ZONE:g}")  # fmt: skip
+    moves.append(f"  MOVE LINEAR TO {pos(places[-1], turn)}")
+    return "\r\n".join(["PROGRAM job", "BEGIN", *head, *START, *moves, "END job", ""])
+
+
+def real_corners(folder: Path, name: str) -> dict[int, float]:
+    """How near the virtual arm comes to every target on its ways, by visit [mm]."""
+    cell = load_cell(CELL)
+    setup, wanted = setup_of(cell), visits_of(folder / "round.pdl", cell)
+    arm = virtual_arm(SEED, DEFAULT, coupling=setup.coupling, rows=1, tool=setup.tool)
+    corner = dict(_tracks(arm, setup, with_stops(wanted)))
+    real = dict(_tracks(arm, setup, visits_of(folder / name, cell)))
+    found = {}
+    for v in real.keys() & corner.keys():
+        way = np.vstack([real[k].real for k in (v, v + 1) if k in real])
+        place = corner[v].nominal[-1]
+        found[v] = float(np.linalg.norm(way - place, axis=1).min() / MM)
+    return found
+
+
+def with_stops(visits: Visits) -> Visits:
+    """Let the arm stop at all targets, so that it goes to them."""
+    return replace(visits, fly=np.zeros(len(visits), dtype=bool))
+
+
+def test_rounded_corners_are_passed_as_the_virtual_arm_does(shop: Path) -> None:
+    (shop / "round.pdl").write_text(rounded())
+    done("compensate", shop / "round.pdl", "--cell", CELL, "--model",
+         shop / "model.json", "-o", shop / "round.out.pdl",
+         "--report", shop / "round.json", "--html", shop / "round.html")  # fmt: skip
+    assert "Cornering round-off" in (shop / "round.html").read_text()
+    report = json.loads((shop / "round.json").read_bytes())
+    told = {p["visit"]: p["corner_mm"] for p in report["path"] if "corner_mm" in p}
+    places = np.array(CORNERS, dtype=float)
+    steps = np.diff(places, axis=0)
+    units = steps / np.linalg.norm(steps, axis=1)[:, None]
+    programmed = ZONE / 4 * np.linalg.norm(np.diff(units, axis=0), axis=1)
+    assert len(told) == len(programmed) == 2  # not where the arm stops
+    for key, name in (("before", "round.pdl"), ("after", "round.out.pdl")):
+        real = real_corners(shop, name)
+        off = [abs(sizes[key] - real[v]) for v, sizes in told.items()]
+        assert max(off) < 0.03
+    after = np.array([sizes["after"] for sizes in told.values()])
+    assert np.abs(after - programmed).max() < 0.1  # corrected, the zones are left
+    most = report["path_accuracy"]["cornering_round_off"]["after"]["max_mm"]
+    assert most == pytest.approx(after.max(), abs=1e-5)
+
+
+def test_it_is_what_a_slow_loop_says(ran: tuple[InTime, Job]) -> None:
+    found, setting = ran
+    cell, model, cycle = setting.cell, setting.model, found.before
+    arm, paths = cell.arm, found.paths
+    half = 2 * arm.play
+    edge, source = cycle.ways
+    for k, visit in enumerate(paths.visit.tolist()):
+        if cycle.targets.move[visit] != Motion.LINEAR:
+            continue
+        play = cycle.arrived.past.play
+        lo, hi = (np.array(side[source[visit]]) for side in (play.lo, play.hi))
+        assert (lo == hi).all()  # the job begins with joints that are told
+        begin, end = cycle.path.edges.start[edge[visit] : edge[visit] + 2]
+        q = np.vstack([cycle.path.q[source[visit]], cycle.path.edges.path[begin:end]])
+        sizes = []
+        for here in fine(q):
+            drive = arm.coupling @ here
+            lo = np.clip(lo, drive - half, drive + half)
+            tool = cycle.targets.tool[visit, :3, 3]
+            state = make_states(here[None], ((drive - lo) / half)[None], tool,
+                                payload=cell.payload_mass,
+                                payload_com=cell.payload_com)  # fmt: skip
+            error = model.error(arm, state)[0]
+            ends = arm.tcp(q[[0, -1]], np.tile(tool, (2, 1)))
+            heading = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+            sizes.append(np.linalg.norm(error - (error @ heading) * heading))
+        # where a drive has crossed is a kink, which samples 8 times as dense miss
+        assert max(sizes) == pytest.approx(paths.before.sizes[k], abs=6e-6)
+
+
+def fine(q: np.ndarray) -> np.ndarray:
+    """Sample a joint path 40 times as densely, straight between its places."""
+    marks = np.arange(len(q))
+    inner = np.linspace(0, len(q) - 1, 40 * (len(q) - 1) + 1)
+    return np.stack([np.interp(inner, marks, column) for column in q.T], axis=1)
+
+
+def test_at_the_targets_the_compensated_program_is_right(ran) -> None:
+    paths = ran[0].paths
+    last = paths.first[1:] - 1
+    assert paths.after.across[last].max() < 2e-5
+    assert paths.before.across[last].min() > 1e-4
+    assert (paths.way[last] > 0).all() and (np.diff(paths.way[: last[0]]) > 0).all()
+
+
+def test_sides_that_nobody_knows_widen_it(shop: Path, ran) -> None:
+    _, setting = ran
+    text = "\r\n".join(line for line in job().split("\r\n") if line not in START)
+    readings = [read_program({"job.pdl": text.encode()}, setting.cell)] * 2
+    nowhere = np.full((len(readings[0].visits), 3), np.nan)
+    paths = run_in_time(*readings, nowhere, setting).paths
+    first = paths.samples(0)
+    assert paths.before.unsure[first].max() > 1e-5
+    assert paths.before.unsure[paths.samples(len(paths) - 1)].max() < 1e-9
+    np.testing.assert_allclose(paths.after.across, paths.before.across, atol=1e-12)

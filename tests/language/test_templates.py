@@ -1,0 +1,44 @@
+"""Lines that differ in numbered names share a form, and say what they would alone."""
+
+import pytest
+
+from postproc.language.lexer import form_of
+from postproc.language.logical_lines import read_lines
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.parser import parse_line, parse_value_form
+from postproc.language.source import source_from_bytes
+from postproc.language.templates import parse_shapes
+
+
+@pytest.mark.parametrize(
+    ("mask", "names"),
+    [
+        (
+            "MOVE LINEAR TO WP_1 WITH CONDITION[Spot2(\x00, Id_3)]",
+            ("WP_1", "Spot2", "Id_3"),
+        ),
+        ("v1, V2 : POSITION", ("v1", "V2")),
+        ("x := 'p1' + $v2", ()),
+    ],
+)
+def test_names_are_taken_out_and_filled_in(mask, names) -> None:
+    assert form_of(mask)[1] == names
+    plain = parse_line(mask.translate(str.maketrans("123", "abc")))
+    said = repr(parse_line(mask)).replace("-1", "-")  # a slot that is not there
+    said = said.translate(str.maketrans("123", "abc"))
+    assert said == repr(plain).replace("-1", "-")
+
+
+def test_case_is_kept_where_it_is_shown_only() -> None:
+    declared = parse_line("Wp1, WP2 : POSITION")
+    assert isinstance(declared, ast.Declare) and declared.names == ("Wp1", "WP2")
+    moved = parse_line("MOVE TO Wp1")
+    assert isinstance(moved, ast.Move) and moved.where == (ast.Reference("wp1"),)
+    lines = read_lines(source_from_bytes("job.lsv", b"Wp1 XTND Arm: 1 Priv"))
+    (entered,) = parse_shapes(lines.shapes, parse_value_form)
+    assert entered is not None and entered.name == "Wp1"
+
+
+@pytest.mark.parametrize("mask", ["?? Wp1 ?? x2", "MOVE TO \x01", "\x01\x01 p1"])
+def test_what_is_not_understood_keeps_its_text(mask) -> None:
+    assert parse_line(mask) == ast.Unknown(mask)
