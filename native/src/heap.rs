@@ -1,4 +1,4 @@
-//! Memory that is not used any more: `postproc.arrays.give_back`.
+//! Memory that is not used any more: `postproc.arrays.release_memory`.
 
 use pyo3::prelude::*;
 

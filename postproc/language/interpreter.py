@@ -137,7 +137,7 @@ class Arrived:
 
     def forget(self) -> Arrived:
         """Forget where the arm is, and what moves are carried out with."""
-        return Arrived(NOWHERE, self.modes.lost())
+        return Arrived(NOWHERE, self.modes.forget())
 
 
 NOWHERE = frozenset([ELSEWHERE])

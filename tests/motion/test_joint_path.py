@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.diagnostics import Reason
+from postproc.diagnostics import NO_REASON, Reason
 from postproc.motion import joint_path as trace_module
 from postproc.motion.joint_path import PathSolver, Trace, trace
 from postproc.motion.planner import plan
@@ -364,7 +364,7 @@ def test_a_loop_back_is_checked(arm: Arm, home: np.ndarray) -> None:
 def test_lines_to_joint_targets(arm: Arm, tool: np.ndarray, home: np.ndarray) -> None:
     there = home + np.array([0.1, 0.05, 0, 0.1, 0, 0.1])
     other = arm.inverse(arm.flange(there[None])).q[0, 4]
-    for end, expected in ((there, ""), (other, OTHER_BRANCH)):
+    for end, expected in ((there, NO_REASON), (other, OTHER_BRANCH)):
         targets = make_targets(
             np.full(2, TargetKind.JOINTS), joints=np.array([home, end]),
             move=np.array([0, 1]), tool=np.tile(tool, (2, 1, 1)),

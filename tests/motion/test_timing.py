@@ -168,7 +168,7 @@ def test_windows_change_no_direction(
 ) -> None:
     whole = milling(arm, tool, home, 0.1)
     for place, size in (
-        ("trace.WINDOW", 7), ("trace.LONG", 5), ("branches.FEW", 3),
+        ("joint_path.WINDOW", 7), ("joint_path.LONG", 5), ("branches.FEW", 3),
     ):  # fmt: skip
         monkeypatch.setattr(f"postproc.motion.{place}", size)
     pieces = milling(arm, tool, home, 0.1)

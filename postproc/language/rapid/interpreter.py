@@ -496,7 +496,7 @@ class RapidMachine(TaskMachine):
         )  # fmt: skip
         (last,) = after.origins
         if math.isnan(self.visits[last].zone_mm):
-            after = replace(after, modes=after.modes.settled())
+            after = replace(after, modes=after.modes.settle())
         if one.name in SYNCHRONOUS:
             return self._synchronous(context, row, one, after)
         return after
