@@ -104,8 +104,8 @@ def test_compensating_loads_nothing_that_it_may_not_need():
     code = (
         "import sys, postproc.cli.job_files, postproc.cli.common\n"
         "import postproc.language.pdl2.language\n"
-        "ours = ('batch.plan', 'compensation.in_time', 'motion.timing',\n"
-        "    'compensation.paths.correction', 'language.pdl2.clones',\n"
+        "ours = ('batch.plan', 'compensation.timing_comparison', 'motion.timing',\n"
+        "    'compensation.paths.insertion_loop', 'language.pdl2.clones',\n"
         "    'model.effects.elm')\n"
         "never = {'matplotlib', 'pinocchio', 'rich', 'ruckig', 'scipy'}\n"
         "never |= {f'postproc.{name}' for name in ours}\n"
