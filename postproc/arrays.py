@@ -92,7 +92,7 @@ def take_rows(
 ) -> NDArray[Any]:
     """Take rows of a column; one value stays one value.
 
-    >>> taken(slim(np.zeros(9)), np.array([2, 5])).strides
+    >>> take_rows(slim(np.zeros(9)), np.array([2, 5])).strides
     (0,)
     """
     if isinstance(rows, slice) or not len(column) or not is_one_value(column):
@@ -191,7 +191,7 @@ class Cells:
 def format_fixed(values: Floats, decimals: int) -> Cells:
     """Write numbers, (n,) or (n, k), as ``%.3f`` does for 3 decimals.
 
-    >>> text_of(2, [fixed(np.array([-0.0625, np.nan]), 3), Cells(b" ")])
+    >>> text_of(2, [format_fixed(np.array([-0.0625, np.nan]), 3), Cells(b" ")])
     b'-0.062 null '
     """
     return Cells(numbers=floats(_in_columns(values)), fixed=decimals)
@@ -257,7 +257,7 @@ CHUNK = 2048  # rows at a time
 def map_chunks(work: Callable[[slice], T], n: int, size: int = CHUNK) -> list[T]:
     """Do the work on slices of n rows, one after the other.
 
-    >>> in_chunks(lambda rows: (rows.start, rows.stop), 5, 2)
+    >>> map_chunks(lambda rows: (rows.start, rows.stop), 5, 2)
     [(0, 2), (2, 4), (4, 5)]
     """
     return [work(rows) for rows in chunks(n, size)]
@@ -286,7 +286,7 @@ def spans(begin: Indices, count: Indices) -> Ints:
 def isin_sorted(values: Indices, some: Indices) -> Bools:
     """Tell which values, (n,), are among some in ascending order, (m,).
 
-    >>> among(np.array([7, 2, 9]), np.array([2, 5, 9])).tolist()
+    >>> isin_sorted(np.array([7, 2, 9]), np.array([2, 5, 9])).tolist()
     [False, True, True]
     """
     if not len(some):

@@ -668,7 +668,7 @@ def schema(kind: str) -> dict[str, Any]:
     """Return the keys that a JSON output begins with.
 
     >>> schema("report")
-    {'schema': 'postproc-report', 'version': 1}
+    {'schema': 'postproc-report', 'version': 2}
     """
     return {"schema": f"postproc-{kind}", "version": SCHEMAS[kind]}
 

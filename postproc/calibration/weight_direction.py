@@ -161,7 +161,7 @@ def unit_directions() -> list[tuple[str, Floats]]:
 def _format(direction: Floats) -> str:
     """Write a direction.
 
-    >>> _listed(np.array([0.0, -0.0, -1.0]))
+    >>> _format(np.array([0.0, -0.0, -1.0]))
     '[0, 0, -1]'
     """
     return "[" + ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in direction) + "]"

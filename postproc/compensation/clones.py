@@ -141,7 +141,7 @@ def _size(box: Box) -> float:
 def unite_overlapping(sets: Iterable[frozenset[int]]) -> list[frozenset[int]]:
     """Unite the sets that overlap, in order of their smallest members.
 
-    >>> [sorted(s) for s in connected([frozenset({1, 2}), frozenset({3}),
+    >>> [sorted(s) for s in unite_overlapping([frozenset({1, 2}), frozenset({3}),
     ...                                frozenset({2, 5})])]
     [[1, 2, 5], [3]]
     """

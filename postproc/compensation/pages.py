@@ -50,7 +50,7 @@ def find_named_programs(text: bytes) -> tuple[dict[str, int], dict[str, int]]:
         Lower-case base names, in order, each with the line that names it first; and
         likewise the names, as written, that lead out of the folder.
 
-    >>> named_programs(b"PROGRAM m\nIMPORT 'Page1'\nIMPORT '../x'\nBEGIN\nEND m")
+    >>> find_named_programs(b"PROGRAM m\nIMPORT 'Page1'\nIMPORT '../x'\nBEGIN\nEND m")
     ({'page1': 2}, {'../x': 3})
     """
     inside: dict[str, int] = {}

@@ -245,7 +245,7 @@ def run_in_time(
 def describe_verification(in_motion: Mapping[str, str]) -> str:
     """Say whether a measured path has shown what the model says of joints in motion.
 
-    >>> verified({"1": "confirmed", "2": "refuted"})
+    >>> describe_verification({"1": "confirmed", "2": "refuted"})
     'a measured path confirms the flanks of joint 1, not those of 2'
     """
     if not in_motion:

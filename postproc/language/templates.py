@@ -60,7 +60,7 @@ def number_in_order(keys: AnyInts) -> tuple[Ints, Ints]:
     Returns:
         The number of every row, (n,), and the first row of every number.
 
-    >>> numbered_in_order(np.array([5, 2, 5]))
+    >>> number_in_order(np.array([5, 2, 5]))
     (array([0, 1, 0]), array([0, 1]))
     """
     if len(keys) == 0:
@@ -251,7 +251,7 @@ def name_index(text: str) -> int:
 def fill_names(part: object, names: Sequence[str]) -> object:
     """Fill names into a part of what a form says.
 
-    >>> filled(("move", open_name(0).lower()), ["Weld_1"])
+    >>> fill_names(("move", open_name(0).lower()), ["Weld_1"])
     ('move', 'weld_1')
     """
     fill = filler(part)

@@ -407,7 +407,7 @@ def deduplicate(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     A line that is reached several times, in a routine or a loop, gives one for every
     visit.
 
-    >>> told_once([Diagnostic("a.pdl", 1, Code.PAGE, "odd")] * 3)[0].message
+    >>> deduplicate([Diagnostic("a.pdl", 1, Code.PAGE, "odd")] * 3)[0].message
     'odd (3 times)'
     """
     return tuple(

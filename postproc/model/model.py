@@ -639,7 +639,7 @@ def _degrees_between(a: Floats, b: Floats) -> float:
 def _format(direction: Direction | Floats) -> str:
     """Write a direction.
 
-    >>> _listed((0.0, -0.0, -1.0))
+    >>> _format((0.0, -0.0, -1.0))
     '[0, 0, -1]'
     """
     return "[" + ", ".join(f"{round(v, 3) + 0.0:g}" for v in direction) + "]"

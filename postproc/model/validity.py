@@ -167,9 +167,9 @@ def _join_intervals(
 ) -> Interval | None:
     """Join two ranges that touch; else the second counts, where it is known.
 
-    >>> _joined((0.0, 2.0), (1.0, 3.0), False), _joined((0.0, 1.0), (2.0, 3.0), False)
+    >>> _join_intervals((0.0, 2.0), (1.0, 3.0), False), _join_intervals((0.0, 1.0), (2.0, 3.0), False)
     ((0.0, 3.0), (2.0, 3.0))
-    >>> _joined((0.0, 2.0), None, False), _joined((0.0, 2.0), (1.0, 3.0), True)
+    >>> _join_intervals((0.0, 2.0), None, False), _join_intervals((0.0, 2.0), (1.0, 3.0), True)
     ((0.0, 2.0), (1.0, 3.0))
     """
     if old is None or new is None:

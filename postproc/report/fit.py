@@ -171,7 +171,7 @@ def _tell_rest(report: FitReport) -> list[str]:
 def _count_names(names: Iterable[str]) -> str:
     """Count names, the most frequent first.
 
-    >>> _counted(["a", "b", "b"])
+    >>> _count_names(["a", "b", "b"])
     'b 2, a 1'
     """
     return ", ".join(f"{name} {n}" for name, n in Counter(names).most_common())
@@ -180,7 +180,7 @@ def _count_names(names: Iterable[str]) -> str:
 def _group_names(names: Iterable[str]) -> str:
     """Name parameters by their effects; where there are more than a few, count them.
 
-    >>> _grouped(["geometry.a2", "backlash.b1", "geometry.d2"])
+    >>> _group_names(["geometry.a2", "backlash.b1", "geometry.d2"])
     'geometry a2 d2, backlash b1'
     """
     groups: dict[str, list[str]] = {}

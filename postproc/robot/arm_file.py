@@ -304,7 +304,7 @@ def arm_path(name: str, beside: Path | None = None) -> Path:
 def list_shipped_arms() -> list[str]:
     """Name the arms that come with the package.
 
-    >>> "nj220-2.7" in shipped_arms()
+    >>> "nj220-2.7" in list_shipped_arms()
     True
     """
     return sorted(path.name.removesuffix(".toml") for path in ARMS.glob("*.toml"))

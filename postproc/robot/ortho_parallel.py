@@ -343,7 +343,7 @@ def _fill_arm_file(
 def _quote(text: str) -> str:
     r"""Write a basic string of TOML; what is no character becomes a question mark.
 
-    >>> _quoted('a "\x7f')
+    >>> _quote('a "\x7f')
     '"a \\"\\u007f"'
     """
     valid = text.encode("utf-8", "replace").decode("utf-8")
@@ -386,7 +386,7 @@ def _numeric_parts(dh: DhParameters) -> dict[str, str]:
 def _round_values(values: Floats) -> Floats:
     """Round to 1e-9 what is so round, and the rest to 1e-12.
 
-    >>> _rounded(np.array([163.94100000000003, 100.0 / 3.0])).tolist()
+    >>> _round_values(np.array([163.94100000000003, 100.0 / 3.0])).tolist()
     [163.941, 33.333333333333]
     """
     short: Floats = np.round(values, 9)

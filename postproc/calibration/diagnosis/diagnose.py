@@ -585,7 +585,7 @@ def _rows(found: Extension) -> dict[str, list[Any]]:
 def thin_rows(count: int) -> NDArray[np.int64]:
     """Choose at most so many rows, evenly.
 
-    >>> len(thinned(10)), len(thinned(100_000))
+    >>> len(thin_rows(10)), len(thin_rows(100_000))
     (10, 3000)
     """
     places = np.linspace(0, count - 1, min(count, SHOWN))

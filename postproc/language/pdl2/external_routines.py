@@ -48,7 +48,7 @@ class RoutineEffect(StrEnum):
 def list_motionless() -> frozenset[str]:
     """Return the names of the shipped list.
 
-    >>> "spot" in known_still(), "tf" in known_still()
+    >>> "spot" in list_motionless(), "tf" in list_motionless()
     (True, False)
     """
     lines = (line.partition("#")[0] for line in _LIST.read_text("ascii").splitlines())

@@ -83,7 +83,7 @@ def read_known_instructions() -> Mapping[str, str]:
         By name in lower case: ``still`` changes nothing of a move, ``modal`` changes
         how the moves after it are carried out, ``left`` is not followed: it may move.
 
-    >>> known_instructions()["tpwrite"], known_instructions()["pdispon"]
+    >>> read_known_instructions()["tpwrite"], read_known_instructions()["pdispon"]
     ('still', 'modal')
     """
     found: dict[str, str] = {}
