@@ -167,10 +167,14 @@ def _join_intervals(
 ) -> Interval | None:
     """Join two ranges that touch; else the second counts, where it is known.
 
-    >>> _join_intervals((0.0, 2.0), (1.0, 3.0), False), _join_intervals((0.0, 1.0), (2.0, 3.0), False)
-    ((0.0, 3.0), (2.0, 3.0))
-    >>> _join_intervals((0.0, 2.0), None, False), _join_intervals((0.0, 2.0), (1.0, 3.0), True)
-    ((0.0, 2.0), (1.0, 3.0))
+    >>> _join_intervals((0.0, 2.0), (1.0, 3.0), False)
+    (0.0, 3.0)
+    >>> _join_intervals((0.0, 1.0), (2.0, 3.0), False)
+    (2.0, 3.0)
+    >>> _join_intervals((0.0, 2.0), None, False)
+    (0.0, 2.0)
+    >>> _join_intervals((0.0, 2.0), (1.0, 3.0), True)
+    (1.0, 3.0)
     """
     if old is None or new is None:
         return old if new is None else new

@@ -37,9 +37,15 @@ def scramble(module: str, name: str, field: str) -> None:
     kind.__init__ = make
 
 
-for place in TEXTS:
-    scramble(*place)
-exceptions = import_module("postproc.exceptions")
-exceptions.PostprocError.__str__ = lambda self: scrambled(repr(self.args))
-for code in import_module("postproc.diagnostics").Code:
-    code.meaning, code.cure = scrambled(code.meaning), scrambled(code.cure)
+def scramble_all() -> None:
+    """Scramble the texts of findings, reasons, refusals and codes."""
+    for place in TEXTS:
+        scramble(*place)
+    exceptions = import_module("postproc.exceptions")
+    exceptions.PostprocError.__str__ = lambda self: scrambled(repr(self.args))
+    for code in import_module("postproc.diagnostics").Code:
+        code.meaning, code.cure = scrambled(code.meaning), scrambled(code.cure)
+
+
+if __name__ == "sitecustomize":  # not where tests are only collected
+    scramble_all()
