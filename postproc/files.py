@@ -716,8 +716,10 @@ def task_beside(name: str) -> str:
 def is_named_as_system(name: str) -> bool:
     """Return True if a module is a system module by its place or its suffix.
 
-    >>> [is_named_as_system(name) for name in ("SYSMOD/a.mod", "BASE.SYS", "job.mod")]
-    [True, True, False]
+    >>> is_named_as_system("SYSMOD/a.mod") and is_named_as_system("BASE.SYS")
+    True
+    >>> is_named_as_system("job.mod")
+    False
     """
     return name.startswith(SYSTEM_MODULES) or _suffix(name) in SYSTEM_SUFFIXES
 

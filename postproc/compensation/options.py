@@ -38,8 +38,8 @@ class Options:
         explained: Keep what explains every target, of long programs too.
         timing: Plan the program in time, before and after; None: if it is no longer
             than `IN_TIME`. Where neither this nor the cell says so, it is not.
-        orientation, shared_points, edit_exported, assume_motion, max_inserted,
-            preload_backlash, reapproach, path_tolerance_mm: See `CompensationSection`.
+
+    All others are described at `CompensationSection`.
     """
 
     shared_points: SharedPoints = AS_IN_CELL
