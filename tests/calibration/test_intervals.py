@@ -175,7 +175,8 @@ def test_a_model_without_registration_finds_it_or_says_so(tmp_path) -> None:
         "--set",
         "measurements.frame=tracker",
     )
-    assert told.exit_code == 2 and "--refit registration" in told.stderr
+    assert told.exit_code == 0  # without positions there are no readings to predict
+    assert "reading_" not in told.stdout.splitlines()[0]
     (tmp_path / "few.csv").write_text("\n".join(lines[:5]) + "\n")
     told = cli(
         "predict", tmp_path / "few.csv", *ask[2:], "--set", "measurements.frame=tracker"
