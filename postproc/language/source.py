@@ -423,3 +423,27 @@ def check_length(source: Source, length: int) -> None:
     longest = int(np.diff(source.line_starts, append=len(source.data)).max())
     if length > longest:
         raise CloneError(f"a line would be longer than {LONGEST_LINE} characters")
+
+
+def find_free_name(old: str, taken: set[str], longest: int) -> str:
+    """Find a name for a clone that nothing has, and add it to those in use.
+
+    Args:
+        old: Name of the original.
+        taken: All names in use, in lower case.
+        longest: Characters that a name may have.
+
+    Raises:
+        CloneError: It would be too long.
+
+    >>> find_free_name("Weld", {"weld", "WELD__2".lower()}, 32)
+    'Weld__3'
+    """
+    number = 2
+    while f"{old}__{number}".lower() in taken:
+        number += 1
+    name = f"{old}__{number}"
+    if len(name) > longest:
+        raise CloneError(f"{name} would be longer than {longest} characters")
+    taken.add(name.lower())
+    return name

@@ -18,6 +18,7 @@ from postproc.language.source import (
     Source,
     Span,
     check_length,
+    find_free_name,
     insert_after,
 )
 from postproc.language.visits import Literals
@@ -150,7 +151,7 @@ class KrlCloner(Cloner):
             inside = all(any(b <= at < e for b, e in spans) for at in starts if at >= 0)
             if literals.file[row] != data[0][0] or not inside:
                 raise CloneError("its numbers stand in other data")
-        name = self._free_name(first.name)
+        name = find_free_name(first.name, self.taken, LONGEST_NAME)
         edits = [(data[0][0], self._declaration(points, file, data, name))]
         for point in points:
             source = self.task.files[point.file].text.source
@@ -166,17 +167,6 @@ class KrlCloner(Cloner):
         if file is None or file.routines or file.is_system:
             raise CloneError("it stands in no data list of the program")
         return file
-
-    def _free_name(self, old: str) -> str:
-        """Find a name for a clone that nothing in the files has."""
-        number = 2
-        while f"{old}__{number}".lower() in self.taken:
-            number += 1
-        name = f"{old}__{number}"
-        if len(name) > LONGEST_NAME:
-            raise CloneError(f"{name} would be longer than {LONGEST_NAME} characters")
-        self.taken.add(name.lower())
-        return name
 
     def _declaration(
         self,

@@ -22,6 +22,7 @@ from postproc.language.source import (
     Source,
     Span,
     check_length,
+    find_free_name,
     insert_after,
 )
 from postproc.language.templates import parse_shapes
@@ -209,29 +210,6 @@ LONGEST_NAME = 32  # characters of an identifier (likely)
 _EXPORTED = re.compile(r"\s+EXPORTED\s+FROM\s+\w+", re.I)
 
 
-def free_name(old: str, taken: set[str]) -> str:
-    """Find a name for a clone that nothing in the files has.
-
-    Args:
-        old: The original's name.
-        taken: All words of the files in lower case; the new one is added.
-
-    Raises:
-        CloneError: It would be too long.
-
-    >>> free_name("Weld", {"weld", "WELD__2".lower()})
-    'Weld__3'
-    """
-    number = 2
-    while f"{old}__{number}".lower() in taken:
-        number += 1
-    name = f"{old}__{number}"
-    if len(name) > LONGEST_NAME:
-        raise CloneError(f"{name} would be longer than {LONGEST_NAME} characters")
-    taken.add(name.lower())
-    return name
-
-
 def clone(
     programs: Sequence[Program],
     values: Source | None,
@@ -359,5 +337,5 @@ class Pdl2Cloner(Cloner):
     ) -> tuple[str, list[tuple[int, Edit]]]:
         """Give some moves a variable of their own, see `Cloner.clone`."""
         own = [cast(CloneTarget, one) for one in named]
-        name = free_name(own[0].variable.name, self.taken)
+        name = find_free_name(own[0].variable.name, self.taken, LONGEST_NAME)
         return name, clone(self.programs, self.values, literals, own, rows, name)

@@ -18,6 +18,7 @@ from postproc.language.source import (
     Source,
     Span,
     check_length,
+    find_free_name,
     insert_after,
 )
 from postproc.language.visits import Literals
@@ -141,7 +142,7 @@ class RapidCloner(Cloner):
             inside = all(begin <= at < end for at in starts.tolist() if at >= 0)
             if literals.file[row] != first.file or not inside:
                 raise CloneError("its numbers stand in other data")
-        name = self._free_name(first.name)
+        name = find_free_name(first.name, self.taken, LONGEST_NAME)
         edits = [self._declaration(points, name)]
         for point in points:
             file, span = point.place
@@ -150,17 +151,6 @@ class RapidCloner(Cloner):
             check_length(source, len(line) + len(name) - (span.end - span.start))
             edits.append((file, Edit(span, name.encode("latin-1"))))
         return name.lower(), edits
-
-    def _free_name(self, old: str) -> str:
-        """Find a name for a clone that nothing in the files has."""
-        number = 2
-        while f"{old}__{number}".lower() in self.taken:
-            number += 1
-        name = f"{old}__{number}"
-        if len(name) > LONGEST_NAME:
-            raise CloneError(f"{name} would be longer than {LONGEST_NAME} characters")
-        self.taken.add(name.lower())
-        return name
 
     def _declaration(self, points: Sequence[RapidPoint], name: str) -> tuple[int, Edit]:
         """Declare the clone behind the original, or in the module of its moves."""
