@@ -55,7 +55,7 @@ for job in $jobs; do
         program=programs/$job.pdl
         [ $state = written ] || program=demo/$job.pdl
         run postproc simulate "$program" --cell $cell --seed "$seed" \
-            --reference programs/$job.pdl --path --json demo/$job.$state.json
+            --reference programs/$job.pdl --path --report demo/$job.$state.json
     done
 done
 

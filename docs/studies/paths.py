@@ -151,7 +151,7 @@ def follow(ran: Path, *arm: object) -> dict[str, Any]:
     at, track = ("--cell", folder / "cell.toml"), folder / "track.csv"
     done("simulate", ran, *at, *arm, "--track", track)
     done("diagnose", "--path", track, "--program", ran, *at, "--model",
-         folder / "model.json", "-o", folder / "better.json", "--json",
+         folder / "model.json", "-o", folder / "better.json", "--report",
          folder / "told.json")  # fmt: skip
     told: dict[str, Any] = json.loads((folder / "told.json").read_bytes())
     return told

@@ -30,6 +30,9 @@ KEYS = {
 }
 OLD_OPTIONS = {
     **{old: f"--set {key}" for old, key in KEYS.items()},
+    "--json": "--report FILE.json",
+    "--html": "--report FILE.html",
+    "--plot": "--report FILE.svg",
     "--clone": "--shared-points clone",
     "--path-mm": "--path-tolerance",
     "--accept-left": "--allow-uncorrected",

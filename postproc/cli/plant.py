@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.common import (
-    HtmlOption,
-    JsonOption,
     OrientationOption,
     PathToleranceOption,
     SecondOpinionOption,
@@ -23,8 +21,8 @@ from postproc.cli.common import (
     changes_of,
     report_errors,
     say,
-    write_text,
 )
+from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.files import check_places, is_program
 
@@ -68,7 +66,7 @@ def batch(
     log: Annotated[
         Path | None, typer.Option("--log", help="Log; default: DST.batch.jsonl.")
     ] = None,
-    html: HtmlOption = None,
+    report: PageOption = None,
     orientation: OrientationOption = False,
     shared_points: SharedPointsOption = None,
     path_tolerance: PathToleranceOption = None,
@@ -88,7 +86,8 @@ def batch(
 
         asked = changes_of(changes, orientation, shared_points, path_tolerance)
         made = make_plan(plan, cell, model, Options(temperature=temperature), asked)
-        check_places([html], [cell, model, plan])
+        reports = Reports.of(report, PAGE)
+        check_places(reports.files, [cell, model, plan])
         for line in _archive_lines(source, made):
             say(line)
         order = run.BatchOptions(
@@ -96,10 +95,9 @@ def batch(
         )
         with progress_bar(f"{source} -> {target}") as told:
             summary = run.batch(order, _workers(jobs, scheduler, tls), told)
-        _print_summary(summary)
+        _print_summary(summary, table=not reports.on_stdout)
         say(f"log: {order.log}")
-        if html is not None:
-            _write_page(html, f"{source} -> {target}", order.log)
+        _write_reports(reports, f"{source} -> {target}", order.log)
         if summary.stopped:
             say("stopped; nothing is half written. Go on: same command with --resume")
     raise typer.Exit(summary.exit_code)
@@ -131,26 +129,30 @@ def _workers(jobs: int, scheduler: str | None, tls: Path | None) -> Gather:
     return lambda plan: ClusterPool(plan.setups, scheduler, tls)
 
 
-def _print_summary(summary: Summary) -> None:
+def _print_summary(summary: Summary, table: bool) -> None:
     """Print the table, and what a person must look at."""
     from postproc.batch.journal import TITLES
     from postproc.report.terminal import Column, print_table
 
     columns = [Column(t, "left" if t == TITLES[0] else "right") for t in TITLES]
-    print_table(columns, summary.rows())
+    if table:
+        print_table(columns, summary.rows())
     for line in summary.lists():
         say(line)
 
 
-def _write_page(html: Path, title: str, log: Path) -> None:
-    """Write the page of a batch from its log, which holds what earlier runs did too."""
+def _write_reports(reports: Reports, title: str, log: Path) -> None:
+    """Write reports of a batch from its log, which holds what earlier runs did too."""
     from postproc.batch.journal import read_entries
     from postproc.report.html import batch_report
+    from postproc.report.json import tree_json
 
-    entries = read_entries(log).values()
-    found = ((entry.place, entry.status, entry.facts) for entry in entries)
-    write_text(str(html), batch_report(title, found))
-    say(f"written {html}")
+    entries = read_entries(log).values() if reports.files else ()
+    found = [(entry.place, entry.status, entry.facts) for entry in entries]
+    reports.write_json(lambda: tree_json(found))
+    reports.write_pages(lambda: batch_report(title, found))
+    for place in reports.pages:
+        say(f"written {place}")
 
 
 @app.command()
@@ -168,7 +170,7 @@ def check(
         typer.Option("--allow-uncorrected", help="Let uncorrected targets pass."),
     ] = False,
     changes: SetOption = None,
-    json: JsonOption = None,
+    report: ReportOption = None,
     cell: CellFile = None,
     second_opinion: SecondOpinionOption = None,
 ) -> None:
@@ -181,17 +183,15 @@ def check(
     from postproc.batch.check import check as look
 
     with report_errors():
-        asked = changes_of(changes)
+        asked, reports = changes_of(changes), Reports.of(report)
         found = look(
             folder, model=model, plan=plan, source=source, cell=cell, changes=asked
         )
         if allow_uncorrected:
             found = found.allow_uncorrected()
         judged = _second_opinion(folder, (cell, model, plan), second_opinion, asked)
-        if json:
-            write_text(
-                json, found.to_json(None if judged is None else judged.to_dict())
-            )
+        opinion = None if judged is None else judged.to_dict()
+        reports.write_json(lambda: found.to_json(opinion))
         for finding in found.findings:
             say(str(finding))
         if judged is not None:

@@ -168,7 +168,7 @@ def test_diagnose_reads_the_reversals_of_a_new_survey(
     replace(fitted(sharp), flank_widths=()).save(model)
     report = tmp_path / "told.json"
     told = cli("diagnose", sharp, "--cell", CELL, "--model", model, "-o",
-               tmp_path / "better.json", "--json", report)  # fmt: skip
+               tmp_path / "better.json", "--report", report)  # fmt: skip
     said = json.loads(report.read_bytes())["flanks_at_stops"]
     assert said.startswith("flanks at stops: joint 1, 2, 3")
     assert said in " ".join(told.stdout.split())

@@ -105,7 +105,7 @@ def test_strict_turns_1_into_2_and_writes_nothing(desk):
     source = desk.put("job.pdl", program(FIRST, UNREACHED))
     out = desk.folder / "out.pdl"
     found = desk.compensate(
-        source, "-o", out, "--strict", "--report", desk.folder / "r"
+        source, "-o", out, "--strict", "--report", desk.folder / "r.json"
     )
     assert found.exit_code == 2
     assert "job.pdl:6" in found.stderr and "--strict" in found.stderr
@@ -315,7 +315,7 @@ def test_survey_simulate_fit_predict(desk, tmp_path):
                 "geometry,backlash")  # fmt: skip
     assert found.exit_code == 0 and "\nbacklash " in found.stdout
     whole = cli("fit", rows, *cell, "-o", tmp_path / "n.json", "--effects",
-                "geometry,backlash", "--json", "-")  # fmt: skip
+                "geometry,backlash", "--report", "-")  # fmt: skip
     told = json.loads(whole.stdout)
     model = load_model(tmp_path / "n.json")
     assert told["model"] == model.id and model.id in found.stdout
@@ -332,7 +332,7 @@ def test_survey_simulate_fit_predict(desk, tmp_path):
 def test_simulate_tells_the_true_error_as_json(desk):
     source = desk.put("job.pdl", program(FIRST, POSE))
     found = cli("simulate", source, "--cell", desk.cell, "--reference", source,
-                "--json", "-")  # fmt: skip
+                "--report", "-")  # fmt: skip
     error = json.loads(found.stdout)["true_error"]
     assert found.exit_code == 0 and error["n"] == 2 and error["mean_mm"] > 0.2
 

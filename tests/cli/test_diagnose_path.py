@@ -36,7 +36,7 @@ def tracked(bench_cell, bench_model, tmp_path_factory):
 
 def diagnosed(folder, track, *more):
     given = ("--cell", folder / "cell.toml", "--model", folder / "model.json")
-    places = ("-o", folder / "better.json", "--json", folder / "d.json")
+    places = ("-o", folder / "better.json", "--report", folder / "d.json")
     program = ("--program", folder / "job.pdl")
     return cli("diagnose", "--path", folder / track, *program, *given, *places, *more)
 

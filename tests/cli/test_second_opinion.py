@@ -58,7 +58,7 @@ def test_check_gives_it_where_cell_and_model_are_given(desk, tree, tmp_path):
         tree,
         "--allow-uncorrected",
         *given(desk),
-        "--json",
+        "--report",
         tmp_path / "told.json",
     )
     assert done.exit_code == 0, done.output
@@ -137,7 +137,7 @@ def compensate(desk: Path, cell: str, folder: Path):
     return run(
         "compensate", PROGRAMS / "spot.pdl", "--cell", desk / cell,
         "--model", desk / "model.json", "-o", folder / "out.pdl",
-        "--report", folder / "out.json", "--html", folder / "out.html",
+        "--report", folder / "out.json", "--report", folder / "out.html",
     )  # fmt: skip
 
 

@@ -73,7 +73,7 @@ def test_a_job_is_compensated_for_the_state_that_the_cell_declares(
     assert [row["status"] for row in rows] == ["corrected", "corrected"]
     found = cli("simulate", campaign / "out.pdl", "--cell", campaign / "now.toml",
                 "--reference", campaign / "job.pdl", "--seed", 3, "--effects", EFFECTS,
-                "--json", "-")  # fmt: skip
+                "--report", "-")  # fmt: skip
     error = json.loads(found.stdout)["true_error"]
     # Where the arm was before its first move is not known: its backlash stays.
     later = (error["mean_mm"] * error["n"] - error["max_mm"]) / (error["n"] - 1)

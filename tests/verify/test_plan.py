@@ -38,7 +38,7 @@ def test_a_program_without_a_rule_is_named(desk, tmp_path, asked, code) -> None:
     told = tmp_path / "told.json"
     done = run(
         "check", desk / "made", "--allow-uncorrected", "--plan", desk / "plan.toml",
-        "--json", told, *asked,
+        "--report", told, *asked,
     )  # fmt: skip
     assert done.exit_code == code, done.stderr
     assert done.stderr.count("handling.pdl: no second opinion: no rule") == 1

@@ -71,7 +71,7 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
         compensated(folder, "job.pdl", name, *more)
         done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
              "--reference", folder / "job.pdl", "--path",
-             "--json", folder / f"{name}.true.json")  # fmt: skip
+             "--report", folder / f"{name}.true.json")  # fmt: skip
     return folder
 
 
@@ -474,7 +474,7 @@ def test_diff_tells_points_apart(shop: Path) -> None:
 def test_a_budget_holds(shop: Path) -> None:
     report = compensated(shop, "job.pdl", "few", "--path-tolerance", TOLERANCE,
                          "--set", "compensation.max_inserted=2",
-                         "--html", shop / "few.html")  # fmt: skip
+                         "--report", shop / "few.html")  # fmt: skip
     assert (shop / "few.html").stat().st_size > 10_000
     assert sum(path["inserted"] for path in report["path"]) <= 2
     assert any("max-inserted" in d["message"] for d in report["diagnostics"])
@@ -520,7 +520,7 @@ def drilled(shop: Path) -> Path:
         compensated(shop, "holes.pdl", name, *more)
         done("simulate", shop / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
              "--reference", shop / "holes.pdl", "--path",
-             "--json", shop / f"{name}.true.json")  # fmt: skip
+             "--report", shop / f"{name}.true.json")  # fmt: skip
     return shop
 
 

@@ -87,7 +87,7 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("job", "out"):
         done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
              "--reference", folder / "job.pdl", "--path",
-             "--json", folder / f"{name}.json")  # fmt: skip
+             "--report", folder / f"{name}.json")  # fmt: skip
     return folder
 
 
@@ -166,7 +166,7 @@ def test_rounded_corners_are_passed_as_the_virtual_arm_does(shop: Path) -> None:
     (shop / "round.pdl").write_text(rounded())
     done("compensate", shop / "round.pdl", "--cell", CELL, "--model",
          shop / "model.json", "-o", shop / "round.out.pdl",
-         "--report", shop / "round.json", "--html", shop / "round.html")  # fmt: skip
+         "--report", shop / "round.json", "--report", shop / "round.html")  # fmt: skip
     assert "Cornering round-off" in (shop / "round.html").read_text()
     report = json.loads((shop / "round.json").read_bytes())
     told = {p["visit"]: p["corner_mm"] for p in report["path"] if "corner_mm" in p}
