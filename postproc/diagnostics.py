@@ -286,7 +286,7 @@ class Code(StrEnum):
         NOTE,
         "Play is not taken up before moves: no measurement confirms how joints change "
         "their flanks there.",
-        "Measure it: survey --reversals, or diagnose --path.",
+        "Measure it: survey.reversals, or diagnose --path.",
     )
     REAPPROACH_INSERTED = (
         "reapproach-inserted",

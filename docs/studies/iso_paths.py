@@ -82,7 +82,7 @@ def program(shape: str, share: float, cell: Cell) -> str:
 
 def study(seed: int, folder: Path) -> None:
     """Print the figures of one arm."""
-    arm = ("--seed", seed)
+    arm = ("--set", f"simulation.seed={seed}")
     place = paths.fit_a_survey(folder, *arm, reversals=paths.REVERSALS)
     cell, at = load_cell(place), ("--cell", place)
     job, ran = folder / "job.pdl", folder / "ran.pdl"

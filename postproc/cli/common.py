@@ -33,7 +33,6 @@ app = typer.Typer(
 
 CellOption = Annotated[Path, typer.Option("--cell", help="Cell file (TOML).")]
 ModelOption = Annotated[Path, typer.Option("--model", help="Model file (JSON).")]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of every random draw.")]
 
 VariablesOption = Annotated[
     Path | None, typer.Option("--variables", help="Variable file, default PROGRAM.lsv.")
@@ -59,20 +58,12 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="SECTION.KEY=VALUE",
-        help="Set a key of [compensation] or [measurements] for this run.",
+        help="Set a key of the cell for this run, such as measurements.unit=m.",
     ),
 ]
 OrientationOption = Annotated[
     bool,
     typer.Option("--orientation", help="Correct orientations too, not only places."),
-]
-SecondOpinionOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--second-opinion/--no-second-opinion",
-        help="Let Pinocchio, toppra and ruckig judge it too.",
-        show_default=False,
-    ),
 ]
 EveryOption = Annotated[
     bool, typer.Option("--all", help="A line for every finding, also for equal ones.")
@@ -90,9 +81,6 @@ PathToleranceOption = Annotated[
         metavar="MM",
         help="Insert points where a path is predicted to be left by more.",
     ),
-]
-TemperatureOption = Annotated[
-    float | None, typer.Option("--temperature", help="Arm temperature [deg C].")
 ]
 
 

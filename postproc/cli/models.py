@@ -11,7 +11,6 @@ import typer
 from postproc.cli.common import (
     CellOption,
     ModelOption,
-    SeedOption,
     SetOption,
     app,
     busy,
@@ -44,43 +43,22 @@ class Method(StrEnum):
     KRIGING = "kriging"
 
 
-class VirtualGears(StrEnum):
-    """What the gears of the virtual arm do in their gaps."""
-
-    SHARP = "sharp"
-    ELASTIC = "elastic"
-    GRAVITY = "gravity"
-    INERTIA = "inertia"
-
-
 @app.command()
 def survey(
     cell: CellOption,
     output: Annotated[Path, typer.Option("-o", "--output", help="SURVEY.pdl")],
     poses: Annotated[int, typer.Option("--poses", help="Number of poses.")] = 300,
-    mode: Annotated[
-        str, typer.Option("--mode", help="lhs, optimal (of predictions) or d-optimal.")
-    ] = "lhs",
-    tracker: Annotated[
-        str | None, typer.Option("--tracker", help="x,y,z [mm] in the base frame.")
-    ] = None,
-    seed: SeedOption = 0,
-    reversals: Annotated[
-        int,
-        typer.Option(
-            "--reversals",
-            min=0,
-            help="How often every joint turns back in small steps, too.",
-        ),
-    ] = 0,
+    changes: SetOption = None,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
     from postproc.calibration.survey_program import write_survey
+    from postproc.robot.cell import load_cell
 
     with report_errors():
         check_places([output], [cell])
+        loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
-            told = write_survey(cell, output, poses, mode, tracker, seed, reversals)
+            told = write_survey(loaded, output, poses)
         say(told)
 
 
@@ -90,14 +68,6 @@ def simulate(
     cell: CellOption,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="MEASURED.csv")
-    ] = None,
-    seed: SeedOption = 1,
-    effects: Annotated[
-        str | None,
-        typer.Option(
-            "--effects",
-            help="Further effects, comma separated; any motion of a part by its text.",
-        ),
     ] = None,
     reference: Annotated[
         Path | None,
@@ -110,13 +80,6 @@ def simulate(
         Path | None,
         typer.Option("--track", help="TRACK.csv: readings while the arm moves."),
     ] = None,
-    rate: Annotated[
-        float, typer.Option("--rate", min=1.0, max=1000.0, help="Of the track [Hz].")
-    ] = 100.0,
-    gears: Annotated[
-        VirtualGears,
-        typer.Option("--backlash-model", help="What gears do in gaps."),
-    ] = VirtualGears.SHARP,
     changes: SetOption = None,
     report: ReportOption = None,
 ) -> None:
@@ -127,18 +90,14 @@ def simulate(
     with report_errors():
         reports = Reports.of(report)
         check_places([output, track, *reports.files], [program, cell, reference])
+        loaded = load_cell(cell, changes=changes_of(changes))
+        arm = loaded.file.simulation
         with busy("run on the virtual arm"):
-            often = rate if track is not None else 0.0
+            often = arm.track_rate_hz if track is not None else 0.0
             found = simulate_file(
-                program,
-                load_cell(cell, changes=changes_of(changes)),
-                seed,
-                effects,
-                reference,
-                path,
-                often,
-                gears.value,
-            )
+                program, loaded, arm.seed, arm.effects, reference, path, often,
+                arm.backlash_model,
+            )  # fmt: skip
         if output is not None:
             found.write(output)
         if track is not None and found.track is not None:
@@ -202,14 +161,6 @@ def predict(
     cell: CellOption,
     model: ModelOption,
     output: Annotated[Path | None, typer.Option("-o", "--output")] = None,
-    refit: Annotated[
-        str | None,
-        typer.Option("--refit", help="registration: find the set-up from these rows."),
-    ] = None,
-    after: Annotated[
-        bool,
-        typer.Option("--after", help="Take drifts as they were at the survey's end."),
-    ] = False,
     changes: SetOption = None,
 ) -> None:
     """Add the predicted error of every row; with positions, also the residual."""
@@ -220,7 +171,7 @@ def predict(
         check_places([output], [states, cell, model])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("predict"):
-            found = prediction.predict(states, loaded, model, refit=refit, after=after)
+            found = prediction.predict(states, loaded, model)
         write_text("-" if output is None else str(output), found.to_csv())
         say(found.summary())
 

@@ -13,10 +13,8 @@ import typer
 from postproc.cli.common import (
     OrientationOption,
     PathToleranceOption,
-    SecondOpinionOption,
     SetOption,
     SharedPointsOption,
-    TemperatureOption,
     app,
     changes_of,
     report_errors,
@@ -71,7 +69,6 @@ def batch(
     shared_points: SharedPointsOption = None,
     path_tolerance: PathToleranceOption = None,
     changes: SetOption = None,
-    temperature: TemperatureOption = None,
 ) -> None:
     """Compensate a tree of programs; what could not be compensated is not in DST."""
     with report_errors():
@@ -81,11 +78,10 @@ def batch(
             start_server()
         from postproc.batch import run
         from postproc.batch.plan import make_plan
-        from postproc.compensation.options import Options
         from postproc.report.terminal import progress_bar
 
         asked = changes_of(changes, orientation, shared_points, path_tolerance)
-        made = make_plan(plan, cell, model, Options(temperature=temperature), asked)
+        made = make_plan(plan, cell, model, DEFAULT_OPTIONS, asked)
         reports = Reports.of(report, PAGE)
         check_places(reports.files, [cell, model, plan])
         for line in _archive_lines(source, made):
@@ -172,7 +168,6 @@ def check(
     changes: SetOption = None,
     report: ReportOption = None,
     cell: CellFile = None,
-    second_opinion: SecondOpinionOption = None,
 ) -> None:
     """Tell whether a tree may be uploaded: exit 0 yes, 1 no, 2 trouble.
 
@@ -181,15 +176,18 @@ def check(
     installed, and cells and models given, these and ruckig judge it too.
     """
     from postproc.batch.check import check as look
+    from postproc.robot.cell import verify_section
 
     with report_errors():
-        asked, reports = changes_of(changes), Reports.of(report)
+        reports = Reports.of(report)
+        verify, asked = verify_section(changes_of(changes))
+        insists = verify.second_opinion if verify.model_fields_set else None
         found = look(
             folder, model=model, plan=plan, source=source, cell=cell, changes=asked
         )
         if allow_uncorrected:
             found = found.allow_uncorrected()
-        judged = _second_opinion(folder, (cell, model, plan), second_opinion, asked)
+        judged = _second_opinion(folder, (cell, model, plan), insists, asked)
         opinion = None if judged is None else judged.to_dict()
         reports.write_json(lambda: found.to_json(opinion))
         for finding in found.findings:
@@ -198,7 +196,7 @@ def check(
             _print_opinion(judged)
         say(f"{folder}: {found.programs} programs, {len(found.findings)} findings")
     code = max(found.exit_code, 0 if judged is None else judged.exit_code)
-    if second_opinion and judged is not None and judged.skipped:
+    if insists and judged is not None and judged.skipped:
         code = code or 2  # what was asked for could not be given
     raise typer.Exit(code)
 

@@ -18,7 +18,6 @@ from postproc.cli.common import (
     ProcessesOption,
     SetOption,
     SharedPointsOption,
-    TemperatureOption,
     VariablesOption,
     app,
     busy,
@@ -95,7 +94,6 @@ def compensate(
     shared_points: SharedPointsOption = None,
     path_tolerance: PathToleranceOption = None,
     changes: SetOption = None,
-    temperature: TemperatureOption = None,
     processes: ProcessesOption = 0,
     every: EveryOption = False,
 ) -> None:
@@ -119,7 +117,7 @@ def compensate(
         check_places(outputs, [given, variables, cell, model])
         asked = changes_of(changes, orientation, shared_points, path_tolerance)
         loaded = load_cell(cell, changes=asked)
-        options = Options(temperature=temperature, timing=loaded.compensation.timing)
+        options = Options(timing=loaded.compensation.timing)
         fitted = as_model(model, loaded.arm)
         files = ProgramFiles.open(program, variables)
         if variables_out is not None:
@@ -241,7 +239,6 @@ def explain(
         int | None, typer.Option("--line", help="Only the visits of this line.")
     ] = None,
     changes: SetOption = None,
-    temperature: TemperatureOption = None,
     every: EveryOption = False,
     code: CodeOption = None,
     report: ReportOption = None,
@@ -261,9 +258,7 @@ def explain(
         with busy("plan"):
             files = ProgramFiles.open(program, variables)
             loaded = load_cell(cell, changes=changes_of(changes))
-            options = Options(
-                temperature=temperature, timing=loaded.compensation.timing
-            )
+            options = Options(timing=loaded.compensation.timing)
             fitted = None if model is None else load_model(model)
             found = tell(files, loaded, fitted, options=options)
         for text in list_findings(found.findings(line), every):

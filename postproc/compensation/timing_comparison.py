@@ -143,7 +143,7 @@ class InTime:
              f"of {len(told.points)} moves; {describe_verification(self.in_motion)}"),
             (Code.BACKLASH_PRELOAD_SKIPPED, told.unconfirmed,
              "play is not taken up before "
-             f"{len(told.unconfirmed)} moves: neither reversals (survey --reversals) "
+             f"{len(told.unconfirmed)} moves: neither reversals (survey.reversals) "
              "nor a measured path (diagnose --path) confirm how joints change their "
              "flanks there"),
             (Code.REAPPROACH_INSERTED, told.approaches,

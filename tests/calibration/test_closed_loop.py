@@ -37,7 +37,7 @@ xyz_mm = [3000.0, -2000.0, 1500.0]
 points_mm = [[-212.5, 96.0, 331.0], [148.0, -121.5, 268.0], [-58.0, 42.5, 514.0]]
 """
 UFRAME = pose_from_record((150.0, -80.0, 120.0, 12.0, 0.0, 0.0))
-ARM = ("--seed", "7", "--effects", "compliance@2=0.8")  # seed of the virtual arm
+ARM = ("--set", "simulation.seed=7", "--set", "simulation.effects=compliance@2=0.8")
 START = "MOVE JOINT TO {0.0, 0.0, -90.0, 0.0, 60.0, 0.0}"
 
 

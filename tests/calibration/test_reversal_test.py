@@ -31,8 +31,10 @@ POSES, EACH = 150, 4
 def surveyed(folder: Path, gears: str, seed: int = SEED) -> Path:
     """A survey with reversals of an arm whose gears are of one kind."""
     rows, written = folder / f"{gears}{seed}.csv", folder / "survey.pdl"
-    done("survey", "--cell", CELL, "--poses", POSES, "--reversals", EACH, "-o", written)
-    done("simulate", written, "--cell", CELL, "--seed", seed, "--backlash-model", gears,
+    design = ("--poses", POSES, "--set", f"survey.reversals={EACH}")
+    done("survey", "--cell", CELL, *design, "-o", written)
+    arm = (f"simulation.seed={seed}", f"simulation.backlash_model={gears}")
+    done("simulate", written, "--cell", CELL, "--set", arm[0], "--set", arm[1],
          "-o", rows)  # fmt: skip
     return rows
 

@@ -297,8 +297,8 @@ def test_clones_are_written_checked_compared_and_restored(desk):
 
 def test_temperature_outside_the_survey_is_guarded(desk):
     found = desk.compensate(
-        desk.put("job.pdl", program(FIRST)), "--temperature", "75", "-o",
-        desk.folder / "o.pdl",
+        desk.put("job.pdl", program(FIRST)), "-o", desk.folder / "o.pdl",
+        "--set", "environment.temperature_c=75",
     )  # fmt: skip
     assert found.exit_code == 1
     assert re.search(r"job\.pdl:5: rejected: .*temperature", found.stderr)
@@ -309,7 +309,12 @@ def test_survey_simulate_fit_predict(desk, tmp_path):
     cell = ("--cell", desk.cell)
     assert cli("survey", *cell, "--poses", "40", "-o", survey).exit_code == 0
     source_from_bytes("s.pdl", survey.read_bytes())
-    assert cli("simulate", survey, *cell, "--seed", "2", "-o", rows).exit_code == 0
+    assert (
+        cli(
+            "simulate", survey, *cell, "--set", "simulation.seed=2", "-o", rows
+        ).exit_code
+        == 0
+    )
     assert len(rows.read_text().splitlines()) == 1 + 2 * 40
     found = cli("fit", rows, *cell, "-o", tmp_path / "m.json", "--effects",
                 "geometry,backlash")  # fmt: skip

@@ -18,6 +18,7 @@ from tests.written import Desk, cli
 
 ROOT = Path(__file__).parents[2]
 NAMES = dict(zip(("PDL2", "RAPID", "KRL"), LANGUAGES, strict=True))
+ARM = ("--set", "simulation.seed=4")
 SAID = "absolute_accuracy = false"
 
 
@@ -229,7 +230,7 @@ def test_the_output_of_a_job_is_read_with_its_changed_data_list(place):
     assert changed.read_bytes() != job.with_suffix(".dat").read_bytes()
     means = []
     for run_ in (job, made):
-        given = ("--cell", place.cell, "--reference", job, "--seed", 4, "--report", "-")
+        given = ("--cell", place.cell, "--reference", job, *ARM, "--report", "-")
         found = cli("simulate", run_, *given, "-o", place.folder / "m.csv")
         means.append(json.loads(found.stdout)["true_error"]["mean_mm"])
     assert means[1] < 0.1 * means[0]

@@ -73,7 +73,7 @@ def test_a_compensated_program_misses_less(desk):
     desk.compensate(source, "-o", out)
     errors = [
         json.loads(
-            cli("simulate", p, "--cell", desk.cell, "--seed", SEED,
+            cli("simulate", p, "--cell", desk.cell, "--set", f"simulation.seed={SEED}",
                 "--reference", source, "--report", "-").stdout
         )["true_error"]
         for p in (source, out)
@@ -108,7 +108,14 @@ def test_another_program_cannot_be_the_wanted_one(desk):
 @pytest.mark.parametrize("effects", ["nonsense", "compliance@9"])
 def test_unknown_effects_are_refused(desk, effects):
     source = desk.put("job.pdl", program(FIRST))
-    found = cli("simulate", source, "--cell", desk.cell, "--effects", effects)
+    found = cli(
+        "simulate",
+        source,
+        "--cell",
+        desk.cell,
+        "--set",
+        f"simulation.effects={effects}",
+    )
     assert found.exit_code == 2 and found.stderr.startswith("postproc: ")
 
 

@@ -94,8 +94,10 @@ def studies() -> Iterator[Case]:
     tracker = f"{fit} --set measurements.frame=tracker --effects geometry,backlash"
     yield Case("fit/tracker", (tracker,), survey, fitted=True)
     for mode in ("lhs", "optimal", "d-optimal"):
-        command = f"survey --cell cell.toml --poses 20 --mode {mode} --seed 3 -o s.pdl"
-        run = "simulate s.pdl --cell cell.toml --seed 5 --effects thermal -o s.csv"
+        design = f"--set survey.mode={mode} --set survey.seed=3"
+        command = f"survey --cell cell.toml --poses 20 {design} -o s.pdl"
+        arm = "--set simulation.seed=5 --set simulation.effects=thermal"
+        run = f"simulate s.pdl --cell cell.toml {arm} -o s.csv"
         yield Case(f"survey/{mode}", (command, run), CELL)
     rows = {**CELL, "rows.csv": "surveys/effects.csv"}
     yield Case("simulate/rows", ("simulate rows.csv --cell cell.toml -o s.csv",), rows)
@@ -124,7 +126,8 @@ def trees() -> Iterator[Case]:
         "batch/two", (f"{batch} --jobs 2 --shared-points clone", *after[:2]), tree
     )
     plan = b'[[rule]]\npattern = "**/*.pdl"\ncell = "cell.toml"\nmodel = "model.json"\n'
-    command = "batch src dst --plan plan.toml --log log.jsonl --jobs 1 --temperature 30"
+    warm = "--set environment.temperature_c=30"
+    command = f"batch src dst --plan plan.toml --log log.jsonl --jobs 1 {warm}"
     yield Case("batch/plan", (command,), tree, {"plan.toml": plan})
 
 
@@ -161,7 +164,8 @@ def effects() -> Iterator[Case]:
         command = f"{COMPENSATE} --report report.json"
         yield Case(f"models/{model}/spot", (command,), files, quick=quick)
         files = {**CELL, **job("handling"), "model.json": f"models/{model}.json"}
-        command = f"{COMPENSATE} --report report.json --temperature 22.4 {EXPORTED}"
+        warm = "--set environment.temperature_c=22.4"
+        command = f"{COMPENSATE} --report report.json {warm} {EXPORTED}"
         yield Case(f"models/{model}/handling", (command,), files)
     for name in ("drilling", "handling", "spot"):
         for short, option in OPTIONS.items():

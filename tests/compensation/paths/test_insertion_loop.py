@@ -29,7 +29,9 @@ from postproc.robot.trajectory import Motion
 from postproc.simulation import DEFAULT, virtual_arm
 from postproc.simulation.program import land
 from tests.compensation.paths.test_path_error import (
+    ARM,
     CELL,
+    DESIGN,
     LINES,
     SEED,
     START,
@@ -61,15 +63,15 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("points")
     (folder / "job.pdl").write_bytes(timed().encode())
     survey, measured = folder / "survey.pdl", folder / "survey.csv"
-    done("survey", "--cell", CELL, "--poses", 250, "--seed", 9, "-o", survey)
-    done("simulate", survey, "--cell", CELL, "--seed", SEED, "-o", measured)
+    done("survey", "--cell", CELL, *DESIGN, "-o", survey)
+    done("simulate", survey, "--cell", CELL, *ARM, "-o", measured)
     done("fit", measured, "--cell", CELL, "-o", folder / "model.json")
     known(folder, "confirmed")
     asked = ("--path-tolerance", TOLERANCE)
     for name, more in (("plain", ()), ("points", asked),
                        ("stops", (*asked, "--set", STOPS))):  # fmt: skip
         compensated(folder, "job.pdl", name, *more)
-        done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+        done("simulate", folder / f"{name}.pdl", "--cell", CELL, *ARM,
              "--reference", folder / "job.pdl", "--path",
              "--report", folder / f"{name}.true.json")  # fmt: skip
     return folder
@@ -518,7 +520,7 @@ def drilled(shop: Path) -> Path:
         ),
     ):
         compensated(shop, "holes.pdl", name, *more)
-        done("simulate", shop / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+        done("simulate", shop / f"{name}.pdl", "--cell", CELL, *ARM,
              "--reference", shop / "holes.pdl", "--path",
              "--report", shop / f"{name}.true.json")  # fmt: skip
     return shop
