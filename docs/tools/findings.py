@@ -17,7 +17,7 @@ Written from `postproc/diagnostics.py` by `python docs/tools/findings.py`.
 A finding is one message about a program, or about a tree of compensated programs. It
 names a file and a line, and has a code: `job.pdl:12: unknown-routine: ..`. JSON outputs
 carry the code; `postproc explain --code CODE` prints what stands here. What is found at
-many lines is one line with the first of them; `--all` lists each.
+many lines is one line with the first of them; `compensate --all` lists each.
 
 The reason for which a target keeps its values has a code of the same registry. JSON
 outputs carry that code (`code`) beside the text.

@@ -68,12 +68,6 @@ OrientationOption = Annotated[
 EveryOption = Annotated[
     bool, typer.Option("--all", help="A line for every finding, also for equal ones.")
 ]
-ProcessesOption = Annotated[
-    int,
-    typer.Option(
-        "--jobs", "-j", min=0, help="Processes; 0: one for a core, 8 at the most."
-    ),
-]
 PathToleranceOption = Annotated[
     float | None,
     typer.Option(
@@ -288,7 +282,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "arm from-urdf": (
         "postproc arm from-urdf robot.urdf -o arm.toml",
         "postproc arm from-urdf robot.urdf --base base_link --tip flange",
-        "postproc arm from-urdf robot.urdf -o arm.toml --verify",
+        "postproc arm from-urdf robot.urdf -o arm.toml --verify new",
     ),
     "arm from-machine-dat": (
         "postproc arm from-machine-dat 'R1/Mada/$machine.dat' -o arm.toml",
