@@ -69,8 +69,11 @@ class Dialect(ABC):
         flag_columns: Which numbers of a pose are flags.
         heads: What tables head the numbers of a pose with, w words.
         pose_decimals, joint_decimals: Least decimals of every written number, w each.
+        runs_alone: What runs beside a program is read with it: a point that other
+            programs may read keeps its value, and a move may have a clone of it.
     """
 
+    runs_alone: bool = False
     terms: Terms
     heads: tuple[str, ...]
     reflags: bool = False

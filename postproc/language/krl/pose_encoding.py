@@ -61,6 +61,7 @@ TERMS = Terms(
 class KrlNumbers(Dialect):
     """Position [mm], angles [deg], S and T of a position, or six joint angles."""
 
+    runs_alone: bool = True
     terms: Terms = TERMS
     heads: tuple[str, ...] = HEADS
     reflags: bool = True
