@@ -688,8 +688,8 @@ class Round:
 
     def _guard_flags(self, reasons: Reasons) -> None:
         """Mark corrections that end where flags are not sure."""
-        visits = self.reading.visits
-        near = visits.dialect.near_border(self.solved.q)
+        visits, before = self.reading.visits, self.planned.plan.q
+        near = visits.dialect.near_border(visits.values, self.solved.q, before)
         if near is None:
             return
         rows = visits.config_given & (visits.target == Meaning.POSE)

@@ -172,9 +172,14 @@ class Dialect(ABC):
         """
         return None
 
-    def near_border(self, q: Floats) -> Bools | None:
-        """Tell which joints (k, 6) [rad] are too near a border of flags, (k, 6).
+    def near_border(self, values: Floats, q: Floats, before: Floats) -> Bools | None:
+        """Tell which joints are too near a border of flags, (k, 6).
 
         None where flags there do no harm.
+
+        Args:
+            values: Numbers of poses as they are written, (k, w).
+            q: Joints that the commands reach, (k, 6) [rad].
+            before: Joints that the source reaches, (k, 6) [rad].
         """
         return None
