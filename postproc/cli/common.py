@@ -95,7 +95,7 @@ PathToleranceOption = Annotated[
     typer.Option(
         "--path-tolerance",
         metavar="MM",
-        help="Insert points where a path is predicted to be left by more.",
+        help="Insert points into moves whose predicted path error is larger.",
     ),
 ]
 TemperatureOption = Annotated[
@@ -335,7 +335,7 @@ PATIENCE = 2.0  # [s] before a person is shown what is being done
 def stages(
     out: TextIO | None = None, log: bool = False
 ) -> Iterator[Callable[[str], None]]:
-    """Show what is being done when it lasts, on a terminal.
+    """Show on a terminal which stage is running, after some seconds.
 
     Args:
         out: Where to; default: stderr.
