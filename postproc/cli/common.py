@@ -326,7 +326,7 @@ def _indent(lines: tuple[str, ...]) -> list[str]:
     return [f"  {line}" for line in lines]
 
 
-# What is being done, told to a person who waits; others load nothing for it.
+# The running stage, shown to a person who waits; others load nothing for it.
 
 PATIENCE = 2.0  # [s] before a person is shown what is being done
 
@@ -342,7 +342,7 @@ def stages(
         log: Whether lines tell it where there is no terminal.
 
     Yields:
-        A function to be told the name of every stage.
+        A function that takes the name of every stage.
     """
     out = out or sys.stderr
     if not out.isatty():
@@ -368,7 +368,7 @@ def _log_stages(out: TextIO) -> Callable[[str], None]:
 
 
 class _StageLine:
-    """The stage that was told last, shown from some time on."""
+    """The newest stage, shown after some time."""
 
     def __init__(self, out: TextIO) -> None:
         self._out, self._stage = out, "starting"
@@ -384,4 +384,4 @@ class _StageLine:
         from postproc.report.terminal import show_status
 
         self._update, self.hide = show_status(self._out, self._stage)
-        self._update(self._stage)  # another one may have been told just now
+        self._update(self._stage)  # another one may have begun just now
