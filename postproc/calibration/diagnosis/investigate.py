@@ -27,6 +27,7 @@ from postproc.calibration.diagnosis.table import Causes
 from postproc.calibration.diagnosis.weight import pass_on, weigh_laws
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import FREE, JointEffect
+from postproc.model.effects.policies import NamingPolicy
 
 # Taking names back that promise more than they explain.
 
@@ -123,7 +124,10 @@ class Investigation:
         added = [a.candidate.effect for a in self.search.additions]
         if not added:
             return "unexplained" if p_value < REMAINS else "noise"
-        nameless = any(e.nameless for e in added) or p_value < STILL_REMAINS
+        nameless = (
+            any(e.naming_policy == NamingPolicy.UNEXPLAINED for e in added)
+            or p_value < STILL_REMAINS
+        )
         return "unexplained" if nameless else "effect"
 
 

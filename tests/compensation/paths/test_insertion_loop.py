@@ -477,7 +477,7 @@ def test_a_budget_holds(shop: Path) -> None:
                          "--html", shop / "few.html")  # fmt: skip
     assert (shop / "few.html").stat().st_size > 10_000
     assert sum(path["inserted"] for path in report["path"]) <= 2
-    assert any("max-inserted" in d["message"] for d in report["diagnostics"])
+    assert any("max_inserted" in d["message"] for d in report["diagnostics"])
     none = compensated(shop, "job.pdl", "none", "--path-tolerance", TOLERANCE,
                        "--set", "compensation.max_inserted=0")  # fmt: skip
     assert sum(path["inserted"] for path in none["path"]) == 0

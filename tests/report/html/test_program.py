@@ -171,7 +171,7 @@ def test_a_page_has_what_free_forms_predict(job_cell, job_model, free_model) -> 
         outcome = compensate(written(FIRST, POSE), job_cell, model, name="job.pdl")
         direct = program.shares_of(outcome)
         again = program.shares_from(json.loads(report_text(outcome))["targets"])
-        for key in ("nonparametric_mm", "nonparametric_std_mm"):
+        for key in ("free_mm", "free_std_mm"):
             assert getattr(direct, key).shape == (2, width)
             np.testing.assert_allclose(
                 getattr(direct, key), getattr(again, key), atol=1e-5
