@@ -31,8 +31,8 @@ SHORT = 1e-3  # [m] what has no length does not grow
 SOON = 1200.0  # [s] in which no arm warms up enough to show
 WARM_UPS = (0.1, 0.2, 0.4, 0.8)  # of the campaign's length: time constants tried
 DOUBT = (
-    ": it may be tracker_drift, so nothing of it is compensated. Rows on fixed points "
-    "(column reference) would tell"
+    ": it may be tracker_drift, so it is not compensated. Rows on monuments (column "
+    "reference) would separate the two"
 )
 
 
