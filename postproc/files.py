@@ -284,7 +284,7 @@ def _sync(out: IO[bytes]) -> None:
 def disk_error(exc: OSError, path: str | Path) -> OutputError:
     """Say in our terms why a file cannot be written."""
     if exc.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        return DiskFullError(path, "no room is left there", "Make room, then go on")
+        return DiskFullError(path, "the disk is full", "Free some space, then resume")
     cure = "Give an existing folder with room that may be written to"
     return OutputError(path, _reason(exc), cure)
 
@@ -434,6 +434,11 @@ def data_list_of(program: str) -> str:
 def find_data_list(program: Path) -> Path | None:
     """Find the data list of a source: same base name, in any case."""
     return _beside(program, data_list_of(program.name))
+
+
+def find_source(data_list: Path) -> Path | None:
+    """Find the source of a data list: same base name, in any case."""
+    return _beside(data_list, data_list.stem + KRL_PROGRAMS[0])
 
 
 class FolderListing:

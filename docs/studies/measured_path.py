@@ -38,7 +38,7 @@ def tell(seed: int, effect: str, told: dict) -> None:
     flanks = told["path"]["flanks"]
     words = [
         f"{sum(j['verdict'] == word for j in flanks)} {word}"
-        for word in ("confirmed", "not sure", "elsewhere", "refuted")
+        for word in ("confirmed", "uncertain", "elsewhere", "refuted")
     ]
     found = ", ".join(e["effect"] for e in told["effects"]) or told["verdict"]
     print(

@@ -62,7 +62,7 @@ def main() -> None:
             said.append(found)
         for joint, own in enumerate(zip(*said, strict=True), start=1):
             count = Counter(own)
-            told = (count["confirmed"], count["elastic"], count["not sure"])
+            told = (count["confirmed"], count["elastic"], count["uncertain"])
             print(
                 f"| {kind.value} | {joint} | {' | '.join(map(str, told))} |", flush=True
             )

@@ -158,7 +158,7 @@ class PredictedRows:
             cells = [spreadsheet_text(cell) for cell in own]
             i = row_of.get(int(line))
             if i is None:
-                why = "fixed point" if int(line) in fixed else "beam lost"
+                why = "monument" if int(line) in fixed else "beam lost"
                 yield [*cells, *[""] * numbers.shape[1], why]
                 continue
             told = [f"{v:.5f}".replace(".", table.decimal) for v in numbers[i]]

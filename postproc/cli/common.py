@@ -73,7 +73,7 @@ PathToleranceOption = Annotated[
     typer.Option(
         "--path-tolerance",
         metavar="MM",
-        help="Insert points where a path is predicted to be left by more.",
+        help="Insert points into moves whose predicted path error is larger.",
     ),
 ]
 
@@ -301,7 +301,7 @@ def _indent(lines: tuple[str, ...]) -> list[str]:
     return [f"  {line}" for line in lines]
 
 
-# What is being done, told to a person who waits; others load nothing for it.
+# The running stage, shown to a person who waits; others load nothing for it.
 
 PATIENCE = 2.0  # [s] before a person is shown what is being done
 
@@ -310,14 +310,14 @@ PATIENCE = 2.0  # [s] before a person is shown what is being done
 def stages(
     out: TextIO | None = None, log: bool = False
 ) -> Iterator[Callable[[str], None]]:
-    """Show what is being done when it lasts, on a terminal.
+    """Show on a terminal which stage is running, after some seconds.
 
     Args:
         out: Where to; default: stderr.
         log: Whether lines tell it where there is no terminal.
 
     Yields:
-        A function to be told the name of every stage.
+        A function that takes the name of every stage.
     """
     out = out or sys.stderr
     if not out.isatty():
@@ -343,7 +343,7 @@ def _log_stages(out: TextIO) -> Callable[[str], None]:
 
 
 class _StageLine:
-    """The stage that was told last, shown from some time on."""
+    """The newest stage, shown after some time."""
 
     def __init__(self, out: TextIO) -> None:
         self._out, self._stage = out, "starting"
@@ -359,4 +359,4 @@ class _StageLine:
         from postproc.report.terminal import show_status
 
         self._update, self.hide = show_status(self._out, self._stage)
-        self._update(self._stage)  # another one may have been told just now
+        self._update(self._stage)  # another one may have begun just now

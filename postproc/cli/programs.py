@@ -87,7 +87,10 @@ def compensate(
     ] = None,
     report: PageOption = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Fail, and write nothing, if any is left.")
+        bool,
+        typer.Option(
+            "--strict", help="Fail, and write nothing, if a target is not corrected."
+        ),
     ] = False,
     orientation: OrientationOption = False,
     shared_points: SharedPointsOption = None,
@@ -147,8 +150,8 @@ def _why_nothing(outcome: Outcome) -> str:
             "Please report it with the program"
         )
     return (
-        "targets were left uncompensated (listed above), nothing is written. "
-        "Mend them, or run without --strict"
+        "targets are not corrected (listed above), nothing is written. "
+        "Change them, or run without --strict"
     )
 
 

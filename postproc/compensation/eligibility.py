@@ -85,11 +85,11 @@ SAID = {
 }
 AFTER = Reason(
     Code.UNKNOWN_POSITION_BEFORE,
-    "it comes from a move whose branch or turn is not sure",
+    "the move before it ends with an uncertain branch or turn",
 )
 STRANDED = Reason(
     Code.UNKNOWN_POSITION_BEFORE,
-    "it comes from a target that the arm cannot reach as it is written",
+    "the arm cannot reach the target before it as it is written",
 )
 
 
@@ -343,11 +343,10 @@ def mark_orientation_interpolation(
         arc & targets.wrist_joint, _name_law(terms, terms.arc, law.WRIST_JOINTS)
     )
     for rows, text, said in (
-        (arc, terms.arc, law.ALONG_PATH),
-        (cartesian, terms.angles, law.EULER_ANGLES),
-        (cartesian, terms.angles, law.ROLL_PITCH_YAW),
+        (targets.along, terms.arc, law.ALONG_PATH),
+        (cartesian & (kind == law.EULER_ANGLES), terms.angles, law.EULER_ANGLES),
+        (cartesian & (kind == law.ROLL_PITCH_YAW), terms.angles, law.ROLL_PITCH_YAW),
     ):
-        rows = rows & (kind == said)
         if rows.any():
             off = _may_be_off(visits, targets, plan, rows)
             reasons.mark(off, _name_law(terms, text, said))
@@ -379,8 +378,8 @@ def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bo
     off = np.minimum(turn**2 / (8.0 * np.maximum(sine, LEAST)), turn)
     both = np.maximum(_sine(world @ begin, kind), _sine(world @ end, kind))
     same = (both < LEAST) & (kind == OrientationLaw.EULER_ANGLES)
-    off = np.where(kind == OrientationLaw.ALONG_PATH, turn, np.where(same, 0.0, off))
-    along = kind == OrientationLaw.ALONG_PATH
+    along = targets.along[edge]
+    off = np.where(along, turn, np.where(same, 0.0, off))
     found[edge[off > np.where(along, SMALL_TURN, PLAY)]] = True
     return found
 
@@ -394,7 +393,7 @@ def _sine(R: Floats, kind: Ints) -> Floats:
     return np.asarray(np.where(kind == OrientationLaw.ROLL_PITCH_YAW, pitch, euler))
 
 
-# Arcs whose circle hangs by a hair: their points are left alone.
+# Arcs that their points hardly determine are not corrected.
 #
 # A correction moves start, VIA and end of an arc by slightly different amounts. That
 # does no harm where they lie well apart; where they do not, the arm would run along
@@ -407,12 +406,12 @@ LINE = Reason(
 )
 TOO_NEAR = Reason(
     Code.ARC_UNDETERMINED,
-    f"two of the three points of an arc are nearer than {NEAR / MM:g} mm, so that its "
-    f"circle is not sure: {CURE}",
+    f"two of the three points of an arc are nearer than {NEAR / MM:g} mm, so that they "
+    f"do not determine its circle: {CURE}",
 )
 STRAYS = Reason(
     Code.ARC_DISTORTED,
-    "corrected, the three points of an arc would make quite another circle: move VIA "
+    "the corrected points of the arc would make a very different circle: move VIA "
     "to its middle, or divide it",
 )
 

@@ -138,10 +138,10 @@ def _tell_rest(report: FitReport) -> list[str]:
     if report.unseen:
         names = _group_names(u.name for u in report.unseen)
         count = len(report.unseen)
-        lines.append(f"not determined, left at the prior, {count} directions: {names}")
+        lines.append(f"not determined, at the prior, {count} directions: {names}")
     if report.correlated:
         names = _count_names(a.partition(".")[0] for a, _, _ in report.correlated)
-        lines.append(f"hardly told apart, {len(report.correlated)} pairs: {names}")
+        lines.append(f"strongly correlated, {len(report.correlated)} pairs: {names}")
     if lines:
         lines.append("all parameters, directions and rows: --report FILE.json")
     return lines
@@ -182,7 +182,7 @@ def _tell_rows(report: FitReport) -> list[str]:
         ids = ", ".join(report.spared[:FEW])
         more = len(report.spared) - FEW
         ids += f" and {more} more" if more > 0 else ""
-        lines.append(f"suspect, but kept, for rows beside them agree: row {ids}")
+        lines.append(f"suspect, but used, because nearby rows agree: row {ids}")
     return lines
 
 
@@ -202,7 +202,7 @@ def _tell_scatter(report: FitReport) -> list[str]:
     if report.orientation_mrad is not None:
         lines.append(f"orientation {report.orientation_mrad:.4f} mrad (estimated)")
     lines.append(f"measured error  {report.before.tell()}")
-    lines.append(f"left by the fit {report.after.tell()}")
+    lines.append(f"error after fit {report.after.tell()}")
     return lines
 
 

@@ -712,7 +712,7 @@ def _probes(path: Path, file: CellFile) -> Floats:
         problem = "has points_mm and points" if named else "has no points"
         cure = (
             "Write points_mm = [[x, y, z], ..], or [survey.points] with lines as "
-            "left = [x, y, z]"
+            "front = [x, y, z]"
         )
         raise CellError(path, problem, cure, place="$.survey")
     return np.array(numbered or named) * MM

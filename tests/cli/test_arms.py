@@ -64,7 +64,7 @@ def test_it_goes_to_standard_output_and_says_what_was_rounded(urdf):
     found = cli("arm", "from-urdf", urdf, "--base", "l0")
     assert found.exit_code == 0 and 'name = "robot"' in found.stdout
     assert found.stderr == (
-        f"{urdf}: joint j3: -1.57 rad taken as -90 deg\n"
+        f"{urdf}: joint j3: -1.57 rad read as -90 deg\n"
         f"{urdf}: states no masses. [links] is not written\n"
     )
 
@@ -148,7 +148,10 @@ def test_an_endless_joint_takes_the_range_that_is_stated(urdf):
     found = cli(
         "arm", "from-urdf", urdf, "--verify", "new", "-o", urdf.with_name("arm.toml")
     )
-    assert found.exit_code == 0 and "is continuous: its range is taken" in found.stderr
+    assert (
+        found.exit_code == 0
+        and "is continuous: the given range is used" in found.stderr
+    )
     assert "continuous joints: the URDF states no range" in found.stderr
 
 

@@ -326,7 +326,7 @@ def test_the_ending_of_a_report_decides_its_kind(desk):
     [
         (errno.EACCES, r"out\.pdl.*: the folder is read-only\. Give"),
         (errno.EROFS, r"out\.pdl.*: the folder is read-only\. Give"),
-        (errno.ENOSPC, r"out\.pdl.*: no room is left there\. Make room"),
+        (errno.ENOSPC, r"out\.pdl.*: the disk is full\. Free some space"),
     ],
 )
 def test_a_folder_that_refuses_leaves_nothing(desk, monkeypatch, code, said):
@@ -604,7 +604,7 @@ def test_a_full_disk_behind_stdout_is_told_as_that(desk, name):
         limits = resource.RLIMIT_FSIZE, (0, 0)
         done = run_with(desk, name, stdout=out, preexec_fn=lambda: setrlimit(*limits))
     assert done.returncode == 2
-    assert "standard output: no room is left there. Make room" in done.stderr
+    assert "standard output: the disk is full. Free some space" in done.stderr
     assert "internal error" not in done.stderr and "Traceback" not in done.stderr
     assert "Exception ignored" not in done.stderr
 

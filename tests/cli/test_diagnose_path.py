@@ -56,7 +56,7 @@ def test_a_path_confirms_the_flanks_and_lacks_nothing(tracked):
     assert path["across_mm"]["mean_mm"] < 2.0 * path["scatter_mm"]
     verdicts = {j["joint"]: j["verdict"] for j in path["flanks"]}
     large = {j["joint"] for j in path["flanks"] if j["predicted_mm"] > 0.15}
-    assert large and all(verdicts[j] in ("confirmed", "not sure") for j in large)
+    assert large and all(verdicts[j] in ("confirmed", "uncertain") for j in large)
     assert "confirmed" in verdicts.values()
     assert (
         told["verdict"] in ("noise", "unexplained") or told["after"]["mean_mm"] < 0.04

@@ -94,7 +94,7 @@ def test_fly_points_that_the_run_does_not_go_on_from_are_told(desk, lines, left)
     given = "simulate", source, "--cell", desk.cell, "--reference", source
     told = json.loads(cli(*given, "--report", "-").stdout)
     assert told.get("left_out", 0) == left and told["true_error"]["n"] == 4 - left
-    said = "1 fly points left out: it does not go on from them"
+    said = "1 fly points without a score: no move continues from them"
     assert (said in cli(*given).output) == bool(left)
 
 

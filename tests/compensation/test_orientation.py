@@ -125,7 +125,10 @@ def test_a_model_of_one_point_does_not_know_rotations(desk, job_cell, job_model)
     source = desk.put("job.pdl", inline()["job.pdl"])
     found = cli("compensate", source, "--cell", desk.cell, "--model",
                 desk.folder / "one.json", "--orientation")  # fmt: skip
-    assert found.exit_code == 2 and "Leave --orientation out" in found.stderr
+    assert (
+        found.exit_code == 2
+        and "orientation: the model was surveyed at one" in found.stderr
+    )
     assert desk.names() == {"job.pdl", "one.json"}
 
 

@@ -100,7 +100,7 @@ def test_what_was_left_alone_is_listed_with_its_reason(desk):
     source = desk.put("job.pdl", program(FIRST, FAR))
     out = desk.folder / "out.pdl"
     desk.compensate(source, "-o", out)
-    listed = cli("diff", source, out).stdout.partition("left as they were:")[2]
+    listed = cli("diff", source, out).stdout.partition("\nnot corrected:")[2]
     assert "6  MOVE LINEAR" in listed and "rejected: out of reach" in listed
 
 

@@ -25,7 +25,7 @@ MEASURED, UNKNOWN_STATUS = 16, 32  # bit 4 of S, and the first value that is non
 BORDER = np.deg2rad(0.02)
 SURE = np.deg2rad(0.0005)  # [rad] more than the last digits of a target move an axis by
 
-_FLAGS_SAY = "S or T say another configuration, or other turns, than the move ends with"
+_FLAGS_SAY = "S or T name another configuration or other turns than the move ends with"
 TERMS = Terms(
     tool="$TOOL",
     base="$ROBROOT",
@@ -43,16 +43,16 @@ TERMS = Terms(
     branch_may_stop=_FLAGS_SAY,
     turn_stops=_FLAGS_SAY,
     turn_may_stop=_FLAGS_SAY,
-    branch="S says another configuration than the arm is in ({})",
-    nearest="T says another turn than the nearest ({}, {})",
-    wrist="on a line with $ORI_TYPE = #JOINT the wrist may end otherwise",
-    overruled="the path arrives in another configuration than S and T say",
-    law_unknown="how the tool turns on the way is not known here ($ORI_TYPE, "
+    branch="S names another configuration than the arm is in ({})",
+    nearest="T names another turn than the nearest ({}, {})",
+    wrist="on a line with $ORI_TYPE = #JOINT the wrist may end differently",
+    overruled="the path arrives in another configuration than S and T name",
+    law_unknown="how the tool turns along the path is not known here ($ORI_TYPE, "
     "$CIRC_TYPE)",
-    angles="how the tool turns on the way is not sure: {}",
-    arc="how the tool turns on this arc is not sure ({}): turn it in smaller steps",
+    angles="how the tool turns along the path is uncertain: {}",
+    arc="how the tool turns along this arc is uncertain ({}): turn it in smaller steps",
     laws=("", "#VAR", "$CIRC_TYPE, $CIRC_MODE", "", "", "$ORI_TYPE = #JOINT"),
-    border="axis {} ends within 0.02 deg of 0, where T is not sure: a wrong one turns "
+    border="axis {} ends within 0.02 deg of 0, where T is uncertain: a wrong T turns "
     "it by 360 deg",
 )
 
@@ -61,6 +61,7 @@ TERMS = Terms(
 class KrlNumbers(Dialect):
     """Position [mm], angles [deg], S and T of a position, or six joint angles."""
 
+    runs_alone: bool = True
     terms: Terms = TERMS
     heads: tuple[str, ...] = HEADS
     reflags: bool = True
@@ -143,9 +144,17 @@ class KrlNumbers(Dialect):
         """Tell where signs of T are not those of joints (k, 6) [rad], (k,)."""
         return np.asarray(_beyond(turn_bits(values[:, TURN]), q).any(axis=1))
 
-    def near_border(self, q: Floats) -> Bools:
-        """Tell which joints (k, 6) [rad] are so near 0 that T may be wrong, (k, 6)."""
-        return np.asarray(np.abs(q) <= BORDER)
+    def near_border(self, values: Floats, q: Floats, before: Floats) -> Bools:
+        """Tell which joints are so near 0 that T may be wrong, see `Dialect`.
+
+        One that the correction takes away from 0, to the side that its bit names, is
+        there on the controller, too, if the source is.
+        """
+        bits = turn_bits(values[:, TURN])
+        inwards = np.where(bits > 0, -1.0, 1.0)  # to the side of the bit
+        away = (q - before) * inwards >= SURE
+        away &= before * inwards >= -SURE
+        return np.asarray((np.abs(q) <= BORDER) & ~away)
 
 
 KRL_DIALECT = KrlNumbers()

@@ -114,9 +114,7 @@ def test_left_alone_comes_first_and_in_words() -> None:
 def test_nothing_left_alone_is_said() -> None:
     outcome = outcome_of(3)
     assert not group_uncorrected(columns_of(outcome))
-    assert "every target that the program holds was corrected" in program_report(
-        outcome
-    )
+    assert "Every target of the program was corrected" in program_report(outcome)
 
 
 def test_a_written_report_gives_the_same_columns() -> None:
@@ -171,7 +169,7 @@ def test_a_page_has_what_free_forms_predict(job_cell, job_model, free_model) -> 
         outcome = compensate(written(FIRST, POSE), job_cell, model, name="job.pdl")
         direct = program.shares_of(outcome)
         again = program.shares_from(json.loads(report_text(outcome))["targets"])
-        for key in ("nonparametric_mm", "nonparametric_std_mm"):
+        for key in ("free_mm", "free_std_mm"):
             assert getattr(direct, key).shape == (2, width)
             np.testing.assert_allclose(
                 getattr(direct, key), getattr(again, key), atol=1e-5
