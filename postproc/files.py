@@ -666,6 +666,7 @@ SCHEMAS = {
     "history": 1,
     "report": 2,
     "simulation": 1,
+    "tree": 1,
 }
 
 
