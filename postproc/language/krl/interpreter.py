@@ -570,8 +570,7 @@ def _puts_out(one: said.Instruction) -> bool:
 
 def _is_tracking(operand: said.Operand) -> bool:
     """Return True if a base follows a conveyor, which takes the arm along."""
-    called = isinstance(operand, said.FunctionCall)
-    return called and operand.name in ("eb", "eb_abs")
+    return isinstance(operand, said.FunctionCall) and operand.name in ("eb", "eb_abs")
 
 
 def _is_modal(name: str) -> bool:
