@@ -10,7 +10,7 @@ from typing import Self
 class Severity(StrEnum):
     """What a finding asks for."""
 
-    NOTE = "note"  # nothing: it tells what was done, or taken for granted
+    NOTE = "note"  # nothing: it reports what was done, or assumed
     WARNING = "warning"  # a look: targets keep their values, or are less certain
     ERROR = "error"  # a change: as it is the program must not be uploaded
 
@@ -48,30 +48,31 @@ class Code(StrEnum):
     UNKNOWN_STATEMENT = (
         "unknown-statement",
         WARNING,
-        "A statement that no grammar of the language knows. It is kept as it is; where "
-        "it may move the arm, what follows is taken to come from an unknown place.",
-        "Check its spelling. If the controller takes it, put it into a routine and "
+        "The grammar of the language has no such statement. Its text is unchanged. If "
+        "it may move the arm, the next move is assumed to start at an unknown place.",
+        "Check its spelling. If the controller accepts it, put it into a routine and "
         "declare that routine under [routines] of the cell.",
     )
     UNKNOWN_INSTRUCTION = (
         "unknown-instruction",
         WARNING,
-        "A RAPID instruction that is neither known nor a routine of the modules at "
-        "hand; it may move the arm.",
-        'Give the module that holds it, or say name = "motionless" or "moves" under '
+        "A RAPID instruction is neither known nor a routine of the given modules. It "
+        "may move the arm.",
+        'Give its module, or write name = "motionless" or name = "moves" under '
         "[routines] of the cell.",
     )
     UNKNOWN_ROUTINE = (
         "unknown-routine",
         WARNING,
-        "A routine is called that is in no file at hand. It may move the arm and set "
+        "A routine is called that no given file holds. It may move the arm and set "
         "frames: targets after it keep their values until these are set again.",
-        "Give its file, or say under [routines] of the cell what it does.",
+        "Give its file, or declare under [routines] of the cell what it does.",
     )
     LATE_BINDING = (
         "late-binding",
         WARNING,
-        "A procedure is called whose name only the run tells; it may move the arm.",
+        "The name of a called procedure is known only while the program runs. The "
+        "procedure may move the arm.",
         "Call the procedures by name, for instance in the branches of a TEST.",
     )
     BLOCK_STRUCTURE = (
@@ -89,8 +90,8 @@ class Code(StrEnum):
     END_MISSING = (
         "end-missing",
         WARNING,
-        "The END of a program or routine is missing; the next one, or the end of the "
-        "file, is taken to end it.",
+        "The END of a program or routine is missing. It is assumed to end at the next "
+        "END, or at the end of the file.",
         "Add it. Was the file cut off?",
     )
     NO_PROGRAM = (
@@ -115,8 +116,8 @@ class Code(StrEnum):
     TOO_COMPLEX = (
         "too-complex",
         WARNING,
-        "The program has too many ways, or calls, to be followed to its end; nothing "
-        "in it is compensated.",
+        "The program has too many branches or calls to be followed to its end. None of "
+        "its targets is corrected.",
         "Split it, or compensate its routines one by one.",
     )
     LOOP_NOT_UNROLLED = (
@@ -132,105 +133,106 @@ class Code(StrEnum):
     ROUTINE_ASSUMED_MOTIONLESS = (
         "routine-assumed-motionless",
         NOTE,
-        "A routine that is in no file at hand is on the shipped list of routines that "
+        "A routine that no given file holds is on the shipped list of routines that "
         "neither move the arm nor set frames.",
-        "Where it does, say so under [routines] of the cell; assume_motion of "
-        "[compensation] takes no routine from the list.",
+        "If it does, declare it under [routines] of the cell; assume_motion of "
+        "[compensation] ignores the list.",
     )
     MOTION_UNKNOWN = (
         "motion-unknown",
         WARNING,
-        "What happens here may move the arm and is not understood: place, frames and "
-        "settings of the motion are not known behind it.",
-        "Say what the routine does under [routines] of the cell, or give its file.",
+        "This statement may move the arm and is not understood: place, frames and "
+        "settings of the motion are not known after it.",
+        "Declare under [routines] of the cell what the routine does, or give its file.",
     )
     FIRST_CAUSE = (
         "first-cause",
         WARNING,
-        "The first place at which what happens is not known, and how many targets keep "
-        "their values because of it.",
+        "The first statement with an unknown effect, and the number of targets that "
+        "keep their values because of it.",
         "Declare this one first.",
     )
     NEVER_REACHED = (
         "never-reached",
         WARNING,
-        "Moves that no way from the start of the program leads to: from where they are "
-        "reached is not known.",
+        "Moves that cannot be reached from the start of the program: the place from "
+        "which the arm comes is not known.",
         "Compensate the program that calls their routine.",
     )
     OTHER_ARM = (
         "other-arm",
         WARNING,
-        "A move of another arm than the cell's; it is left as it is.",
+        "A move of another arm than the cell's; it is unchanged.",
         "Compensate it with a cell of its arm ([robot] arm_number), and its model.",
     )
     CALL_NOT_FOLLOWED = (
         "call-not-followed",
         WARNING,
         "A function that is called in an expression may move the arm: the next move is "
-        "taken to come from an unknown place.",
+        "assumed to start at an unknown place.",
         "Call it as a statement.",
     )
     RECURSION = (
         "recursion",
         WARNING,
-        "A routine calls itself: it is not followed, and moves behind it are taken to "
-        "come from an unknown place.",
+        "A routine calls itself: it is not followed, and the next move is assumed to "
+        "start at an unknown place.",
         "Write it as a loop.",
     )
     POSITION_UNKNOWN = (
         "position-unknown",
         WARNING,
-        "A sensor leads the arm, or stops to: the next move comes from an unknown "
+        "A sensor guides the arm, or ceases to: the next move starts at an unknown "
         "place.",
-        "Move to a known place behind it, before what has to be exact.",
+        "Move to a known place before targets that have to be exact.",
     )
     HANDLER_MOVES = (
         "handler-moves",
         WARNING,
-        "A condition handler may move the arm at any time: no move's origin is sure.",
+        "A condition handler may move the arm at any time: the start of every move is "
+        "uncertain.",
         "Let the handler set a signal, and move in the program.",
     )
     HANDLER_CANCELS = (
         "handler-cancels",
         WARNING,
-        "A condition handler may end a move on its way at any time: no move's origin "
-        "is sure.",
+        "A condition handler may end any move early: the start of every move is "
+        "uncertain.",
         "Let the handler set a signal, and end the move in the program.",
     )
     MANY_ORIGINS = (
         "many-origins",
         NOTE,
-        "So many arrivals may come before this move that they are not told apart; from "
-        "which side it arrives is not known.",
+        "Too many moves may come before this one to be followed separately; the "
+        "approach direction is not known.",
         "Start the approach from one place.",
     )
     ASSUMED_JOINT = (
         "assumed-joint",
         NOTE,
-        "A move names no trajectory, and $MOVE_TYPE is not set: it is taken as JOINT.",
+        "A move names no trajectory, and $MOVE_TYPE is not set: JOINT is assumed.",
         "Name the trajectory, or set $MOVE_TYPE.",
     )
     DIRECTION_UNCERTAIN = (
         "direction-uncertain",
         WARNING,
-        "A joint reaches a corrected target from a side that is not sure, soon after "
-        "it turned or from a place that is not known. Up to half of its backlash may "
-        "remain; the stated standard error holds it.",
-        "Start the approach farther away, or from the side that the joint moves to.",
+        "The approach direction of a joint at a corrected target is uncertain: the "
+        "joint reversed shortly before, or the place before is not known. Up to half "
+        "of its backlash may remain; the stated standard error includes it.",
+        "Start the approach farther away, or so that the joint does not reverse.",
     )
     DIRECTION_DISAGREES = (
         "direction-disagrees",
         WARNING,
-        "In the trajectory in time a joint arrives from the other side than along the "
-        "path; the correction is that of the path.",
+        "In the trajectory over time a joint arrives in the other direction than along "
+        "the path; the correction is that of the path.",
         "Stop before the target, or approach it from farther away.",
     )
     CONFIGURATION_OVERRULED = (
         "configuration-overruled",
         NOTE,
-        "The path arrives on another branch or turn than the configuration of the "
-        "target says; the path decides.",
+        "The path arrives on another branch or turn than the configuration flags of "
+        "the target name; the path decides.",
         "Write the configuration that the path arrives with.",
     )
 
@@ -239,16 +241,16 @@ class Code(StrEnum):
     FLY_ASSUMED = (
         "fly-assumed",
         NOTE,
-        "How points are rounded is not set in the program; the controller's usual "
-        "settings are assumed.",
+        "The program does not set how fly points are blended; the controller's "
+        "defaults are assumed.",
         "Set them in the program.",
     )
     FLY_CORNER = (
         "fly-corner",
         NOTE,
-        "The path passes points at a distance; a correction moves the corner, not the "
-        "path onto the point.",
-        "Where the point matters, stop there or make the zone smaller.",
+        "The path passes fly points at a distance. A correction moves the corner; it "
+        "does not lead the path through the point.",
+        "If the point matters, stop there or make the zone smaller.",
     )
     FLY_UNKNOWN = (
         "fly-unknown",
@@ -272,32 +274,33 @@ class Code(StrEnum):
     FLANK_ACCELERATION = (
         "flank-acceleration",
         NOTE,
-        "On the way to a point the correction follows the backlash faster than the "
-        "axis can accelerate; the controller may round the step off.",
+        "Between two points the correction follows the backlash faster than the axis "
+        "can accelerate; the controller may smooth the step.",
         "Program a lower speed there, or points that are farther apart.",
     )
     PATH_POINTS = (
         "path-points",
         NOTE,
-        "Points were put on the ways of moves, so that these keep their paths.",
+        "Points were inserted into moves, so that these stay on their paths.",
     )
     BACKLASH_PRELOAD_SKIPPED = (
         "backlash-preload-skipped",
         NOTE,
-        "Play is not taken up before moves: no measurement confirms how joints change "
-        "their flanks there.",
-        "Measure it: survey --reversals, or diagnose --path.",
+        "The backlash is not preloaded before moves: no measurement confirms how the "
+        "joints change their flanks there.",
+        "Measure it: survey.reversals, or diagnose --path.",
     )
     REAPPROACH_INSERTED = (
         "reapproach-inserted",
         NOTE,
-        "Targets are approached once more, from a stop on the way already travelled.",
+        "Targets are approached again, from an inserted stop on the path already "
+        "travelled.",
     )
     PATH_TOLERANCE_EXCEEDED = (
         "path-tolerance-exceeded",
         WARNING,
-        "A move is predicted to leave its path by more than was asked for.",
-        "Program a lower speed, or approach the path from the side it moves to.",
+        "The predicted path error of a move is larger than the path tolerance.",
+        "Program a lower speed, or start the approach so that no joint reverses.",
     )
 
     # What the corrected program does.
@@ -306,19 +309,19 @@ class Code(StrEnum):
         "cycle-time-increased",
         WARNING,
         "The compensated program takes more than 3 % longer than the original.",
-        "Look at the corrections of its fastest moves.",
+        "Check the corrections of its fastest moves.",
     )
     JOINT_LIMIT_EXCEEDED = (
         "joint-limit-exceeded",
         ERROR,
-        "A joint comes beyond a limit that the original program keeps.",
+        "A joint exceeds a limit that the original program keeps.",
         "Move the target away from the limit.",
     )
     CLONED = (
         "cloned",
         NOTE,
-        "Moves got a point of their own, since another move to the same point needs "
-        "another correction (--shared-points clone).",
+        "Moves have a new point of their own, because another move to the same point "
+        "needs another correction (--shared-points clone).",
     )
     NOT_CLONED = (
         "not-cloned",
@@ -328,19 +331,19 @@ class Code(StrEnum):
         "Give the moves points of their own.",
     )
 
-    # What is taken for granted.
+    # What is assumed.
 
     ABSOLUTE_ACCURACY = (
         "absolute-accuracy",
         NOTE,
-        "The controller's own accuracy model is taken to be off, as the cell says.",
-        "Make sure that it is: two corrections add up.",
+        "The controller's own accuracy model is assumed to be off, as the cell states.",
+        "Check that it is off: two corrections add up.",
     )
     CONTROLLER = (
         "controller",
         NOTE,
-        "Neither the cell nor the arm file names the controller: it is assumed to be "
-        "one that runs the language of the program.",
+        "Neither the cell nor the arm file names the controller: a controller that "
+        "runs the language of the program is assumed.",
         "Write controller = .. in the arm file.",
     )
     TOOL_LENGTH = (
@@ -352,22 +355,22 @@ class Code(StrEnum):
     BASE_FRAME_MISMATCH = (
         "base-frame-mismatch",
         WARNING,
-        "Joint angles and Cartesian targets of the program place the base elsewhere "
-        "than the cell.",
-        "Give [base] of the cell the frame that the program was made with.",
+        "Joint angles and Cartesian targets of the program agree with another base "
+        "frame than the cell's.",
+        "Write the frame that the program was made with into [base] of the cell.",
     )
     ARCHIVE_BASE = (
         "archive-base",
         WARNING,
-        "The archive places the arm otherwise than the cell.",
+        "The archive has another base frame of the arm than the cell.",
         "Paste the lines of the message into [base] of the cell.",
     )
     LSV_PRECISION = (
         "lsv-precision",
         NOTE,
-        "The controller lists values with two decimals: to list corrected values and "
-        "to load them again costs what the message says.",
-        "Keep the files that were written, not listings of them.",
+        "The controller lists values with two decimals. Corrected values that are "
+        "listed and loaded again lose the accuracy that the message states.",
+        "Keep the written files, not listings of them.",
     )
     PAGE = ("page", NOTE, "Another file is read with the program, as a part of it.")
     NOT_FOLLOWED = (
@@ -393,26 +396,26 @@ class Code(StrEnum):
     LSV_DUPLICATE = (
         "lsv-duplicate",
         WARNING,
-        "A variable has two entries: which one the controller takes is not known.",
+        "A variable has two entries: which one the controller reads is not known.",
         "Delete one.",
     )
     LSV_PARTS = (
         "lsv-parts",
         WARNING,
         "An entry of records or arrays is not read as a whole.",
-        "List it anew at the controller.",
+        "List the file again at the controller.",
     )
     LSV_INCOMPLETE = (
         "lsv-incomplete",
         WARNING,
         "A position has fewer than six values.",
-        "Was the file cut off? List it anew at the controller.",
+        "Was the file cut off? List it again at the controller.",
     )
     LSV_TOO_MANY = (
         "lsv-too-many",
         WARNING,
         "A position has more than six values.",
-        "List it anew at the controller.",
+        "List the file again at the controller.",
     )
     LSV_UNINITIALISED = (
         "lsv-uninitialised",
@@ -434,13 +437,13 @@ class Code(StrEnum):
         "Is it the file of another program?",
     )
 
-    # Why a target keeps its values: what the program tells of it.
+    # Why a target keeps its values: what stands in the program.
 
     NO_TARGET = (
         "no-target",
         NOTE,
-        "The move goes where no numbers of its own say: home, a step, a part of an "
-        "axis position.",
+        "The move has no target numbers of its own: it goes home, a step, or to a part "
+        "of an axis position.",
     )
     TAUGHT_POINT = (
         "taught-point",
@@ -482,7 +485,7 @@ class Code(StrEnum):
     NUMBERS_NOT_OWN = (
         "numbers-not-own",
         WARNING,
-        "The numbers of the target are not written in one place that is its own.",
+        "The numbers of the target do not stand in one place that belongs to it alone.",
         "Write the numbers of the target one by one, in the move or in a variable.",
     )
     EXPORTED_VARIABLE = (
@@ -495,8 +498,8 @@ class Code(StrEnum):
     NUMBERS_USED_ELSEWHERE = (
         "numbers-used-elsewhere",
         WARNING,
-        "The program uses the numbers of the target for something else as well, which "
-        "a correction would change.",
+        "The program uses the numbers of the target for something else too, and a "
+        "correction would change that.",
         "Give the move a point of its own.",
     )
     FRAME_UNKNOWN = (
@@ -515,7 +518,7 @@ class Code(StrEnum):
         "remote-tool",
         WARNING,
         "The tool stands still and the arm holds the part.",
-        "Such targets are not compensated; look at them by hand.",
+        "Such targets are not corrected; check them by hand.",
     )
     EXTERNAL_AXES = (
         "external-axes",
@@ -535,25 +538,25 @@ class Code(StrEnum):
         WARNING,
         "The move may end before its target, or beside it: a search, a trigger, a "
         "condition, a spline.",
-        "Such targets are not compensated; look at them by hand.",
+        "Such targets are not corrected; check them by hand.",
     )
     SENSOR_GUIDED = (
         "sensor-guided",
         WARNING,
-        "A sensor may lead the arm off the path of the program.",
+        "A sensor may move the arm away from the programmed path.",
         "Switch the sensor off before targets that have to be exact.",
     )
     CONVEYOR = (
         "conveyor",
         WARNING,
         "The work object moves, on a conveyor or with a mechanical unit.",
-        "Such targets are not compensated; look at them by hand.",
+        "Such targets are not corrected; check them by hand.",
     )
     COORDINATED_ARMS = (
         "coordinated-arms",
         WARNING,
         "The arm moves together with another one.",
-        "Such targets are not compensated; look at them by hand.",
+        "Such targets are not corrected; check them by hand.",
     )
     SOFT_AXIS = (
         "soft-axis",
@@ -570,21 +573,21 @@ class Code(StrEnum):
     SETTING_UNTRACKED = (
         "setting-untracked",
         WARNING,
-        "The program sets something that moves the arm off its targets and that is not "
-        "followed.",
-        "Take the setting back before targets that have to be exact.",
+        "The program changes a setting that moves the arm away from its targets and is "
+        "not followed.",
+        "Reset it before targets that have to be exact.",
     )
     LOAD_UNKNOWN = (
         "load-unknown",
         WARNING,
-        "What the arm carries is not known, and how far it sags depends on it.",
+        "The payload is not known, and how far the arm sags depends on it.",
         "Write the load as constants in the program.",
     )
     BESIDE_PROGRAM = (
         "beside-program",
         WARNING,
-        "A program that runs beside this one, an interrupt or a trap may change what "
-        "holds at the move, or move the arm.",
+        "A concurrent program, an interrupt or a trap may move the arm, or change the "
+        "settings of the move.",
         "Let it set a signal, and act in the program.",
     )
 
@@ -599,62 +602,63 @@ class Code(StrEnum):
     TARGET_BEYOND_LIMIT = (
         "target-beyond-limit",
         WARNING,
-        "A joint is beyond its limit at the target as it is written, or on the way.",
+        "A joint is beyond its limit at the target as it is written, or on the path to "
+        "it.",
         "Check the target and its turns.",
     )
     CONFIGURATION_UNKNOWN = (
         "configuration-unknown",
         WARNING,
-        "On which branch, or with which turns, the arm reaches the target is not "
-        "known.",
+        "The branch or the turns with which the arm reaches the target are not known.",
         "Write configuration flags, or a joint target before it.",
     )
     CONFIGURATION_CONTRADICTED = (
         "configuration-contradicted",
         WARNING,
-        "The path arrives otherwise than the configuration flags say: the controller "
-        "stops there, or may.",
+        "The path arrives on another branch or turn than the configuration flags name: "
+        "the controller stops there, or may stop.",
         "Write the flags that the path arrives with.",
     )
     CONFIGURATION_BORDER = (
         "configuration-border",
         WARNING,
-        "Corrected, an axis would stand so near a border of the configuration flags "
-        "that they could become wrong.",
+        "After the correction an axis would be so near a border of the configuration "
+        "flags that they could become wrong.",
         "Move the target a little, or go there by joint angles.",
     )
     SINGULAR_WRIST = (
         "singular-wrist",
         WARNING,
-        "The wrist is near its singularity, where corrections turn axes far.",
+        "The wrist is near its singularity, where a correction turns axes by a large "
+        "angle.",
         "Turn the tool, or lower wrist_deg in the cell.",
     )
     SINGULAR_PATH = (
         "singular-path",
         WARNING,
-        "The path to the target leaves the reach or passes through a singularity.",
+        "The path to the target goes out of reach or through a singularity.",
         "Lead the path round it, add a point, or use a joint move.",
     )
     ARC_UNDETERMINED = (
         "arc-undetermined",
         WARNING,
-        "The points of the arc make no circle that is certain, or where the arc ends "
-        "is not known.",
-        "Move the point on the way of the arc, or use lines.",
+        "The points of the arc do not determine its circle, or the end of the arc is "
+        "not known.",
+        "Move the middle point of the arc, or use lines.",
     )
     ORIENTATION_LAW = (
         "orientation-law",
         WARNING,
-        "How the tool turns on the way is not planned, so that joints may arrive from "
-        "another side.",
-        "Use the usual orientation of the language, or points that are nearer.",
+        "The orientation of the tool along the path is not planned for this setting, "
+        "so that joints may arrive in another direction.",
+        "Use the default orientation setting of the language, or nearer points.",
     )
     UNKNOWN_POSITION_BEFORE = (
         "unknown-position-before",
         WARNING,
-        "The move comes from a place that is not certain: a target out of reach, or "
-        "with doubtful configuration flags.",
-        "Correct the move before, or put a joint target between.",
+        "The start of the move is uncertain: a target out of reach, or with uncertain "
+        "configuration flags.",
+        "Correct the move before, or add a joint target between.",
     )
 
     # Why a target keeps its values: what the correction would do.
@@ -662,21 +666,21 @@ class Code(StrEnum):
     OUTSIDE_SURVEY = (
         "outside-survey",
         WARNING,
-        "The target lies outside of what the survey covers, or the model is too "
+        "The target lies outside of the range of the survey, or the model is too "
         "uncertain there.",
         "Survey the range of the program.",
     )
     CORRECTION_UNREACHABLE = (
         "correction-unreachable",
         WARNING,
-        "Corrected, the target would be out of reach on its branch, or the search for "
-        "the correction does not come to an end.",
+        "The corrected target would be out of reach on its branch, or the search for "
+        "the correction does not converge.",
         "Move the target away from the border of the reach.",
     )
     CORRECTION_BEYOND_LIMIT = (
         "correction-beyond-limit",
         WARNING,
-        "Corrected, a joint would be beyond its limit.",
+        "After the correction a joint would be beyond its limit.",
         "Move the target away from the limit.",
     )
     CORRECTION_TOO_LARGE = (
@@ -688,34 +692,34 @@ class Code(StrEnum):
     ARM_SWINGS = (
         "arm-swings",
         WARNING,
-        "Corrected, a joint, the elbow or the wrist would move farther than the cell's "
-        "limits, at the target or on the way.",
-        "Look at the target: near a singularity, turn the tool.",
+        "With the correction a joint, the elbow or the wrist would move farther than "
+        "the cell's limits, at the target or on the path to it.",
+        "Near a singularity, turn the tool; otherwise check the target.",
     )
     DIRECTION_CHANGES = (
         "direction-changes",
         WARNING,
-        "With the correction a joint would arrive from its other side.",
+        "With the correction a joint would arrive in the other direction.",
         "Start the approach farther away.",
     )
     CORRECTION_STEP = (
         "correction-step",
         WARNING,
         "The correction changes too fast along the path.",
-        "Stop between the points, or raise step_mm of the cell.",
+        "Stop between the points, or raise correction_step_mm of the cell.",
     )
     PATH_BENT = (
         "path-bent",
         WARNING,
         "A neighbour on the path, or on the same arc or curve, cannot be corrected: "
         "correcting this point alone would bend the path.",
-        "Look at the neighbour.",
+        "Check the neighbour.",
     )
     ARC_DISTORTED = (
         "arc-distorted",
         WARNING,
-        "Corrected, the points of the arc would make quite another circle.",
-        "Move the point on the way to its middle, or divide the arc.",
+        "The corrected points of the arc would make a very different circle.",
+        "Put the middle point halfway along the arc, or divide the arc.",
     )
     ARRIVALS_DIFFER = (
         "arrivals-differ",
@@ -726,14 +730,14 @@ class Code(StrEnum):
     SHARED_POINT = (
         "shared-point",
         WARNING,
-        "Several moves go to one point, and the cell keeps such points as they are.",
+        "Several moves go to one point, and the cell does not let such points change.",
         'Set shared_points = "mean" or "clone" under [compensation].',
     )
     DEPENDANT_WORSE = (
         "dependant-worse",
         WARNING,
-        "A correction would take a target that is computed from this one farther off, "
-        "or another arrival at the point cannot be corrected.",
+        "A correction would increase the error of a target that is computed from this "
+        "one, or another arrival at the point cannot be corrected.",
         "Give the moves points of their own.",
     )
 
@@ -754,7 +758,7 @@ class Code(StrEnum):
     UNFINISHED = (
         "unfinished",
         ERROR,
-        "A run that was killed left the file.",
+        "The file is a temporary file of a run that was killed.",
         "Delete it, and run batch --resume.",
     )
     CHANGED = (
@@ -773,13 +777,13 @@ class Code(StrEnum):
     OLDER_MODEL = (
         "older-model",
         ERROR,
-        "The file was made with another model than the current one.",
+        "The file was written with another model than the current one.",
         "Compensate it again.",
     )
     MIXED_MODELS = (
         "mixed-models",
         ERROR,
-        "Files of one job were made with different models.",
+        "Files of one job were written with different models.",
         "Compensate the job again.",
     )
     SOURCE_CHANGED = (
@@ -798,7 +802,7 @@ class Code(StrEnum):
         "left-alone",
         ERROR,
         "Targets that could have been compensated keep their values.",
-        "Look at them, then pass --allow-uncorrected.",
+        "Check them, then pass --allow-uncorrected.",
     )
 
 

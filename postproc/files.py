@@ -284,7 +284,7 @@ def _sync(out: IO[bytes]) -> None:
 def disk_error(exc: OSError, path: str | Path) -> OutputError:
     """Say in our terms why a file cannot be written."""
     if exc.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        return DiskFullError(path, "no room is left there", "Make room, then go on")
+        return DiskFullError(path, "the disk is full", "Free some space, then resume")
     cure = "Give an existing folder with room that may be written to"
     return OutputError(path, _reason(exc), cure)
 
@@ -666,6 +666,7 @@ SCHEMAS = {
     "history": 1,
     "report": 2,
     "simulation": 1,
+    "tree": 1,
 }
 
 

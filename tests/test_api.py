@@ -85,7 +85,7 @@ def test_a_fit_scores_other_rows_and_is_saved(found, job_folder, tmp_path):
     text = place.read_bytes()
     assert postproc.load_model(place).id == found.model.id
     assert postproc.load_model(text, name="m").id == found.model.id
-    assert "left by the fit mean" in str(found)
+    assert "error after fit mean" in str(found)
     table = found.to_frame()
     assert set(table["name"]) == set(found.model.effects.names)
 

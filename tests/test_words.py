@@ -39,6 +39,19 @@ key = "left"
     ]
 
 
+def test_left_is_a_side_beside_right():
+    assert not words.PROSE.findall("wave to the left; left or right; on the left")
+    assert words.PROSE.findall("it is left, and left to themselves") == ["left"] * 2
+
+
+def test_pages_that_commands_write_count_too(tmp_path):
+    page, script = tmp_path / "a.html.j2", tmp_path / "a.js"
+    page.write_text('<i id="left">{% if left %}left alone{% endif %}</i>')
+    script.write_text('const left = "left"; say("left alone", `what ${x} left`);')
+    found = [words.PROSE.findall(t) for p in (page, script) for _, t in words.assets(p)]
+    assert found == [["left"], ["left"], ["left"]]
+
+
 def test_sentences_are_counted_one_by_one():
     assert not words.long_sentences("word " * 24 + "end. " + "word " * 24 + "end.")
     assert len(words.long_sentences("word " * 30 + "end. Short one.")) == 1

@@ -16,16 +16,16 @@ Written from `postproc/diagnostics.py` by `python docs/tools/findings.py`.
 
 A finding is one message about a program, or about a tree of compensated programs. It
 names a file and a line, and has a code: `job.pdl:12: unknown-routine: ..`. JSON outputs
-carry the code; `postproc explain --code CODE` prints what stands here. What is found at
-many lines is one line with the first of them; `--all` lists each.
+carry the code; `postproc explain --code CODE` prints its meaning and cure. Equal
+findings at many lines are printed as one, with the first lines; `--all` lists each.
 
-The reason for which a target keeps its values has a code of the same registry. JSON
+The reason why a target is not corrected has a code of the same registry. JSON
 outputs carry that code (`code`) beside the text.
 
 | severity | what it asks for |
 |---|---|
-| note | nothing: it tells what was done, or taken for granted |
-| warning | a look: targets keep their values, or are less certain |
+| note | nothing: it reports what was done, or assumed |
+| warning | a check: targets keep their values, or are less certain |
 | error | a change: as it is the program must not be uploaded |
 """
 

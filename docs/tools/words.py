@@ -20,13 +20,14 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from counts import is_participle
+from counts import FORBIDDEN, is_participle
+from counts import WORDS as PROSE
 
 ROOT = Path(__file__).parents[2]
 ALLOWED = Path(__file__).with_suffix(".txt")
-WORDS = ("told", "said", "came of", "left", "taken", "sure", "anew", "whatever")
-PROSE = re.compile(rf"\b({'|'.join([*WORDS, 'at hand', 'nobody knows'])})\b", re.I)
-NAME = re.compile(rf"(?:^|_)({'|'.join(w.replace(' ', '_') for w in WORDS)})(?=_|$)")
+NAME = re.compile(
+    rf"(?:^|_)({'|'.join(w.replace(' ', '_') for w in FORBIDDEN)})(?=_|$)"
+)
 MOST = 25  # words of a sentence
 
 Found = tuple[str, str, int, str]
@@ -83,6 +84,16 @@ def texts(file: str, tree: ast.Module) -> Iterator[tuple[str, int, str]]:
                 yield "messages", node.lineno, node.value
 
 
+def assets(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield the texts of a template or script of the HTML pages: line and text."""
+    for number, line in enumerate(path.read_text("utf-8").split("\n"), 1):
+        quoted = re.findall(r"\"[^\"]*\"|`[^`]*`", line)
+        shown = [re.sub(r"\${[^}]*}", " ", text) for text in quoted if " " in text]
+        if path.suffix == ".j2":
+            shown.append(re.sub(r"<[^>]*>|{%.*?%}|{{.*?}}|\"[^\"]*\"", " ", line))
+        yield from ((number, text) for text in shown)
+
+
 def page(file: str) -> Iterator[tuple[int, str]]:
     """Yield line number and prose of a page: no code, neither blocks nor words."""
     fence = False
@@ -134,6 +145,11 @@ def places() -> Iterator[Found]:
             if kind == "help":
                 for sentence in long_sentences(text):
                     yield "long", file, line, sentence
+    html = ROOT / "postproc" / "report" / "html"
+    for path in sorted([*html.rglob("*.j2"), *html.rglob("*.js")]):
+        for line, text in assets(path):
+            for word in PROSE.findall(text):
+                yield "messages", str(path.relative_to(ROOT)), line, word
     for file in pages():
         for line, text in page(file):
             for word in PROSE.findall(text):
@@ -156,7 +172,7 @@ def write(counts: Counter[tuple[str, str]]) -> None:
 
 
 def problems() -> list[str]:
-    """Say where there is more of a kind than is allowed."""
+    """Return where there is more of a kind than is allowed."""
     found, limit = list(places()), allowed()
     counts = Counter((kind, file) for kind, file, *_ in found)
     over = {key for key, count in counts.items() if count > limit[key]}

@@ -232,8 +232,8 @@ def _find_mixed_models(root: Path, places: Sequence[str]) -> Iterator[CheckFindi
         (model, place), *others = found.items()
         for other, at in others:
             text = (
-                f"was made with model {other}, and {place} beside it with {model}: "
-                "they are one job. Compensate it again"
+                f"was written with model {other}, and {place} of the same job with "
+                f"{model}. Compensate the job again"
             )
             yield CheckFinding(at, Code.MIXED_MODELS, text)
 
@@ -271,7 +271,7 @@ class _Look:
         """Find what is wrong with a file."""
         if place.endswith(TEMPORARY):
             yield CheckFinding(
-                place, Code.UNFINISHED, "was left by a run that was killed"
+                place, Code.UNFINISHED, "is a temporary file of a run that was killed"
             )
         elif is_program(place) or self._is_own_list(place):
             yield from self._program(place)
@@ -324,7 +324,7 @@ class _Look:
         """Check that a program was made with the model it should be made with."""
         wanted = self.current(place)
         if wanted is not None and sidecar.model != wanted:
-            text = f"was made with model {sidecar.model}, the current one is {wanted}"
+            text = f"was written with model {sidecar.model}, the current is {wanted}"
             yield CheckFinding(place, Code.OLDER_MODEL, f"{text}: compensate it again")
 
     def _content(
@@ -336,7 +336,7 @@ class _Look:
         stamp = read_stamp(data)
         if record is None:
             if stamp is not None:
-                text = "is stamped, and its record does not know it"
+                text = "is stamped, and its record does not name it"
                 yield CheckFinding(place, Code.NO_RECORD, text)
             yield from _find_uncorrected(place, {}, sidecar.list_uncorrected_in(name))
             yield from self._source(place, sha256(data))
@@ -369,7 +369,7 @@ class _Look:
         """Check that a compiled file is not that of the uncompensated program."""
         if self.source is not None and (self.source / place).is_file():
             if read_input(self.source / place) == read_input(self.root / place):
-                text = "is compiled from the uncompensated program: translate it anew"
+                text = "is compiled from the uncompensated program: translate it again"
                 yield CheckFinding(place, Code.UNCOMPENSATED, text)
 
 
@@ -383,8 +383,8 @@ def _find_uncorrected(
     rows = [row for row in zip(*columns, strict=False) if row[0] in codes]
     if rows:
         lines = line_ranges(sorted(line for _, line, _ in rows))
-        text = f"{len(rows)} visits were left alone, lines {lines} of the source"
-        cure = "look at them, then pass --allow-uncorrected"
+        text = f"{len(rows)} visits are not corrected, lines {lines} of the source"
+        cure = "check them, then pass --allow-uncorrected"
         yield CheckFinding(
             place, Code.LEFT_ALONE, f"{text}: {cure}; {_by_reason(rows, told)}"
         )

@@ -205,22 +205,23 @@ class Summary:
         return rows
 
     def lists(self) -> list[str]:
-        """Say which programs are absent, have targets left alone, were removed."""
+        """Return which programs are absent, have uncorrected targets, were removed."""
         return [
             *_some("absent", (f"{place}: {why}" for place, why in self.problems)),
             *_some(
-                "left alone", (f"{p}: {_describe_uncorrected(n)}" for p, n in self.left)
+                "not corrected",
+                (f"{p}: {_describe_uncorrected(n)}" for p, n in self.left),
             ),
             *_some("note", (f"{place}: {why}" for place, why in self.notes)),
-            *_some("removed, no source any more", self.removed),
+            *_some("removed, its source is gone", self.removed),
         ]
 
 
-TITLES = ("programs and files", "files", "unchanged", "visits", "left alone")
+TITLES = ("programs and files", "files", "unchanged", "visits", "not corrected")
 
 
 def _describe_uncorrected(visits: int) -> str:
-    """Say what of a program was left alone."""
+    """Return what of a program was not corrected."""
     return f"{visits} visits" if visits else "moves that are never reached"
 
 

@@ -37,7 +37,7 @@ from postproc.language.languages import language_of
 
 # The files of a tree, sorted folder by folder.
 
-_STALE = "is compiled from the uncompensated program: translate it anew"
+_STALE = "is compiled from the uncompensated program: translate it again"
 
 
 @dataclass(frozen=True)

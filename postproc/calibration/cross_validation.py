@@ -118,8 +118,8 @@ class HeldOutError:
         how = "effects chosen again" if self.chosen else "effects as in this fit"
         return (
             f"expected on new poses {self.error.mean_mm:.4f} mm, without the tracker's "
-            f"own scatter {self.arm_mm:.4f} mm, in regions that were left out "
-            f"{self.regions_mm:.4f} mm; intervals hold {self.covered:.0%} "
+            f"own scatter {self.arm_mm:.4f} mm, in held-out regions "
+            f"{self.regions_mm:.4f} mm; intervals cover {self.covered:.0%} "
             f"({self.error.n} held-out rows, {how})"
         )
 

@@ -26,6 +26,7 @@ from postproc.model.doubt import Doubt
 from postproc.model.effect_sum import Combination
 from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
 from postproc.model.effects.effect import Effect
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import ArmStates
@@ -69,7 +70,7 @@ def candidates(
     without = exclude_effects(motion)
     tried = [
         k for k in EFFECTS
-        if k.unasked == "weighed" and k.name not in without
+        if k.fit_policy == FitPolicy.IF_EVIDENT and k.name not in without
         and (k.may_show_alone(states) if without else k.may_show(states))
         and k.propose(arm, states).parameters()
     ]  # fmt: skip
@@ -79,7 +80,7 @@ def candidates(
 
 def free_forms(states: States) -> tuple[str, ...]:
     """Name the effects without a law that are weighed for what the others leave."""
-    last = [k for k in EFFECTS if k.unasked == "last" and k.may_show(states)]
+    last = [k for k in EFFECTS if k.fit_policy == FitPolicy.LAST and k.may_show(states)]
     return tuple(kind.name for kind in last)
 
 
@@ -139,7 +140,7 @@ def sightings(
     if origin is None:
         return ()
     kept, batch = fitted.combination.effects, fitted.batch
-    names = [k.name for k in EFFECTS if k.unasked == "seen"]
+    names = [k.name for k in EFFECTS if k.fit_policy == FitPolicy.WITH_TRACKER]
     more = propose(names, batch.arm, batch.states)
     tried = beside(fitted, (*kept, *(e.see_from(origin) for e in more)))
     if len(keep_needed(tried, always=(), aside=kept, enough=SURE)) == len(kept):

@@ -111,7 +111,7 @@ class Calibration:
             f"{', '.join(dict.fromkeys(e.name for e in self.model.effects.effects))}",
             "" if report.held_out is None else report.held_out.describe(),
             f"measured error  {report.before.tell()}",
-            f"left by the fit {report.after.tell()}",
+            f"error after fit {report.after.tell()}",
             *(f"warning: {warning}" for warning in report.warnings),
             f"not to be used: {self.rejected}" if self.rejected else "",
         ]
@@ -422,9 +422,9 @@ def _left_open(doubt: Doubt | None, fitted: Fit) -> tuple[str, ...]:
     names = " or ".join(dict.fromkeys(e.name for e in effects))
     state = ", and state mounting under [robot]" if _any_direction(effects) else ""
     return (
-        f"these rows do not tell whether there is {names}: not corrected, but the "
-        f"stated errors have {size:.3f} mm at the tool (rms) of it. Measure more "
-        f"poses, with more decimals of joint angles{state}",
+        f"these rows do not show whether there is {names}: it is not corrected, but "
+        f"stated standard errors include {size:.3f} mm at the tool (rms) for it. "
+        f"Measure more poses, with more decimals of joint angles{state}",
     )
 
 
@@ -441,8 +441,8 @@ def drifts(fitted: Fit) -> tuple[str, ...]:
         if state := effect.refers_to():
             kept = _mean_mm((fitted.residual + fitted.move(part))[used])
             told.append(
-                f"{effect.name} in time: rows are left {left:.4f} mm off, {kept:.4f} "
-                f"mm with it left in. Predictions are for {state}"
+                f"{effect.name} over time: the mean error of the rows is {left:.4f} mm "
+                f"with it, {kept:.4f} mm without it. Predictions are for {state}"
             )
     return tuple(told)
 
@@ -619,8 +619,8 @@ def probe_note(placed: Registration, arm: Arm, states: States) -> tuple[str, ...
     )
     near = NEAR_POINT if np.abs(states.tool).max() > 0 else NEAR_FLANGE
     return (
-        f"the tool {how}: where the probe sits{where} in the flange frame is not "
-        f"determined, and taken from the cell (+- {near / MM:.0f} mm); predictions "
-        "hold for poses with the tool turned like this alone. Measure poses with other "
+        f"the tool {how}: the position of the probe{where} in the flange frame is not "
+        f"determined; that of the cell is used (+- {near / MM:.0f} mm). Predictions "
+        "are valid only for this orientation of the tool. Measure poses with other "
         "orientations",
     )

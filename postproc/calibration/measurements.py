@@ -306,15 +306,15 @@ def _tie_files(parts: Sequence[Measurements]) -> list[Measurements]:
         worst = f"{left.max() / MM:.3f} mm"
         if left.max() > LOOSE:
             note = (
-                f"{part.path.name}: fixed points lie to each other by up to {worst} "
-                f"otherwise than in {first.path.name}: stations stay apart. Are names "
-                f"exchanged, or was {names[int(left.argmax())]!r} moved?"
+                f"{part.path.name}: distances of monuments differ by up to {worst} "
+                f"from {first.path.name}, so that the stations are not joined. Are "
+                f"names exchanged, or was {names[int(left.argmax())]!r} moved?"
             )
             out.append(replace(part, warnings=(*part.warnings, note)))
             continue
         note = (
-            f"{part.path.name}: in the frame of {first.path.name} by {len(names)} "
-            f"fixed points, {worst} remain there at most"
+            f"{part.path.name}: registered to {first.path.name} by {len(names)} "
+            f"monuments, largest residual {worst}"
         )
         moved = _in_frame(part, T, name)
         out.append(replace(moved, warnings=(*part.warnings, note)))

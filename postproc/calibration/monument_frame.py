@@ -63,7 +63,7 @@ def at_monuments(
     off = np.linalg.norm(known - seen @ T[:3, :3].T - T[:3, 3], axis=1).max() / MM
     by = float(np.linalg.norm(moved - rows.position, axis=1).mean()) / MM
     what = "shift and turn" if turns else "shift"
-    count = f"{len(names)} fixed points" if len(names) > 1 else "a fixed point"
+    count = f"{len(names)} monuments" if len(names) > 1 else "a monument"
     return replace(rows, position=moved), (
         f"\nregistered by {count} of the survey ({what}, {by:.3f} mm on average); "
         f"{off:.3f} mm remain there"

@@ -78,7 +78,7 @@ def split_references(table: TextTable) -> tuple[TextTable, ReferenceRows | None]
         return table, None
     if fixed.all():
         cure = "Put the rows of the arm into the same file"
-        raise MeasurementError(table.path, "has rows on fixed points only", cure)
+        raise MeasurementError(table.path, "has rows on monuments only", cure)
     some, arm = _rows(table, fixed), _rows(table, ~fixed)
     some.require(*POSITION)
     _require_positions(some)
@@ -112,7 +112,7 @@ def _require_positions(table: TextTable) -> None:
         if empty.any():
             raise MeasurementError(
                 table.path,
-                f"a row on a fixed point has no {column}",
+                f"a row on a monument has no {column}",
                 "Fill it in or remove the row",
                 line=int(table.line[np.argmax(empty)]),
             )
@@ -154,8 +154,8 @@ def check_references(rows: ReferenceRows) -> None:
         if len(own) == 1:
             raise MeasurementError(
                 rows.path,
-                f"fixed point {name!r} was read once, which tells of no drift",
-                "Read it all along the survey, or remove the row",
+                f"monument {name!r} was read once, which shows no drift",
+                "Read it several times during the survey, or remove the row",
                 line=line,
             )
         away = rows.position[own] - rows.position[own[0]]
@@ -163,9 +163,9 @@ def check_references(rows: ReferenceRows) -> None:
         if far.max() > ONE_POINT:
             raise MeasurementError(
                 rows.path,
-                f"fixed point {name!r} is {far.max() / MM:.1f} mm from where it was "
-                f"in line {line}",
-                "Give every fixed point a name of its own in column reference",
+                f"monument {name!r} is {far.max() / MM:.1f} mm from its place in line "
+                f"{line}",
+                "Give every monument a name of its own in column reference",
                 line=int(rows.line[own[np.argmax(far)]]),
             )
 
@@ -258,34 +258,33 @@ class TrackerMotion:
 
     def tell(self) -> tuple[str, ...]:
         """Say in words what was found."""
-        found = f"moved by up to {self.peak_mm:.4f} mm, taken out of the rows"
+        found = f"moved by up to {self.peak_mm:.4f} mm; the rows are corrected for it"
         if not self.drifts:
             found = "did not move while they were read"
         if self.stands:
-            found = f"did not move ({self.unsure / MM:.4f} mm could be told per axis)"
+            found = f"did not move (detectable: {self.unsure / MM:.4f} mm per axis)"
         told = [
-            f"{self.readings} readings of {self.points} fixed points: the tracker "
-            + found
+            f"{self.readings} readings of {self.points} monuments: the tracker " + found
         ]
         if self.jump is not None:
             told.append(
                 f"the tracker jumped at {self.drift.clock} {self.jump:g}, between two "
-                "readings of fixed points: rows near it may be weighed down"
+                "readings of monuments: rows near it may have a lower weight"
             )
         if self.rank < 2:
             which = "turns" if self.rank == 0 else "turn about their line"
-            cure = "three points that lie apart tell all motions"
-            told.append(f"the tracker's {which} cannot be told from them: {cure}")
+            cure = "measure three monuments that are not on one line"
+            told.append(f"the tracker's {which} cannot be determined: {cure}")
         if self.covered < COVERED:
             told.append(
-                f"the readings of fixed points span {self.covered:.0%} of the survey: "
-                "what the tracker did besides is not known"
+                f"the readings of monuments span {self.covered:.0%} of the survey: "
+                "the tracker's motion during the rest is not known"
             )
         elif not self.is_watched:
             told.append(
-                f"{self.unseen:.0%} of the survey pass between two readings of fixed "
-                "points: what the tracker did meanwhile is not known. Read one every "
-                "20 rows or so"
+                f"{self.unseen:.0%} of the survey lie between two readings of "
+                "monuments: the tracker's motion meanwhile is not known. Measure a "
+                "monument every 20 rows or so"
             )
         return tuple(told)
 

@@ -11,6 +11,7 @@ from postproc.calibration.diagnosis.search import search, with_effects
 from postproc.calibration.diagnosis.table import Causes
 from postproc.calibration.regression import Fit
 from postproc.model.effects import EFFECTS
+from postproc.model.effects.policies import FitPolicy, SearchPolicy
 
 REMAINS = 0.01  # level at which what is left is no noise: a step may be a piece of it
 SOUGHT_BESIDE_FREE = 600  # poses at the most: of more, with many columns, it takes long
@@ -35,14 +36,16 @@ def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
     poses = fitted.poses
     if poses < LEAST_POSES or (free and poses > SOUGHT_BESIDE_FREE):
         return fitted
-    now = ("always", "rival") if free else ("always", "rival", "alone")
+    now = {SearchPolicy.ALWAYS, SearchPolicy.RIVAL}
+    if not free:
+        now.add(SearchPolicy.ALONE)
     found = _search_residuals(fitted, now, without)
     new = tuple(e for e in found.combination.effects if e not in kept)
-    if not new or any(e.sought == "rival" for e in new):
+    if not new or any(e.search_policy == SearchPolicy.RIVAL for e in new):
         return fitted
     if worth(found, kept) < SURE:
         return fitted
-    sure = tuple(e for e in kept if not e.free and e.unasked != "weighed")
+    sure = tuple(e for e in kept if not e.free and e.fit_policy != FitPolicy.IF_EVIDENT)
     needed = keep_needed(found, always=(*sure, *new))
     if any(e.free for e in needed):
         return fitted
@@ -53,14 +56,18 @@ def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
 
 
 def _search_residuals(
-    fitted: Fit, now: tuple[str, ...], without: Collection[str]
+    fitted: Fit, now: Collection[SearchPolicy], without: Collection[str]
 ) -> Fit:
-    """Search in what a fit leaves, but for a drift in time, for what is sought now."""
+    """Search the residual of a fit, drifts aside, for effects of some policies."""
     kept, states = fitted.combination.effects, fitted.batch.states
-    steady = tuple(e for e in kept if not (e.sought and e.driven_by == "time"))
+    never = SearchPolicy.NEVER
+    steady = tuple(e for e in kept if e.search_policy == never or e.driven_by != "time")
     base = fitted if steady == kept else with_effects(fitted, steady)
-    sought = [k for k in EFFECTS if k.sought in now and k.may_be_sought(states)]
-    other = {k.name for k in EFFECTS if k not in sought}
+    other = {
+        k.name
+        for k in EFFECTS
+        if k.search_policy not in now or not k.may_be_searched(states)
+    }
     causes = Causes(Library.of(base, other.union(without)))
     if not causes.library.shelves:
         return fitted

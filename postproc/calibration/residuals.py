@@ -35,8 +35,8 @@ def _of_means(rows: Measurements, left: Floats) -> str:
         return ""
     size = np.linalg.norm(means(left, label), axis=1) / MM
     return (
-        f"\n{len(rows)} readings, {count} means over stops and probe points: these are "
-        f"left {size.mean():.4f} mm on average, {size.max():.4f} mm at most"
+        f"\n{len(rows)} readings, {count} means over stops and probe points: the error "
+        f"of the means is {size.mean():.4f} mm on average, {size.max():.4f} mm at most"
     )
 
 

@@ -200,7 +200,7 @@ def tell_widths(widths: tuple[Width, ...]) -> str:
     """Say in words what reversals tell of the joints; "" where there were none.
 
     >>> tell_widths((*[(1.0, 1.25)] * 4, (2.0, 6.0), UNTOLD))
-    'flanks at stops: joint 1, 2, 3, 4 sharp; joint 5 2 to 6 gaps; joint 6 not sure'
+    'flanks at stops: joint 1, 2, 3, 4 sharp; joint 5 2 to 6 gaps; joint 6 uncertain'
     """
     if not widths:
         return ""
@@ -216,5 +216,5 @@ def _describe_width(width: Width) -> str:
     if verdict_at_stops(width) == CONFIRMED:
         return "sharp"
     if np.isinf(width[1]):
-        return "not sure"
+        return "uncertain"
     return f"{width[0]:g} to {width[1]:g} gaps"

@@ -347,9 +347,9 @@ def list_losses(arm: Arm, survey: Measurements) -> tuple[str, ...]:
     told = []
     if arm.file.links is None:
         told.append(
-            "the arm file has no [links]: how joints yield to the arm's own weight is "
-            "fitted by the shapes of gravity alone, which tell less where no row was; "
-            "gaps that depend on it cannot be fitted and stay in what is left"
+            "the arm file has no [links]: joint compliance under the arm's own weight "
+            "is fitted with general shapes, which extrapolate less well; gaps that "
+            "depend on the weight cannot be fitted and remain in the residuals"
         )
     if arm.file.joints.drive_coupling is None and survey.inferred.any():
         told.append(

@@ -92,6 +92,6 @@ def carrying_load(rows: Measurements, cell: Cell) -> Measurements:
     if not untold.any():
         return loaded
     which = "rows" if untold.all() else f"{untold.sum()} rows"
-    told = f"no payload_kg: {which} taken as measured with the payload of the cell, "
-    told += f"{cell.payload_mass:g} kg"
+    told = f"no payload_kg: {which} assumed to be measured with the payload of the "
+    told += f"cell, {cell.payload_mass:g} kg"
     return replace(loaded, warnings=(*rows.warnings, told))

@@ -452,7 +452,7 @@ def _check_order(table: TextTable, order: Floats) -> None:
     """Refuse a column order that puts two rows at one place, or has gaps in it."""
     lost = np.isnan(order)
     if lost.any():
-        cure = "Number all rows, those on fixed points too, or leave the column out"
+        cure = "Number all rows, also those on monuments, or omit the column"
         line = int(table.line[np.argmax(lost)])
         raise MeasurementError(table.path, "has no order", cure, line=line)
     place = np.argsort(order, kind="stable")
@@ -731,7 +731,7 @@ def check_axes(table: TextTable) -> None:
         cure = (
             "Of an arm with seven axes keep one joint locked: write the other six as "
             "q1_deg .. q6_deg, and the locked angle into the D-H rows of the arm file. "
-            "A track or positioner that stood still is left out"
+            "Omit the columns of a track or positioner that stood still"
         )
     else:
         cure = (

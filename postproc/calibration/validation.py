@@ -267,7 +267,7 @@ def _conclude(task: FitTask, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Va
     if mean_error_mm(plain) * MM < GOOD * task.arm.repeatability:
         cause = "The arm is as good as its drawing, as far as these rows show"
     why = (
-        f"new poses are left {error.error.mean_mm:.4f} mm with this model and "
+        f"the error of new poses is {error.error.mean_mm:.4f} mm with this model and "
         f"{mean_error_mm(plain):.4f} mm with {SET_UP.name}. {cause}"
     )
     return Validated(fitted, error, rows.widening, rejected=why)

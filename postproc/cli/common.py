@@ -33,17 +33,9 @@ app = typer.Typer(
 
 CellOption = Annotated[Path, typer.Option("--cell", help="Cell file (TOML).")]
 ModelOption = Annotated[Path, typer.Option("--model", help="Model file (JSON).")]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of every random draw.")]
 
-
-JsonOption = Annotated[
-    str | None, typer.Option("--json", help="Write JSON to a file, - for stdout.")
-]
 VariablesOption = Annotated[
     Path | None, typer.Option("--variables", help="Variable file, default PROGRAM.lsv.")
-]
-HtmlOption = Annotated[
-    Path | None, typer.Option("--html", help="Write a report (HTML) here.")
 ]
 
 
@@ -66,20 +58,12 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="SECTION.KEY=VALUE",
-        help="Set a key of [compensation] or [measurements] for this run.",
+        help="Set a key of the cell for this run, such as measurements.unit=m.",
     ),
 ]
 OrientationOption = Annotated[
     bool,
     typer.Option("--orientation", help="Correct orientations too, not only places."),
-]
-SecondOpinionOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--second-opinion/--no-second-opinion",
-        help="Let Pinocchio, toppra and ruckig judge it too.",
-        show_default=False,
-    ),
 ]
 EveryOption = Annotated[
     bool, typer.Option("--all", help="A line for every finding, also for equal ones.")
@@ -95,11 +79,8 @@ PathToleranceOption = Annotated[
     typer.Option(
         "--path-tolerance",
         metavar="MM",
-        help="Insert points where a path is predicted to be left by more.",
+        help="Insert points into moves whose predicted path error is larger.",
     ),
-]
-TemperatureOption = Annotated[
-    float | None, typer.Option("--temperature", help="Arm temperature [deg C].")
 ]
 
 
@@ -249,14 +230,14 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "compensate": (
         "postproc compensate job.pdl --cell cell.toml --model model.json",
         "postproc compensate job.pdl --cell cell.toml --model model.json"
-        " -o out/job.pdl --html job.html",
+        " -o out/job.pdl --report job.html",
         "cat job.pdl | postproc compensate - --cell cell.toml --model model.json > out",
         "cat job.pdl | postproc compensate - --variables job.lsv"
         " --variables-out new.lsv --cell cell.toml --model model.json > new.pdl",
     ),
     "diff": (
         "postproc diff job.pdl out/job.pdl | less -S",
-        "postproc diff job.pdl out/job.pdl --json -",
+        "postproc diff job.pdl out/job.pdl --report -",
     ),
     "restore": (
         "postproc restore out/job.pdl",
@@ -273,7 +254,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc simulate out/job.pdl --cell cell.toml --track track.csv",
     ),
     "fit": (
-        "postproc fit measured.csv --cell cell.toml -o model.json --html model.html",
+        "postproc fit measured.csv --cell cell.toml -o model.json --report model.html",
         "postproc fit measured.csv --cell cell.toml -o model.json"
         " --set measurements.frame=tracker",
     ),
@@ -281,12 +262,12 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc predict states.csv --cell cell.toml --model model.json -o errors.csv",
     ),
     "compare": (
-        "postproc compare measured.csv --cell cell.toml --html methods.html",
-        "postproc compare measured.csv --cell cell.toml --plot methods.svg",
+        "postproc compare measured.csv --cell cell.toml --report methods.html",
+        "postproc compare measured.csv --cell cell.toml --report methods.svg",
     ),
     "diagnose": (
         "postproc diagnose fresh.csv --cell cell.toml --model model.json"
-        " -o better.json --html diagnosis.html",
+        " -o better.json --report diagnosis.html",
         "postproc diagnose points.csv --program job.pdl --cell cell.toml"
         " --model model.json",
         "postproc diagnose --path track.csv --program job.pdl --cell cell.toml"
@@ -326,7 +307,7 @@ def _indent(lines: tuple[str, ...]) -> list[str]:
     return [f"  {line}" for line in lines]
 
 
-# What is being done, told to a person who waits; others load nothing for it.
+# The running stage, shown to a person who waits; others load nothing for it.
 
 PATIENCE = 2.0  # [s] before a person is shown what is being done
 
@@ -335,14 +316,14 @@ PATIENCE = 2.0  # [s] before a person is shown what is being done
 def stages(
     out: TextIO | None = None, log: bool = False
 ) -> Iterator[Callable[[str], None]]:
-    """Show what is being done when it lasts, on a terminal.
+    """Show on a terminal which stage is running, after some seconds.
 
     Args:
         out: Where to; default: stderr.
         log: Whether lines tell it where there is no terminal.
 
     Yields:
-        A function to be told the name of every stage.
+        A function that takes the name of every stage.
     """
     out = out or sys.stderr
     if not out.isatty():
@@ -368,7 +349,7 @@ def _log_stages(out: TextIO) -> Callable[[str], None]:
 
 
 class _StageLine:
-    """The stage that was told last, shown from some time on."""
+    """The newest stage, shown after some time."""
 
     def __init__(self, out: TextIO) -> None:
         self._out, self._stage = out, "starting"
@@ -384,4 +365,4 @@ class _StageLine:
         from postproc.report.terminal import show_status
 
         self._update, self.hide = show_status(self._out, self._stage)
-        self._update(self._stage)  # another one may have been told just now
+        self._update(self._stage)  # another one may have begun just now

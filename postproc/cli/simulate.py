@@ -141,7 +141,7 @@ class Simulation:
             f"95 % {e.p95_mm:.4f}, max {e.max_mm:.4f} over {e.n} visits"
         )
         if self.left_out:
-            why = "fly points left out: it does not go on from them"
+            why = "fly points without a score: no move continues from them"
             said += f" ({self.left_out} {why})"
         if self.paths is None:
             return said

@@ -74,20 +74,20 @@ def _advise_joints(
     angle = np.rad2deg(missing.max())
     if (np.abs(turned[joints]) < LOST).any():
         return (
-            f"begin it at a place from where {names} {turn} by {angle:.3f} deg or more"
+            f"start the approach where {names} {turn} by {angle:.3f} deg or more to it"
         )
     back = length * float((missing[joints] / np.abs(turned[joints])).max())
     if cartesian and 0 < back <= FAR:
-        return f"begin the approach {np.ceil(back / MM):.0f} mm farther back"
-    return f"begin the approach where {names} still {turn} by {angle:.3f} deg more"
+        return f"start the approach {np.ceil(back / MM):.0f} mm farther back"
+    return f"start the approach where {names} still {turn} by {angle:.3f} deg more"
 
 
 def _from_nowhere(arm: Arm) -> str:
     """Say what to do at a first move, from a place that the program does not tell."""
     most = np.rad2deg(2 * half_width(arm).max())
     return (
-        f"before it, move every axis by {most:.2f} deg or more to where its side is "
-        "told, with a JOINT move from a place that is in the program"
+        f"before it, add a JOINT move from a place in the program that moves every "
+        f"axis by {most:.2f} deg or more"
     )
 
 

@@ -19,24 +19,24 @@ LEAST_STEP = 0.1 * MM  # [m] a step that is never too large
 PER = 100.0 * MM  # [m] of path that `correction_step_mm` is for
 TURNED = 0.5  # change of a side by which a joint has turned
 ARC = Reason(
-    Code.PATH_BENT, "its arc is left as a whole: its other point cannot be corrected"
+    Code.PATH_BENT, "no point of its arc is corrected: its other point cannot be"
 )
 ANGLED = Reason(
     Code.PATH_BENT,
-    "its arc ends at an angle, and is left with its start as a whole: another of its "
-    "points cannot be corrected",
+    "its arc ends at an angle, so that all its points are corrected or none: another "
+    "of its points cannot be corrected",
 )
 CURVE = Reason(
     Code.PATH_BENT,
-    "its curve is corrected whole, with the point before it, or not at all: another "
-    "point of it cannot be corrected",
+    "all points of its curve, and the point before it, are corrected or none: another "
+    "of them cannot be corrected",
 )
 STEP = (
     "the correction steps by more than correction_step_mm = {:g} for 100 mm of the path"
 )
 BENT = (
-    "its neighbour on the path is left: correcting this one alone would bend the path "
-    "by more than correction_step_mm = {:g} for 100 mm"
+    "its neighbour on the path is not corrected: correcting this target alone would "
+    "bend the path by more than correction_step_mm = {:g} for 100 mm"
 )
 
 # Which visits follow each other on a continuous path.

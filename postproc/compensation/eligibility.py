@@ -85,11 +85,11 @@ SAID = {
 }
 AFTER = Reason(
     Code.UNKNOWN_POSITION_BEFORE,
-    "it comes from a move whose branch or turn is not sure",
+    "the move before it ends with an uncertain branch or turn",
 )
 STRANDED = Reason(
     Code.UNKNOWN_POSITION_BEFORE,
-    "it comes from a target that the arm cannot reach as it is written",
+    "the arm cannot reach the target before it as it is written",
 )
 
 
@@ -393,7 +393,7 @@ def _sine(R: Floats, kind: Ints) -> Floats:
     return np.asarray(np.where(kind == OrientationLaw.ROLL_PITCH_YAW, pitch, euler))
 
 
-# Arcs whose circle hangs by a hair: their points are left alone.
+# Arcs that their points hardly determine are not corrected.
 #
 # A correction moves start, VIA and end of an arc by slightly different amounts. That
 # does no harm where they lie well apart; where they do not, the arm would run along
@@ -406,12 +406,12 @@ LINE = Reason(
 )
 TOO_NEAR = Reason(
     Code.ARC_UNDETERMINED,
-    f"two of the three points of an arc are nearer than {NEAR / MM:g} mm, so that its "
-    f"circle is not sure: {CURE}",
+    f"two of the three points of an arc are nearer than {NEAR / MM:g} mm, so that they "
+    f"do not determine its circle: {CURE}",
 )
 STRAYS = Reason(
     Code.ARC_DISTORTED,
-    "corrected, the three points of an arc would make quite another circle: move VIA "
+    "the corrected points of the arc would make a very different circle: move VIA "
     "to its middle, or divide it",
 )
 

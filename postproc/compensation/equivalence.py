@@ -22,7 +22,7 @@ _OTHERWISE = frozenset(
     "line values literal literals follows config configs name names reason reasons"
     " shift shifts".split()
 )  # fmt: skip
-"""Columns that edits change, that are numbered anew, or that speak of lines."""
+"""Columns that edits change, that renumber, or that name lines."""
 
 
 def equivalent(

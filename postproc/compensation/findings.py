@@ -32,8 +32,8 @@ SINGLY = 20  # findings of one kind that are listed line by line
 
 
 def report_controller_assumption(name: str, cell: Cell) -> Diagnostic:
-    """State that the controller is taken not to compensate on its own."""
-    text = f"the controller's own absolute accuracy is taken to be off ({cell.path})"
+    """State that the controller is assumed not to compensate on its own."""
+    text = f"the controller's own absolute accuracy is assumed to be off ({cell.path})"
     return Diagnostic(name, 1, Code.ABSOLUTE_ACCURACY, text)
 
 
@@ -44,7 +44,7 @@ def controller_unknown(name: str, cell: Cell) -> list[Diagnostic]:
     language = language_of(name)
     text = (
         f"neither {cell.path} nor the file of the arm {cell.arm.name} names its "
-        f"controller: it is assumed to run {language.name}. Write "
+        f"controller, which is assumed to run {language.name}. Write "
         f'controller = "{language.controller}" in the arm file'
     )
     return [Diagnostic(name, 1, Code.CONTROLLER, text)]
@@ -281,7 +281,7 @@ def report_uncertain_sides(
     std_error: Floats,
     advice: Callable[[Ints], Mapping[int, str]],
 ) -> list[Diagnostic]:
-    """List the corrected targets that a joint reaches from a side that is not sure.
+    """List the corrected targets of which an approach direction is uncertain.
 
     They are corrected for where the joint should lie within its play, or for its
     middle where that is not known: up to half of the backlash may remain.
@@ -295,14 +295,14 @@ def report_uncertain_sides(
     """
     rows = np.flatnonzero(corrected & any_in_rows((-SURE < side) & (side < SURE)))
     size = np.linalg.norm(std_error, axis=1) / MM
-    cure = "start the approach farther away, or from the side it moves to"
+    cure = "start the approach farther away, or so that the axis does not reverse"
     if len(rows) > SINGLY:
         worst = rows[np.argsort(-size[rows])[:5]]
         lines = ", ".join(str(line) for line in np.unique(visits.line[worst]))
         text = (
-            f"{len(rows)} targets are reached soon after a joint turned, from a side "
-            f"that is not sure (up to +-{size[rows].max():.3f} mm, for instance lines "
-            f"{lines}): {cure}"
+            f"the approach direction of {len(rows)} targets is uncertain, because an "
+            f"axis reversed shortly before (up to +-{size[rows].max():.3f} mm, for "
+            f"instance lines {lines}): {cure}"
         )
         return [
             Diagnostic(
@@ -318,18 +318,18 @@ def report_uncertain_sides(
             visits.files[visits.file[i]],
             int(visits.line[i]),
             Code.DIRECTION_UNCERTAIN,
-            f"{_how(side[i])}, from a side that is not sure "
-            f"(+-{size[i]:.3f} mm): {told.get(i, cure)}",
+            f"the approach direction is uncertain (+-{size[i]:.3f} mm), because "
+            f"{_how(side[i])}: {told.get(i, cure)}",
         )
         for i in rows.tolist()
     ]
 
 
 def _how(side: Floats) -> str:
-    """Say why the side is not sure."""
+    """Say why the approach direction is uncertain."""
     if not side.any():
-        return "reached from a place that the program does not tell"
-    return f"reached soon after axis {_axes(side)} turned"
+        return "the place before is not known"
+    return f"axis {_axes(side)} reversed shortly before"
 
 
 def _axes(side: Floats) -> str:

@@ -133,7 +133,7 @@ def _rows(edits: Replacements) -> bytes:
 
 
 LeftLine = tuple[str, int, Reason]
-"""A file, a line of its source, and why what stands there was left as it is."""
+"""A file, a line of its source, and the reason why it is not corrected."""
 
 AssumedLine = tuple[str, int, str]
 """A file, a line of its source, and what was assumed there."""

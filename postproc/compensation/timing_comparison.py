@@ -128,7 +128,7 @@ class InTime:
             )
             yield Diagnostic(visits.files[0], 1, Code.CYCLE_TIME_INCREASED, text)
         for v in self._beyond.tolist():
-            text = "a joint comes beyond its limit, which the original program keeps"
+            text = "a joint exceeds a limit that the original program keeps"
             file = visits.files[visits.file[v]]
             yield Diagnostic(file, int(visits.line[v]), Code.JOINT_LIMIT_EXCEEDED, text)
         yield from self._report_slowed(visits)
@@ -139,16 +139,16 @@ class InTime:
     def _points(self, visits: Visits, told: Insertions) -> Iterator[Diagnostic]:
         """Say what was put on the ways, and which moves still leave their paths."""
         said = (
-            (Code.PATH_POINTS, told.points, f"{told.count} points are put on the ways "
-             f"of {len(told.points)} moves; {describe_verification(self.in_motion)}"),
+            (Code.PATH_POINTS, told.points, f"{told.count} points are inserted into "
+             f"{len(told.points)} moves; {describe_verification(self.in_motion)}"),
             (Code.BACKLASH_PRELOAD_SKIPPED, told.unconfirmed,
-             "play is not taken up before "
-             f"{len(told.unconfirmed)} moves: neither reversals (survey --reversals) "
-             "nor a measured path (diagnose --path) confirm how joints change their "
-             "flanks there"),
+             "the backlash is not preloaded before "
+             f"{len(told.unconfirmed)} moves: neither reversals (survey.reversals) "
+             "nor a measured path (diagnose --path) confirm how the joints change "
+             "their flanks there"),
             (Code.REAPPROACH_INSERTED, told.approaches,
-             f"{len(told.approaches)} targets "
-             "are approached anew, from a stop on the way already travelled"),
+             f"{len(told.approaches)} targets are approached "
+             "again, from an inserted stop on the path already travelled"),
         )  # fmt: skip
         for code, moves, text in said:
             if moves:
@@ -158,8 +158,8 @@ class InTime:
         for k in self._too_far.tolist():
             v = int(self.paths.visit[k])
             far = self.paths.after.sizes[k] / MM
-            why = told.left.get(v, "more points on its way do not help")
-            text = f"the move is predicted to leave its path by {far:.3f} mm: {why}"
+            why = told.left.get(v, "more points do not help")
+            text = f"the predicted path error of the move is {far:.3f} mm: {why}"
             place = visits.files[visits.file[v]], int(visits.line[v])
             yield Diagnostic(*place, Code.PATH_TOLERANCE_EXCEEDED, text)
 
@@ -168,9 +168,9 @@ class InTime:
         for v in np.flatnonzero(self.other_side.any(axis=1)).tolist():
             joints = (np.flatnonzero(self.other_side[v]) + 1).tolist()
             text = (
-                f"joint {' and '.join(map(str, joints))} arrives from the other side "
-                "in the trajectory in time than along the path; the correction is "
-                "that of the path"
+                f"joint {' and '.join(map(str, joints))} arrives in the other "
+                "direction in the trajectory over time than along the path; the "
+                "correction is that of the path"
             )
             file = visits.files[visits.file[v]]
             yield Diagnostic(file, int(visits.line[v]), Code.DIRECTION_DISAGREES, text)
@@ -188,8 +188,8 @@ class InTime:
         joint = int(self.after.clock.velocity[worst].argmax()) + 1
         text = (
             f"the joints reach {least:.0f} % of the programmed speed at the least, "
-            f"axis {joint} turning the fastest for its limits: the "
-            "controller slows down or stops there, near a singularity as a rule "
+            f"where axis {joint} is nearest to its limit: the controller slows down "
+            "or stops there, usually near a singularity "
             f"(lines {', '.join(map(str, [*lines][:FEW]))}{more})"
         )
         place = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])

@@ -160,7 +160,7 @@ def _pickle_exception(exc: BaseException) -> bytes:
     exc.add_note(f"in a child process:\n{format_exc()}")
     try:
         if not isinstance(exc, Exception):
-            raise TypeError("ends a process, but not the one that is told")
+            raise TypeError("ends a process, but not the one that receives it")
         told = pickle.dumps((_RAISED, exc))
         pickle.loads(told)
     except Exception:

@@ -479,9 +479,9 @@ class TaskMachine(ABC):
         if said_of_it == "sets-frames":
             return here.forget()
         what = (
-            "is neither a known instruction nor a routine of the files at hand: it may "
-            f"move the arm. Say what it does under [routines] in the cell: {name} = "
-            '"motionless" or "moves"'
+            "is neither a known instruction nor a routine of the given files: it may "
+            f"move the arm. Declare it under [routines] of the cell: {name} = "
+            f'"motionless", or {name} = "moves"'
         )
         return self.unknown(context, row, here, what)
 

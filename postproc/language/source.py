@@ -284,8 +284,8 @@ def source_from_bytes(name: str, data: bytes) -> Source:
     if len(data) > LAST:
         raise ProgramError(
             name,
-            f"has {len(data):,} bytes, and places in it are told up to {LAST:,}",
-            "Cut the program in parts",
+            f"has {len(data):,} bytes; at most {LAST:,} can be read",
+            "Divide the program",
         )
     said = data.removeprefix(UTF8_MARK)  # itself where there is no mark: no copy
     if not said or said.isspace():

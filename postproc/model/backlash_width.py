@@ -13,7 +13,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats
 from postproc.model.kinematics import ArmStates
-from postproc.model.model import CONFIRMED, NOT_SURE, UNTOLD, Model, Width
+from postproc.model.model import CONFIRMED, UNCERTAIN, UNTOLD, Model, Width
 from postproc.robot.arm import Arm
 from postproc.robot.direction import WIDTH_IN_PLAYS, half_width
 from postproc.robot.state import make_states
@@ -61,12 +61,12 @@ def verdict_at_stops(width: Width) -> str:
         width: Over how many gaps it does at the least and at the most, by reversals.
 
     Returns:
-        "confirmed", "elastic", or "not sure".
+        "confirmed", "elastic", or "uncertain".
     """
     least, most = width
     if most <= SHARP:
         return CONFIRMED
-    return ELASTIC if least > SHARP and np.isfinite(most) else NOT_SURE
+    return ELASTIC if least > SHARP and np.isfinite(most) else UNCERTAIN
 
 
 def verdicts_of_flanks(model: Model, arm: Arm) -> tuple[str, ...]:
@@ -74,7 +74,7 @@ def verdicts_of_flanks(model: Model, arm: Arm) -> tuple[str, ...]:
 
     Returns:
         "elastic" of what reversals say so of, whatever a measured path says; else what
-        that says in motion. Where it is not sure, or none was measured, "not sure" of
+        that says in motion. Where it is not sure, or none was measured, "uncertain" of
         links that are ahead of their drives, and what reversals say at stops of all
         others, "" without any.
     """
@@ -88,9 +88,9 @@ def _verdict(at_stops: str, in_motion: str, leads: bool) -> str:
     """Say what is known of one joint, "" for nothing."""
     if at_stops == ELASTIC:
         return ELASTIC
-    if in_motion not in ("", NOT_SURE):
+    if in_motion not in ("", UNCERTAIN):
         return in_motion
-    return NOT_SURE if leads else at_stops or in_motion
+    return UNCERTAIN if leads else at_stops or in_motion
 
 
 def on_the_way(side: Floats, width: Floats | float) -> Floats:

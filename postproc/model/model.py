@@ -120,7 +120,7 @@ Width = tuple[float, float]  # least and largest way from flank to flank [gaps]
 Direction = tuple[float, float, float]
 TILTED = 1.0  # [deg] by which a cell may say that weight pulls another way
 UNTOLD: Width = 1.0, np.inf
-CONFIRMED, NOT_SURE = "confirmed", "not sure"  # what a measured path says of a joint
+CONFIRMED, UNCERTAIN = "confirmed", "uncertain"  # what a measured path says of a joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,10 +184,13 @@ class Model:
     def in_motion(self) -> dict[str, str]:
         """What the newest measured path says of joints ("1" to "6") in motion.
 
-        Empty where none was measured; see `paths.backlash_steps` for verdicts.
+        Empty where none was measured; see `paths.backlash_steps` for verdicts. Those
+        of other versions that have no meaning here are uncertain.
         """
         told = (r["in_motion"] for r in reversed(self.history) if "in_motion" in r)
-        return dict(next(told, {}))
+        newest = dict(next(told, {}))
+        known = (CONFIRMED, "refuted", "elsewhere")
+        return {j: word if word in known else UNCERTAIN for j, word in newest.items()}
 
     @property
     def reading_spread(self) -> float:

@@ -95,7 +95,7 @@ class RowBlocks:
         for index, matrix in self.parts:
             inside = (place[index] >= 0).all(axis=1)
             if (place[index[~inside]] >= 0).any():
-                raise ValueError("rows of one pose were taken apart")
+                raise ValueError("rows of one pose were separated")
             if inside.any():
                 parts.append((place[index[inside]], matrix[inside]))
         return RowBlocks(tuple(parts))

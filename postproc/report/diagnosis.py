@@ -55,7 +55,7 @@ def tell(found: Diagnosis) -> str:
     lines += [
         f"before {_spread(found.before)}",
         f"after  {_spread(found.after)}",
-        f"on {found.n_held_out} rows, each left out of the search that predicts it; "
+        f"on {found.n_held_out} rows held out of the search that predicts them; "
         f"noise floor {found.noise_floor_mm:.4f} mm ({found.noise_floor_source})",
     ]
     if found.vap_mm is not None:
@@ -64,8 +64,8 @@ def tell(found: Diagnosis) -> str:
     if found.set_anew is not None:
         lines.append(found.set_anew.tell())
     lines += [
-        f"{f.effect} may be tracker_drift: nothing of it is compensated. Rows on fixed "
-        "points (column reference) would tell"
+        f"{f.effect} may be tracker_drift and is not compensated. Rows on monuments "
+        "(column reference) would separate the two"
         for f in found.findings
         if f.settings.get("form") == "time" and not f.settings.get("told")
     ]
@@ -77,9 +77,10 @@ def tell(found: Diagnosis) -> str:
         ABOVE * found.noise_floor_mm
     ):
         lines.append(
-            f"what is left is {found.after.mean_mm / found.noise_floor_mm:.1f} times "
-            "the noise floor: the arm repeats worse than its data sheet says, or "
-            "something is missing that these rows do not show. Measure some poses twice"
+            "the remaining error is "
+            f"{found.after.mean_mm / found.noise_floor_mm:.1f} times the noise floor: "
+            "the arm repeats worse than its data sheet states, or these rows do not "
+            "show an effect that the model lacks. Measure some poses twice"
         )
     lines += [f"row {d.id} (line {d.line}): {d.why}" for d in found.dropped]
     lines += tell_directions(found.directions, LIKELIEST)

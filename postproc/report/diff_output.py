@@ -164,7 +164,7 @@ SIGN_ARROWS = tuple(ARROWS[d] for d in range(-1, 3))
 
 
 def print_difference(found: Difference, out: TextIO | None = None) -> None:
-    """Print a row for every line that differs, the targets left alone, a summary."""
+    """Print a row for every line that differs, uncorrected targets, a summary."""
     out = out or sys.stdout
     names = {r.file for r in (*found.differing, *found.untouched) if len(r)}
     skip = 0 if len(names) > 1 or any(map(is_variables, names)) else 1
@@ -176,7 +176,7 @@ def print_difference(found: Difference, out: TextIO | None = None) -> None:
         blocks = writer.blocks(found.differing, range(skip, len(columns)))
         print_blocks(columns[skip:], blocks, {STATUS: status_colour}, out)
     if any(len(rows) for rows in found.untouched):
-        print("\nleft as they were:", file=out)
+        print("\nnot corrected:", file=out)
         shown = [*range(skip, len(PLACE)), *range(len(columns) - 2, len(columns))]
         blocks = writer.blocks(found.untouched, shown)
         print_blocks([columns[c] for c in shown], blocks, {STATUS: status_colour}, out)

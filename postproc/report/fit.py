@@ -13,7 +13,7 @@ import numpy as np
 from postproc.calibration.baselines import VOLUME_DEG, Comparison
 from postproc.calibration.fit import Calibration
 from postproc.calibration.report import FitReport, Found
-from postproc.files import schema, write_all
+from postproc.files import schema
 from postproc.report.diagnosis import tell_directions
 from postproc.report.json import finite
 from postproc.report.terminal import Column, table_text
@@ -75,18 +75,20 @@ def fit_json(found: Calibration) -> str:
     return json.dumps(finite(said), indent=1, allow_nan=False) + "\n"
 
 
-def write_page(path: Path, found: Calibration) -> None:
-    """Write a page about a fit.
-
-    Raises:
-        OutputError: The place cannot be written to.
-    """
+def fit_page(found: Calibration) -> str:
+    """Return the page (HTML) of a fit."""
     from postproc.report.html import calibration_report
     from postproc.report.html.model import fit_evidence
 
     rows = fit_evidence(found.report, found.model, found.survey, found.cell.arm)
-    page = calibration_report(found.model.to_dict(), rows)
-    write_all({path: page.encode()})
+    return calibration_report(found.model.to_dict(), rows)
+
+
+def comparison_page(found: Comparison) -> str:
+    """Return the page (HTML) of a comparison of methods."""
+    from postproc.report.html import comparison_report
+
+    return comparison_report(asdict(found))
 
 
 def tell_fit(report: FitReport, everything: bool = False) -> str:
@@ -159,10 +161,10 @@ def _tell_rest(report: FitReport) -> list[str]:
     if report.unseen:
         names = _group_names(u.name for u in report.unseen)
         count = len(report.unseen)
-        lines.append(f"not determined, left at the prior, {count} directions: {names}")
+        lines.append(f"not determined, at the prior, {count} directions: {names}")
     if report.correlated:
         names = _count_names(a.partition(".")[0] for a, _, _ in report.correlated)
-        lines.append(f"hardly told apart, {len(report.correlated)} pairs: {names}")
+        lines.append(f"strongly correlated, {len(report.correlated)} pairs: {names}")
     if lines:
         lines.append("all parameters, directions and rows: --all")
     return lines
@@ -203,7 +205,7 @@ def _tell_rows(report: FitReport, most: int) -> list[str]:
         ids = ", ".join(report.spared[: max(most, FEW)])
         more = len(report.spared) - max(most, FEW)
         ids += f" and {more} more" if more > 0 else ""
-        lines.append(f"suspect, but kept, for rows beside them agree: row {ids}")
+        lines.append(f"suspect, but used, because nearby rows agree: row {ids}")
     return lines
 
 
@@ -223,7 +225,7 @@ def _tell_scatter(report: FitReport) -> list[str]:
     if report.orientation_mrad is not None:
         lines.append(f"orientation {report.orientation_mrad:.4f} mrad (estimated)")
     lines.append(f"measured error  {report.before.tell()}")
-    lines.append(f"left by the fit {report.after.tell()}")
+    lines.append(f"error after fit {report.after.tell()}")
     return lines
 
 

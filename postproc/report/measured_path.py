@@ -27,13 +27,13 @@ def tell_path(found: PathDiagnosis) -> str:
         f"{found.name}: {found.readings} readings at {found.rate:.0f} Hz, scatter "
         f"{found.scatter / MM:.4f} mm; {found.stops[0]} of {sum(found.stops)} stops "
         f"found, {found.moves} moves",
-        f"across the way, from where the model has it: mean {a.mean_mm:.4f} mm, "
+        f"error across the path, against the model: mean {a.mean_mm:.4f} mm, "
         f"95 % {a.p95_mm:.4f}, max {a.max_mm:.4f} over {a.n} places",
-        "along the way nothing is told: the tracker's clock is its own",
+        "error along the path: unknown, because the tracker has its own clock",
         _of_lag(found.lag),
     ]
     if not found.joints:
-        return "\n".join([*lines, "no joint changes its flank alone on a way"])
+        return "\n".join([*lines, "no joint changes its flank alone during a move"])
     rows = (
         (str(j.joint), str(j.steps), f"{j.predicted / MM:.3f}", f"{j.share:.2f}",
          f"{j.error:.2f}", f"{j.later / MM:.0f}", j.verdict)
@@ -46,19 +46,19 @@ def _of_lag(lag: ServoLag) -> str:
     """Say what bends tell of the servos' lag.
 
     >>> _of_lag(ServoLag(4e-4, 1e-5, 12))
-    'servos lag by 20.0 ms (+- 0.2), by how 12 moves cut their bends; not fitted'
+    'servo lag 20.0 ms (+- 0.2), from the bends of 12 moves; not fitted'
     >>> _of_lag(ServoLag(1e-5, 1e-4, 12))
-    'servos lag by less than 14.5 ms, as far as the bends of 12 moves tell'
+    'servo lag less than 14.5 ms, from the bends of 12 moves'
     """
     if lag.is_certain:
         error = lag.error / (2.0 * lag.seconds)
         return (
-            f"servos lag by {1e3 * lag.seconds:.1f} ms (+- {1e3 * error:.1f}), by how "
-            f"{lag.moves} moves cut their bends; not fitted"
+            f"servo lag {1e3 * lag.seconds:.1f} ms (+- {1e3 * error:.1f}), from the "
+            f"bends of {lag.moves} moves; not fitted"
         )
     if not np.isfinite(lag.error):
-        return "of the servos' lag nothing is told: too few moves bend"
+        return "servo lag unknown: too few moves bend"
     return (
-        f"servos lag by less than {1e3 * lag.most:.1f} ms, as far as the bends of "
-        f"{lag.moves} moves tell"
+        f"servo lag less than {1e3 * lag.most:.1f} ms, from the bends of "
+        f"{lag.moves} moves"
     )

@@ -385,5 +385,5 @@ def _verify(path: Path, shape: KukaShape, text: str) -> None:
     back = arm.flange(arm.nearest(wanted, q))
     gap = max(gap, float(np.abs(back - wanted).max()))
     if not gap < 1e-9:
-        problem = f"cannot be said as an arm file: flanges differ by {gap:.3g}"
+        problem = f"cannot be written as an arm file: flanges differ by {gap:.3g}"
         raise ArmError(path, problem, "Write the arm file by hand")

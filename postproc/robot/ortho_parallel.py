@@ -467,5 +467,5 @@ def _verify(chain: UrdfChain, arm: Arm) -> None:
         back = np.where(np.isnan(back), wanted, back)
     gap = max(gap, float(np.abs(back - wanted).max()))
     if not gap < 1e-9:
-        problem = f"cannot be said as an arm file: flanges differ by {gap:.3g}"
+        problem = f"cannot be written as an arm file: flanges differ by {gap:.3g}"
         raise ArmError(chain.path, problem, "Write the arm file by hand")

@@ -168,7 +168,7 @@ class UrdfChain:
     def endless(self) -> tuple[str, ...]:
         """Which joints turn without end, and what range is taken, in words."""
         return tuple(
-            f"joint {joint.name} is continuous: its range is taken as the stated "
+            f"joint {joint.name} is continuous: the given range is used, "
             f"{math.degrees(joint.lower):g} to {math.degrees(joint.upper):g} deg"
             for joint in self.moving
             if joint.kind == "continuous"
@@ -336,7 +336,7 @@ def _origin(path: Path, name: str, element: Element) -> tuple[Floats, tuple[str,
     pose = _rotation(*square)
     pose[:3, 3] = _numbers(path, element, "xyz", (0.0, 0.0, 0.0))
     rounded = (
-        f"joint {name}: {given:g} rad taken as {math.degrees(taken):g} deg"
+        f"joint {name}: {given:g} rad read as {math.degrees(taken):g} deg"
         for given, taken in zip(rpy, square, strict=True)
         if abs(given - taken) > 1e-12
     )

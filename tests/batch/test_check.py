@@ -86,7 +86,7 @@ def test_targets_left_alone_are_found_and_may_be_accepted(trees):
     path.write_text(json.dumps(record))
     found = check(target)
     assert codes(found) == {("spot.lsv", "left-alone")}
-    assert "1 visits were left alone, lines 2 of" in found.findings[0].message
+    assert "1 visits are not corrected, lines 2 of" in found.findings[0].message
     assert found.exit_code == 1 and found.allow_uncorrected().exit_code == 0
     command = ["check", str(target)]
     assert CliRunner().invoke(app, command).exit_code == 1
@@ -162,7 +162,7 @@ def test_the_command_says_it_by_its_exit_code(trees, job_folder, tmp_path):
     runner = CliRunner()
     assert runner.invoke(app, [*call, "--source", str(source)]).exit_code == 0
     (target / "raw.pdl").write_bytes(b"x")
-    found = runner.invoke(app, [*call, "--json", "-"])
+    found = runner.invoke(app, [*call, "--report", "-"])
     assert found.exit_code == 1
     assert json.loads(found.stdout)["findings"][0]["place"] == "raw.pdl"
     assert runner.invoke(app, ["check", str(tmp_path / "none")]).exit_code == 2

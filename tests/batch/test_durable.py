@@ -124,7 +124,7 @@ def test_a_full_disk_stops_the_run_and_loses_nothing(plant):
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, small),
     )
     assert done.returncode == 2
-    assert "no room is left" in done.stderr and "Traceback" not in done.stderr
+    assert "the disk is full" in done.stderr and "Traceback" not in done.stderr
     assert "zz.bin" not in contents(target)
     assert not [p for p in contents(target) if p.endswith(TEMPORARY)]
     assert plant.run(target, "--resume") == 0

@@ -96,7 +96,7 @@ def test_a_fit_names_what_is_left_open(tmp_path: Path) -> None:
         cell = write_cell(tmp_path / f"cell{said}.toml", FLOOR, said)
         found = fit_measurements(survey, cell, validate=False)
         assert found.model.doubt is not None
-        told[said] = [w for w in found.report.warnings if "do not tell whether" in w]
+        told[said] = [w for w in found.report.warnings if "do not show whether" in w]
     (free,), (stated,) = told[""], told["mounting"]
     assert "compliance: not corrected" in free
     assert free.endswith("state mounting under [robot]")

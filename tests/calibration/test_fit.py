@@ -144,7 +144,7 @@ def test_fit_prints_what_an_engineer_reads(tmp_path: Path) -> None:
     assert sizes == sorted(sizes, reverse=True) and sizes[0] > 0.1
     assert min(int(row[-1]) for row in rows) > 3
     assert "row 8 (line 9): position 0, 0, 0: beam lost" in lines
-    assert any(line.startswith("not determined, left at the prior, ") for line in lines)
+    assert any(line.startswith("not determined, at the prior, ") for line in lines)
     assert len(lines) < 40
 
 
@@ -245,7 +245,7 @@ def test_rows_without_a_payload_carry_that_of_the_cell(tmp_path: Path) -> None:
     assert not any("payload" in text for text in whole.warnings)
     for other, which in zip(others, ("rows", "20 rows"), strict=True):
         np.testing.assert_array_equal(other.states.payload, whole.states.payload)
-        said = f"no payload_kg: {which} taken as measured with the payload of the cell"
+        said = f"no payload_kg: {which} assumed to be measured with the payload of the"
         assert any(text.startswith(said) for text in other.warnings)
 
 
@@ -294,7 +294,7 @@ def test_a_report_says_what_is_suspect_in_few_lines() -> None:
     told = tell_fit(report).splitlines()
     assert "and 42 more rows that count less (--all)" in told
     assert sum(line.startswith("row ") for line in told) == 8
-    kept = next(line for line in told if line.startswith("suspect, but kept"))
+    kept = next(line for line in told if line.startswith("suspect, but used"))
     assert kept.endswith("row 60, 61, 62, 63, 64, 65, 66, 67 and 12 more")
     assert (
         sum(line.startswith("row ") for line in tell_fit(report, True).split("\n"))

@@ -84,7 +84,7 @@ def test_a_warm_up_beside_a_tracker_that_stands_is_the_arms(
     c = campaign(seed, ("warmup",), 1.0)
     model, told = fitted(c, places)
     assert "did not move" in told[0]
-    assert ("turns cannot be told" in told[1]) == (len(places) == 1)
+    assert ("turns cannot be determined" in told[1]) == (len(places) == 1)
     assert told[-1].endswith("Predictions are for the arm as warm as at the end")
     assert in_time(model.compensable()[0].effects) == {"thermal"}
     assert in_time(model.effects.effects) == {"thermal"}
@@ -192,7 +192,7 @@ def test_a_diagnosis_says_whose_the_warm_up_is(places: np.ndarray | None) -> Non
     assert finding.settings["told"] == (places is not None)
     named = in_time(found.model.compensable()[0].effects)
     assert named == (set() if places is None else {"thermal"})
-    stood = " fixed points: the tracker did not move"
+    stood = " monuments: the tracker did not move"
     assert (stood in tell(found.diagnosis)) == (places is not None)
     assert bool(found.diagnosis.to_dict()["monuments"]) == (places is not None)
 
@@ -216,7 +216,7 @@ def test_readings_at_both_ends_only_leave_it_in_doubt() -> None:
     assert motion.covered > 0.9 and motion.unseen > 0.9 and not motion.drifts
     assert not motion.stands and not motion.leaves(1e-3)
     assert motion.tell()[0].endswith("did not move while they were read")
-    assert "pass between two readings of fixed points" in motion.tell()[-1]
+    assert "lie between two readings of monuments" in motion.tell()[-1]
 
 
 def test_a_moving_tracker_whose_turns_nobody_sees_leaves_it_in_doubt() -> None:
@@ -279,8 +279,8 @@ def test_a_lost_beam_on_a_fixed_point_is_left_out(tmp_path: Path) -> None:
     ("lines", "message"),
     [
         ([*LINES, "r3,,,,,,,1500,,500,30,m1"], r":7: .*has no y_mm"),
-        (LINES[:-1], r":3: fixed point 'm1' was read once"),
-        ([LINES[1], LINES[4]], r"has rows on fixed points only"),
+        (LINES[:-1], r":3: monument 'm1' was read once"),
+        ([LINES[1], LINES[4]], r"has rows on monuments only"),
         ([*LINES, "r3,,,,,,,1600,1000,500,30,m1"], r":7: .* is 100\.0 mm from where"),
         ([*LINES, "d,,0,0,0,20,0,1900,300,2100,30,"], r":7: '' in column q1_deg"),
     ],

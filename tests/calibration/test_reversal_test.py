@@ -20,7 +20,7 @@ from postproc.calibration.reversal_test import (
 from postproc.calibration.survey_files import read_measurements
 from postproc.model.backlash_width import ELASTIC, SHARP, on_the_way, verdicts_of_flanks
 from postproc.model.effects import BASE_EFFECTS
-from postproc.model.model import CONFIRMED, NOT_SURE, UNTOLD, Model, load_model
+from postproc.model.model import CONFIRMED, UNCERTAIN, UNTOLD, Model, load_model
 from postproc.robot.cell import load_cell
 from tests.compensation.paths.test_path_error import CELL, SEED, done
 from tests.written import cli
@@ -31,8 +31,10 @@ POSES, EACH = 150, 4
 def surveyed(folder: Path, gears: str, seed: int = SEED) -> Path:
     """A survey with reversals of an arm whose gears are of one kind."""
     rows, written = folder / f"{gears}{seed}.csv", folder / "survey.pdl"
-    done("survey", "--cell", CELL, "--poses", POSES, "--reversals", EACH, "-o", written)
-    done("simulate", written, "--cell", CELL, "--seed", seed, "--backlash-model", gears,
+    design = ("--poses", POSES, "--set", f"survey.reversals={EACH}")
+    done("survey", "--cell", CELL, *design, "-o", written)
+    arm = (f"simulation.seed={seed}", f"simulation.backlash_model={gears}")
+    done("simulate", written, "--cell", CELL, "--set", arm[0], "--set", arm[1],
          "-o", rows)  # fmt: skip
     return rows
 
@@ -72,7 +74,7 @@ def test_other_gears_are_not_taken_for_sharp_ones(folder: Path, gears: str) -> N
     verdicts = verdicts_of_flanks(model, load_cell(CELL).arm)
     # About a vertical axis weight pushes nothing: that gear is as a sharp one.
     loaded = verdicts if gears == "inertia" else verdicts[1:]
-    assert CONFIRMED not in loaded and NOT_SURE in loaded
+    assert CONFIRMED not in loaded and UNCERTAIN in loaded
 
 
 def test_reversals_are_no_rows_of_the_fit(sharp: Path) -> None:
@@ -133,13 +135,15 @@ def test_the_model_keeps_what_they_tell(sharp: Path, tmp_path: Path) -> None:
     again = load_model(tmp_path / "again.json")
     assert again.flank_widths == other.flank_widths and again.id == other.id
     said = verdicts_of_flanks(again, load_cell(CELL).arm)
-    assert said[:3] == (ELASTIC, NOT_SURE, CONFIRMED)
-    asked = {str(joint): NOT_SURE for joint in range(1, 7)}
+    assert said[:3] == (ELASTIC, UNCERTAIN, CONFIRMED)
+    asked = {str(joint): UNCERTAIN for joint in range(1, 7)}
     unclear = replace(again, history=({"in_motion": asked},))
     assert verdicts_of_flanks(unclear, load_cell(CELL).arm) == said
+    older = replace(again, history=({"in_motion": dict.fromkeys(asked, "not sure")},))
+    assert older.in_motion == asked
     refuted = replace(again, history=({"in_motion": {"1": "refuted", "3": "refuted"}},))
     then = verdicts_of_flanks(refuted, load_cell(CELL).arm)
-    assert then[:3] == (ELASTIC, NOT_SURE, "refuted")
+    assert then[:3] == (ELASTIC, UNCERTAIN, "refuted")
     silent = replace(model, flank_widths=())
     assert not any(verdicts_of_flanks(silent, load_cell(CELL).arm))
 
@@ -168,7 +172,7 @@ def test_diagnose_reads_the_reversals_of_a_new_survey(
     replace(fitted(sharp), flank_widths=()).save(model)
     report = tmp_path / "told.json"
     told = cli("diagnose", sharp, "--cell", CELL, "--model", model, "-o",
-               tmp_path / "better.json", "--json", report)  # fmt: skip
+               tmp_path / "better.json", "--report", report)  # fmt: skip
     said = json.loads(report.read_bytes())["flanks_at_stops"]
     assert said.startswith("flanks at stops: joint 1, 2, 3")
     assert said in " ".join(told.stdout.split())
@@ -187,5 +191,6 @@ def test_a_link_on_its_way_goes_from_flank_to_flank() -> None:
 def test_widths_in_words() -> None:
     sharp, wide = (1.0, 1.25), (1.0, 4.0)
     assert tell_widths((sharp, sharp, wide, UNTOLD, sharp, wide)) == (
-        "flanks at stops: joint 1, 2, 5 sharp; joint 3, 6 1 to 4 gaps; joint 4 not sure"
+        "flanks at stops: joint 1, 2, 5 sharp; joint 3, 6 1 to 4 gaps; "
+        "joint 4 uncertain"
     )

@@ -30,7 +30,7 @@ def test_a_program_is_planned_with_every_arm(tmp_path, name):
     job.write_text("\n".join(["PROGRAM job", "BEGIN", *moves, "END job", ""]))
     joints = [round(float(v), 4) for v in np.rad2deg(home)]
     cell.write_text(f'[robot]\narm = "{name}"\n[home]\njoints_deg = {joints}\n')
-    found = cli("explain", job, "--cell", cell, "--json", "-")
+    found = cli("explain", job, "--cell", cell, "--report", "-")
     planned = [visit["q_deg"] for visit in json.loads(found.stdout)["visits"]]
     np.testing.assert_allclose(planned, np.rad2deg(q), atol=0.003)
 
@@ -64,7 +64,7 @@ def test_it_goes_to_standard_output_and_says_what_was_rounded(urdf):
     found = cli("arm", "from-urdf", urdf, "--name", "nj130", "--base", "l0")
     assert found.exit_code == 0 and 'name = "nj130"' in found.stdout
     assert found.stderr == (
-        f"{urdf}: joint j3: -1.57 rad taken as -90 deg\n"
+        f"{urdf}: joint j3: -1.57 rad read as -90 deg\n"
         f"{urdf}: states no masses. [links] is not written\n"
     )
 
@@ -148,7 +148,10 @@ def test_without_pinocchio_it_says_what_installs_it(urdf, monkeypatch):
 def test_an_endless_joint_takes_the_range_that_is_stated(urdf):
     urdf.write_text(urdf.read_text().replace('"revolute"', '"continuous"', 1))
     found = cli("arm", "from-urdf", urdf, "--verify", "-o", urdf.with_name("arm.toml"))
-    assert found.exit_code == 0 and "is continuous: its range is taken" in found.stderr
+    assert (
+        found.exit_code == 0
+        and "is continuous: the given range is used" in found.stderr
+    )
     assert "continuous joints: the URDF states no range" in found.stderr
 
 

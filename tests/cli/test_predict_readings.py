@@ -105,10 +105,11 @@ def test_rows_without_a_clock_have_an_unknown_moment(tmp_path, clock) -> None:  
     bare, timed = c.write("bare.csv", AFTER), c.write("timed.csv", AFTER, clock)
     mean, end = (
         c.predict(bare, "--set", "measurements.frame=base", *o)
-        for o in ((), ("--after",))
+        for o in ((), ("--set", "measurements.after_survey=true"))
     )
     assert f"no {clock} in the file: tracker_drift at the mean" in mean.stderr
-    assert "--after takes the end" in mean.stderr and "--after" not in end.stderr
+    assert "after_survey of [measurements]" in mean.stderr
+    assert "after_survey" not in end.stderr
     assert 0.10 < left(mean) < 0.18  # half of the drift
     assert left(end) < 0.07
     assert (
@@ -139,7 +140,7 @@ def test_a_file_of_another_station_is_placed(tmp_path, pillars: int) -> None:  #
     found = c.predict(later, "--set", "measurements.frame=tracker")
     assert left(found) < 0.1
     if pillars == 3:
-        assert "registered by 3 fixed points" in found.stderr
+        assert "registered by 3 monuments" in found.stderr
         assert "registered from its own rows the file would leave" in found.stderr
     else:
         assert "read from another station" in found.stderr
@@ -152,7 +153,7 @@ def test_fixed_points_show_a_shift_of_the_base(tmp_path) -> None:  # type: ignor
     assert left(c.predict(bare, "--set", "measurements.frame=base")) > 0.8
     watched = c.write("watched.csv", AFTER, "", None, None, 1, shift=5e-4)
     found = c.predict(watched, "--set", "measurements.frame=base")
-    assert left(found) < 0.06 and "registered by a fixed point of" in found.stderr
+    assert left(found) < 0.06 and "registered by a monument of" in found.stderr
 
 
 def test_one_file_in_the_set_up_of_the_survey_says_both_errors(tmp_path) -> None:  # type: ignore[no-untyped-def]

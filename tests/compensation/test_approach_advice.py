@@ -48,7 +48,7 @@ def advice(bench_cell, bench_model):
         for d in found.diagnostics:
             if d.code == "direction-uncertain" and (hole := (d.line - 4) // 2) >= 0:
                 moved = re.search(
-                    r"begin the approach (\d+) mm farther back", d.message
+                    r"start the approach (\d+) mm farther back", d.message
                 )
                 if moved and d.line % 2:
                     told[hole] = float(moved[1])
@@ -68,7 +68,7 @@ def test_a_first_move_is_told_what_to_do_before_it(bench_cell, bench_model) -> N
     source = job({}).replace(f"{START}\n".encode(), b"")
     found = compensate(source, bench_cell, bench_model, options=TIMED)
     told = [d.message for d in found.diagnostics if d.code == "direction-uncertain"]
-    assert any("before it, move every axis by" in text for text in told)
+    assert any("before it, add a JOINT move" in text for text in told)
     plain = compensate(source, bench_cell, bench_model)
     texts = [d.message for d in plain.diagnostics if d.code == "direction-uncertain"]
     assert all("start the approach farther away" in text for text in texts)

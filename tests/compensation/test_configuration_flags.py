@@ -109,10 +109,10 @@ def test_a_joint_move_to_another_branch(
     after = f"MOVE LINEAR TO {pos(cell, HERE, 'W T1:0 T2:0')}"
     _, found = planned(cell, START, care, other, after, START, after)
     assert ("another branch than the arm is on" in found.reasons[1].text) == doubted
-    comes = "it comes from a move whose branch or turn is not sure"
+    comes = "the move before it ends with an uncertain branch or turn"
     assert (found.reasons[2].text == comes) == doubted
     assert (found.reasons[3].text == comes) == doubted
-    assert "comes from" not in found.reasons[4].text
+    assert "the move before" not in found.reasons[4].text
     np.testing.assert_allclose(np.rad2deg(found.plan.q[1]), flipped, atol=1e-3)
     same = f"MOVE JOINT TO {pos(cell, THERE, '')}"
     _, found = planned(cell, START, care, same, same)

@@ -203,7 +203,7 @@ def test_doubt_about_a_branch_goes_on_behind_a_cut(job, joined) -> None:
     assert told(cut) == told(whole) and joined[-1] > 2
     behind = cut.decisions.why[200:]
     assert (behind > 0).all()
-    assert "not sure" in cut.decisions.reasons[behind[0]].text
+    assert "uncertain" in cut.decisions.reasons[behind[0]].text
 
 
 def test_one_window_is_in_memory_at_a_time(job, monkeypatch, joined) -> None:

@@ -18,15 +18,15 @@ ALLOWED = tuple(
     re.compile(text)
     for text in (
         "out of reach", "the path to it", "axis . beyond", "singularity",
-        "three points of the arc", "three points of an arc", "would flip the wrist",
+        "points of the arc", "points of an arc", "would flip the wrist",
         "beyond a joint limit",
         "steps by more than correction_step_mm", "bend the path",
-        "its arc is left as a whole",
+        "no point of its arc is corrected",
         "would turn by more than joint_deg", "would move by more than",
         "would swing a joint", "on another branch",
         "other programs may read", "computes? with",
         "composes it", "is set to it", "is given it", "may move to it",
-        "a target computed from it", "a move whose target is not sure",
+        "a target computed from it", "a move whose target is uncertain",
         "another arm goes to it", "a number of the target belongs to another",
     )
 )  # fmt: skip

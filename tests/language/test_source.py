@@ -70,7 +70,9 @@ def test_empty_files_are_refused(data: bytes) -> None:
 def test_a_text_whose_places_cannot_be_told_is_refused(monkeypatch) -> None:
     monkeypatch.setattr("postproc.language.source.LAST", 99)
     assert source_from_bytes("x.pdl", b"a" * 99).data
-    with pytest.raises(ProgramError, match=r"x\.pdl: has 100 bytes, .* up to 99\. Cut"):
+    with pytest.raises(
+        ProgramError, match=r"x\.pdl: has 100 bytes; at most 99 .*\. Divide"
+    ):
         source_from_bytes("x.pdl", b"a" * 100)
 
 

@@ -130,7 +130,7 @@ def test_a_model_file_is_written_whole_or_not_at_all(
 
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", full)
-        with pytest.raises(OutputError, match=r"m\.json: no room is left"):
+        with pytest.raises(OutputError, match=r"m\.json: the disk is full"):
             model().save(path)
     assert path.read_text() == "what was there"
     assert [p.name for p in tmp_path.iterdir()] == ["m.json"]

@@ -270,7 +270,7 @@ def test_it_is_fitted_predicted_and_compensated(tmp_path):
     cell, model = ("--cell", tmp_path / "cell.toml"), tmp_path / "model.json"
     found = cli("fit", tmp_path / "fit.csv", *cell, "-o", model,
                 "--effects", "geometry")  # fmt: skip
-    assert found.exit_code == 0 and left(found, "left by the fit") < 0.026
+    assert found.exit_code == 0 and left(found, "error after fit") < 0.026
     found = cli("predict", tmp_path / "check.csv", *cell, "--model", model,
                 "-o", tmp_path / "predicted.csv")  # fmt: skip
     assert found.exit_code == 0 and left(found, "residual") < 0.035

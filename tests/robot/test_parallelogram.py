@@ -233,7 +233,7 @@ def test_a_fit_leaves_the_noise_and_a_program_is_compensated(tmp_path, seed, sen
     found = cli("fit", measured, "--cell", tmp_path / "cell.toml", "-o",
                 tmp_path / "m.json", "--effects", "geometry")  # fmt: skip
     assert found.exit_code == 0
-    left = re.search(r"left by the fit mean ([\d.]+)", found.stdout + found.stderr)
+    left = re.search(r"error after fit mean ([\d.]+)", found.stdout + found.stderr)
     assert left is not None and float(left[1]) < 0.026
     records = record_from_pose(wanted).round(4).tolist()
     moves = [f"  MOVE LINEAR TO POS({str(record)[1:-1]}, '')" for record in records]

@@ -82,7 +82,7 @@ def test_a_shipped_arm_is_what_its_urdf_gives(tmp_path, name):
 def test_rounded_quarter_turns_are_whole_ones_and_that_is_said(tmp_path):
     rounded = (*NJ130_SERIAL[:2], replace(NJ130_SERIAL[2], rpy=(0.0, -1.57, 0.0)))
     chain = read_chain(write(tmp_path, (*rounded, *NJ130_SERIAL[3:])))
-    assert chain.rounded == ("joint j3: -1.57 rad taken as -90 deg",)
+    assert chain.rounded == ("joint j3: -1.57 rad read as -90 deg",)
     q = np.random.default_rng(4).uniform(-3.0, 3.0, (20, 6))
     wanted = urdf.flange(NJ130_SERIAL, q)
     np.testing.assert_allclose(chain.flange(q), wanted, atol=1e-12)

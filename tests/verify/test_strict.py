@@ -31,4 +31,4 @@ def test_the_message_names_the_disagreement(
     assert done.exit_code == (2 if strict else 1), done.stderr
     assert out.exists() == (not strict)
     assert ("--strict: the second opinion disagrees" in done.stderr) == bool(strict)
-    assert "targets were left uncompensated" not in done.stderr
+    assert "targets are not corrected" not in done.stderr

@@ -13,6 +13,7 @@ from postproc.calibration.regression import Fit
 from postproc.calibration.report import SHOWN_UNITS, impossible
 from postproc.model.covariate import varies_enough
 from postproc.model.effects.effect import PART_MOTION, Effect
+from postproc.model.effects.policies import NamingPolicy
 from postproc.robot.pose import MM
 from postproc.robot.state import States
 
@@ -52,7 +53,7 @@ def _describe(
     return Finding(
         effect=family.effect,
         joint=family.joint,
-        nameless=effect.nameless,
+        nameless=effect.naming_policy == NamingPolicy.UNEXPLAINED,
         of_setup=effect.belongs_to() == "setup",
         source=source,
         p_value=standing.p_value,

@@ -66,6 +66,7 @@ from postproc.exceptions import ModelError
 from postproc.model.covariate import JOINTS
 from postproc.model.doubt import Doubt
 from postproc.model.effect_sum import Combination
+from postproc.model.effects.policies import NamingPolicy
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import WORST_STD, Model
 from postproc.model.statistics import ErrorStatistics
@@ -380,7 +381,7 @@ def _judge(traced: Investigation, held_out: HeldOut, floor: NoiseFloor) -> Verdi
     names = [a.candidate.effect for a in traced.search.additions]
     small = floor.measured and size < CLEARLY_ABOVE * floor.size
     if traced.verdict == "unexplained" and names and small:
-        nameless = any(e.nameless for e in names)
+        nameless = any(e.naming_policy == NamingPolicy.UNEXPLAINED for e in names)
         return "unexplained" if nameless else "effect"
     return traced.verdict
 

@@ -156,8 +156,8 @@ def registrations(
     free = max(3 * len(seen) - spent, 1)
     own = mean_gap(base) * float(np.sqrt(3 * len(seen) / free))
     told = (
-        f"registered from its own rows the file is left {own:.4f} mm on average "
-        f"({spent} numbers of {3 * len(seen)} readings counted)"
+        f"mean error of the file, registered from its own rows: {own:.4f} mm "
+        f"(corrected for {spent} fitted numbers of {3 * len(seen)} readings)"
     )
     survey = model.registration
     if survey is None or np.setdiff1d(seen.states.tool_id, survey.tool_ids).size:

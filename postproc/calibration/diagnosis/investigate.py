@@ -27,6 +27,7 @@ from postproc.calibration.diagnosis.table import Causes
 from postproc.calibration.diagnosis.weight import pass_on, weigh_laws
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import FREE, JointEffect
+from postproc.model.effects.policies import NamingPolicy
 
 # Taking names back that promise more than they explain.
 
@@ -123,7 +124,10 @@ class Investigation:
         added = [a.candidate.effect for a in self.search.additions]
         if not added:
             return "unexplained" if p_value < REMAINS else "noise"
-        nameless = any(e.nameless for e in added) or p_value < STILL_REMAINS
+        nameless = (
+            any(e.naming_policy == NamingPolicy.UNEXPLAINED for e in added)
+            or p_value < STILL_REMAINS
+        )
         return "unexplained" if nameless else "effect"
 
 
@@ -146,8 +150,8 @@ def trace(
     progress("thresholds", 0.05)
     null = causes.null(Projection.of(base), seed)
     found = investigate(base, causes, null, progress)
-    progress("groups that cannot be told apart", 0.5)
+    progress("groups that fit equally well", 0.5)
     standings = tuple(stand(found, k) for k in range(len(found.additions)))
-    progress("what is left", 0.55)
+    progress("tests of the residuals", 0.55)
     left = leftovers(Projection.of(found.fit), seed)
     return Investigation(found, standings, left)

@@ -243,10 +243,10 @@ class FrameShift:
         base, tool = (float(np.linalg.norm(v)) / MM for v in (self.base, self.tool))
         turn = 1e3 * float(np.linalg.norm(self.turn))
         return (
-            f"since the given model the base has moved by {base:.3f} mm and turned by "
-            f"{turn:.3f} mrad, the tool by {tool:.3f} mm: this is compensated. If the "
-            "tracker was set up anew instead, give its readings with "
-            "--set measurements.frame=tracker"
+            f"since the survey of the given model the base has moved by {base:.3f} mm "
+            f"and turned by {turn:.3f} mrad, the tool has moved by {tool:.3f} mm: both "
+            "are compensated. If it was the tracker that moved, give its readings "
+            "with --set measurements.frame=tracker"
         )
 
     def to_dict(self) -> dict[str, list[float]]:

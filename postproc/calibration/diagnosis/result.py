@@ -187,7 +187,7 @@ class Diagnosis:
         )
         if self.verdict == "rejected":
             return (
-                f"held-out poses are left {self.after.mean_mm:.4f} mm with the "
+                f"the error of held-out poses is {self.after.mean_mm:.4f} mm with the "
                 f"extended model and {self.before.mean_mm:.4f} mm with the given one: "
                 "no model is written. The rows are too few, or those of another arm"
             )

@@ -48,10 +48,10 @@ def hindrances_of_arcs(v: Visits, alike: Bools) -> list[tuple[Bools, str]]:
     told = np.array([bool(v.measure_id[k]) for k in via.tolist()], dtype=bool)
     rows = (
         (~np.isnan(v.arc_angle[via + 1]), "it ends at an angle"),
-        (~own, "the point on its way is a variable's: write its numbers in the move"),
-        (told, "the point on its way is measured"),
+        (~own, "its middle point is a variable: write its numbers in the move"),
+        (told, "its middle point is measured"),
         (~(alike[via] & alike[via + 1]), "its frames or configuration flags change"),
-        (_uneven(v, via), "how the tool turns on its way is not sure"),
+        (_uneven(v, via), "it is uncertain how the tool turns along it"),
     )
     found = []
     for bad, why in rows:

@@ -19,7 +19,7 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.compensation.paths.path_error import PredictedWays
 from postproc.compensation.paths.track_alignment import OnTheWay
-from postproc.model.model import CONFIRMED, NOT_SURE
+from postproc.model.model import CONFIRMED, UNCERTAIN
 from postproc.robot.pose import lengths
 
 LEAST = 0.03  # [m] of the way on both sides that a step is looked for in
@@ -84,20 +84,20 @@ class JointInMotion:
 
     @property
     def verdict(self) -> str:
-        """Say "confirmed", "refuted", "elsewhere" or "not sure", at 95 %."""
+        """Say "confirmed", "refuted", "elsewhere" or "uncertain", at 95 %."""
         if self.steps < FEW:
-            return NOT_SURE
+            return UNCERTAIN
         times = _student(self.steps - 1)
         off, wide = abs(self.share - 1.0), times * self.error
         away = abs(self.later)
         if off - wide > LIKE:
             return "refuted"
         if off + wide > HALF:
-            return NOT_SURE
+            return UNCERTAIN
         if away - times * self.later_error > THERE:
             return "elsewhere"
         near = away <= THERE and away + times * self.later_error <= ELSEWHERE
-        return CONFIRMED if near else NOT_SURE
+        return CONFIRMED if near else UNCERTAIN
 
 
 def _student(freedom: int) -> float:

@@ -68,8 +68,8 @@ def correct_paths(
     splitter = language.splitter(reading.sources)
     if splitter is None and setting.options.reapproach:
         raise PostprocError(
-            f"reapproach: targets are not approached anew in {language.name} programs. "
-            "Leave it out: direction-uncertain says how to approach them"
+            f"reapproach: no stops are inserted into {language.name} programs. Leave "
+            "the key out; findings direction-uncertain advise how to approach targets"
         )
     work = InsertionPlan(draft, first, setting, write, splitter)
     if splitter is not None and setting.options.reapproach:
@@ -244,7 +244,7 @@ def _report_insertions(work: InsertionPlan, told: InTime) -> Insertions:
     """Say what was put on ways, and why moves that are left too far got nothing."""
     why = "its pieces would be too short, or the path no better"
     if work.crowded:
-        why = "no more points may be put on ways (max_inserted)"
+        why = "no more points may be inserted (max_inserted)"
     too_far = set(work.paths.visit[work.too_far].tolist()) - work.points.keys()
     otherwise = {}
     if work.latest is not work.source:

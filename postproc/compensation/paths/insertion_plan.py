@@ -227,7 +227,7 @@ class InsertionPlan:
         if not len(left):
             return ""
         why = decided.reasons[decided.why[left[0]]]
-        return f"points on its way cannot be corrected: {why}"
+        return f"points inserted into it cannot be corrected: {why}"
 
     def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""

@@ -28,8 +28,7 @@ NEAR = 4  # visits behind a move that may be worse for its points
 HARM = 3e-5  # [m] that any place of it may be worse where flanks give way
 SLIGHT = 1e-6  # [m] a difference that is none
 NOT_AS_PREDICTED = (
-    "it would be worse if a flank is not as predicted: a measured path "
-    "(diagnose --path) tells"
+    "it would be worse if a flank is not as predicted: measure a path (diagnose --path)"
 )
 MOVED = 5e-6  # [m] that a rounded corner may move
 
@@ -47,10 +46,10 @@ def judge(work: InsertionPlan) -> None:
                 work.left[v] = why
                 _take_back(work, v)
         for v in anew:
-            work.left[v] = "the stop to approach its target from was no help"
+            work.left[v] = "a stop before its target is no help"
             _take_back(work, v)
         work.make()
-    work.left |= dict.fromkeys(work.points, "its points do not stay put")
+    work.left |= dict.fromkeys(work.points, "its points change with every round")
     work.points.clear()
     work.approaches.clear()
     work.make()
@@ -130,14 +129,14 @@ class _Judged:
     def why_not(self, v: int) -> Reason | None:
         """Say why the points of a move must go, None where they may stay."""
         if v not in self.worst:
-            return "nothing is predicted for it with points", None
+            return "with inserted points its path is not predicted", None
         if v in self.bent:
-            return "pieces of it would bend too little for arcs", None
+            return "its pieces would be too straight for arcs", None
         if refused := self.work.refusal(v):
             return refused, None
         far, share = self.worst[v]
         if far > self.without[v]:
-            return "points on its way make it no better", share
+            return "inserted points make it no better", share
         if v in self.otherwise:
             return NOT_AS_PREDICTED, self.otherwise[v]
         if self.corner[v]:
@@ -163,7 +162,7 @@ def _harmful(
         last = int(np.searchsorted(cut, v)) - 1
         near = last >= 0 and v - cut[last] <= NEAR
         if near and now[v] > without.get(v, np.inf) + WORSE:
-            yield int(cut[last]), ("a move behind it would be worse", None)
+            yield int(cut[last]), ("a later move would be worse", None)
 
 
 def _if_otherwise(

@@ -42,24 +42,24 @@ def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int
     alike = np.all([column == column[before] for column in frames], axis=0)
     found: dict[int, str] = {}
     for rows, why in (
-        (v.motion == Motion.JOINT, "it is no line and no arc"),
-        (v.before < 0, "where it comes from is not one known place"),
+        (v.motion == Motion.JOINT, "it is neither a line nor an arc"),
+        (v.before < 0, "its start is not known, or there are several"),
         (_several(v), "it is reached several times"),
         (
             taught | taught[before],
-            "an end of it is taught: it contains the arm's error",
+            "one of its ends is taught and contains the arm's error",
         ),
         (~(ends & ends[before]), "its ends are not both corrected poses"),
         (v.shift >= 0, "its end is shifted from a point"),
-        (v.weaves, "it weaves, or may: what is counted along it would begin anew"),
-        (v.load > 0, "the program states what the arm carries on it"),
-        (~alike, "it begins with other frames or configuration flags"),
-        (~np.isnan(v.aux).all(axis=1), "auxiliary axes move along"),
+        (v.weaves, "it weaves, or may: the pattern would restart at every point"),
+        (v.load > 0, "the program states the payload on it"),
+        (~alike, "it starts with other frames or configuration flags"),
+        (~np.isnan(v.aux).all(axis=1), "auxiliary axes move with it"),
         (v.tool_remote, "the arm holds the part"),
         *hindrances_of_arcs(v, alike),
-        (_turns_otherwise(v, before), "how the tool turns on its way is not sure"),
+        (_turns_otherwise(v, before), "it is uncertain how the tool turns along it"),
         (has_unknown(cycle.targets.linear_speed[:, None]), "its speed is not known"),
-        (v.reason > 0, "it is left"),
+        (v.reason > 0, "it is not corrected"),
     ):
         for row in np.flatnonzero(rows).tolist():
             found.setdefault(row, why)

@@ -12,7 +12,7 @@ from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.split_constraints import shortest_pieces
 from postproc.language.languages import language_of
 from postproc.model.backlash_width import ELASTIC
-from postproc.model.model import CONFIRMED, NOT_SURE
+from postproc.model.model import CONFIRMED, UNCERTAIN
 
 UNSURE = 2e-5  # [m] a flank that is less sure is no reason to put points anywhere
 SMALL = 5e-5  # [m] a step of a joint that matters little if it is not as predicted
@@ -41,13 +41,13 @@ def _explain_refusal(work: InsertionPlan, k: int, v: int) -> str:
     after = work.paths.after
     if work.splitter is None:
         name = language_of(work.source.reading.sources[0].name).name
-        return f"no points are put on ways in {name}"
+        return f"no points are inserted into {name} programs"
     if v in work.approaches:
-        return "its target is approached anew"
+        return "its target is approached again from an inserted stop"
     if told := work.find_hindrance(work.splitter, v):
         return told
     if after.unsure[work.paths.samples(k)].max() > UNSURE:
-        return "the side of a joint is not sure on its way"
+        return "the flank of a joint is uncertain along it"
     return _otherwise_in_motion(work, k, v)
 
 
@@ -96,7 +96,7 @@ def _in_doubt(
     small to matter much: all of it, but for what nobody could measure for certain.
     """
     lacks = {
-        joint: (work.max_lag[joint - 1] if told[joint - 1] == NOT_SURE else 1.0)
+        joint: (work.max_lag[joint - 1] if told[joint - 1] == UNCERTAIN else 1.0)
         * _step(work, v, joint)
         for joint in joints
         if told[joint - 1] != CONFIRMED

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 TABLES = ("tool_data", "base_data", "load_data")
-"""Arrays that $TOOL, $BASE and $LOAD are taken from."""
+"""Arrays that $TOOL, $BASE and $LOAD are read from."""
 CORRECTIONS: Mapping[str, tuple[tuple[str, str], tuple[str, str]]] = {
     "$tool": (("tool_corr_w", "tool_corr_w_on"), ("tool_corr", "tool_corr_on")),
     "$base": (("base_corr", "base_corr_on"), ("m_base_corr", "m_bas_cor_on")),

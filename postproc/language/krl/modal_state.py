@@ -36,8 +36,8 @@ UNKNOWN = -1.0  # a number that is not known
 CELL_LOAD: tuple[float, ...] = ()
 LOST_LOAD: tuple[float, ...] = (-1.0,)
 LOST_FRAME = no_frame(
-    "which $TOOL and $BASE hold here is not known: set them anew behind what is not "
-    "followed, or on every way here",
+    "$TOOL and $BASE are not known here: set them after the statement that is not "
+    "followed, or in every branch that leads here",
 )
 
 

@@ -25,7 +25,7 @@ MEASURED, UNKNOWN_STATUS = 16, 32  # bit 4 of S, and the first value that is non
 BORDER = np.deg2rad(0.02)
 SURE = np.deg2rad(0.0005)  # [rad] more than the last digits of a target move an axis by
 
-_FLAGS_SAY = "S or T say another configuration, or other turns, than the move ends with"
+_FLAGS_SAY = "S or T name another configuration or other turns than the move ends with"
 TERMS = Terms(
     tool="$TOOL",
     base="$ROBROOT",
@@ -43,16 +43,16 @@ TERMS = Terms(
     branch_may_stop=_FLAGS_SAY,
     turn_stops=_FLAGS_SAY,
     turn_may_stop=_FLAGS_SAY,
-    branch="S says another configuration than the arm is in ({})",
-    nearest="T says another turn than the nearest ({}, {})",
-    wrist="on a line with $ORI_TYPE = #JOINT the wrist may end otherwise",
-    overruled="the path arrives in another configuration than S and T say",
-    law_unknown="how the tool turns on the way is not known here ($ORI_TYPE, "
+    branch="S names another configuration than the arm is in ({})",
+    nearest="T names another turn than the nearest ({}, {})",
+    wrist="on a line with $ORI_TYPE = #JOINT the wrist may end differently",
+    overruled="the path arrives in another configuration than S and T name",
+    law_unknown="how the tool turns along the path is not known here ($ORI_TYPE, "
     "$CIRC_TYPE)",
-    angles="how the tool turns on the way is not sure: {}",
-    arc="how the tool turns on this arc is not sure ({}): turn it in smaller steps",
+    angles="how the tool turns along the path is uncertain: {}",
+    arc="how the tool turns along this arc is uncertain ({}): turn it in smaller steps",
     laws=("", "#VAR", "$CIRC_TYPE, $CIRC_MODE", "", "", "$ORI_TYPE = #JOINT"),
-    border="axis {} ends within 0.02 deg of 0, where T is not sure: a wrong one turns "
+    border="axis {} ends within 0.02 deg of 0, where T is uncertain: a wrong T turns "
     "it by 360 deg",
 )
 

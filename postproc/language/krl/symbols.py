@@ -169,7 +169,7 @@ class KrlTask:
     def datum(
         self, name: str, here: Scope, index: tuple[int, ...] = ()
     ) -> tuple[int, KrlDatum] | None:
-        """Find data, or an element of an array, None where nothing sure is known."""
+        """Find data, or an element of an array, None where it is not known."""
         place = self.place(name, here)
         return None if place is None else self._own[(*place, name)].get(index)
 
@@ -185,7 +185,7 @@ class KrlTask:
         if name in here.parameters:
             return code, "is a parameter: what is given for it is not followed"
         if self.place(name, here) is None:
-            text = "is declared in no file at hand, or in several of them"
+            text = "is declared in none of the given files, or in several of them"
             return Code.UNDECLARED_VARIABLE, text
         if name in self.written:
             text = "may be changed by the program: it is known only when that runs"

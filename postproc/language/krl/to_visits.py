@@ -56,7 +56,7 @@ TURNING = ("#var", "#joint")  # ways to the orientation of a point
 _SWAPPED = Reason(
     Code.FRAME_UNKNOWN,
     "$TOOL and $BASE were set with IPO_FRAME #TCP, which swaps them on some "
-    "controllers: set them anew with #BASE",
+    "controllers: set them again with #BASE",
 )
 _NOT_SET = "an inline setting (WITH) is not known"
 

@@ -153,8 +153,8 @@ def _apply_summary(
             here.row,
             Code.CALL_NOT_FOLLOWED,
             name,
-            f"{name} may move the arm where it is called in an expression: the next "
-            "move is taken to come from an unknown place; call it as a statement",
+            f"{name} is called in an expression and may move the arm: the next move "
+            "is assumed to start at an unknown place. Call it as a statement",
         )
 
 
@@ -165,8 +165,8 @@ def _refuse_recursion(machine: Machine, here: Execution, inside: Place) -> None:
         here.row,
         Code.RECURSION,
         name,
-        f"{name} calls itself: what it does is not followed; moves after it are taken "
-        "to come from an unknown place",
+        f"{name} calls itself and is not followed: the next move is assumed to start "
+        "at an unknown place. Write it as a loop",
     )
     summarise_call(machine, here, name, call_graph_of(here.world, inside))
     here.store.last = frozenset({ELSEWHERE})
@@ -232,15 +232,15 @@ def opaque_call(
             _track(here, name, arguments)
         case RoutineEffect.KNOWN:
             _say(here, Code.ROUTINE_ASSUMED_MOTIONLESS, name,
-                 "is not in the files at hand: it is "
-                 "on the list of routines known neither to move the arm nor to set "
-                 "frames (docs/routines.md); if it does, say so under [routines] "
-                 "in the cell file, or set assume_motion")  # fmt: skip
+                 "is not in the given files. It is assumed to neither move the arm "
+                 "nor set frames, because it is on the list of such routines "
+                 "(docs/routines.md). If it does, declare it under [routines] of the "
+                 "cell, or set assume_motion")  # fmt: skip
         case RoutineEffect.UNKNOWN:
             report_unknown_routine(here.world, here.place.program, here.row, name)
-            forget_surroundings(here, f"{name}, which is not in the files at hand, may "
-                                "set it: say under [routines] in the cell file what it "
-                                "does")  # fmt: skip
+            forget_surroundings(here, f"{name}, which is not in the given files, may "
+                                "set it: declare it under [routines] of the "
+                                "cell")  # fmt: skip
 
 
 def _say(here: Execution, code: Code, name: str, text: str) -> None:
@@ -254,8 +254,8 @@ def _track(
     on = here.value(arguments[0]) if arguments else Nothing("")
     here.store.set(**{TRACKING: on})
     here.store.last = frozenset({ELSEWHERE})
-    _say(here, Code.POSITION_UNKNOWN, name, "lets a sensor lead the arm, or ends that: "
-         "the next move comes from an unknown place")  # fmt: skip
+    _say(here, Code.POSITION_UNKNOWN, name, "lets a sensor guide the arm, or ends "
+         "that: the next move starts at an unknown place")  # fmt: skip
 
 
 def _unknown_frames(here: Execution, why: str) -> None:

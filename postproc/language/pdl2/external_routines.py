@@ -104,9 +104,9 @@ def stays_still(world: World, program: Program, name: str) -> bool:
 def report_unknown_routine(world: World, program: Program, row: int, name: str) -> None:
     """Say, once for each routine, what to put into the cell file about it."""
     text = (
-        f"{name} is not in the files at hand and may move the arm and set frames: "
-        "targets after it are left as they are until these are set again. To have them "
-        "compensated, paste under [routines] in the cell file: "
+        f"{name} is not in the given files and may move the arm and set frames: "
+        "targets after it are not corrected until these are set again. To have them "
+        "corrected, write under [routines] of the cell: "
         f'{name} = "motionless" if it does neither, {name} = "moves" if it moves; if '
         f"it sets frames, under [frames.routines.{name}] a row for each call: "
         '"1,2" = { tool = [x, y, z, a, e, r], uframe = [x, y, z, a, e, r] }'

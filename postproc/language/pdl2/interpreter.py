@@ -360,9 +360,9 @@ def _forget_by_text(here: Execution, why: str) -> None:
         here.place.program,
         here.row,
         Code.MOTION_UNKNOWN,
-        "where the arm is, its frames and its motion settings are not known after "
-        "this statement, which is not understood: targets after it are left as they "
-        "are until these are set again",
+        "this statement is not understood: the position of the arm, its frames and "
+        "its motion settings are not known after it, and targets are not corrected "
+        "until these are set again",
     )
 
 
@@ -687,8 +687,8 @@ def _cancelling_handler(
         row,
         Code.HANDLER_CANCELS,
         str(row),
-        "this condition handler may end a move on its way (CANCEL, EXIT CYCLE) at any "
-        "time: no move's origin is sure",
+        "this condition handler may end any move early (CANCEL, EXIT CYCLE): the start "
+        "of every move is uncertain",
     )
 
 
@@ -702,7 +702,8 @@ def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> N
         row,
         Code.HANDLER_MOVES,
         str(row),
-        "this condition handler may move the arm at any time: no move's origin is sure",
+        "this condition handler may move the arm at any time: the start of every move "
+        "is uncertain",
     )
     context = machine.root.within(machine.position(place.program, row), HANDLED)
     machine.enter(context, place)

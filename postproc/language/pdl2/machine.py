@@ -227,8 +227,8 @@ class Machine:
     def _report_many(self, here: Execution) -> None:
         here.world.report_once(
             here.place.program, here.row, Code.MANY_ORIGINS, str(here.row),
-            f"more than {MOST_ORIGINS} arrivals may come before this move: they are "
-            "not told apart, and from which side it arrives is not known",
+            f"more than {MOST_ORIGINS} moves may come before this one: they are not "
+            "followed separately, and the approach direction is not known",
         )  # fmt: skip
 
     def predecessors(self, here: Execution) -> frozenset[int]:

@@ -91,7 +91,7 @@ _FRAME = {
     "BASE": Meaning.RELATIVE_BASE,
     "UFRAME": Meaning.RELATIVE_UFRAME,
 }
-UNSURE = "a move whose target is not sure may go to it"
+UNSURE = "a move whose target is uncertain may go to it"
 _PLACES = {"home": Meaning.HOME, "cal_sys": Meaning.CALIBRATION}
 
 
@@ -172,7 +172,7 @@ def _along(here: Execution, path: ast.Expression) -> Goal:
     escape_names(here, frozenset({name}), why)
     reason = (
         f"the nodes of a path are not followed (MOVE ALONG {name}): the next move is "
-        "taken to come from an unknown place"
+        "assumed to start at an unknown place"
     )
     return Goal(Meaning.UNKNOWN, reason=Reason(Code.POSITION_UNKNOWN, reason))
 
@@ -336,8 +336,8 @@ def _list_other(here: Execution, statement: ast.Move) -> None:
     whose = f"arm {arm}'s" if arm is not None else "not our arm's"
     number = f" with arm_number = {arm} under [robot]" if arm is not None else ""
     text = (
-        f"this move is {whose}, and the cell is of arm {here.world.arm}: it is left as "
-        f"it is. Compensate it with a cell of its arm{number}, and its model"
+        f"this move is {whose}, and the cell is of arm {here.world.arm}: it is not "
+        f"corrected. Compensate it with a cell of its arm{number}, and its model"
     )
     here.world.report(here.place.program, here.row, Code.OTHER_ARM, text)
 
@@ -370,7 +370,7 @@ def motion_of(
             here.row,
             Code.ASSUMED_JOINT,
             "move_type",
-            "the move names no trajectory and $MOVE_TYPE is not set: taken as JOINT",
+            "the move names no trajectory and $MOVE_TYPE is not set: JOINT is assumed",
         )
         return Motion.JOINT, NO_REASON
     motion = _MOTIONS.get(said) if isinstance(said, str) else None

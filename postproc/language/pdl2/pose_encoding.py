@@ -46,19 +46,20 @@ TERMS = Terms(
     branch_may_stop=_MAY_STOP.format("CNFG_CARE", "branch"),
     turn_stops=_STOPS.format("TURN_CARE", "turn"),
     turn_may_stop=_MAY_STOP.format("TURN_CARE", "turn"),
-    branch="the configuration string says another branch than the arm is on: whether "
-    "it counts is not sure with $CNFG_CARE {}",
-    nearest="the configuration string says another turn than the nearest: which of "
-    "them counts is not sure with $TURN_CARE {} and $JNT_MTURN {}",
-    wrist="the configuration string says another branch or turn than the nearest: "
-    "whether a line with $ORNT_TYPE WRIST_JNT leads there is not sure",
+    branch="the configuration string names another branch than the arm is on: whether "
+    "it counts is uncertain with $CNFG_CARE {}",
+    nearest="the configuration string names another turn than the nearest: which of "
+    "the two counts is uncertain with $TURN_CARE {} and $JNT_MTURN {}",
+    wrist="the configuration string names another branch or turn than the nearest: "
+    "whether a line with $ORNT_TYPE WRIST_JNT leads there is uncertain",
     overruled="the path arrives on another branch or turn than the configuration "
-    "string says: the string is kept, the path decides",
-    law_unknown="$ORNT_TYPE is not known here: how the tool turns on the way is not "
-    "sure",
-    angles="with $ORNT_TYPE {} how the tool turns on the way is not sure: use "
+    "string names: the string is kept, the path decides",
+    law_unknown="$ORNT_TYPE is not known here, and with it how the tool turns along "
+    "the path",
+    angles="with $ORNT_TYPE {} it is uncertain how the tool turns along the path: use "
     "RS_WORLD, or turn it in smaller steps",
-    arc="with $ORNT_TYPE {} how the tool turns on this arc is not sure: use RS_WORLD",
+    arc="with $ORNT_TYPE {} it is uncertain how the tool turns along this arc: use "
+    "RS_WORLD",
     laws=("", "RS_WORLD", "RS_TRAJ", "EUL_WORLD", "RPY_WORLD", "WRIST_JNT", ""),
 )
 

@@ -72,8 +72,8 @@ AT_A_STOP = (
 _LOAD_UNKNOWN = Reason(Code.LOAD_UNKNOWN, "the load that \\TLoad names is not known")
 _COMPUTED = Reason(Code.COMPUTED_TARGET, "it is computed from other data")
 _NO_QUATERNION = Reason(Code.UNREADABLE_NUMBER, "no quaternion")
-_NO_TOOL = Reason(Code.FRAME_UNKNOWN, "its tool is declared in no file at hand")
-_SEARCH = Reason(Code.ENDS_ELSEWHERE, "where a search ends is not known before")
+_NO_TOOL = Reason(Code.FRAME_UNKNOWN, "its tool is declared in no given file")
+_SEARCH = Reason(Code.ENDS_ELSEWHERE, "a search ends at a place that is not known")
 _STAYS = Reason(
     Code.ENDS_ELSEWHERE, "only external axes move: the arm stays where it is"
 )
@@ -349,9 +349,9 @@ class Goals:
         found, code = self.task.datum(name, scope), Code.RUNTIME_VALUE
         if found is None:
             code = Code.UNDECLARED_VARIABLE
-            text = "is no data of the files at hand, or of several of them"
+            text = "is declared in none of the given files, or in several of them"
         elif found[1].declared.value is None:
-            code, text = Code.NO_VALUE, "has no value in the files at hand"
+            code, text = Code.NO_VALUE, "has no value in the given files"
         elif self.task.is_changed_beside(*found):
             code = Code.BESIDE_PROGRAM
             text = f"may be changed by another task at any time: {RUN_TIME}"

@@ -45,17 +45,17 @@ TERMS = Terms(
     turn_stops=f"{_FLAGS_SAY}: with ConfL or ConfJ \\On the controller stops here",
     turn_may_stop=f"{_FLAGS_SAY}, and whether that is checked is not known here",
     branch="confdata names another configuration than the arm is in: whether it "
-    "counts is not sure (ConfJ {})",
-    nearest="confdata counts another turn than the nearest: which of them counts is "
-    "not sure (ConfJ {}, {})",
+    "counts is uncertain (ConfJ {})",
+    nearest="confdata names another turn than the nearest: which of the two counts is "
+    "uncertain (ConfJ {}, {})",
     wrist="confdata names another configuration or turn than the nearest: whether a "
-    "line with SingArea \\Wrist leads there is not sure",
-    overruled="the path arrives in another configuration than confdata says: with "
+    "line with SingArea \\Wrist leads there is uncertain",
+    overruled="the path arrives in another configuration than confdata names: with "
     "ConfL \\Off the path decides",
-    law_unknown="how the tool turns on the way is not known here (SingArea, "
+    law_unknown="how the tool turns along the path is not known here (SingArea, "
     "CirPathMode)",
-    angles="how the tool turns on the way is not sure: {}",
-    arc="how the tool turns on this arc is not sure ({}): turn it in smaller steps",
+    angles="how the tool turns along the path is uncertain: {}",
+    arc="how the tool turns along this arc is uncertain ({}): turn it in smaller steps",
     laws=("", "SingArea \\Off", "CirPathMode \\PathFrame", "", "", "SingArea \\Wrist"),
 )
 

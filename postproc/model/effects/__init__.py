@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.exceptions import PostprocError
 from postproc.model.effects.effect import Effect
+from postproc.model.effects.policies import FitPolicy
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -84,7 +85,9 @@ def __getattr__(name: str) -> Any:
         EFFECTS=every,
         BY_NAME={kind.name: kind for kind in every},
         KNOWN=tuple(kind.name for kind in every if not kind.published),
-        BASE_EFFECTS=tuple(kind.name for kind in every if kind.unasked == "always"),
+        BASE_EFFECTS=tuple(
+            kind.name for kind in every if kind.fit_policy == FitPolicy.ALWAYS
+        ),
     )
     return globals()[name]
 

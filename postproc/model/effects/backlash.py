@@ -12,10 +12,10 @@ from postproc.model.effects.effect import (
     Cells,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
     own_cells,
 )
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 
 SCALE = 1e-4  # [rad] prior scale of half a backlash
@@ -28,7 +28,7 @@ class Backlash(JointEffect):
     name: ClassVar[str] = "backlash"
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "lambda"
-    unasked: ClassVar[Unasked | None] = "always"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.ALWAYS
 
     joints: tuple[int, ...] = JOINTS
 

@@ -18,11 +18,11 @@ from postproc.model.effects.effect import (
     Cells,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
     fade_turns,
     own_cells,
 )
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -44,7 +44,7 @@ class BacklashProfile(JointEffect):
     name: ClassVar[str] = "backlash_profile"
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "lambda"
-    unasked: ClassVar[Unasked | None] = "always"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.ALWAYS
     variation_of: ClassVar[str | None] = "backlash"
 
     joints: tuple[int, ...] = JOINTS

@@ -12,10 +12,10 @@ from postproc.model.effects.effect import (
     Candidate,
     Cells,
     Parameter,
-    Sought,
     alternatives,
     cells_in_time,
 )
+from postproc.model.effects.policies import SearchPolicy
 from postproc.model.effects.step import CampaignStep, moments
 from postproc.model.kinematics import ArmStates
 
@@ -46,7 +46,7 @@ class BaseShift(CampaignStep):
     """A step of the base frame: a shift and a turn at one row."""
 
     name: ClassVar[str] = "base_shift"
-    sought: ClassVar[Sought | None] = "rival"
+    search_policy: ClassVar[SearchPolicy] = SearchPolicy.RIVAL
 
     @classmethod
     def cells(cls) -> Cells:

@@ -14,9 +14,9 @@ from postproc.model.effects.effect import (
     Candidate,
     Effect,
     Parameter,
-    Sought,
     alternatives,
 )
+from postproc.model.effects.policies import SearchPolicy
 from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import GRAVITY, Arm
 from postproc.robot.state import States
@@ -44,7 +44,7 @@ class BaseTilt(Effect):
 
     name: ClassVar[str] = "base_tilt"
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("base turn", "moment"),)
-    sought: ClassVar[Sought | None] = "always"
+    search_policy: ClassVar[SearchPolicy] = SearchPolicy.ALWAYS
     driven_by: ClassVar[str] = "torque"
 
     skew: bool = False

@@ -16,10 +16,10 @@ from postproc.model.effects.effect import (
     Effect,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
     own_cells,
 )
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates, Loads
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -97,7 +97,7 @@ class WeightEffect(Effect):
     """
 
     driven_by: ClassVar[str] = "torque"
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
 
     joints: tuple[int, ...] = YIELDING
     moments: tuple[tuple[tuple[int, float], ...], ...] = ((), (), ())

@@ -13,9 +13,9 @@ from postproc.model.effects.effect import (
     Effect,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
 )
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 
 SCALE = 2e-4  # [rad] at the spring's largest torque
@@ -43,7 +43,7 @@ class Counterbalance(JointEffect):
 
     name: ClassVar[str] = "counterbalance"
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "joint"),)
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
 
     ratio: float = 0.4
     upright: float = 0.0

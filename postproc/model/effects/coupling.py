@@ -13,9 +13,9 @@ from postproc.model.effects.effect import (
     Cells,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
 )
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 
 SCALE = 5e-5  # [rad/rad]
@@ -32,7 +32,7 @@ class Coupling(JointEffect):
     """
 
     name: ClassVar[str] = "coupling"
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
 
     pairs: tuple[tuple[int, int], ...] = HOLLOW_WRIST
 

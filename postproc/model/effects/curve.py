@@ -21,6 +21,7 @@ from postproc.model.effects.effect import (
     fade,
 )
 from postproc.model.effects.part_motion import CarriedEffect
+from postproc.model.effects.policies import NamingPolicy
 from postproc.model.kinematics import ArmStates
 
 TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 16, 3, 5
@@ -52,7 +53,7 @@ class Curve(CarriedEffect):
     """
 
     name: ClassVar[str] = "curve"
-    nameless: ClassVar[bool] = True
+    naming_policy: ClassVar[NamingPolicy] = NamingPolicy.UNEXPLAINED
     free: ClassVar[bool] = True
 
     source: tuple[str, ...] = ("joint 1",)

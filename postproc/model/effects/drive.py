@@ -25,10 +25,10 @@ from postproc.model.effects.effect import (
     Family,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
 )
 from postproc.model.effects.load_backlash import LoadBacklash, laws
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.effects.transmission import (
     ECCENTRIC,
     Orders,
@@ -106,7 +106,7 @@ class DriveEffect(Effect):
         coupling: Drive angles are this times joint angles, 6 rows.
     """
 
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
 
     coupling: Matrix = ALONE
 
@@ -287,7 +287,7 @@ class DriveLoad(DriveEffect):
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "torque"),)
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "torque"
-    unasked: ClassVar[Unasked | None] = None
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.ON_REQUEST
     variation_of: ClassVar[str | None] = "drive_backlash"
 
     drives: tuple[int, ...] = ()

@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.model.covariate import covariate, varies_enough
+from postproc.model.effects.policies import FitPolicy, NamingPolicy, SearchPolicy
 from postproc.model.kinematics import ArmStates
 from postproc.model.splines import Splines
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
 Origin = Literal["arm", "state", "setup"]
-Unasked = Literal["always", "weighed", "last", "seen"]
-Sought = Literal["always", "alone", "rival"]
 
 Cells = tuple[tuple[str, str, str], ...]  # carrier, driver and law of each
 PART_MOTION = "part_motion"  # what has no name but its place, its driver and its law
@@ -66,18 +65,12 @@ class Effect(ABC):
         name: Name in model files and reports.
         direct: True where the effect is odd in the arrival direction.
         driven_by: Kind of covariate that drives it, one of `covariate.DRIVERS`.
-        unasked: What a fit does with it that is not told which effects to fit:
-            "always" fits it; "weighed" keeps it where the rows speak for it; "last"
-            weighs it alone, for what all others leave; "seen" weighs it for that where
-            the tracker's place is known. None: it must be asked for.
-        sought: Whether a fit looks for it in what all else leaves, as `diagnose` does,
-            since when it happened or how fast it turns is not known beforehand:
-            "always", or "alone", where no free form holds a part of it; "rival" where
-            it only must not be taken for another: whose step it is nobody knows.
+        fit_policy: When a fit takes it where no effects are asked for.
+        search_policy: Whether a fit searches for it in its residual.
+        naming_policy: What a report says where `diagnose` adds it.
         variation_of: Name of the plainer effect that a search takes first.
         acts: What it moves and what drives that, in the words of the table of causes,
             where it is more than `cells`, several of them at once say.
-        nameless: True where finding it says no more than that something is there.
         at_one_row: True for what happens once, or at one place of what drives it.
         free: True for a function that may have any shape: what no law predicts.
         everywhere: True for what is the same at all poses, unseen ones too.
@@ -88,11 +81,11 @@ class Effect(ABC):
     name: ClassVar[str]
     direct: ClassVar[bool] = False
     driven_by: ClassVar[str] = "joint"
-    unasked: ClassVar[Unasked | None] = None
-    sought: ClassVar[Sought | None] = None
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.ON_REQUEST
+    search_policy: ClassVar[SearchPolicy] = SearchPolicy.NEVER
+    naming_policy: ClassVar[NamingPolicy] = NamingPolicy.NAMED
     variation_of: ClassVar[str | None] = None
     acts: ClassVar[tuple[tuple[str, str], ...]] = ()
-    nameless: ClassVar[bool] = False
     at_one_row: ClassVar[bool] = False
     free: ClassVar[bool] = False
     everywhere: ClassVar[bool] = False
@@ -113,7 +106,9 @@ class Effect(ABC):
         What few arms have, and what many columns tell, is a false name sooner. Nearly
         all arms yield to their weight, which follows the angles as well.
         """
-        follows_angles = self.driven_by == "joint" and self.unasked == "weighed"
+        follows_angles = (
+            self.driven_by == "joint" and self.fit_policy == FitPolicy.IF_EVIDENT
+        )
         return BEHIND_WEIGHT if follows_angles else 0.0
 
     @classmethod
@@ -122,8 +117,8 @@ class Effect(ABC):
         return varies_enough(states, cls.driven_by)
 
     @classmethod
-    def may_be_sought(cls, states: States) -> bool:
-        """Tell whether rows let a fit look for it, where it is `sought`."""
+    def may_be_searched(cls, states: States) -> bool:
+        """Tell whether rows let a fit look for it, see `search_policy`."""
         return True
 
     @classmethod

@@ -13,10 +13,10 @@ from postproc.model.effects.effect import (
     Effect,
     JointEffect,
     Parameter,
-    Unasked,
     fade,
 )
 from postproc.model.effects.joint_spline import LEAST_ROWS
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -115,7 +115,7 @@ class Elm(JointEffect):
     """
 
     name: ClassVar[str] = "elm"
-    unasked: ClassVar[Unasked | None] = "last"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.LAST
     free: ClassVar[bool] = True
 
     layer: HiddenLayer

@@ -9,8 +9,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Effect, Parameter, Unasked
+from postproc.model.effects.effect import Effect, Parameter
 from postproc.model.effects.placement import Placement
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates, Deviation
 from postproc.robot.arm import Arm
 from postproc.robot.pose import cross
@@ -44,7 +45,7 @@ class Geometry(Effect):
         ("tool shift", "constant"),
         ("joint", "constant"),
     )
-    unasked: ClassVar[Unasked | None] = "always"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.ALWAYS
 
     beta: tuple[int, ...] = (2, 6)
     base: bool = True

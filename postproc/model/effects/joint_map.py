@@ -16,11 +16,11 @@ from postproc.model.effects.effect import (
     Effect,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
     own_cells,
 )
 from postproc.model.effects.joint_spline import LONG_SURVEY
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -47,7 +47,7 @@ class JointMap(JointEffect):
     """
 
     name: ClassVar[str] = "joint_map"
-    unasked: ClassVar[Unasked | None] = "last"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.LAST
     free: ClassVar[bool] = True
 
     bumps: tuple[tuple[int, float], ...] = ()

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter, Unasked, fade
+from postproc.model.effects.effect import JointEffect, Parameter, fade
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.effects.smooth import smooth, smooth_count
 from postproc.model.kinematics import ArmStates
 from postproc.model.splines import Splines
@@ -49,7 +50,7 @@ class JointSpline(JointEffect):
 
     name: ClassVar[str] = "joint_spline"
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "joint"),)
-    unasked: ClassVar[Unasked | None] = "last"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.LAST
     free: ClassVar[bool] = True
 
     joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)

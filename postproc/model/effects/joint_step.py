@@ -14,10 +14,10 @@ from postproc.model.effects.effect import (
     Cells,
     JointEffect,
     Parameter,
-    Sought,
     alternatives,
     own_cells,
 )
+from postproc.model.effects.policies import SearchPolicy
 from postproc.model.effects.step import CampaignStep, moments
 from postproc.model.kinematics import ArmStates
 
@@ -36,7 +36,7 @@ class JointStep(CampaignStep, JointEffect):
     """
 
     name: ClassVar[str] = "joint_step"
-    sought: ClassVar[Sought | None] = "always"
+    search_policy: ClassVar[SearchPolicy] = SearchPolicy.ALWAYS
 
     joints: tuple[int, ...] = JOINTS
 

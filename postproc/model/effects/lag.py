@@ -14,10 +14,10 @@ from postproc.model.effects.effect import (
     Cells,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
     own_cells,
 )
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 
 SCALE = 2e-4  # [rad s/m]
@@ -34,7 +34,7 @@ class Lag(JointEffect):
     name: ClassVar[str] = "lag"
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "speed"
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
 
     joints: tuple[int, ...] = JOINTS
 

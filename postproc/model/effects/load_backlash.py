@@ -16,10 +16,10 @@ from postproc.model.effects.effect import (
     Effect,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
     own_cells,
 )
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -49,7 +49,7 @@ class LoadBacklash(JointEffect):
     name: ClassVar[str] = "load_backlash"
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "torque"
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
     variation_of: ClassVar[str | None] = "backlash"
 
     joints: tuple[int, ...] = (2, 3, 5)

@@ -15,9 +15,9 @@ from postproc.model.effects.effect import (
     JointEffect,
     Origin,
     Parameter,
-    Unasked,
     alternatives,
 )
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 
 UNSURE_LEVER = 0.5  # [m] along the links of an arm of this size
@@ -38,7 +38,7 @@ class Payload(JointEffect):
     name: ClassVar[str] = "payload"
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "payload"),)
     driven_by: ClassVar[str] = "payload"
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
 
     joints: tuple[int, ...] = (2, 3, 5)
 

@@ -12,10 +12,10 @@ from postproc.model.effects.effect import (
     Cells,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
     own_cells,
 )
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 
 SCALE = 5e-5  # [rad/rad]
@@ -30,7 +30,7 @@ class Scale(JointEffect):
     """
 
     name: ClassVar[str] = "scale"
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
 
     joints: tuple[int, ...] = JOINTS
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
-from postproc.model.effects.effect import Effect, Origin, Unasked
+from postproc.model.effects.effect import Effect, Origin
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 
 
@@ -25,7 +26,7 @@ class Sighting(Effect):
             it reads wrongly.
     """
 
-    unasked: ClassVar[Unasked | None] = "seen"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.WITH_TRACKER
 
     tracker: tuple[float, float, float] = (0.0, 0.0, 0.0)
     told: bool = True

@@ -15,10 +15,9 @@ from postproc.model.effects.effect import (
     Effect,
     Origin,
     Parameter,
-    Sought,
-    Unasked,
     alternatives,
 )
+from postproc.model.effects.policies import FitPolicy, SearchPolicy
 from postproc.model.effects.step import moments
 from postproc.model.effects.tracker_drift import TrackerDrift
 from postproc.model.kinematics import ArmStates
@@ -32,8 +31,8 @@ SHORT = 1e-3  # [m] what has no length does not grow
 SOON = 1200.0  # [s] in which no arm warms up enough to show
 WARM_UPS = (0.1, 0.2, 0.4, 0.8)  # of the campaign's length: time constants tried
 DOUBT = (
-    ": it may be tracker_drift, so nothing of it is compensated. Rows on fixed points "
-    "(column reference) would tell"
+    ": it may be tracker_drift, so it is not compensated. Rows on monuments (column "
+    "reference) would separate the two"
 )
 
 
@@ -59,9 +58,9 @@ class Thermal(Effect):
         ("link shift", "temperature"),
         ("link shift", "time"),
     )
-    sought: ClassVar[Sought | None] = "always"
+    search_policy: ClassVar[SearchPolicy] = SearchPolicy.ALWAYS
     driven_by: ClassVar[str] = "temperature"
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
 
     lengths: tuple[str, ...] = ("a1", "d1", "a2", "a3", "d4", "d6")
     form: Literal["temperature", "time"] = "temperature"
@@ -80,7 +79,7 @@ class Thermal(Effect):
         return varies(states.time) and float(np.ptp(states.time)) > SOON
 
     @classmethod
-    def may_be_sought(cls, states: States) -> bool:
+    def may_be_searched(cls, states: States) -> bool:
         """Tell it of rows without times, too: their order tells what passes."""
         return cls.may_show(states) or not varies(states.time)
 

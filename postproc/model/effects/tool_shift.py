@@ -12,10 +12,10 @@ from postproc.model.effects.effect import (
     Candidate,
     Cells,
     Parameter,
-    Sought,
     alternatives,
     cells_in_time,
 )
+from postproc.model.effects.policies import SearchPolicy
 from postproc.model.effects.step import CampaignStep, moments
 from postproc.model.kinematics import ArmStates
 
@@ -32,7 +32,7 @@ class ToolShift(CampaignStep):
     """
 
     name: ClassVar[str] = "tool_shift"
-    sought: ClassVar[Sought | None] = "rival"
+    search_policy: ClassVar[SearchPolicy] = SearchPolicy.RIVAL
 
     turns: bool = False
 

@@ -16,11 +16,10 @@ from postproc.model.effects.effect import (
     Effect,
     Origin,
     Parameter,
-    Sought,
-    Unasked,
     alternatives,
     cells_in_time,
 )
+from postproc.model.effects.policies import FitPolicy, SearchPolicy
 from postproc.model.effects.step import moments
 from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
@@ -46,9 +45,9 @@ class TrackerDrift(Effect):
     """
 
     name: ClassVar[str] = "tracker_drift"
-    sought: ClassVar[Sought | None] = "always"
+    search_policy: ClassVar[SearchPolicy] = SearchPolicy.ALWAYS
     driven_by: ClassVar[str] = "time"
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
 
     start: float = 0.0
     duration: float = 1.0

@@ -17,10 +17,9 @@ from postproc.model.effects.effect import (
     Family,
     JointEffect,
     Parameter,
-    Sought,
-    Unasked,
     own_cells,
 )
+from postproc.model.effects.policies import FitPolicy, SearchPolicy
 from postproc.model.kinematics import ArmStates
 from postproc.robot.arm import Arm
 
@@ -44,8 +43,8 @@ class Transmission(JointEffect):
     """
 
     name: ClassVar[str] = "transmission"
-    sought: ClassVar[Sought | None] = "alone"
-    unasked: ClassVar[Unasked | None] = "weighed"
+    search_policy: ClassVar[SearchPolicy] = SearchPolicy.ALONE
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
 
     waves: tuple[tuple[int, float], ...] = tuple(
         (j, float(k)) for j in range(1, 7) for k in (1, 2)

@@ -16,10 +16,10 @@ from postproc.model.effects.effect import (
     Effect,
     JointEffect,
     Parameter,
-    Unasked,
     alternatives,
     own_cells,
 )
+from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
 
 SCALE = 3e-5  # [rad]
@@ -48,7 +48,7 @@ class Windup(JointEffect):
     name: ClassVar[str] = "windup"
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "travel"
-    unasked: ClassVar[Unasked | None] = "weighed"
+    fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
     variation_of: ClassVar[str | None] = "backlash"
 
     joints: tuple[int, ...] = JOINTS

@@ -23,10 +23,10 @@ from postproc.report.html.page import render
 
 SCRIPTS = ("page.js", "figures.js")
 VERDICTS = {
-    "effect": "The model lacks an effect, and it has a name.",
-    "noise": "What is left is noise: nothing is missing that these rows could show.",
-    "rejected": "New poses are worse off with what was found: no model is written.",
-    "unexplained": "What is left is not noise, and no effect with a name explains it.",
+    "effect": "The model lacks a named effect.",
+    "noise": "The remaining error is noise: these rows show no missing effect.",
+    "rejected": "The result is worse on new poses: no model is written.",
+    "unexplained": "The remaining error is not noise, and no named effect explains it.",
 }
 BANDS = 24  # of the running mean along a covariate
 FEWEST = 3  # rows in a band
@@ -34,7 +34,7 @@ MOST_CANDIDATES = 25
 
 
 def diagnosis_report(diagnosis: Mapping[str, Any]) -> str:
-    """Make the page of what ``diagnose --json`` wrote.
+    """Make the page of what ``diagnose --report`` wrote as JSON.
 
     Beyond the keys that every diagnosis has, the page shows, where they are given:
     ``evidence`` of an effect (``covariate``, ``unit``, ``direction``, and lists ``x``,

@@ -175,7 +175,7 @@ def test_a_base_that_moved_is_told_and_compensated(later: Later) -> None:
     assert found.diagnosis.verdict == "noise"
     anew = found.diagnosis.set_anew
     assert anew is not None and not anew.bent
-    assert "since the given model the base has moved" in tell(found.diagnosis)
+    assert "survey of the given model the base has moved" in tell(found.diagnosis)
     assert set(found.diagnosis.to_dict()["frame_shift"]) == {
         "base_mm", "turn_mrad", "tool_mm",
     }  # fmt: skip

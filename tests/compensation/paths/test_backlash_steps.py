@@ -51,7 +51,7 @@ def test_steps_within_the_scatter_say_nothing():
     track = read(ways, 1e-3)
     found = align(track, ways, STOPS)
     steps = measure_steps(ways, found.on_the_way, track.scatter)
-    assert all(j.verdict == "not sure" for j in in_motion(steps))
+    assert all(j.verdict == "uncertain" for j in in_motion(steps))
 
 
 def test_the_standard_error_is_that_of_repetition():
@@ -65,7 +65,7 @@ def test_the_standard_error_is_that_of_repetition():
 
 def test_what_a_measured_path_says_is_said_where_points_are_put():
     assert "unverified" in describe_verification({})
-    told = describe_verification({"1": "confirmed", "3": "confirmed", "2": "not sure"})
+    told = describe_verification({"1": "confirmed", "3": "confirmed", "2": "uncertain"})
     assert told.endswith("flanks of joint 1, 3, not those of 2")
     assert describe_verification({"1": "confirmed"}).endswith("joint 1")
 
@@ -79,11 +79,11 @@ def steps_of(share, later=0.0, error=0.1):
 @pytest.mark.parametrize(
     ("share", "later", "verdict"),
     [
-        ([0.1, 0.3, 0.55, 0.8], 0.0, "not sure"),  # few, and alike by chance
+        ([0.1, 0.3, 0.55, 0.8], 0.0, "uncertain"),  # few, and alike by chance
         ([0.35, 0.4, 0.45, 0.5] * 4, 0.0, "refuted"),
-        ([0.9, 1.1, 1.2], 0.0, "not sure"),
+        ([0.9, 1.1, 1.2], 0.0, "uncertain"),
         ([0.9, 1.1, 1.2] * 3, 0.0, "confirmed"),
-        ([0.9, 1.1, 1.2] * 3, [-0.02, 0.011, 0.03] * 3, "not sure"),
+        ([0.9, 1.1, 1.2] * 3, [-0.02, 0.011, 0.03] * 3, "uncertain"),
         ([0.9, 1.1, 1.2] * 3, [0.015, 0.016, 0.018] * 3, "elsewhere"),
     ],
 )

@@ -14,7 +14,7 @@ MOVES = (
 )
 
 
-WORDS = ("an end of it is taught", "it weaves, or may", "states what the arm carries")
+WORDS = ("one of its ends is taught", "it weaves, or may", "states the payload")
 
 
 @pytest.mark.parametrize(("line", "why"), [

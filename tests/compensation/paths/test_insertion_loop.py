@@ -29,7 +29,9 @@ from postproc.robot.trajectory import Motion
 from postproc.simulation import DEFAULT, virtual_arm
 from postproc.simulation.program import land
 from tests.compensation.paths.test_path_error import (
+    ARM,
     CELL,
+    DESIGN,
     LINES,
     SEED,
     START,
@@ -61,17 +63,17 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("points")
     (folder / "job.pdl").write_bytes(timed().encode())
     survey, measured = folder / "survey.pdl", folder / "survey.csv"
-    done("survey", "--cell", CELL, "--poses", 250, "--seed", 9, "-o", survey)
-    done("simulate", survey, "--cell", CELL, "--seed", SEED, "-o", measured)
+    done("survey", "--cell", CELL, *DESIGN, "-o", survey)
+    done("simulate", survey, "--cell", CELL, *ARM, "-o", measured)
     done("fit", measured, "--cell", CELL, "-o", folder / "model.json")
     known(folder, "confirmed")
     asked = ("--path-tolerance", TOLERANCE)
     for name, more in (("plain", ()), ("points", asked),
                        ("stops", (*asked, "--set", STOPS))):  # fmt: skip
         compensated(folder, "job.pdl", name, *more)
-        done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+        done("simulate", folder / f"{name}.pdl", "--cell", CELL, *ARM,
              "--reference", folder / "job.pdl", "--path",
-             "--json", folder / f"{name}.true.json")  # fmt: skip
+             "--report", folder / f"{name}.true.json")  # fmt: skip
     return folder
 
 
@@ -192,13 +194,13 @@ def test_flanks_that_a_measured_path_confirms_are_no_reason_for_doubt(
 def test_a_joint_that_is_not_sure_in_motion_matters_where_its_step_does(
     shop: Path, small_mm: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    known(shop, "not sure")
+    known(shop, "uncertain")
     monkeypatch.setattr(split_selection, "SMALL", small_mm * MM)
     monkeypatch.setattr(prune, "HARM", small_mm * MM)
     asked, name = ("--path-tolerance", TOLERANCE), f"small{small_mm}"
-    paths = lines_of(compensated(shop, "job.pdl", name, *asked, model="not sure"))
+    paths = lines_of(compensated(shop, "job.pdl", name, *asked, model="uncertain"))
     hindered = [
-        "which in motion is not sure" in (p["insertion_skipped"] or "") for p in paths
+        "which in motion is uncertain" in (p["insertion_skipped"] or "") for p in paths
     ]
     assert sum(hindered) == 0 if small_mm else sum(hindered) > 5
     assert (sum(path["inserted"] for path in paths) > 10) == (small_mm > 0)
@@ -257,7 +259,7 @@ def test_a_link_ahead_of_its_drive_at_stops_is_not_sure_in_motion(shop: Path) ->
         )
     )
     why = [p["insertion_skipped"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
-    assert sum("which in motion is not sure" in (text or "") for text in why) > 5
+    assert sum("which in motion is uncertain" in (text or "") for text in why) > 5
 
 
 def test_pieces_are_as_short_as_the_cell_says(shop: Path) -> None:
@@ -334,7 +336,7 @@ def test_elastic_flanks_are_so_whatever_a_measured_path_says(shop: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("width", "verdict"), [((2.0, 6.0), "elastic"), ((1.0, 4.0), "not sure")]
+    ("width", "verdict"), [((2.0, 6.0), "elastic"), ((1.0, 4.0), "uncertain")]
 )
 def test_moves_with_flanks_that_reversals_do_not_call_sharp_are_left(
     shop: Path, width: tuple[float, float], verdict: str
@@ -474,7 +476,7 @@ def test_diff_tells_points_apart(shop: Path) -> None:
 def test_a_budget_holds(shop: Path) -> None:
     report = compensated(shop, "job.pdl", "few", "--path-tolerance", TOLERANCE,
                          "--set", "compensation.max_inserted=2",
-                         "--html", shop / "few.html")  # fmt: skip
+                         "--report", shop / "few.html")  # fmt: skip
     assert (shop / "few.html").stat().st_size > 10_000
     assert sum(path["inserted"] for path in report["path"]) <= 2
     assert any("max_inserted" in d["message"] for d in report["diagnostics"])
@@ -518,9 +520,9 @@ def drilled(shop: Path) -> Path:
         ),
     ):
         compensated(shop, "holes.pdl", name, *more)
-        done("simulate", shop / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+        done("simulate", shop / f"{name}.pdl", "--cell", CELL, *ARM,
              "--reference", shop / "holes.pdl", "--path",
-             "--json", shop / f"{name}.true.json")  # fmt: skip
+             "--report", shop / f"{name}.true.json")  # fmt: skip
     return shop
 
 
@@ -701,7 +703,7 @@ def test_targets_are_approached_anew_only_where_no_path_is_worse(drilled: Path) 
     for path in report["path"]:
         most = max(usual[path["visit"]] + 0.05, TOLERANCE)
         assert path["max_mm"]["after"] <= most + 1e-6
-        if "approached anew" in (path["insertion_skipped"] or ""):
+        if "approached again" in (path["insertion_skipped"] or ""):
             assert path["inserted"]
 
 

@@ -81,7 +81,7 @@ OTHER = "DEF other( )\nsub( )\nEND\n"
 @pytest.mark.parametrize("called", ["sub", "other"])
 def test_a_routine_that_calls_itself_begins_with_what_holds_there(called):
     found = job(*FRAMES, "sub( )", more=AGAIN.format(THIRD, called, OTHER))
-    assert "which $TOOL and $BASE" in reasons(found)[0]
+    assert "$TOOL and $BASE are not known" in reasons(found)[0]
 
 
 @pytest.mark.parametrize("called", ["sub", "other"])
@@ -113,7 +113,7 @@ def test_an_error_may_skip_a_call_that_moves():
 def test_an_error_may_skip_a_call_that_sets_frames():
     more = f"DEF sets(a:IN)\nINT a\n{THIRD}\nEND\n"
     found = job(*FRAMES, "ON_ERROR_PROCEED", "sets(N)", "LIN XP1", more=more)
-    assert "which $TOOL and $BASE" in reasons(found)[0]
+    assert "$TOOL and $BASE are not known" in reasons(found)[0]
 
 
 # Moves that run beside what is followed.
@@ -262,7 +262,10 @@ def test_a_home_position_that_the_program_sets_is_not_known(line):
 
 @pytest.mark.parametrize("name", ["XHOME3", "$AXIS_HOME[2]"])
 def test_a_home_position_other_than_the_first_is_not_that_of_the_cell(name):
-    assert "declared in no file" in reasons(job(f"PTP {name}", "LIN XP1"))[0]
+    assert (
+        "declared in none of the given files"
+        in reasons(job(f"PTP {name}", "LIN XP1"))[0]
+    )
 
 
 def test_the_home_position_of_the_controller_may_be_set():

@@ -182,7 +182,7 @@ def test_the_cell_says_what_holds_at_first():
         (["LIN {X 1,Y 2,Z 3,A 0,B 0,C 0,S 22,T 2}"], "accuracy model"),
         (["PTP {X 1,Y 2,Z 3,A 0,B 0,C 0,S 99,T 2}"], "no such number"),
         (["CIRC XP1,XP2,CA XP1.X+$POS_ACT.X"], "CA"),
-        (["LIN XNOT"], "declared in no file"),
+        (["LIN XNOT"], "declared in none of the given files"),
         (["XP1.X=5", "LIN XP1"], "may be changed"),
         (["LIN XS[I]", "I=I+1"], "no value that is known"),
         (["other(XP1)", "LIN XP1"], "may be changed"),
@@ -595,7 +595,7 @@ def test_how_fast_a_spline_is_run_changes_nothing_of_it(line):
 
 def test_a_frame_that_nobody_knows_is_told_so():
     found = job("SLIN XP1", "grip( )", "SLIN XP2", f"SLIN XP1{NEW}")
-    assert "which $TOOL and $BASE hold here" in reasons(found)[1]
+    assert "$TOOL and $BASE are not known here" in reasons(found)[1]
     assert reasons(found)[2] == ""
 
 

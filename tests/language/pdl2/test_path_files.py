@@ -95,7 +95,7 @@ def test_the_rows_of_diff_name_the_nodes(made):
         line for line in found.output.splitlines() if "->" in line and "job.lsv" in line
     ]
     assert [name for row in rows for name in MOVED if name in row] == MOVED
-    left = found.output.partition("left as they were")[2]
+    left = found.output.partition("\nnot corrected:")[2]
     assert "seam.NODE[1].$MAIN_POS" in left
     assert "rec[2].p" in left
 

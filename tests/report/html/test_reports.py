@@ -202,8 +202,8 @@ def test_evidence_is_told_in_words_too() -> None:
     text = diagnosis_report(diagnosis())
     assert "transmission of joint 3<" in text
     assert "joint_map of joint 3" in text
-    assert "nothing is missing" in diagnosis_report(noise())
-    told = "3 readings of 1 fixed points: <the tracker did not move"
+    assert "no missing effect" in diagnosis_report(noise())
+    told = "3 readings of 1 monuments: <the tracker did not move"
     seen = {"monuments": [told], "undetectable": ["waves & more"]}
     page = diagnosis_report(noise() | seen)
     assert told.replace("<", "&lt;") in page and "waves &amp; more" in page

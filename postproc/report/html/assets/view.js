@@ -42,7 +42,7 @@ class View {
     return View.SCALES.reduce((best, s) => (off(s) < off(best) ? s : best), 1);
   }
 
-  // The rows that are drawn: all, or those left alone and every k-th of the others.
+  // The rows that are drawn: all, or uncorrected ones and every k-th of the others.
   thin(rows) {
     const placed = rows.filter((i) => Number.isFinite(this.columns.of("position_mm", i)[0]));
     if (placed.length <= this.most) return { rows: placed, of: placed.length };
@@ -180,7 +180,7 @@ class View {
 
   note(thin) {
     const some = thin.rows.length < thin.of
-      ? ` Showing ${thin.rows.length} of ${thin.of}: those left alone, and evenly the others; filter to see all of a part.` : "";
+      ? ` Showing ${thin.rows.length} of ${thin.of}: uncorrected targets and every k-th of the others; filter to see all of a part.` : "";
     document.getElementById("view-note").textContent =
       `Lines run from each target to where the tool would land uncorrected, drawn ${this.scale} times as long as they are.${some}`;
   }
