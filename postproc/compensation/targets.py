@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.arc_angles import ArcAngles, place_ends
+from postproc.compensation.arc_angles import ArcAngles, find_past_start, place_ends
 from postproc.compensation.arc_turns import ArcTurns, turn_between
 from postproc.compensation.eligibility import Reasons
 from postproc.diagnostics import Code, Reason
@@ -228,6 +228,7 @@ def _targets(
         block=visits.block,
         curved=visits.curved,
         along=along,
+        past_start=find_past_start(visits),
         pred_start=pred_start,
         pred=pred,
     )
