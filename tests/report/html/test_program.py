@@ -114,9 +114,7 @@ def test_left_alone_comes_first_and_in_words() -> None:
 def test_nothing_left_alone_is_said() -> None:
     outcome = outcome_of(3)
     assert not group_uncorrected(columns_of(outcome))
-    assert "Every target of the program was corrected" in program_report(
-        outcome
-    )
+    assert "Every target of the program was corrected" in program_report(outcome)
 
 
 def test_a_written_report_gives_the_same_columns() -> None:
