@@ -288,7 +288,7 @@ class Code(StrEnum):
         NOTE,
         "The backlash is not preloaded before moves: no measurement confirms how the "
         "joints change their flanks there.",
-        "Measure it: survey --reversals, or diagnose --path.",
+        "Measure it: survey.reversals, or diagnose --path.",
     )
     REAPPROACH_INSERTED = (
         "reapproach-inserted",

@@ -436,6 +436,11 @@ def find_data_list(program: Path) -> Path | None:
     return _beside(program, data_list_of(program.name))
 
 
+def find_source(data_list: Path) -> Path | None:
+    """Find the source of a data list: same base name, in any case."""
+    return _beside(data_list, data_list.stem + KRL_PROGRAMS[0])
+
+
 class FolderListing:
     """What folders hold; each is read once, so that many programs of one are cheap."""
 
@@ -661,6 +666,7 @@ SCHEMAS = {
     "history": 1,
     "report": 2,
     "simulation": 1,
+    "tree": 1,
 }
 
 

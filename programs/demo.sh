@@ -26,7 +26,7 @@ title "A survey program: 300 poses, each approached from both sides"
 run postproc survey --cell $cell --poses 300 -o demo/survey.pdl
 
 title "The (virtual) arm runs it, the tracker reads"
-run postproc simulate demo/survey.pdl --cell $cell --seed "$seed" -o demo/survey.csv
+run postproc simulate demo/survey.pdl --cell $cell --set simulation.seed="$seed" -o demo/survey.csv
 
 title "A model of the arm's error, fitted to the readings"
 run postproc fit demo/survey.csv --cell $cell -o demo/model.json
@@ -47,15 +47,15 @@ for job in $jobs; do
 done
 cp demo/spot.lsv demo/upload
 run postproc check demo/upload --cell $cell --model demo/model.json --allow-uncorrected \
-    --second-opinion
+    --set verify.second_opinion=true
 
 title "What the tool really misses by: programs as written, and compensated"
 for job in $jobs; do
     for state in written compensated; do
         program=programs/$job.pdl
         [ $state = written ] || program=demo/$job.pdl
-        run postproc simulate "$program" --cell $cell --seed "$seed" \
-            --reference programs/$job.pdl --path --json demo/$job.$state.json
+        run postproc simulate "$program" --cell $cell --set simulation.seed="$seed" \
+            --reference programs/$job.pdl --path --report demo/$job.$state.json
     done
 done
 

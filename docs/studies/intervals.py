@@ -73,7 +73,8 @@ LATER = """
 ## Other series and last quarters
 
 Here there is no promise: a set-up drifts, and an arm changes. The registration is found
-again from the rows where the series is another one (`--refit registration`). The *term
+again from the rows where the series is another one
+(`measurements.refit_registration`). The *term
 between campaigns* is the further standard deviation of every coordinate with which
 squared residuals are as large as stated, root(mean(r^2) - mean(s^2)); `predict` tells
 it under every file for which it is not 0.

@@ -82,7 +82,7 @@ def program(shape: str, share: float, cell: Cell) -> str:
 
 def study(seed: int, folder: Path) -> None:
     """Print the figures of one arm."""
-    arm = ("--seed", seed)
+    arm = ("--set", f"simulation.seed={seed}")
     place = paths.fit_a_survey(folder, *arm, reversals=paths.REVERSALS)
     cell, at = load_cell(place), ("--cell", place)
     job, ran = folder / "job.pdl", folder / "ran.pdl"
@@ -128,7 +128,7 @@ def scored(
     """Let the arm run a program; mean along the shape and AT_p, second time round."""
     told = to / "true.json"
     paths.done(
-        "simulate", run, *at, *arm, "--path", "--reference", source, "--json", told
+        "simulate", run, *at, *arm, "--path", "--reference", source, "--report", told
     )
     own = json.loads(told.read_bytes())["path"]
     second = own[len(own) // 2 + 1 :] if len(own) > 2 else own

@@ -22,14 +22,14 @@ EFFECTS = ("", "compliance", "transmission", "coupling", "load_backlash", "scale
 
 def study(seed: int, folder: Path) -> None:
     """Print the rows of one arm."""
-    arm = ("--seed", seed)
+    arm = ("--set", f"simulation.seed={seed}")
     place = paths.fit_a_survey(folder, *arm)
     job, ran = folder / "job.pdl", folder / "ran.pdl"
     job.write_text(paths.job(seed, load_cell(place)))
     paths.done("compensate", job, "--cell", place, "--model",
                folder / "model.json", "-o", ran)  # fmt: skip
     for effect in EFFECTS:
-        more = ("--effects", effect) if effect else ()
+        more = ("--set", f"simulation.effects={effect}") if effect else ()
         tell(seed, effect, paths.follow(ran, *arm, *more))
 
 

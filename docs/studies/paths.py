@@ -139,7 +139,16 @@ def fit_a_survey(folder: Path, *arm: object, reversals: int = 0) -> Path:
     place = folder / "cell.toml"
     place.write_text(CELL)
     at, survey = ("--cell", place), folder / "survey.pdl"
-    done("survey", *at, "--poses", 300, "--reversals", reversals, "-o", survey)
+    done(
+        "survey",
+        *at,
+        "--poses",
+        300,
+        "--set",
+        f"survey.reversals={reversals}",
+        "-o",
+        survey,
+    )
     done("simulate", survey, *at, *arm, "-o", folder / "survey.csv")
     done("fit", folder / "survey.csv", *at, "-o", folder / "model.json")
     return place
@@ -151,7 +160,7 @@ def follow(ran: Path, *arm: object) -> dict[str, Any]:
     at, track = ("--cell", folder / "cell.toml"), folder / "track.csv"
     done("simulate", ran, *at, *arm, "--track", track)
     done("diagnose", "--path", track, "--program", ran, *at, "--model",
-         folder / "model.json", "-o", folder / "better.json", "--json",
+         folder / "model.json", "-o", folder / "better.json", "--report",
          folder / "told.json")  # fmt: skip
     told: dict[str, Any] = json.loads((folder / "told.json").read_bytes())
     return told
@@ -159,7 +168,8 @@ def follow(ran: Path, *arm: object) -> dict[str, Any]:
 
 def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
     """Print the figures of one arm."""
-    arm = ("--seed", seed, "--backlash-model", gears)
+    kind = f"simulation.backlash_model={gears}"
+    arm = ("--set", f"simulation.seed={seed}", "--set", kind)
     place = fit_a_survey(folder, *arm, reversals=REVERSALS)
     (folder / "job.pdl").write_text(job(seed, load_cell(place)))
     at = ("--cell", place)

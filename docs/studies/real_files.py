@@ -103,7 +103,7 @@ def predict_of(data: DataSet, split: Split, place: Path) -> tuple[str, ...]:
     In another set-up the registration is found from the tested rows themselves.
     """
     frame = ("--set", f"measurements.frame={data.about.frame}")
-    how = frame if split.same else ("--refit", "registration")
+    how = frame if split.same else ("--set", "measurements.refit_registration=true")
     given = ("--cell", f"{place}/cell.toml", "--model", f"{place}/model.json")
     out = ("-o", f"{place}/predicted.csv")
     return ("predict", f"{place}/test.csv", *given, *how, *out)

@@ -28,9 +28,17 @@ def verdicts(folder: Path, seed: int, gears: str, count: int) -> tuple[str, ...]
     place, program, rows = (folder / n for n in ("cell.toml", "s.pdl", "s.csv"))
     place.write_text(paths.CELL)
     at = ("--cell", place)
-    paths.done("survey", *at, "--reversals", count, "-o", program)
+    paths.done("survey", *at, "--set", f"survey.reversals={count}", "-o", program)
     paths.done(
-        "simulate", program, *at, "--seed", seed, "--backlash-model", gears, "-o", rows
+        "simulate",
+        program,
+        *at,
+        "--set",
+        f"simulation.seed={seed}",
+        "--set",
+        f"simulation.backlash_model={gears}",
+        "-o",
+        rows,
     )
     cell = load_cell(place)
     return verdicts_of_flanks(

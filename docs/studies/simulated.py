@@ -167,7 +167,7 @@ def designs(seeds: int, poses: tuple[int, ...] = (30, 80)) -> list[str]:
     lines = [
         "Held-out true error in mm, and its ratio to that of the Latin hypercube.",
         "",
-        "| poses | Latin hypercube | D-optimal | I-optimal (`--mode optimal`) |",
+        "| poses | Latin hypercube | D-optimal | I-optimal (`survey.mode=optimal`) |",
         "|---|---|---|---|",
     ]
     for count in poses:

@@ -25,9 +25,9 @@ PICTURE = ROOT / "docs/pictures/report.png"
 SIZE = {"width": 1280, "height": 860, "deviceScaleFactor": 1, "mobile": False}
 COMMANDS = """
 survey --poses 200 -o survey.pdl
-simulate survey.pdl --seed 1 -o survey.csv
+simulate survey.pdl -o survey.csv
 fit survey.csv -o model.json
-compensate drilling.pdl --model model.json -o out.pdl --html drilling.html
+compensate drilling.pdl --model model.json -o out.pdl --report drilling.html
 """
 ROW = 5  # of the table: its source line and joints are shown beside the view
 

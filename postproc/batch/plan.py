@@ -17,6 +17,7 @@ from postproc.exceptions import CellError, PostprocError
 from postproc.model.model import Model, load_model
 from postproc.robot.arm_file import Strict, read_toml
 from postproc.robot.cell import (
+    DESIGN,
     MOTIONLESS,
     ArmNumber,
     Cell,
@@ -54,7 +55,9 @@ class JobSetup:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-NOT_DECIDING = ("verify", "compensation", "measurements", "serial_number")
+NOT_DECIDING = DESIGN | {
+    "verify", "compensation", "measurements", "serial_number", "simulation",
+}  # fmt: skip
 FIRST_WORDS = {
     **{new: old for section in (LimitSection, FrameSection)
        for old, new in section.RENAMED.items()},

@@ -306,7 +306,7 @@ def where_to_reverse(
     """
     if MORE * count > len(design.q):
         raise PostprocError(
-            f"--reversals {count} need {MORE * count} poses, and there are "
+            f"survey.reversals: {count} need {MORE * count} poses, and there are "
             f"{len(design.q)}. Ask for more --poses"
         )
     tools = np.atleast_2d(probes)[design.probe]

@@ -185,8 +185,8 @@ def predict(
         model: The model, or its file.
         frame: Frame of the positions, where the readings of the set-up are to be
             predicted, too; default: as the cell says.
-        refit: "registration": find the set-up from these rows.
-        after: Take what passes with time as at the survey's end.
+        refit: "registration": find the set-up from these rows, as the cell may say.
+        after: Take what passes with time as at the survey's end, likewise.
         name: File name of states that are given as bytes.
         reading: What the user knows of the file.
 
@@ -201,7 +201,9 @@ def predict(
     measured = table.has(*POSITION)
     if frame is None and measured and cell.measurements.frame is not None:
         frame = survey_frame(cell, None)
-    asked = Readings(frame, refit, after)
+    if cell.measurements.refit_registration:
+        refit = refit or "registration"
+    asked = Readings(frame, refit, after or cell.measurements.after_survey)
     if not asked.is_asked:
         rows, read, placed = rows_of(table, cell, positions=False), None, ""
         if measured:

@@ -33,7 +33,7 @@ from postproc.robot.state import States
 LATER = 1e9  # [s], or rows: a moment after any survey
 MOVED = 0.01  # [m] rows that are further off were read from another station
 STOPS = 6  # from which rows tell where their tracker stood
-CURE = "Find it from these rows: --refit registration"
+CURE = "Find it from these rows: --set measurements.refit_registration=true"
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Readings:
 
     def __post_init__(self) -> None:
         if self.refit not in (None, "registration"):
-            raise PostprocError(f"--refit {self.refit!r}: write registration")
+            raise PostprocError(f"refit {self.refit!r}: write registration")
 
     @property
     def is_asked(self) -> bool:
@@ -252,8 +252,8 @@ def clock_missing(
     return (
         f"\nno {' and no '.join(clocks)} in the file: "
         f"{', '.join(e.name for e in changed)} at the mean over the survey, +- "
-        f"{spread:.4f} mm per axis. The column gives the moment, --after takes the end "
-        "of the survey"
+        f"{spread:.4f} mm per axis. The column gives the moment, after_survey of "
+        "[measurements] the end of the survey"
     )
 
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.calibration.pose_design import design_survey, where_to_reverse
-from postproc.exceptions import PostprocError
 from postproc.files import write_all
-from postproc.robot.cell import Cell, load_cell
+from postproc.robot.cell import Cell, SurveySection, as_cell
 from postproc.robot.pose import MM
 
 BACK = np.deg2rad(2.0)  # how far to the side every approach starts [rad]
@@ -90,55 +89,31 @@ def _joints(q: Floats) -> str:
     return "{" + ", ".join(f"{v:.5f}" for v in np.rad2deg(q)) + "}"
 
 
-def write_survey(
-    cell_path: Path,
-    output: Path,
-    poses: int,
-    mode: str = "lhs",
-    tracker: str | None = None,
-    seed: int = 0,
-    reversals: int = 0,
-) -> str:
-    """Design a survey and write it as a program.
+def write_survey(cell: Cell | str | Path, output: Path, poses: int) -> str:
+    """Design a survey as [survey] of the cell says, and write it as a program.
 
     Args:
-        cell_path: The cell.
+        cell: The cell, or its file.
         output: The program to write.
         poses: Number of poses.
-        mode: How they are chosen, see `design_survey`.
-        tracker: Where it stands, x,y,z [mm]; the cell says so else.
-        seed: Of the random draws.
-        reversals: How many times every drive turns back step by step.
 
     Returns:
         What was written, with the observability of the design, in words.
 
     Raises:
-        PostprocError: A wrong mode, tracker position or number of poses.
+        PostprocError: A wrong number of poses.
         OutputError: The program cannot be written.
     """
-    cell = load_cell(cell_path)
-    stand = cell.tracker if tracker is None else _position(tracker)
-    design = design_survey(cell.arm, cell.probes, poses, mode, stand, seed)
+    cell = as_cell(cell)
+    asked = cell.file.survey or SurveySection()
+    arm, probes = cell.arm, cell.probes
+    design = design_survey(arm, probes, poses, asked.mode, cell.tracker, asked.seed)
     name = "".join(c if c.isalnum() else "_" for c in output.stem) or "survey"
     turned = (
-        where_to_reverse(cell.arm, design, cell.probes, reversals) if reversals else []
+        where_to_reverse(arm, design, probes, asked.reversals)
+        if asked.reversals
+        else []
     )
     text = survey_program(cell, design.q, design.side, design.probe, name, turned)
     write_all({output: text.encode("ascii")})
     return f"{output}: {design.summary()}"
-
-
-def _position(text: str) -> Floats:
-    """Read x,y,z [mm] as a position [m].
-
-    Raises:
-        PostprocError: It is not three numbers.
-    """
-    try:
-        x, y, z = (float(v) for v in text.split(","))
-    except ValueError:
-        raise PostprocError(
-            f"--tracker {text}: not a position. Write x,y,z in mm"
-        ) from None
-    return np.array([x, y, z]) * MM

@@ -27,16 +27,32 @@ KEYS = {
     "--decimal": "measurements.decimal=SIGN",
     "--encoding": "measurements.encoding=NAME",
     "--unit": "measurements.unit=UNIT",
+    "--temperature": "environment.temperature_c=C",
+    "--seed": "simulation.seed=N",
+    "survey --seed": "survey.seed=N",
+    "--mode": "survey.mode=MODE",
+    "--reversals": "survey.reversals=N",
+    "--tracker": "tracker.xyz_mm=[X,Y,Z]",
+    "--effects": "simulation.effects=EFFECTS",
+    "--backlash-model": "simulation.backlash_model=MODEL",
+    "--gears": "simulation.backlash_model=MODEL",
+    "--rate": "simulation.track_rate_hz=HZ",
+    "--refit": "measurements.refit_registration=true",
+    "--after": "measurements.after_survey=true",
+    "--second-opinion": "verify.second_opinion=true",
+    "--no-second-opinion": "verify.second_opinion=false",
 }
 OLD_OPTIONS = {
     **{old: f"--set {key}" for old, key in KEYS.items()},
+    "--json": "--report FILE.json",
+    "--html": "--report FILE.html",
+    "--plot": "--report FILE.svg",
     "--clone": "--shared-points clone",
     "--path-mm": "--path-tolerance",
     "--accept-left": "--allow-uncorrected",
     "--wanted": "--reference",
     "--lsv": "--variables",
     "--lsv-out": "--variables-out",
-    "--gears": "--backlash-model",
     "--blocks": "--cv-blocks",
 }
 
@@ -49,8 +65,9 @@ class Command(TyperCommand):
         known = {word for param in self.params for word in param.opts}
         for arg in args:
             word = arg.partition("=")[0]
-            if word in OLD_OPTIONS and word not in known:
-                ctx.fail(f"{word} is called {OLD_OPTIONS[word]}")
+            new = OLD_OPTIONS.get(f"{ctx.info_name} {word}", OLD_OPTIONS.get(word))
+            if new is not None and word not in known:
+                ctx.fail(f"{word} is called {new}")
         return super().parse_args(ctx, args)
 
 

@@ -33,17 +33,9 @@ app = typer.Typer(
 
 CellOption = Annotated[Path, typer.Option("--cell", help="Cell file (TOML).")]
 ModelOption = Annotated[Path, typer.Option("--model", help="Model file (JSON).")]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of every random draw.")]
 
-
-JsonOption = Annotated[
-    str | None, typer.Option("--json", help="Write JSON to a file, - for stdout.")
-]
 VariablesOption = Annotated[
     Path | None, typer.Option("--variables", help="Variable file, default PROGRAM.lsv.")
-]
-HtmlOption = Annotated[
-    Path | None, typer.Option("--html", help="Write a report (HTML) here.")
 ]
 
 
@@ -66,20 +58,12 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="SECTION.KEY=VALUE",
-        help="Set a key of [compensation] or [measurements] for this run.",
+        help="Set a key of the cell for this run, such as measurements.unit=m.",
     ),
 ]
 OrientationOption = Annotated[
     bool,
     typer.Option("--orientation", help="Correct orientations too, not only places."),
-]
-SecondOpinionOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--second-opinion/--no-second-opinion",
-        help="Let Pinocchio, toppra and ruckig judge it too.",
-        show_default=False,
-    ),
 ]
 EveryOption = Annotated[
     bool, typer.Option("--all", help="A line for every finding, also for equal ones.")
@@ -97,9 +81,6 @@ PathToleranceOption = Annotated[
         metavar="MM",
         help="Insert points into moves whose predicted path error is larger.",
     ),
-]
-TemperatureOption = Annotated[
-    float | None, typer.Option("--temperature", help="Arm temperature [deg C].")
 ]
 
 
@@ -249,14 +230,14 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "compensate": (
         "postproc compensate job.pdl --cell cell.toml --model model.json",
         "postproc compensate job.pdl --cell cell.toml --model model.json"
-        " -o out/job.pdl --html job.html",
+        " -o out/job.pdl --report job.html",
         "cat job.pdl | postproc compensate - --cell cell.toml --model model.json > out",
         "cat job.pdl | postproc compensate - --variables job.lsv"
         " --variables-out new.lsv --cell cell.toml --model model.json > new.pdl",
     ),
     "diff": (
         "postproc diff job.pdl out/job.pdl | less -S",
-        "postproc diff job.pdl out/job.pdl --json -",
+        "postproc diff job.pdl out/job.pdl --report -",
     ),
     "restore": (
         "postproc restore out/job.pdl",
@@ -273,7 +254,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc simulate out/job.pdl --cell cell.toml --track track.csv",
     ),
     "fit": (
-        "postproc fit measured.csv --cell cell.toml -o model.json --html model.html",
+        "postproc fit measured.csv --cell cell.toml -o model.json --report model.html",
         "postproc fit measured.csv --cell cell.toml -o model.json"
         " --set measurements.frame=tracker",
     ),
@@ -281,12 +262,12 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc predict states.csv --cell cell.toml --model model.json -o errors.csv",
     ),
     "compare": (
-        "postproc compare measured.csv --cell cell.toml --html methods.html",
-        "postproc compare measured.csv --cell cell.toml --plot methods.svg",
+        "postproc compare measured.csv --cell cell.toml --report methods.html",
+        "postproc compare measured.csv --cell cell.toml --report methods.svg",
     ),
     "diagnose": (
         "postproc diagnose fresh.csv --cell cell.toml --model model.json"
-        " -o better.json --html diagnosis.html",
+        " -o better.json --report diagnosis.html",
         "postproc diagnose points.csv --program job.pdl --cell cell.toml"
         " --model model.json",
         "postproc diagnose --path track.csv --program job.pdl --cell cell.toml"

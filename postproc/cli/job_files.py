@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from postproc.cli.common import write_stdout
+from postproc.cli.reports import NO_REPORTS, Reports
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.pages import OUTPUT
 from postproc.compensation.program_files import ProgramFiles
@@ -39,8 +40,7 @@ class Destination:
         self,
         outcome: Outcome,
         output: Path | None = None,
-        report: Path | None = None,
-        html: Path | None = None,
+        reports: Reports = NO_REPORTS,
         values: Path | None = None,
     ) -> list[Path]:
         """Write the program, its variable file, the record and the reports.
@@ -52,8 +52,7 @@ class Destination:
         Args:
             outcome: What came of the program.
             output: Where the program goes.
-            report: Where the report goes, None for nowhere.
-            html: Where the report for a browser goes.
+            reports: Where the reports go; the one for standard output is not written.
             values: Where the variable file goes, changed or not; default: beside the
                 program, if it has changed.
 
@@ -65,20 +64,22 @@ class Destination:
                 program has no place to go to.
         """
         inputs = (*self.given.inputs, *self.inputs)
-        check_places([output, report, html, values], inputs)
-        files: dict[Path, Content] = {}
-        if report is not None and report != Path(STREAM):
-            files[report] = report_pieces(outcome)
-        if html is not None:
+        check_places([output, *reports.files, values], inputs)
+        files: dict[Path, Content] = {
+            place: report_pieces(outcome)
+            for place in reports.json
+            if place != Path(STREAM)
+        }
+        for place in reports.pages:
             from postproc.report.html import program_report
 
-            files[html] = program_report(outcome).encode()
+            files[place] = program_report(outcome).encode()
         own = self.given.path
-        place = output or (None if own is None else default_output(own))
-        files |= self._results(outcome, place, values)
+        target = output or (None if own is None else default_output(own))
+        files |= self._results(outcome, target, values)
         check_places(files, inputs)
         write_all(files)
-        if place is None:
+        if target is None:
             write_stdout(outcome.outputs[self.given.name])
         return list(files)
 

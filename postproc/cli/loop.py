@@ -9,17 +9,14 @@ import typer
 
 from postproc.cli.common import (
     CellOption,
-    HtmlOption,
-    JsonOption,
     ModelOption,
     SetOption,
     app,
-    as_path,
     changes_of,
     report_errors,
     say,
-    write_text,
 )
+from postproc.cli.reports import PAGE, PLOTS, PlotOption, ReportOption, Reports
 from postproc.exceptions import PostprocError
 from postproc.files import check_places, schema
 
@@ -39,11 +36,7 @@ def diagnose(
         Path | None,
         typer.Option("-o", "--output", help="Default: MODEL.extended.json beside it."),
     ] = None,
-    json: JsonOption = None,
-    html: HtmlOption = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", help="Plots (.png or .svg), by this name.")
-    ] = None,
+    report: PlotOption = None,
     program: Annotated[
         Path | None,
         typer.Option("--program", help="The program whose points were measured."),
@@ -64,7 +57,8 @@ def diagnose(
     with report_errors():
         files = data or []
         inputs = [*files, cell, model, program, path]
-        check_places([output, as_path(json), html, plot], inputs)
+        reports = Reports.of(report, PAGE, *PLOTS)
+        check_places([output, *reports.files], inputs)
         how = {"program": program}
         loaded = load_cell(cell, changes=changes_of(changes))
         with stage_bar() as progress:
@@ -73,21 +67,18 @@ def diagnose(
             )
             if not found.rejected:
                 found.save(output or path_of_extension(model))
-        if json:
-            told = evidence_of(found)
-            if on_the_way is not None:
-                told |= {"path": on_the_way.to_dict()}
-            write_text(json, dump_json(schema("diagnosis") | told))
-        if html is not None:
+        told = evidence_of(found)
+        measured = {} if on_the_way is None else {"path": on_the_way.to_dict()}
+        reports.write_json(lambda: dump_json(schema("diagnosis") | told | measured))
+        if reports.pages:
             from postproc.report.html import diagnosis_report
 
-            write_text(str(html), diagnosis_report(evidence_of(found)))
-        if plot is not None:
+            reports.write_pages(lambda: diagnosis_report(told))
+        if reports.plots:
             from postproc.report.plots import plot_diagnosis
 
-            for path in plot_diagnosis(found, plot):
-                say(f"plot {path}")
-        if json != "-":
+            reports.write_plots(lambda path: plot_diagnosis(found, path))
+        if not reports.on_stdout:
             if on_the_way is not None:
                 typer.echo(tell_path(on_the_way))
             typer.echo(tell(found.diagnosis))
@@ -116,15 +107,15 @@ def path_of_extension(model_path: Path) -> Path:
 
 
 @app.command()
-def history(model: Path, json: JsonOption = None) -> None:
+def history(model: Path, report: ReportOption = None) -> None:
     """Print what was added to a model and its parents, with before and after."""
     from postproc.report.diagnosis import history_json, history_text
 
     with report_errors():
-        check_places([as_path(json)], [model])
-        if json:
-            write_text(json, history_json(model))
-        if json != "-":
+        reports = Reports.of(report)
+        check_places(reports.files, [model])
+        reports.write_json(lambda: history_json(model))
+        if not reports.on_stdout:
             typer.echo(history_text(model))
 
 

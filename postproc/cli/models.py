@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -11,13 +10,9 @@ import typer
 
 from postproc.cli.common import (
     CellOption,
-    HtmlOption,
-    JsonOption,
     ModelOption,
-    SeedOption,
     SetOption,
     app,
-    as_path,
     busy,
     changes_of,
     report_errors,
@@ -25,6 +20,14 @@ from postproc.cli.common import (
     split_names,
     stages,
     write_text,
+)
+from postproc.cli.reports import (
+    PAGE,
+    PLOTS,
+    PageOption,
+    PlotOption,
+    ReportOption,
+    Reports,
 )
 from postproc.files import check_places
 
@@ -40,43 +43,22 @@ class Method(StrEnum):
     KRIGING = "kriging"
 
 
-class VirtualGears(StrEnum):
-    """What the gears of the virtual arm do in their gaps."""
-
-    SHARP = "sharp"
-    ELASTIC = "elastic"
-    GRAVITY = "gravity"
-    INERTIA = "inertia"
-
-
 @app.command()
 def survey(
     cell: CellOption,
     output: Annotated[Path, typer.Option("-o", "--output", help="SURVEY.pdl")],
     poses: Annotated[int, typer.Option("--poses", help="Number of poses.")] = 300,
-    mode: Annotated[
-        str, typer.Option("--mode", help="lhs, optimal (of predictions) or d-optimal.")
-    ] = "lhs",
-    tracker: Annotated[
-        str | None, typer.Option("--tracker", help="x,y,z [mm] in the base frame.")
-    ] = None,
-    seed: SeedOption = 0,
-    reversals: Annotated[
-        int,
-        typer.Option(
-            "--reversals",
-            min=0,
-            help="How often every joint turns back in small steps, too.",
-        ),
-    ] = 0,
+    changes: SetOption = None,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
     from postproc.calibration.survey_program import write_survey
+    from postproc.robot.cell import load_cell
 
     with report_errors():
         check_places([output], [cell])
+        loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
-            told = write_survey(cell, output, poses, mode, tracker, seed, reversals)
+            told = write_survey(loaded, output, poses)
         say(told)
 
 
@@ -86,14 +68,6 @@ def simulate(
     cell: CellOption,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="MEASURED.csv")
-    ] = None,
-    seed: SeedOption = 1,
-    effects: Annotated[
-        str | None,
-        typer.Option(
-            "--effects",
-            help="Further effects, comma separated; any motion of a part by its text.",
-        ),
     ] = None,
     reference: Annotated[
         Path | None,
@@ -106,40 +80,29 @@ def simulate(
         Path | None,
         typer.Option("--track", help="TRACK.csv: readings while the arm moves."),
     ] = None,
-    rate: Annotated[
-        float, typer.Option("--rate", min=1.0, max=1000.0, help="Of the track [Hz].")
-    ] = 100.0,
-    gears: Annotated[
-        VirtualGears,
-        typer.Option("--backlash-model", help="What gears do in gaps."),
-    ] = VirtualGears.SHARP,
     changes: SetOption = None,
-    json: JsonOption = None,
+    report: ReportOption = None,
 ) -> None:
     """Let the virtual arm run a program or a survey, and measure it."""
     from postproc.cli.simulate import simulate_file
     from postproc.robot.cell import load_cell
 
     with report_errors():
-        check_places([output, track, as_path(json)], [program, cell, reference])
+        reports = Reports.of(report)
+        check_places([output, track, *reports.files], [program, cell, reference])
+        loaded = load_cell(cell, changes=changes_of(changes))
+        arm = loaded.file.simulation
         with busy("run on the virtual arm"):
-            often = rate if track is not None else 0.0
+            often = arm.track_rate_hz if track is not None else 0.0
             found = simulate_file(
-                program,
-                load_cell(cell, changes=changes_of(changes)),
-                seed,
-                effects,
-                reference,
-                path,
-                often,
-                gears.value,
-            )
+                program, loaded, arm.seed, arm.effects, reference, path, often,
+                arm.backlash_model,
+            )  # fmt: skip
         if output is not None:
             found.write(output)
         if track is not None and found.track is not None:
             found.track.write(track)
-        if json:
-            write_text(json, found.to_json())
+        reports.write_json(found.to_json)
         say(found.summary())
 
 
@@ -158,20 +121,20 @@ def fit(
         typer.Option("--program", help="The survey program, for id, x, y, z files."),
     ] = None,
     changes: SetOption = None,
-    json: JsonOption = None,
-    html: HtmlOption = None,
+    report: PageOption = None,
     everything: Annotated[
         bool, typer.Option("--all", help="List all parameters and rows.")
     ] = False,
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
     from postproc.calibration import fit as calibration
-    from postproc.report.fit import fit_json, tell_fit_files, write_page
+    from postproc.report.fit import fit_json, fit_page, tell_fit_files
     from postproc.robot.cell import load_cell
 
     names = None if effects is None else split_names(effects)
     with report_errors():
-        check_places([output, html, as_path(json)], [*data, cell, program])
+        reports = Reports.of(report, PAGE)
+        check_places([output, *reports.files], [*data, cell, program])
         loaded = load_cell(cell, changes=changes_of(changes))
         with stages(log=True) as progress:
             found = calibration.fit(
@@ -184,11 +147,9 @@ def fit(
             )
             if not found.rejected:
                 found.save(output)
-                if html is not None:
-                    write_page(html, found)
-        if json:
-            write_text(json, fit_json(found))
-        if json != "-":
+                reports.write_pages(lambda: fit_page(found))
+        reports.write_json(lambda: fit_json(found))
+        if not reports.on_stdout:
             typer.echo(tell_fit_files(found, output, everything))
         if found.rejected:
             raise typer.Exit(2)
@@ -200,14 +161,6 @@ def predict(
     cell: CellOption,
     model: ModelOption,
     output: Annotated[Path | None, typer.Option("-o", "--output")] = None,
-    refit: Annotated[
-        str | None,
-        typer.Option("--refit", help="registration: find the set-up from these rows."),
-    ] = None,
-    after: Annotated[
-        bool,
-        typer.Option("--after", help="Take drifts as they were at the survey's end."),
-    ] = False,
     changes: SetOption = None,
 ) -> None:
     """Add the predicted error of every row; with positions, also the residual."""
@@ -218,7 +171,7 @@ def predict(
         check_places([output], [states, cell, model])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("predict"):
-            found = prediction.predict(states, loaded, model, refit=refit, after=after)
+            found = prediction.predict(states, loaded, model)
         write_text("-" if output is None else str(output), found.to_csv())
         say(found.summary())
 
@@ -227,11 +180,7 @@ def predict(
 def compare(
     data: Annotated[list[Path], typer.Argument(help="Measurement files (CSV).")],
     cell: CellOption,
-    json: JsonOption = None,
-    html: HtmlOption = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", help="Plot (.png or .svg).")
-    ] = None,
+    report: PlotOption = None,
     test: Annotated[
         list[Path] | None,
         typer.Option("--test", help="Files to test on; default: a third of the rows."),
@@ -243,25 +192,22 @@ def compare(
 ) -> None:
     """Fit every method to the same rows, and test it on the same others."""
     from postproc.calibration.comparison import Held, compare_files
-    from postproc.report.fit import comparison_json, tell_comparison
+    from postproc.report.fit import comparison_json, comparison_page, tell_comparison
     from postproc.robot.cell import load_cell
 
     with report_errors():
         others = test or []
-        check_places([as_path(json), html, plot], [*data, *others, cell])
+        reports = Reports.of(report, PAGE, *PLOTS)
+        check_places(reports.files, [*data, *others, cell])
         loaded = load_cell(cell, changes=changes_of(changes))
         held = Held(others, blocks)
         with busy("fit every method"):
             found = compare_files(data, loaded, None, held)
-        if json:
-            write_text(json, comparison_json(found))
-        if html is not None:
-            from postproc.report.html import comparison_report
-
-            write_text(str(html), comparison_report(asdict(found)))
-        if plot is not None:
+        reports.write_json(lambda: comparison_json(found))
+        reports.write_pages(lambda: comparison_page(found))
+        if reports.plots:
             from postproc.report.plots import plot_comparison
 
-            say(f"plot {plot_comparison(found, plot)}")
-        if json != "-":
+            reports.write_plots(lambda path: [plot_comparison(found, path)])
+        if not reports.on_stdout:
             typer.echo(tell_comparison(found))

@@ -11,20 +11,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.common import (
-    HtmlOption,
-    JsonOption,
     OrientationOption,
     PathToleranceOption,
-    SecondOpinionOption,
     SetOption,
     SharedPointsOption,
-    TemperatureOption,
     app,
     changes_of,
     report_errors,
     say,
-    write_text,
 )
+from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.files import check_places, is_program
 
@@ -68,12 +64,11 @@ def batch(
     log: Annotated[
         Path | None, typer.Option("--log", help="Log; default: DST.batch.jsonl.")
     ] = None,
-    html: HtmlOption = None,
+    report: PageOption = None,
     orientation: OrientationOption = False,
     shared_points: SharedPointsOption = None,
     path_tolerance: PathToleranceOption = None,
     changes: SetOption = None,
-    temperature: TemperatureOption = None,
 ) -> None:
     """Compensate a tree of programs; what could not be compensated is not in DST."""
     with report_errors():
@@ -83,12 +78,12 @@ def batch(
             start_server()
         from postproc.batch import run
         from postproc.batch.plan import make_plan
-        from postproc.compensation.options import Options
         from postproc.report.terminal import progress_bar
 
         asked = changes_of(changes, orientation, shared_points, path_tolerance)
-        made = make_plan(plan, cell, model, Options(temperature=temperature), asked)
-        check_places([html], [cell, model, plan])
+        made = make_plan(plan, cell, model, DEFAULT_OPTIONS, asked)
+        reports = Reports.of(report, PAGE)
+        check_places(reports.files, [cell, model, plan])
         for line in _archive_lines(source, made):
             say(line)
         order = run.BatchOptions(
@@ -96,10 +91,9 @@ def batch(
         )
         with progress_bar(f"{source} -> {target}") as told:
             summary = run.batch(order, _workers(jobs, scheduler, tls), told)
-        _print_summary(summary)
+        _print_summary(summary, table=not reports.on_stdout)
         say(f"log: {order.log}")
-        if html is not None:
-            _write_page(html, f"{source} -> {target}", order.log)
+        _write_reports(reports, f"{source} -> {target}", order.log)
         if summary.stopped:
             say("stopped; nothing is half written. Go on: same command with --resume")
     raise typer.Exit(summary.exit_code)
@@ -131,26 +125,30 @@ def _workers(jobs: int, scheduler: str | None, tls: Path | None) -> Gather:
     return lambda plan: ClusterPool(plan.setups, scheduler, tls)
 
 
-def _print_summary(summary: Summary) -> None:
+def _print_summary(summary: Summary, table: bool) -> None:
     """Print the table, and what a person must look at."""
     from postproc.batch.journal import TITLES
     from postproc.report.terminal import Column, print_table
 
     columns = [Column(t, "left" if t == TITLES[0] else "right") for t in TITLES]
-    print_table(columns, summary.rows())
+    if table:
+        print_table(columns, summary.rows())
     for line in summary.lists():
         say(line)
 
 
-def _write_page(html: Path, title: str, log: Path) -> None:
-    """Write the page of a batch from its log, which holds what earlier runs did too."""
+def _write_reports(reports: Reports, title: str, log: Path) -> None:
+    """Write reports of a batch from its log, which holds what earlier runs did too."""
     from postproc.batch.journal import read_entries
     from postproc.report.html import batch_report
+    from postproc.report.json import tree_json
 
-    entries = read_entries(log).values()
-    found = ((entry.place, entry.status, entry.facts) for entry in entries)
-    write_text(str(html), batch_report(title, found))
-    say(f"written {html}")
+    entries = read_entries(log).values() if reports.files else ()
+    found = [(entry.place, entry.status, entry.facts) for entry in entries]
+    reports.write_json(lambda: tree_json(found))
+    reports.write_pages(lambda: batch_report(title, found))
+    for place in reports.pages:
+        say(f"written {place}")
 
 
 @app.command()
@@ -168,9 +166,8 @@ def check(
         typer.Option("--allow-uncorrected", help="Let uncorrected targets pass."),
     ] = False,
     changes: SetOption = None,
-    json: JsonOption = None,
+    report: ReportOption = None,
     cell: CellFile = None,
-    second_opinion: SecondOpinionOption = None,
 ) -> None:
     """Tell whether a tree may be uploaded: exit 0 yes, 1 no, 2 trouble.
 
@@ -179,26 +176,27 @@ def check(
     installed, and cells and models given, these and ruckig judge it too.
     """
     from postproc.batch.check import check as look
+    from postproc.robot.cell import verify_section
 
     with report_errors():
-        asked = changes_of(changes)
+        reports = Reports.of(report)
+        verify, asked = verify_section(changes_of(changes))
+        insists = verify.second_opinion if verify.model_fields_set else None
         found = look(
             folder, model=model, plan=plan, source=source, cell=cell, changes=asked
         )
         if allow_uncorrected:
             found = found.allow_uncorrected()
-        judged = _second_opinion(folder, (cell, model, plan), second_opinion, asked)
-        if json:
-            write_text(
-                json, found.to_json(None if judged is None else judged.to_dict())
-            )
+        judged = _second_opinion(folder, (cell, model, plan), insists, asked)
+        opinion = None if judged is None else judged.to_dict()
+        reports.write_json(lambda: found.to_json(opinion))
         for finding in found.findings:
             say(str(finding))
         if judged is not None:
             _print_opinion(judged)
         say(f"{folder}: {found.programs} programs, {len(found.findings)} findings")
     code = max(found.exit_code, 0 if judged is None else judged.exit_code)
-    if second_opinion and judged is not None and judged.skipped:
+    if insists and judged is not None and judged.skipped:
         code = code or 2  # what was asked for could not be given
     raise typer.Exit(code)
 

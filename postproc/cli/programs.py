@@ -12,24 +12,21 @@ import typer
 from postproc.cli.common import (
     CellOption,
     EveryOption,
-    HtmlOption,
-    JsonOption,
     ModelOption,
     OrientationOption,
     PathToleranceOption,
     ProcessesOption,
     SetOption,
     SharedPointsOption,
-    TemperatureOption,
     VariablesOption,
     app,
-    as_path,
     busy,
     changes_of,
     report_errors,
     say,
     write_text,
 )
+from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
 from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places, is_stream
 
@@ -89,11 +86,7 @@ def compensate(
             "--variables-out", help="Where the variable file goes, changed or not."
         ),
     ] = None,
-    report: Annotated[
-        Path | None,
-        typer.Option("--report", help="Write the report (JSON), - for stdout."),
-    ] = None,
-    html: HtmlOption = None,
+    report: PageOption = None,
     strict: Annotated[
         bool,
         typer.Option(
@@ -104,7 +97,6 @@ def compensate(
     shared_points: SharedPointsOption = None,
     path_tolerance: PathToleranceOption = None,
     changes: SetOption = None,
-    temperature: TemperatureOption = None,
     processes: ProcessesOption = 0,
     every: EveryOption = False,
 ) -> None:
@@ -121,13 +113,14 @@ def compensate(
 
     given = None if is_stream(program) else Path(program)
     with report_errors(given, variables):
-        if report == Path(STREAM) and given is None and output is None:
+        reports = Reports.of(report, PAGE)
+        if reports.on_stdout and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
-        outputs = [output, report, html, variables_out]
+        outputs = [output, *reports.files, variables_out]
         check_places(outputs, [given, variables, cell, model])
         asked = changes_of(changes, orientation, shared_points, path_tolerance)
         loaded = load_cell(cell, changes=asked)
-        options = Options(temperature=temperature, timing=loaded.compensation.timing)
+        options = Options(timing=loaded.compensation.timing)
         fitted = as_model(model, loaded.arm)
         files = ProgramFiles.open(program, variables)
         if variables_out is not None:
@@ -142,9 +135,9 @@ def compensate(
             _print_outcome(outcome, every)
             raise PostprocError(f"--strict: {_why_nothing(outcome)}")
         places = Destination(files, (cell, model))
-        written = places.write(outcome, output, report, html, variables_out)
+        written = places.write(outcome, output, reports, variables_out)
         _print_outcome(outcome, every)
-        if report == Path(STREAM):
+        if reports.on_stdout:
             write_text(STREAM, report_text(outcome))
         for path in written:
             say(f"written {path}")
@@ -205,19 +198,19 @@ def _print_outcome(outcome: Outcome, every: bool) -> None:
 def diff(
     original: Path,
     compensated: Path,
-    json: JsonOption = None,
+    report: ReportOption = None,
 ) -> None:
     """Compare the targets of two programs: exit 0 same, 1 different, 2 trouble."""
     from postproc.report import diff as differ
     from postproc.report.diff_output import difference_pieces, print_difference
 
     with report_errors():
-        check_places([as_path(json)], [original, compensated])
+        reports = Reports.of(report)
+        check_places(reports.files, [original, compensated])
         with busy("compare"):
             found = differ.diff(original, compensated)
-        if json:
-            write_text(json, difference_pieces(found))
-        if json != "-":
+        reports.write_json(lambda: difference_pieces(found))
+        if not reports.on_stdout:
             print_difference(found)
     raise typer.Exit(1 if found else 0)
 
@@ -249,10 +242,9 @@ def explain(
         int | None, typer.Option("--line", help="Only the visits of this line.")
     ] = None,
     changes: SetOption = None,
-    temperature: TemperatureOption = None,
     every: EveryOption = False,
     code: CodeOption = None,
-    json: JsonOption = None,
+    report: ReportOption = None,
 ) -> None:
     """Show why every target moves: from where it is reached, and what that costs."""
     from postproc.compensation.explanation import explain as tell
@@ -264,18 +256,16 @@ def explain(
     from postproc.robot.cell import load_cell
 
     with report_errors(program, variables):
-        check_places([as_path(json)], [program, cell, model, variables])
+        reports = Reports.of(report)
+        check_places(reports.files, [program, cell, model, variables])
         with busy("plan"):
             files = ProgramFiles.open(program, variables)
             loaded = load_cell(cell, changes=changes_of(changes))
-            options = Options(
-                temperature=temperature, timing=loaded.compensation.timing
-            )
+            options = Options(timing=loaded.compensation.timing)
             fitted = None if model is None else load_model(model)
             found = tell(files, loaded, fitted, options=options)
         for text in list_findings(found.findings(line), every):
             say(text)
-        if json:
-            write_text(json, explanation_json(found, line))
-        if json != "-":
+        reports.write_json(lambda: explanation_json(found, line))
+        if not reports.on_stdout:
             print_explanation(found, line)

@@ -177,10 +177,15 @@ def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
         return empty
     held = find_taught(visits)
     reasons.mark(held, TAUGHT)
-    if not options.edit_exported:
+    if not (options.edit_exported or _may_clone_exported(visits, options)):
         shared = has & visits.literals.shared[literal]
         reasons.mark(shared, EXPORTED)
     return np.asarray(empty | held)
+
+
+def _may_clone_exported(visits: Visits, options: Options) -> bool:
+    """Return True if moves to points of other programs may be given clones of them."""
+    return options.shared_points == "clone" and visits.dialect.runs_alone
 
 
 def mark_disagreement(
@@ -683,8 +688,8 @@ class Round:
 
     def _guard_flags(self, reasons: Reasons) -> None:
         """Mark corrections that end where flags are not sure."""
-        visits = self.reading.visits
-        near = visits.dialect.near_border(self.solved.q)
+        visits, before = self.reading.visits, self.planned.plan.q
+        near = visits.dialect.near_border(visits.values, self.solved.q, before)
         if near is None:
             return
         rows = visits.config_given & (visits.target == Meaning.POSE)
@@ -734,9 +739,12 @@ class Round:
         stay = pinned_targets(
             visits, agreement, change, self._is_trusted, cell, absorbing
         )
-        if self.setting.options.shared_points == "leave":
+        options = self.setting.options
+        if options.shared_points == "leave":
             count = len(agreement.literal)
             stay[SEVERAL_MOVES] = ~_by_one_move(visits, agreement.group, count)
+        elif _may_clone_exported(visits, options) and not options.edit_exported:
+            stay[EXPORTED] = visits.literals.shared[agreement.literal]
         return stay
 
     def _collect_needs(self) -> tuple[Floats, Floats, Floats]:

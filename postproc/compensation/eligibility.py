@@ -343,11 +343,10 @@ def mark_orientation_interpolation(
         arc & targets.wrist_joint, _name_law(terms, terms.arc, law.WRIST_JOINTS)
     )
     for rows, text, said in (
-        (arc, terms.arc, law.ALONG_PATH),
-        (cartesian, terms.angles, law.EULER_ANGLES),
-        (cartesian, terms.angles, law.ROLL_PITCH_YAW),
+        (targets.along, terms.arc, law.ALONG_PATH),
+        (cartesian & (kind == law.EULER_ANGLES), terms.angles, law.EULER_ANGLES),
+        (cartesian & (kind == law.ROLL_PITCH_YAW), terms.angles, law.ROLL_PITCH_YAW),
     ):
-        rows = rows & (kind == said)
         if rows.any():
             off = _may_be_off(visits, targets, plan, rows)
             reasons.mark(off, _name_law(terms, text, said))
@@ -379,8 +378,8 @@ def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bo
     off = np.minimum(turn**2 / (8.0 * np.maximum(sine, LEAST)), turn)
     both = np.maximum(_sine(world @ begin, kind), _sine(world @ end, kind))
     same = (both < LEAST) & (kind == OrientationLaw.EULER_ANGLES)
-    off = np.where(kind == OrientationLaw.ALONG_PATH, turn, np.where(same, 0.0, off))
-    along = kind == OrientationLaw.ALONG_PATH
+    along = targets.along[edge]
+    off = np.where(along, turn, np.where(same, 0.0, off))
     found[edge[off > np.where(along, SMALL_TURN, PLAY)]] = True
     return found
 

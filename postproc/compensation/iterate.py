@@ -17,6 +17,7 @@ from postproc.arrays import (
     take_rows,
 )
 from postproc.compensation.arc_angles import ArcAngles
+from postproc.compensation.arc_turns import ArcTurns
 from postproc.compensation.consensus import (
     NO_GLIMPSES,
     Glimpses,
@@ -320,6 +321,7 @@ class Replanner:
         old = self._visits.values
         moved = any_in_rows((values != old) & ~(np.isnan(values) & np.isnan(old)))
         moved |= ArcAngles.of(new).find_moved(moved)
+        moved |= ArcTurns.of(new).find_moved(moved)
         rows = np.flatnonzero(moved)
         targets = move_targets(self._targets, new, self._cell, rows)
         arm, last = self._cell.arm, self._last

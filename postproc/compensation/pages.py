@@ -18,6 +18,7 @@ from postproc.files import (
     KRL_PROGRAMS,
     base_name,
     data_list_of,
+    find_source,
     is_data_list,
     is_module,
     program_key,
@@ -104,7 +105,7 @@ def names_in(path: Path) -> tuple[dict[str, int], dict[str, int]]:
     """
     text = _read(path, -1)
     if data_list_of(path.name):
-        return _name_sources(path.name, text), {}
+        return _name_sources(path.name, text) | _name_lists(path, text), {}
     if not is_module(path.name):
         return ({}, {}) if is_data_list(path.name) else find_named_programs(text)
     found = _MAIN.search(text)
@@ -128,6 +129,57 @@ def _name_sources(name: str, text: bytes) -> dict[str, int]:
         if called not in found:
             found[called] = text.count(b"\n", 0, call.start()) + 1
     return found
+
+
+_WORD = re.compile(rb"[A-Za-z_$]\w*")
+_SHARED_POINT = re.compile(  # in a public list, declared for all programs
+    rb"^[ \t]*(?:DECL[ \t]+)?GLOBAL[ \t]+(?:DECL[ \t]+)?"
+    rb"(?:E6POS|POS|FRAME|E6AXIS|AXIS)[ \t]+(\w+)",
+    re.IGNORECASE | re.MULTILINE,
+)
+_PUBLIC = re.compile(rb"^[ \t]*DEFDAT[ \t]+\w+[ \t]+PUBLIC\b", re.I | re.M)
+_MOVE = re.compile(rb"^[ \t]*(?:S?(?:PTP|LIN|CIRC)|SPL|(?:PTP_)?SPLINE)\b", re.I | re.M)
+
+
+def _name_lists(path: Path, text: bytes) -> dict[str, int]:
+    """Name sources without moves whose lists declare points that a source goes to."""
+    found: dict[str, int] = {}
+    lists = [(other, _points_for_all(other, *_state(other)))
+             for other in sorted(path.parent.iterdir())
+             if is_data_list(other.name) and other.stem.lower() != path.stem.lower()
+             and other.is_file() and not other.is_symlink()]  # fmt: skip
+    if not any(points for _, points in lists):
+        return found
+    lines = {
+        word[0].lower(): word.start() for word in reversed([*_WORD.finditer(text)])
+    }
+    for other, points in lists:
+        places = [lines[name] for name in points & lines.keys()]
+        if places:
+            line = text.count(b"\n", 0, min(places)) + 1
+            found[program_key(other.stem + KRL_PROGRAMS[0])] = line
+    return found
+
+
+def _state(path: Path) -> tuple[int, int]:
+    """Return what changes with the content of a file."""
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size
+
+
+@lru_cache(maxsize=8192)
+def _points_for_all(path: Path, changed: int, size: int) -> frozenset[bytes]:
+    """Return the points that a list declares for all programs, in lower case.
+
+    A list whose source moves belongs to that source, whoever else names its points.
+    """
+    text = _read(path, -1)
+    if not _PUBLIC.search(text):
+        return frozenset()
+    names = frozenset(name.lower() for name in _SHARED_POINT.findall(text))
+    own = find_source(path) if names else None
+    moves = own is None or _MOVE.search(_read(own, -1)) is not None
+    return frozenset() if moves else names
 
 
 def _modules_beside(path: Path) -> Iterator[Path]:

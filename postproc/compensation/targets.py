@@ -8,13 +8,13 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.arc_angles import ArcAngles, place_ends
+from postproc.compensation.arc_turns import ArcTurns, turn_between
 from postproc.compensation.eligibility import Reasons
 from postproc.diagnostics import Code, Reason
 from postproc.language.visits import (
     Blend,
     Diagnostic,
     Meaning,
-    OrientationLaw,
     Visits,
     ZoneRule,
 )
@@ -176,10 +176,12 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     lost |= _find_unplaced(kind, tcp, joints, frames)
     lost |= place_ends(visits, tcp, reasons)
     lost |= _mark_unnamed(visits, cell, reasons)
+    along = turn_between(visits, tcp)
     slot, turns = visits.dialect.flags(visits.config, visits.configs, values)
     branch = np.where(visits.config_given & poses, slot, -1), turns
     places = np.where(lost, TargetKind.UNKNOWN, kind), tcp, joints
-    return _targets(visits, places, frames.tool, branch).slim(), reasons
+    found = _targets(visits, places, frames.tool, branch, along)
+    return found.slim(), reasons
 
 
 def _targets(
@@ -187,6 +189,7 @@ def _targets(
     places: tuple[Ints, Floats, Floats],
     tool: Floats,
     branch: tuple[Ints, Floats],
+    along: Bools,
 ) -> Targets:
     """Put targets together with how the program moves there.
 
@@ -195,6 +198,7 @@ def _targets(
         places: Kinds, TCP poses and joints, as `_places` returns them.
         tool: TCP in the flange frame, (n, 4, 4) [m].
         branch: Slots of the arm's branches, -1 where not told, and turns.
+        along: Points of arcs on which it is not known how the tool turns, (n,).
     """
     kind, tcp, joints = places
     rounding, fly_distance, overlap = rounding_of(visits)
@@ -223,8 +227,7 @@ def _targets(
         wrist_joint=visits.wrist_joint,
         block=visits.block,
         curved=visits.curved,
-        along=(visits.motion == Motion.CIRCULAR)
-        & (visits.orientation_law == OrientationLaw.ALONG_PATH),
+        along=along,
         pred_start=pred_start,
         pred=pred,
     )
@@ -262,16 +265,28 @@ def move_targets(targets: Targets, visits: Visits, cell: Cell, rows: Ints) -> Ta
         targets: All visits as they were.
         visits: All visits as they are now.
         cell: As in `targets_from_visits`.
-        rows: Visits with other numbers, and ends of arcs that move with them, (m,).
+        rows: Visits with other numbers, and points of arcs that move or turn with
+            them, (m,).
     """
     user, values = _user_frames(visits, rows), _values(visits, cell, rows)
     _, tcp, joints = _places(visits, user, values, rows)
     found = targets.move_to(rows, tcp, joints)
     arcs = ArcAngles.of(visits)
     arcs = arcs.among(np.isin(arcs.end, rows))
+    if len(arcs):
+        ends = arcs.ends(found.tcp)
+        found = found.move_to(arcs.end, ends, found.joints[arcs.end])
+    return _turn_again(found, visits, rows)
+
+
+def _turn_again(targets: Targets, visits: Visits, rows: Ints) -> Targets:
+    """Turn the points between on arcs that lie elsewhere now, as `turn_between` has."""
+    arcs = ArcTurns.of(visits)
+    arcs = arcs.among(~targets.along[arcs.via] & np.isin(arcs.via, rows))
     if len(arcs) == 0:
-        return found
-    return found.move_to(arcs.end, arcs.ends(found.tcp), found.joints[arcs.end])
+        return targets
+    joints = targets.joints[arcs.via]
+    return targets.move_to(arcs.via, arcs.turned(targets.tcp), joints)
 
 
 def _frames(visits: Visits) -> Frames:

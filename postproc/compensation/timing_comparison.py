@@ -143,7 +143,7 @@ class InTime:
              f"{len(told.points)} moves; {describe_verification(self.in_motion)}"),
             (Code.BACKLASH_PRELOAD_SKIPPED, told.unconfirmed,
              "the backlash is not preloaded before "
-             f"{len(told.unconfirmed)} moves: neither reversals (survey --reversals) "
+             f"{len(told.unconfirmed)} moves: neither reversals (survey.reversals) "
              "nor a measured path (diagnose --path) confirm how the joints change "
              "their flanks there"),
             (Code.REAPPROACH_INSERTED, told.approaches,

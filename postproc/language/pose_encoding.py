@@ -69,8 +69,11 @@ class Dialect(ABC):
         flag_columns: Which numbers of a pose are flags.
         heads: What tables head the numbers of a pose with, w words.
         pose_decimals, joint_decimals: Least decimals of every written number, w each.
+        runs_alone: What runs beside a program is read with it: a point that other
+            programs may read keeps its value, and a move may have a clone of it.
     """
 
+    runs_alone: bool = False
     terms: Terms
     heads: tuple[str, ...]
     reflags: bool = False
@@ -169,9 +172,14 @@ class Dialect(ABC):
         """
         return None
 
-    def near_border(self, q: Floats) -> Bools | None:
-        """Tell which joints (k, 6) [rad] are too near a border of flags, (k, 6).
+    def near_border(self, values: Floats, q: Floats, before: Floats) -> Bools | None:
+        """Tell which joints are too near a border of flags, (k, 6).
 
         None where flags there do no harm.
+
+        Args:
+            values: Numbers of poses as they are written, (k, w).
+            q: Joints that the commands reach, (k, 6) [rad].
+            before: Joints that the source reaches, (k, 6) [rad].
         """
         return None

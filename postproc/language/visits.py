@@ -71,6 +71,7 @@ class OrientationLaw(IntEnum):
     ROLL_PITCH_YAW = 4  # .. other ones
     WRIST_JOINTS = 5  # the wrist's joints in proportion
     UNKNOWN = 6  # it is set, to what only the run tells
+    START_TO_END = 7  # of an arc: about one axis, whatever the point on its way says
 
 
 class ZoneRule(IntEnum):

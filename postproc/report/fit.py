@@ -13,7 +13,7 @@ import numpy as np
 from postproc.calibration.baselines import VOLUME_DEG, Comparison
 from postproc.calibration.fit import Calibration
 from postproc.calibration.report import FitReport, Found
-from postproc.files import schema, write_all
+from postproc.files import schema
 from postproc.report.diagnosis import tell_directions
 from postproc.report.json import finite
 from postproc.report.terminal import Column, table_text
@@ -75,18 +75,20 @@ def fit_json(found: Calibration) -> str:
     return json.dumps(finite(said), indent=1, allow_nan=False) + "\n"
 
 
-def write_page(path: Path, found: Calibration) -> None:
-    """Write a page about a fit.
-
-    Raises:
-        OutputError: The place cannot be written to.
-    """
+def fit_page(found: Calibration) -> str:
+    """Return the page (HTML) of a fit."""
     from postproc.report.html import calibration_report
     from postproc.report.html.model import fit_evidence
 
     rows = fit_evidence(found.report, found.model, found.survey, found.cell.arm)
-    page = calibration_report(found.model.to_dict(), rows)
-    write_all({path: page.encode()})
+    return calibration_report(found.model.to_dict(), rows)
+
+
+def comparison_page(found: Comparison) -> str:
+    """Return the page (HTML) of a comparison of methods."""
+    from postproc.report.html import comparison_report
+
+    return comparison_report(asdict(found))
 
 
 def tell_fit(report: FitReport, everything: bool = False) -> str:

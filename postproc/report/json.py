@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from json.encoder import encode_basestring_ascii
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,12 @@ JOINTS = 6  # numbers of a joint target; a pose may have more
 def report_text(outcome: Outcome) -> str:
     """Write the whole report."""
     return b"".join(report_pieces(outcome)).decode("ascii")
+
+
+def tree_json(entries: Iterable[tuple[str, str, Mapping[str, Any]]]) -> str:
+    """Return what came of every program of a tree: its path, status and facts."""
+    rows = [{"program": place, "status": what} | dict(f) for place, what, f in entries]
+    return json.dumps(finite(schema("tree") | {"programs": rows}), indent=1) + "\n"
 
 
 def report_pieces(outcome: Outcome) -> Iterator[bytes]:

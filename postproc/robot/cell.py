@@ -35,6 +35,8 @@ from postproc.robot.pose import MM, pose_from_record, rotation_from_zyz
 
 Source = Literal["cad", "tracker", "taught"]
 Effect = Literal["motionless", "moves", "sets-frames"]
+SurveyMode = Literal["lhs", "optimal", "d-optimal"]
+DESIGN = frozenset({"mode", "seed", "reversals"})  # keys of how poses are chosen
 ArmNumber = PositiveInt  # which arm of its controller
 MOTIONLESS = "motionless"  # beside names: the key whose value lists patterns
 STILL = "still"  # what that was called
@@ -159,7 +161,7 @@ class TrackerSection(Strict):
 
 
 class SurveySection(Strict):
-    """Where the survey's probe points (SMR nests) sit, in the flange frame.
+    """How the arm is surveyed: probe points (SMR nests) in the flange frame, and poses.
 
     A 6D probe also has an orientation there; without it, the flange's own orientation
     cannot be told from the probe's.
@@ -169,12 +171,39 @@ class SurveySection(Strict):
         points: The points by name, instead.
         euler_zyz_deg: Orientation of a 6D probe.
         levelled: Whether z of the tracker's frame points up, set by its level.
+        mode: How poses are chosen, see `design_survey`.
+        seed: Of the random draws of poses.
+        reversals: How often every joint turns back in small steps, too.
     """
 
     points_mm: list[Triple] = Field(default_factory=list)
     points: dict[str, Triple] = Field(default_factory=dict)
     euler_zyz_deg: Triple | None = None
     levelled: bool = False
+    mode: SurveyMode = "lhs"
+    seed: NonNegativeInt = 0
+    reversals: NonNegativeInt = 0
+
+    @property
+    def names_points(self) -> bool:
+        """Whether more is stated than how poses are chosen."""
+        return not self.model_fields_set or bool(self.model_fields_set - DESIGN)
+
+
+class SimulationSection(Strict):
+    """Which virtual arm runs the programs of this cell.
+
+    Attributes:
+        seed: Of every random draw.
+        effects: Further effects, comma separated; any motion of a part by its text.
+        backlash_model: What gears do in their gaps.
+        track_rate_hz: Readings in a second of a tracker that follows the tool.
+    """
+
+    seed: NonNegativeInt = 1
+    effects: str | None = None
+    backlash_model: Literal["sharp", "elastic", "gravity", "inertia"] = "sharp"
+    track_rate_hz: Annotated[float, Field(ge=1.0, le=1000.0)] = 100.0
 
 
 Limits = Annotated[list[PositiveFloat], Field(min_length=6, max_length=6)]
@@ -281,6 +310,8 @@ class MeasurementSection(Strict):
         unit: Of coordinates in files that do not state it; default: mm.
         frame: Frame of the measured positions; default: the arm's base frame.
         instrument: What measured, kept with the models that are fitted.
+        refit_registration: `predict` finds the place of the tracker from the rows.
+        after_survey: `predict` takes what passes with time as at the survey's end.
     """
 
     columns: str | None = None
@@ -290,6 +321,8 @@ class MeasurementSection(Strict):
     unit: Literal["mm", "m", "inch"] | None = None
     frame: PointFrame | None = None
     instrument: str | None = None
+    refit_registration: bool = False
+    after_survey: bool = False
 
 
 AS_USUAL, DETECTED = CompensationSection(), MeasurementSection()
@@ -322,6 +355,7 @@ class CellFile(Strict):
     environment: EnvironmentSection | None = None
     tracker: TrackerSection | None = None
     survey: SurveySection | None = None
+    simulation: SimulationSection = SimulationSection()
     aux: dict[str, Literal["gun", "track", "positioner"]] = Field(default_factory=dict)
     limits: LimitSection = LimitSection()
     compensation: CompensationSection = CompensationSection()
@@ -478,7 +512,7 @@ def load_cell(
     Args:
         file: Its path, or its text as bytes.
         name: Of text, for messages; an arm file it names lies beside this path.
-        changes: Keys of [compensation] and [measurements] for this run, as
+        changes: Keys of `CHANGEABLE` sections for this run, as
             ``compensation.orientation=true``; the value ``none`` stands for the
             default.
 
@@ -498,7 +532,13 @@ def load_cell(
 
 CHANGEABLE: Mapping[str, type[Strict]] = {
     "compensation": CompensationSection,
+    "environment": EnvironmentSection,
     "measurements": MeasurementSection,
+    "payload": PayloadSection,
+    "simulation": SimulationSection,
+    "survey": SurveySection,
+    "tracker": TrackerSection,
+    "verify": VerifySection,
 }
 
 
@@ -511,9 +551,10 @@ def _changed(file: CellFile, change: str) -> CellFile:
     place, _, text = change.partition("=")
     name, _, key = place.strip().partition(".")
     if name not in CHANGEABLE or not key or not text.strip():
-        known = " or ".join(f"{section}.KEY=VALUE" for section in CHANGEABLE)
-        raise CellError(f"--set {change}", "sets nothing", f"Write {known}")
-    data = getattr(file, name).model_dump(exclude_unset=True)
+        cure = f"Write SECTION.KEY=VALUE, of the sections {', '.join(CHANGEABLE)}"
+        raise CellError(f"--set {change}", "sets nothing", cure)
+    stated = getattr(file, name)
+    data = {} if stated is None else stated.model_dump(exclude_unset=True)
     data.pop(key, None)
     value = _value(text.strip())
     if value != "none":
@@ -521,8 +562,23 @@ def _changed(file: CellFile, change: str) -> CellFile:
         data[key] = str(Path(str(value)).absolute()) if whole else value
     elif key not in CHANGEABLE[name].model_fields:
         data[key] = value
+    if not data and CellFile.model_fields[name].default is None:
+        return file.model_copy(update={name: None})
     section = validate(f"--set {change}", data, CHANGEABLE[name], CellError)
     return file.model_copy(update={name: section})
+
+
+def verify_section(changes: Sequence[str]) -> tuple[VerifySection, tuple[str, ...]]:
+    """Return [verify] as changes alone make it, and the other changes.
+
+    Raises:
+        CellError: There is no such key, or the value is wrong.
+    """
+    own = [change for change in changes if change.strip().startswith("verify.")]
+    file = CellFile.model_construct()
+    for change in own:
+        file = _changed(file, change)
+    return file.verify, tuple(change for change in changes if change not in own)
 
 
 def _value(text: str) -> object:
@@ -649,7 +705,7 @@ def _probes(path: Path, file: CellFile) -> Floats:
     Raises:
         CellError: They are given twice, or not at all.
     """
-    if file.survey is None:
+    if file.survey is None or not file.survey.names_points:
         return _frame(file.tool).pose[None, :3, 3]
     numbered, named = file.survey.points_mm, list(file.survey.points.values())
     if bool(numbered) == bool(named):

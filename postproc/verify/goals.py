@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.language.visits import Meaning, Switch, Visits
+from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
 from postproc.robot.trajectory import Motion
 from postproc.verify.opinion import ArmFacts, Claim
 
@@ -38,6 +38,7 @@ def goals_of(claim: Claim, facts: ArmFacts) -> WrittenGoals:
     tcp = np.full((len(v), 4, 4), np.nan)
     known = ~np.isnan(frames[v.base]).any((1, 2)) & np.isin(v.target, POSES)
     known &= np.isnan(v.arc_angle)
+    known &= ~(v.via & (v.orientation_law == OrientationLaw.START_TO_END))
     rows = np.flatnonzero(known & ~np.isnan(v.values[:, :6]).any(axis=1))
     user = np.linalg.inv(frames[v.base[rows]]) @ frames[v.uframe[rows]]
     tcp[rows] = user @ _poses(v)[rows] @ _shift(v)[rows]

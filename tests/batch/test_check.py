@@ -162,7 +162,7 @@ def test_the_command_says_it_by_its_exit_code(trees, job_folder, tmp_path):
     runner = CliRunner()
     assert runner.invoke(app, [*call, "--source", str(source)]).exit_code == 0
     (target / "raw.pdl").write_bytes(b"x")
-    found = runner.invoke(app, [*call, "--json", "-"])
+    found = runner.invoke(app, [*call, "--report", "-"])
     assert found.exit_code == 1
     assert json.loads(found.stdout)["findings"][0]["place"] == "raw.pdl"
     assert runner.invoke(app, ["check", str(tmp_path / "none")]).exit_code == 2

@@ -48,14 +48,14 @@ def test_check_and_diff_name_every_line_that_was_left(desk, name, by):
         assert desk.compensate(job, "-o", out).exit_code == 1
     else:
         assert cli("batch", job.parent, out.parent, *given).exit_code == 1
-    found = cli("check", out.parent, "--json", "-")
+    found = cli("check", out.parent, "--report", "-")
     assert found.exit_code == 1
     (finding,) = json.loads(found.stdout)["findings"]
     assert finding["code"] == "left-alone" and why in finding["message"]
     assert f"{len(lines)} visits are not corrected, " in finding["message"]
     assert f"lines {lines[0]}-{lines[-1]} of" in finding["message"]
     assert cli("check", out.parent, "--allow-uncorrected").exit_code == 0
-    told = json.loads(cli("diff", job, out, "--json", "-").stdout)
+    told = json.loads(cli("diff", job, out, "--report", "-").stdout)
     assert [row["line"] for row in told["uncorrected"]] == lines
     assert all(row["status"] == "runtime" for row in told["uncorrected"])
     assert "\nnot corrected:" in cli("diff", job, out).stdout
@@ -69,7 +69,9 @@ def test_targets_in_a_program_of_which_only_the_values_change_are_found(desk):
     out = desk.folder / "out" / "s.pdl"
     out.parent.mkdir()
     assert desk.compensate(job, "-o", out).exit_code == 1
-    (finding,) = json.loads(cli("check", out.parent, "--json", "-").stdout)["findings"]
+    (finding,) = json.loads(cli("check", out.parent, "--report", "-").stdout)[
+        "findings"
+    ]
     assert "ext, which is not in the given files" in finding["message"]
     count = re.search(r"(\d+) visits", finding["message"])
     left = desk.report(job)["targets"]

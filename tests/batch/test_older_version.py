@@ -54,7 +54,7 @@ def test_every_record_gives_its_sources_back(tree):
 def test_diff_reports_the_same_targets(tree):
     names = {old: Status(k).name.lower() for k, old in enumerate(STATUSES)}
     for place, old in json.loads((tree / "diffs.json").read_text()).items():
-        found = cli("diff", f"src/{place}", f"dst/{place}", "--json", "-")
+        found = cli("diff", f"src/{place}", f"dst/{place}", "--report", "-")
         assert found.exit_code == old["exit"]
         new = json.loads(found.stdout)
         assert new["counts"] == {names[k]: v for k, v in old["counts"].items()}
@@ -78,7 +78,7 @@ def as_now(rows: list[dict], names: dict[str, str]) -> list[dict]:
 
 def test_check_finds_the_same_files_and_lines(tree):
     old = json.loads((tree / "check.json").read_text())
-    found = cli("check", "dst", "--source", "src", "--json", "-")
+    found = cli("check", "dst", "--source", "src", "--report", "-")
     assert found.exit_code == 1
     new = json.loads(found.stdout)
     assert new["programs"] == old["programs"]
@@ -88,7 +88,7 @@ def test_check_finds_the_same_files_and_lines(tree):
 
 
 def test_check_knows_by_which_model_a_program_was_made(tree):
-    found = cli("check", "dst", "--model", "abb/model.json", "--json", "-")
+    found = cli("check", "dst", "--model", "abb/model.json", "--report", "-")
     others = json.loads(found.stdout)["findings"]
     older = {f["place"] for f in others if f["code"] == "older-model"}
     records = {p.removesuffix(SUFFIX) for p in contents(tree / "dst") if SUFFIX in p}

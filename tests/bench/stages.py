@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from postproc.cli.job_files import Destination
+from postproc.cli.reports import Reports
 from postproc.compensation import workers
 from postproc.compensation.compensate import compensate
 from postproc.compensation.program_files import ProgramFiles
@@ -43,7 +44,7 @@ def measure(kind: str, n: int, cell: Path, model: Path) -> dict[str, float]:
         pipeline = time.perf_counter() - start
         begin = time.perf_counter()
         out, told = place.with_name("out.pdl"), place.with_name("report.json")
-        Destination(given, (cell, model)).write(outcome, out, told)
+        Destination(given, (cell, model)).write(outcome, out, Reports.of([told]))
         write = time.perf_counter() - begin
     found = {
         "targets": len(outcome.visits), "lines": lines, "read": read,

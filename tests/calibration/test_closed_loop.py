@@ -37,7 +37,7 @@ xyz_mm = [3000.0, -2000.0, 1500.0]
 points_mm = [[-212.5, 96.0, 331.0], [148.0, -121.5, 268.0], [-58.0, 42.5, 514.0]]
 """
 UFRAME = pose_from_record((150.0, -80.0, 120.0, 12.0, 0.0, 0.0))
-ARM = ("--seed", "7", "--effects", "compliance@2=0.8")  # seed of the virtual arm
+ARM = ("--set", "simulation.seed=7", "--set", "simulation.effects=compliance@2=0.8")
 START = "MOVE JOINT TO {0.0, 0.0, -90.0, 0.0, 60.0, 0.0}"
 
 
@@ -64,7 +64,7 @@ def true_error(folder: Path, program: str) -> float:
     """Return where the tool lands, against the job as it was written: mean [mm]."""
     told = folder / "true.json"
     done("simulate", folder / program, "--cell", folder / "cell.toml", *ARM,
-         "--reference", folder / "job.pdl", "--json", told)  # fmt: skip
+         "--reference", folder / "job.pdl", "--report", told)  # fmt: skip
     return float(json.loads(told.read_bytes())["true_error"]["mean_mm"])
 
 
@@ -118,7 +118,7 @@ def test_points_of_a_job_find_the_effect_and_mend_the_job(
         "diagnose", points(shop, f"{frame}.csv", FRAMES[frame]), *cell,
         "--model", shop / "model.json", "--program", shop / "out.pdl",
         "--set", f"measurements.frame={frame}", "-o", better,
-        "--json", shop / "found.json",
+        "--report", shop / "found.json",
     )  # fmt: skip
     assert found.exit_code == 0, found.stderr
     report = json.loads((shop / "found.json").read_bytes())

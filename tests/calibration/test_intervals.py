@@ -9,8 +9,10 @@ from scipy.spatial.transform import Rotation
 from postproc.calibration.effect_selection import fit_survey
 from postproc.calibration.fit import fit_measurements
 from postproc.calibration.measurements import Measurements
+from postproc.calibration.readings import Readings
 from postproc.calibration.registration import predict_registered
 from postproc.calibration.stops import pool_readings
+from postproc.exceptions import PostprocError
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, load_model
@@ -145,8 +147,8 @@ def test_predict_reads_in_the_tracker_s_frame(tmp_path) -> None:
                  "--set", "measurements.frame=tracker", *effects)  # fmt: skip
     assert fitted.exit_code == 0, fitted.stderr
     ask = ("predict", tmp_path / "test.csv", "--cell", setup, "--model", model)
-    for how in (("--set", "measurements.frame=tracker"), ("--refit", "registration")):
-        told = cli(*ask, *how)
+    for how in ("frame=tracker", "refit_registration=true"):
+        told = cli(*ask, "--set", f"measurements.{how}")
         assert told.exit_code == 0, told.stderr
         header = told.stdout.splitlines()[0].split(",")
         assert {"reading_dx_mm", "reading_sz_mm", "rx_mm"} <= set(header)
@@ -182,5 +184,5 @@ def test_a_model_without_registration_finds_it_or_says_so(tmp_path) -> None:
         "predict", tmp_path / "few.csv", *ask[2:], "--set", "measurements.frame=tracker"
     )
     assert told.exit_code == 2 and "Measure 6 poses or more" in told.stderr
-    told = cli(*ask, "--refit", "everything")
-    assert told.exit_code == 2 and "write registration" in told.stderr
+    with pytest.raises(PostprocError, match="write registration"):
+        Readings(refit="everything")

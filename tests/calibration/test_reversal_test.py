@@ -31,8 +31,10 @@ POSES, EACH = 150, 4
 def surveyed(folder: Path, gears: str, seed: int = SEED) -> Path:
     """A survey with reversals of an arm whose gears are of one kind."""
     rows, written = folder / f"{gears}{seed}.csv", folder / "survey.pdl"
-    done("survey", "--cell", CELL, "--poses", POSES, "--reversals", EACH, "-o", written)
-    done("simulate", written, "--cell", CELL, "--seed", seed, "--backlash-model", gears,
+    design = ("--poses", POSES, "--set", f"survey.reversals={EACH}")
+    done("survey", "--cell", CELL, *design, "-o", written)
+    arm = (f"simulation.seed={seed}", f"simulation.backlash_model={gears}")
+    done("simulate", written, "--cell", CELL, "--set", arm[0], "--set", arm[1],
          "-o", rows)  # fmt: skip
     return rows
 
@@ -170,7 +172,7 @@ def test_diagnose_reads_the_reversals_of_a_new_survey(
     replace(fitted(sharp), flank_widths=()).save(model)
     report = tmp_path / "told.json"
     told = cli("diagnose", sharp, "--cell", CELL, "--model", model, "-o",
-               tmp_path / "better.json", "--json", report)  # fmt: skip
+               tmp_path / "better.json", "--report", report)  # fmt: skip
     said = json.loads(report.read_bytes())["flanks_at_stops"]
     assert said.startswith("flanks at stops: joint 1, 2, 3")
     assert said in " ".join(told.stdout.split())

@@ -9,6 +9,7 @@ import pytest
 
 from postproc.calibration.survey_program import BACK, STEPS, write_survey
 from postproc.compensation.program import plan_visits, read_program
+from postproc.robot.cell import load_cell
 from tests.written import cli
 
 POSES = 24
@@ -60,7 +61,9 @@ def test_same_seed_same_survey(job_folder, survey, tmp_path):
     again, other = tmp_path / "s.pdl", tmp_path / "other" / "s.pdl"
     other.parent.mkdir()
     write_survey(job_folder / "cell.toml", again, POSES)
-    write_survey(job_folder / "cell.toml", other, POSES, seed=1)
+    write_survey(
+        load_cell(job_folder / "cell.toml", changes=["survey.seed=1"]), other, POSES
+    )
     assert again.read_bytes() == survey.read_bytes() != other.read_bytes()
 
 
@@ -68,7 +71,9 @@ def test_reversals_turn_one_drive_back_from_where_all_came(
     job_folder, job_cell, tmp_path
 ):
     path = tmp_path / "s.pdl"
-    write_survey(job_folder / "cell.toml", path, POSES, reversals=2)
+    write_survey(
+        load_cell(job_folder / "cell.toml", changes=["survey.reversals=2"]), path, POSES
+    )
     visits = read_program({path.name: path.read_bytes()}, job_cell).visits
     first = path.read_text().splitlines()[0]
     many, measured = map(int, re.findall(r"and (\d+) reversals: (\d+) meas", first)[0])
@@ -97,9 +102,12 @@ def test_reversals_turn_one_drive_back_from_where_all_came(
     ("options", "said"),
     [
         (("--poses", "0"), "0 poses are no survey"),
-        (("--mode", "both"), "no survey mode 'both'. Use lhs, optimal, d-optimal"),
-        (("--tracker", "1,2"), "--tracker 1,2: not a position. Write x,y,z in mm"),
-        (("--poses", "11", "--reversals", "4"), "need 12 poses, and there are 11"),
+        (("--set", "survey.mode=both"), "'lhs', 'optimal' or 'd-optimal' @ $.mode"),
+        (("--set", "tracker.xyz_mm=[1,2]"), "$.xyz_mm"),
+        (
+            ("--poses", "11", "--set", "survey.reversals=4"),
+            "need 12 poses, and there are 11",
+        ),
     ],
 )
 def test_wrong_options(desk, options, said):

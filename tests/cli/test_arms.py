@@ -30,7 +30,7 @@ def test_a_program_is_planned_with_every_arm(tmp_path, name):
     job.write_text("\n".join(["PROGRAM job", "BEGIN", *moves, "END job", ""]))
     joints = [round(float(v), 4) for v in np.rad2deg(home)]
     cell.write_text(f'[robot]\narm = "{name}"\n[home]\njoints_deg = {joints}\n')
-    found = cli("explain", job, "--cell", cell, "--json", "-")
+    found = cli("explain", job, "--cell", cell, "--report", "-")
     planned = [visit["q_deg"] for visit in json.loads(found.stdout)["visits"]]
     np.testing.assert_allclose(planned, np.rad2deg(q), atol=0.003)
 

@@ -270,10 +270,12 @@ def test_no_output_is_an_input(desk):
     before = source.read_bytes(), own.read_bytes(), desk.cell.read_bytes()
     for place in (source, desk.folder / ".." / desk.folder.name / "job.pdl", own,
                   desk.cell):  # fmt: skip
-        for option in ("-o", "--report", "--html"):
+        for option in ("-o", "--report"):
             found = cli("compensate", source, "--cell", desk.cell, "--model", own,
                         option, place)  # fmt: skip
-            refused(found, "is an input. Give another output")
+            json = option == "-o" or place == own
+            said = "is an input. Give another output" if json else "no kind of report"
+            refused(found, said)
     assert (source.read_bytes(), own.read_bytes(), desk.cell.read_bytes()) == before
     assert desk.names() == {"job.pdl", "own.json"}
 
@@ -294,17 +296,29 @@ def test_no_other_command_overwrites_its_input(desk, job_folder, command):
 
 def test_output_places_that_cannot_be(desk):
     source = desk.put("job.pdl", program(FIRST))
+    (desk.folder / "made.json").mkdir()
     for place, said in (
-        ("none/out.pdl", "the folder does not exist. Make the folder"),
-        ("job.pdl/out.pdl", "job.pdl is a file: give a folder"),
-        (".", "is a folder. Name the file"),
+        ("none/out.json", "the folder does not exist. Make the folder"),
+        ("job.pdl/out.json", "job.pdl is a file: give a folder"),
+        ("made.json", "is a folder. Name the file"),
     ):
         refused(desk.compensate(source, "-o", desk.folder / place), said)
         found = desk.compensate(source, "--report", desk.folder / place)
         refused(found, said)
-    twice = desk.folder / "x"
+    twice = desk.folder / "x.json"
     refused(desk.compensate(source, "-o", twice, "--report", twice), "named twice")
-    assert desk.names() == {"job.pdl"}
+    assert desk.names() == {"job.pdl", "made.json"}
+
+
+def test_the_ending_of_a_report_decides_its_kind(desk):
+    source = desk.put("job.pdl", program(FIRST))
+    json, page = desk.folder / "r.JSON", desk.folder / "r.html"
+    assert desk.compensate(source, "--report", json, "--report", page).exit_code == 0
+    assert json.read_bytes().startswith(b"{") and b"<!DOCTYPE" in page.read_bytes()
+    for name in ("r.txt", "r", "r.svg"):
+        found = desk.compensate(source, "--report", desk.folder / name)
+        refused(found, r"no kind of report. Write FILE\.json, FILE\.html, or - for")
+    refused(cli("diff", source, source, "--report", page), r"Write FILE\.json, or -")
 
 
 @pytest.mark.parametrize(
@@ -560,7 +574,7 @@ GIVEN = ("--cell", "CELL", "--model", "MODEL")
 COMMANDS = {
     "diff": ("diff", "job.pdl", "job.pdl"),
     "explain": ("explain", "job.pdl", "--cell", "CELL"),
-    "json": ("explain", "job.pdl", "--cell", "CELL", "--json", "-"),
+    "json": ("explain", "job.pdl", "--cell", "CELL", "--report", "-"),
     "filter": ("compensate", "-", *GIVEN),
     "help": ("--help",),
 }

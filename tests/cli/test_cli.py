@@ -105,7 +105,7 @@ def test_strict_turns_1_into_2_and_writes_nothing(desk):
     source = desk.put("job.pdl", program(FIRST, UNREACHED))
     out = desk.folder / "out.pdl"
     found = desk.compensate(
-        source, "-o", out, "--strict", "--report", desk.folder / "r"
+        source, "-o", out, "--strict", "--report", desk.folder / "r.json"
     )
     assert found.exit_code == 2
     assert "job.pdl:6" in found.stderr and "--strict" in found.stderr
@@ -297,8 +297,8 @@ def test_clones_are_written_checked_compared_and_restored(desk):
 
 def test_temperature_outside_the_survey_is_guarded(desk):
     found = desk.compensate(
-        desk.put("job.pdl", program(FIRST)), "--temperature", "75", "-o",
-        desk.folder / "o.pdl",
+        desk.put("job.pdl", program(FIRST)), "-o", desk.folder / "o.pdl",
+        "--set", "environment.temperature_c=75",
     )  # fmt: skip
     assert found.exit_code == 1
     assert re.search(r"job\.pdl:5: rejected: .*temperature", found.stderr)
@@ -309,13 +309,18 @@ def test_survey_simulate_fit_predict(desk, tmp_path):
     cell = ("--cell", desk.cell)
     assert cli("survey", *cell, "--poses", "40", "-o", survey).exit_code == 0
     source_from_bytes("s.pdl", survey.read_bytes())
-    assert cli("simulate", survey, *cell, "--seed", "2", "-o", rows).exit_code == 0
+    assert (
+        cli(
+            "simulate", survey, *cell, "--set", "simulation.seed=2", "-o", rows
+        ).exit_code
+        == 0
+    )
     assert len(rows.read_text().splitlines()) == 1 + 2 * 40
     found = cli("fit", rows, *cell, "-o", tmp_path / "m.json", "--effects",
                 "geometry,backlash")  # fmt: skip
     assert found.exit_code == 0 and "\nbacklash " in found.stdout
     whole = cli("fit", rows, *cell, "-o", tmp_path / "n.json", "--effects",
-                "geometry,backlash", "--json", "-")  # fmt: skip
+                "geometry,backlash", "--report", "-")  # fmt: skip
     told = json.loads(whole.stdout)
     model = load_model(tmp_path / "n.json")
     assert told["model"] == model.id and model.id in found.stdout
@@ -332,7 +337,7 @@ def test_survey_simulate_fit_predict(desk, tmp_path):
 def test_simulate_tells_the_true_error_as_json(desk):
     source = desk.put("job.pdl", program(FIRST, POSE))
     found = cli("simulate", source, "--cell", desk.cell, "--reference", source,
-                "--json", "-")  # fmt: skip
+                "--report", "-")  # fmt: skip
     error = json.loads(found.stdout)["true_error"]
     assert found.exit_code == 0 and error["n"] == 2 and error["mean_mm"] > 0.2
 

@@ -44,7 +44,7 @@ def files(
 
 def told(desk: Desk, *arguments: object) -> dict[str, object]:
     out = desk.folder / "compared.json"
-    found = cli("compare", *arguments, "--cell", desk.cell, "--json", out)
+    found = cli("compare", *arguments, "--cell", desk.cell, "--report", out)
     assert found.exit_code == 0, found.stderr
     return json.loads(out.read_bytes())
 

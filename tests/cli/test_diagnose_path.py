@@ -14,6 +14,7 @@ from tests.compensation.paths.test_path_error import job
 from tests.conftest import SEED
 from tests.written import cli
 
+RATE = "simulation.track_rate_hz=100"
 LINES = 25  # enough for some on which a joint changes its flank alone
 EFFECT, PLANTED = "compliance", "compliance@2=0.8"
 
@@ -25,9 +26,12 @@ def tracked(bench_cell, bench_model, tmp_path_factory):
     shutil.copy(bench_cell.path, folder / "cell.toml")
     bench_model.save(folder / "model.json")
     (folder / "job.pdl").write_bytes(job(LINES).encode())
-    at = ("--cell", folder / "cell.toml", "--seed", SEED)
-    for name, more in (("plain", ()), ("planted", ("--effects", PLANTED))):
-        track = ("--track", folder / f"{name}.csv", "--rate", 100)
+    at = ("--cell", folder / "cell.toml", "--set", f"simulation.seed={SEED}")
+    for name, more in (
+        ("plain", ()),
+        ("planted", ("--set", f"simulation.effects={PLANTED}")),
+    ):
+        track = ("--track", folder / f"{name}.csv", "--set", RATE)
         found = cli("simulate", folder / "job.pdl", *at, *track, *more)
         assert found.exit_code == 0, found.output
         assert "on the way" in found.stderr
@@ -36,7 +40,7 @@ def tracked(bench_cell, bench_model, tmp_path_factory):
 
 def diagnosed(folder, track, *more):
     given = ("--cell", folder / "cell.toml", "--model", folder / "model.json")
-    places = ("-o", folder / "better.json", "--json", folder / "d.json")
+    places = ("-o", folder / "better.json", "--report", folder / "d.json")
     program = ("--program", folder / "job.pdl")
     return cli("diagnose", "--path", folder / track, *program, *given, *places, *more)
 

@@ -30,7 +30,7 @@ def visits(found):
 
 def explained(desk, *options):
     source = desk.put("job.pdl", program(*LOOPED))
-    given = ("--cell", desk.cell, "--model", desk.model, "--json", "-")
+    given = ("--cell", desk.cell, "--model", desk.model, "--report", "-")
     return cli("explain", source, *given, *options)
 
 
@@ -103,7 +103,7 @@ def test_free_forms_are_told_below_the_error(desk, free_model):
     source = desk.put("job.pdl", program(FIRST, POSE))
     given = ("--cell", desk.cell, "--model", model, "--line", 6)
     lines = cli("explain", source, *given).stdout.splitlines()
-    (row,) = visits(cli("explain", source, *given, "--json", "-"))
+    (row,) = visits(cli("explain", source, *given, "--report", "-"))
     for line, name, key in (
         (lines[-2], "of it free forms", "nonparametric_mm"),
         (lines[-1], "+- free forms", "nonparametric_std_mm"),
@@ -131,7 +131,7 @@ def test_without_a_model_there_are_no_shares(desk):
     source = desk.put("job.pdl", program(FIRST, POSE))
     found = cli("explain", source, "--cell", desk.cell, "--line", 6).stdout
     assert len(found.splitlines()) == 2
-    rows = visits(cli("explain", source, "--cell", desk.cell, "--json", "-"))
+    rows = visits(cli("explain", source, "--cell", desk.cell, "--report", "-"))
     assert "share_mm" not in rows[0]
 
 
@@ -146,7 +146,7 @@ def test_a_program_is_planned_once(desk, monkeypatch, with_model):
     monkeypatch.setattr(planning, "plan", counted)
     source = desk.put("job.pdl", program(*LOOPED))
     model = ("--model", desk.model) if with_model else ()
-    visits(cli("explain", source, "--cell", desk.cell, *model, "--json", "-"))
+    visits(cli("explain", source, "--cell", desk.cell, *model, "--report", "-"))
     assert len(planned) == 1
 
 
@@ -157,7 +157,7 @@ def test_sides_follow_from_the_way(desk, job_cell):
     lines = [there % ", ".join(f"{v:.2f}" for v in row)
              for row in (q, q + ways[0], q + ways[0] + ways[1])]  # fmt: skip
     source = desk.put("job.pdl", program(*lines))
-    rows = visits(cli("explain", source, "--cell", desk.cell, "--json", "-"))
+    rows = visits(cli("explain", source, "--cell", desk.cell, "--report", "-"))
     assert [r["lambda"] for r in rows] == [[0] * 6, *np.sign(ways).tolist()]
     turned = ways[0] * ways[1] < 0
     assert np.allclose(np.array(rows[2]["travel_deg"])[turned], 3.0)

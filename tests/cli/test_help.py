@@ -77,7 +77,7 @@ def test_shells_get_a_script(shell):
     [
         ("postproc com", {"compensate", "compare"}),
         ("postproc fit --method el", {"elm"}),
-        ("postproc diff --js", {"--json"}),
+        ("postproc diff --rep", {"--report"}),
     ],
 )
 def test_what_is_typed_is_completed(typed, offered):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from dataclasses import replace
 
 import pytest
@@ -24,6 +25,8 @@ HIGH = "MOVE JOINT TO {12.0, 20.0, -85.0, 30.0, 60.0, 45.0}"
 LOW = "MOVE JOINT TO {-12.0, -8.0, -140.0, -40.0, 20.0, -60.0}"
 TWICE = (PLACE, HIGH, "MOVE JOINT TO p", LOW, "MOVE JOINT TO p")
 
+ALONE = ("--set", "verify.second_opinion=false")
+
 
 def with_section(desk, text: str):
     """Return a cell file with a further section."""
@@ -33,6 +36,8 @@ def with_section(desk, text: str):
 def test_old_options_name_the_new_one(desk):
     job = desk.put("job.pdl", program(*TWICE))
     for old, new in OLD_OPTIONS.items():
+        if " " in old:
+            continue
         found = desk.compensate(job, old)
         assert found.exit_code == 2
         assert f"{old} is called {new}" in " ".join(found.stderr.split())
@@ -60,8 +65,8 @@ def test_the_help_of_compensate_fits_on_a_screen():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ("compensation.orientation", "Write compensation.KEY=VALUE or measurements."),
-        ("limits.conflict_mm=1", "Write compensation.KEY=VALUE or measurements."),
+        ("compensation.orientation", "Write SECTION.KEY=VALUE, of the sections comp"),
+        ("limits.conflict_mm=1", "Write SECTION.KEY=VALUE, of the sections comp"),
         ("compensation.nosuch=1", "unknown key @ $.nosuch. Known here: orientation"),
         ("compensation.nosuch=none", "unknown key @ $.nosuch"),
         ("compensation.shared_points=all", "'mean', 'clone' or 'leave' @ $.shared_poi"),
@@ -97,6 +102,30 @@ def test_changes_go_before_the_cell_and_none_stands_for_the_default(desk):
     assert load_cell(own).compensation.max_inserted == 7
     back = load_cell(own, changes=["compensation.max_inserted=none"])
     assert back.compensation.max_inserted == 1_000
+
+
+def test_a_state_and_a_virtual_arm_are_set_like_all_else(desk):
+    asked = (
+        "environment.temperature_c=31", "payload.mass_kg=12", "tracker.xyz_mm=[1,2,3]",
+        "simulation.effects=thermal,compliance@2=0.8", "survey.mode=optimal",
+    )  # fmt: skip
+    plain, cell = load_cell(desk.cell), load_cell(desk.cell, changes=asked)
+    assert (cell.temperature, cell.payload_mass) == (31.0, 12.0)
+    assert cell.tracker.tolist() == [0.001, 0.002, 0.003]
+    assert cell.file.simulation.effects == "thermal,compliance@2=0.8"
+    assert cell.probes.tolist() == plain.probes.tolist()
+    back = load_cell(desk.cell, changes=[*asked, "environment.temperature_c=none"])
+    assert math.isnan(back.temperature)
+
+
+def test_a_word_of_two_commands_is_named_for_each(desk):
+    job = desk.put("job.pdl", program(*TWICE))
+    place = desk.folder / "s.pdl"
+    for command in (("survey", "-o", place), ("simulate", job)):
+        found = cli(*command, "--cell", desk.cell, "--seed", 3)
+        section = "survey" if command[0] == "survey" else "simulation"
+        said = f"--seed is called --set {section}.seed=N"
+        assert found.exit_code == 2 and said in " ".join(found.stderr.split())
 
 
 def test_every_way_to_compensate_does_the_same(desk):
@@ -200,7 +229,7 @@ def test_check_asks_by_the_cell(desk):
         (("--cell", own), True),
         (("--plan", text), True),
     ):
-        done = cli("check", out, *asked, "--allow-uncorrected", "--no-second-opinion")
+        done = cli("check", out, *asked, "--allow-uncorrected", *ALONE)
         assert ("routine-assumed-motionless" in done.stderr) is found, asked
     bare = cli("check", out, "--set", "compensation.assume_motion=true")
     assert bare.exit_code == 2 and "Give --cell or --plan" in bare.stderr

@@ -51,7 +51,7 @@ def test_assume_motion_ignores_the_shipped_list(desk):
         checked = cli("check", out, *STRICT, "--cell", desk.cell, "--allow-uncorrected")
         assert checked.exit_code == 1 - code  # made strictly, nothing was assumed
         assert ("routine-assumed-motionless" in checked.stderr) is not bool(code)
-        told = cli("explain", job, *given, "--json", "-", *strict).stdout
+        told = cli("explain", job, *given, "--report", "-", *strict).stdout
         assert ("spot, which is not in the given files" in told) is bool(code)
-        planned = cli("explain", job, *given[:2], "--json", "-", *strict)
+        planned = cli("explain", job, *given[:2], "--report", "-", *strict)
         assert planned.exit_code == 0

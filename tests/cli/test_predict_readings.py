@@ -105,10 +105,11 @@ def test_rows_without_a_clock_have_an_unknown_moment(tmp_path, clock) -> None:  
     bare, timed = c.write("bare.csv", AFTER), c.write("timed.csv", AFTER, clock)
     mean, end = (
         c.predict(bare, "--set", "measurements.frame=base", *o)
-        for o in ((), ("--after",))
+        for o in ((), ("--set", "measurements.after_survey=true"))
     )
     assert f"no {clock} in the file: tracker_drift at the mean" in mean.stderr
-    assert "--after takes the end" in mean.stderr and "--after" not in end.stderr
+    assert "after_survey of [measurements]" in mean.stderr
+    assert "after_survey" not in end.stderr
     assert 0.10 < left(mean) < 0.18  # half of the drift
     assert left(end) < 0.07
     assert (

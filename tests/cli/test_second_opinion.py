@@ -15,6 +15,8 @@ from postproc.verify import extra
 from tests.verify.judged import PROGRAMS
 
 ASKING = "\n[verify]\nsecond_opinion = true\n"
+INSIST = ("--set", "verify.second_opinion=true")
+ALONE = ("--set", "verify.second_opinion=false")
 
 
 def run(*arguments: object):
@@ -58,7 +60,7 @@ def test_check_gives_it_where_cell_and_model_are_given(desk, tree, tmp_path):
         tree,
         "--allow-uncorrected",
         *given(desk),
-        "--json",
+        "--report",
         tmp_path / "told.json",
     )
     assert done.exit_code == 0, done.output
@@ -78,9 +80,7 @@ def test_a_wrong_direction_is_exit_1_and_named(desk, tree):
     flipped = targets["direction"][:k] + "-" + targets["direction"][k + 1 :]
     targets["direction"] = flipped
     record.write_text(json.dumps(told))
-    assert (
-        run("check", tree, "--allow-uncorrected", "--no-second-opinion").exit_code == 0
-    )
+    assert run("check", tree, "--allow-uncorrected", *ALONE).exit_code == 0
     done = run("check", tree, "--allow-uncorrected", *given(desk))
     assert done.exit_code == 1
     assert "1 differ" in done.stderr and f"axis {k % 6 + 1}" in done.stderr
@@ -108,7 +108,7 @@ def test_without_a_cell_there_is_a_note(desk, tree):
     done = run("check", tree, "--allow-uncorrected")
     assert done.exit_code == 0
     assert done.stderr.count("no second opinion: it takes --cell and --model") == 1
-    asked = run("check", tree, "--allow-uncorrected", "--second-opinion")
+    asked = run("check", tree, "--allow-uncorrected", *INSIST)
     assert asked.exit_code == 2 and "--cell and --model" in asked.stderr
 
 
@@ -116,11 +116,9 @@ def test_without_its_libraries_there_is_a_note(desk, tree, nothing_installed):
     done = run("check", tree, "--allow-uncorrected", *given(desk))
     assert done.exit_code == 0
     assert done.stderr.count("no second opinion: pin and toppra not installed") == 1
-    quiet = run(
-        "check", tree, "--allow-uncorrected", *given(desk), "--no-second-opinion"
-    )
+    quiet = run("check", tree, "--allow-uncorrected", *given(desk), *ALONE)
     assert quiet.exit_code == 0 and "opinion" not in quiet.stderr
-    asked = run("check", tree, "--allow-uncorrected", *given(desk), "--second-opinion")
+    asked = run("check", tree, "--allow-uncorrected", *given(desk), *INSIST)
     assert asked.exit_code == 2 and "pip install pin toppra" in asked.stderr
 
 
@@ -129,7 +127,7 @@ def test_a_broken_library_is_none(desk, tree, monkeypatch):
     monkeypatch.setitem(sys.modules, "pinocchio", None)
     done = run("check", tree, "--allow-uncorrected", *given(desk))
     assert done.exit_code == 0 and "a library is broken" in done.stderr
-    asked = run("check", tree, "--second-opinion", *given(desk))
+    asked = run("check", tree, *INSIST, *given(desk))
     assert asked.exit_code == 2 and "pip install pin toppra" in asked.stderr
 
 
@@ -137,7 +135,7 @@ def compensate(desk: Path, cell: str, folder: Path):
     return run(
         "compensate", PROGRAMS / "spot.pdl", "--cell", desk / cell,
         "--model", desk / "model.json", "-o", folder / "out.pdl",
-        "--report", folder / "out.json", "--html", folder / "out.html",
+        "--report", folder / "out.json", "--report", folder / "out.html",
     )  # fmt: skip
 
 

@@ -73,8 +73,8 @@ def test_a_compensated_program_misses_less(desk):
     desk.compensate(source, "-o", out)
     errors = [
         json.loads(
-            cli("simulate", p, "--cell", desk.cell, "--seed", SEED,
-                "--reference", source, "--json", "-").stdout
+            cli("simulate", p, "--cell", desk.cell, "--set", f"simulation.seed={SEED}",
+                "--reference", source, "--report", "-").stdout
         )["true_error"]
         for p in (source, out)
     ]  # fmt: skip
@@ -92,7 +92,7 @@ FLY = f"MOVEFLY {POSE.removeprefix('MOVE ')} ADVANCE"
 def test_fly_points_that_the_run_does_not_go_on_from_are_told(desk, lines, left):
     source = desk.put("job.pdl", program(FIRST, *lines, NEXT))
     given = "simulate", source, "--cell", desk.cell, "--reference", source
-    told = json.loads(cli(*given, "--json", "-").stdout)
+    told = json.loads(cli(*given, "--report", "-").stdout)
     assert told.get("left_out", 0) == left and told["true_error"]["n"] == 4 - left
     said = "1 fly points without a score: no move continues from them"
     assert (said in cli(*given).output) == bool(left)
@@ -108,14 +108,21 @@ def test_another_program_cannot_be_the_wanted_one(desk):
 @pytest.mark.parametrize("effects", ["nonsense", "compliance@9"])
 def test_unknown_effects_are_refused(desk, effects):
     source = desk.put("job.pdl", program(FIRST))
-    found = cli("simulate", source, "--cell", desk.cell, "--effects", effects)
+    found = cli(
+        "simulate",
+        source,
+        "--cell",
+        desk.cell,
+        "--set",
+        f"simulation.effects={effects}",
+    )
     assert found.exit_code == 2 and found.stderr.startswith("postproc: ")
 
 
 def test_no_known_target_is_told_and_is_valid_json(desk):
     source = desk.put("job.pdl", program("MOVE LINEAR TO p"))
     found = cli("simulate", source, "--cell", desk.cell, "--reference", source,
-                "--json", "-")  # fmt: skip
+                "--report", "-")  # fmt: skip
     assert found.exit_code == 0
     assert json.loads(found.stdout)["true_error"]["mean_mm"] is None
 

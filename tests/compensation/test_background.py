@@ -61,7 +61,7 @@ def ended(run: subprocess.Popen) -> tuple[int, bytes]:
         return run.wait(PATIENCE), said
 
 
-@pytest.mark.parametrize("options", [(), ("--json", "-")])
+@pytest.mark.parametrize("options", [(), ("--report", "-")])
 def test_a_closed_pipe_ends_it_quietly(pair, options) -> None:
     run = begun(pair, *options)
     assert run.stdout.read(100_000)  # within the first block

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from postproc.compensation.pages import names_in
+from postproc.compensation.program_files import find_pages
 from postproc.compensation.sidecar import sidecar_path
 from postproc.language.source import Source
 from postproc.language.stamp import stamp_line
@@ -29,3 +30,39 @@ def test_a_module_with_such_a_name_and_no_record_is_one(tmp_path):
     for name, text in (("main.mod", MAIN), ("part.compensated.mod", PART)):
         (tmp_path / name).write_bytes(text)
     assert set(names_in(tmp_path / "main.mod")[0]) == {"part.compensated.mod"}
+
+
+POINTS = b"DEFDAT points PUBLIC\nDECL GLOBAL E6POS XGRIP={X 1}\nENDDAT\n"
+EMPTY = b"DEF points( )\nEND\n"
+USER = b"DEF job( )\nPTP xgrip\nEND\n"
+LISTS = {
+    "of a source without moves": ({}, True),
+    "of a program that moves": (
+        {"points.src": b"DEF points( )\n PTP XGRIP\nEND\n"}, False),
+    "not public": ({"points.dat": POINTS.replace(b" PUBLIC", b"")}, False),
+    "not global": ({"points.dat": POINTS.replace(b" GLOBAL", b"")}, False),
+    "of numbers": ({"points.dat": POINTS.replace(b"E6POS", b"INT")}, False),
+    "not named": ({"job.src": USER.replace(b"xgrip", b"xgrip2")}, False),
+    "not named in code": ({"job.src": b"DEF job( )\nPTP XP1 ;grip\nEND\n"}, False),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("other", "named"), LISTS.values(), ids=LISTS)
+def test_lists_with_points_for_all_programs(tmp_path, other, named):
+    files = {"job.src": USER, "points.src": EMPTY, "points.dat": POINTS}
+    for name, text in {**files, **other}.items():
+        (tmp_path / name).write_bytes(text)
+    wanted = names_in(tmp_path / "job.src")[0]
+    assert ("points.src" in wanted) == named
+    assert not named or wanted["points.src"] == 2
+    pages = find_pages(tmp_path / "job.src").paths
+    assert ({p.name for p in pages} == {"points.src", "points.dat"}) == named
+
+
+def test_points_that_several_programs_go_to_belong_to_none(tmp_path):
+    for name, text in (
+        ("job.src", USER), ("other.src", USER.replace(b"job", b"other")),
+        ("points.src", EMPTY), ("points.dat", POINTS),
+    ):  # fmt: skip
+        (tmp_path / name).write_bytes(text)
+    assert find_pages(tmp_path / "job.src").paths == ()

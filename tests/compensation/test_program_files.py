@@ -53,7 +53,7 @@ def test_pages_beside_their_sources_get_names_of_their_own(desk):
 def test_explain_and_simulate_follow_pages(desk):
     source = pages(desk.folder / "src", 2, 3)
     found = cli("explain", source / "main.pdl", "--cell", desk.cell, "--model",
-                desk.model, "--json", "-")  # fmt: skip
+                desk.model, "--report", "-")  # fmt: skip
     rows = json.loads(found.stdout)["visits"]
     assert len(rows) == 7 and rows[4]["from"] == "page1.pdl:7"
     measured = desk.folder / "m.csv"

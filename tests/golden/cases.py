@@ -74,14 +74,16 @@ def studies() -> Iterator[Case]:
     report = "report fitted.json -o page.html"
     predict = "predict survey.csv --cell cell.toml --model fitted.json -o p.csv"
     worn = {**PLANT, "worn.csv": "surveys/worn.csv"}
-    diagnose = f"diagnose worn.csv {SETUP} -o better.json --json diagnosis.json"
-    shown = ("history better.json", "history better.json --json history.json")
+    diagnose = f"diagnose worn.csv {SETUP} -o better.json --report diagnosis.json"
+    shown = ("history better.json", "history better.json --report history.json")
     pages = ("report diagnosis.json -o d.html", "report better.json -o b.html")
-    compare = "compare survey.csv --cell cell.toml --json compared.json --html c.html"
+    compare = (
+        "compare survey.csv --cell cell.toml --report compared.json --report c.html"
+    )
     yield Case("diagnose", (diagnose, *shown, *pages), worn, fitted=True)
     yield Case("compare", (compare,), survey, fitted=True)
     yield Case(
-        "fit/full", (f"{fit} --html f.html", report, predict), survey, fitted=True
+        "fit/full", (f"{fit} --report f.html", report, predict), survey, fitted=True
     )
     for method in ("eja-elm", "elm", "interpolation", "kinematic-elm", "kriging"):
         commands = (f"{fit} --method {method}", predict, report)
@@ -92,8 +94,10 @@ def studies() -> Iterator[Case]:
     tracker = f"{fit} --set measurements.frame=tracker --effects geometry,backlash"
     yield Case("fit/tracker", (tracker,), survey, fitted=True)
     for mode in ("lhs", "optimal", "d-optimal"):
-        command = f"survey --cell cell.toml --poses 20 --mode {mode} --seed 3 -o s.pdl"
-        run = "simulate s.pdl --cell cell.toml --seed 5 --effects thermal -o s.csv"
+        design = f"--set survey.mode={mode} --set survey.seed=3"
+        command = f"survey --cell cell.toml --poses 20 {design} -o s.pdl"
+        arm = "--set simulation.seed=5 --set simulation.effects=thermal"
+        run = f"simulate s.pdl --cell cell.toml {arm} -o s.csv"
         yield Case(f"survey/{mode}", (command, run), CELL)
     rows = {**CELL, "rows.csv": "surveys/effects.csv"}
     yield Case("simulate/rows", ("simulate rows.csv --cell cell.toml -o s.csv",), rows)
@@ -113,16 +117,17 @@ def trees() -> Iterator[Case]:
     tree = {**PLANT, **DESK, **{f"src/{k}": v for k, v in below("tree").items()}}
     batch = f"batch src dst {SETUP} --log log.jsonl"
     after = (
-        "check dst --model model.json --source src --json check.json",
+        "check dst --model model.json --source src --report check.json",
         "check dst --allow-uncorrected",
         f"{batch} --resume --jobs 1",
     )
-    yield Case("batch/one", (f"{batch} --jobs 1 --html b.html", *after), tree)
+    yield Case("batch/one", (f"{batch} --jobs 1 --report b.html", *after), tree)
     yield Case(
         "batch/two", (f"{batch} --jobs 2 --shared-points clone", *after[:2]), tree
     )
     plan = b'[[rule]]\npattern = "**/*.pdl"\ncell = "cell.toml"\nmodel = "model.json"\n'
-    command = "batch src dst --plan plan.toml --log log.jsonl --jobs 1 --temperature 30"
+    warm = "--set environment.temperature_c=30"
+    command = f"batch src dst --plan plan.toml --log log.jsonl --jobs 1 {warm}"
     yield Case("batch/plan", (command,), tree, {"plan.toml": plan})
 
 
@@ -132,17 +137,21 @@ def samples() -> Iterator[Case]:
         files = {**PLANT, **job(name)}
         line = "--line 60"
         commands = (
-            f"{COMPENSATE} --report report.json --html page.html",
+            f"{COMPENSATE} --report report.json --report page.html",
             "diff job.pdl out/job.pdl",
-            "diff job.pdl out/job.pdl --json diff.json",
+            "diff job.pdl out/job.pdl --report diff.json",
             f"explain job.pdl {SETUP}",
-            f"explain job.pdl {SETUP} {line} --json explained.json",
+            f"explain job.pdl {SETUP} {line} --report explained.json",
             "report report.json -o again.html",
             "restore out/job.pdl -o back.pdl",
             "restore out/job.pdl",
         )
         yield Case(f"programs/{name}", commands, files)
-        quick = (commands[0].partition(" --html")[0], *commands[1:3], commands[6])
+        quick = (
+            commands[0].partition(" --report page")[0],
+            *commands[1:3],
+            commands[6],
+        )
         if name != "milling":
             yield Case(f"quick/{name}", quick, files, quick=True)
 
@@ -155,7 +164,8 @@ def effects() -> Iterator[Case]:
         command = f"{COMPENSATE} --report report.json"
         yield Case(f"models/{model}/spot", (command,), files, quick=quick)
         files = {**CELL, **job("handling"), "model.json": f"models/{model}.json"}
-        command = f"{COMPENSATE} --report report.json --temperature 22.4 {EXPORTED}"
+        warm = "--set environment.temperature_c=22.4"
+        command = f"{COMPENSATE} --report report.json {warm} {EXPORTED}"
         yield Case(f"models/{model}/handling", (command,), files)
     for name in ("drilling", "handling", "spot"):
         for short, option in OPTIONS.items():
@@ -176,9 +186,9 @@ def made() -> Iterator[Case]:
         pdl = next(place for place in files if place.endswith(".pdl"))
         command = f"compensate {pdl} {SETUP} -o out/{pdl} --report report.json"
         after = (
-            f"diff {pdl} out/{pdl} --json diff.json",
-            f"explain {pdl} {SETUP} --json explained.json",
-            f"simulate out/{pdl} --cell cell.toml --reference {pdl} --json true.json",
+            f"diff {pdl} out/{pdl} --report diff.json",
+            f"explain {pdl} {SETUP} --report explained.json",
+            f"simulate out/{pdl} --cell cell.toml --reference {pdl} --report true.json",
         )
         yield Case(f"made/{name}", (command, *after), files, quick=name == "drilling")
 
@@ -197,7 +207,7 @@ def small() -> Iterator[Case]:
             few = (clone if group == "shared" else command,)
             yield Case(f"{group}/{name}", few, files, quick=quick)
             if group in ("shared", "generated"):
-                after = ("diff job.pdl out/job.pdl --json diff.json",)
+                after = ("diff job.pdl out/job.pdl --report diff.json",)
                 yield Case(f"{group}/{name}/clone", (clone, *after), files)
 
 
@@ -206,7 +216,7 @@ def pages() -> Iterator[Case]:
     files = {**DESK, **below("tree/paged")}
     command = f"compensate main.pdl {SETUP} -o out/main.pdl --report report.json"
     after = ("diff main.pdl out/main.pdl", "restore out/main.pdl -o back/main.pdl")
-    explain = f"explain main.pdl {SETUP} --json explained.json"
+    explain = f"explain main.pdl {SETUP} --report explained.json"
     yield Case("pages", (command, *after, explain), files, quick=True)
 
 

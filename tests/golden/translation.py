@@ -28,7 +28,8 @@ class Translation:
     """The words that differ.
 
     Attributes:
-        arguments: Options of commands, this version's -> the base's.
+        commands: Patterns of whole commands, this version's -> the base's.
+        arguments: Words of commands, likewise.
         cells: Text of cells and plans, likewise.
         keys: Keys of JSON, the base's -> this version's.
         words: Codes and statuses, likewise, as whole words of any text.
@@ -37,6 +38,7 @@ class Translation:
             stands for them.
     """
 
+    commands: Mapping[str, str] = field(default_factory=dict)
     arguments: Mapping[str, str] = field(default_factory=dict)
     cells: Mapping[str, str] = field(default_factory=dict)
     keys: Mapping[str, str] = field(default_factory=dict)
@@ -53,7 +55,7 @@ class Translation:
     @property
     def digest(self) -> bytes:
         """Return what decides how the base is run."""
-        return json.dumps([self.arguments, self.cells]).encode()
+        return json.dumps([self.commands, self.arguments, self.cells]).encode()
 
     def case(self, case: Case) -> Case:
         """Return a case in the words of the base."""
@@ -66,7 +68,7 @@ class Translation:
         }
         commands = tuple(
             " ".join(self.arguments.get(word, word) for word in line.split(" "))
-            for line in case.commands
+            for line in map(self._command, case.commands)
         )
         return replace(case, commands=commands, texts=texts)
 
@@ -85,6 +87,11 @@ class Translation:
                 text = _even(what, self._without(text))
             out[what] = text
         return out
+
+    def _command(self, line: str) -> str:
+        for pattern, stands in self.commands.items():
+            line = re.sub(pattern, stands, line)
+        return line
 
     def _without(self, text: str) -> str:
         for pattern, stands in self.added.items():

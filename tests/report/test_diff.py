@@ -30,7 +30,7 @@ def test_a_compensated_program_is_exit_1_with_a_row_a_target(desk):
     source = desk.put("job.pdl", program(FIRST, "x := 1.5", POSE, NEXT))
     out = desk.folder / "out.pdl"
     report = desk.report(source, "-o", out)
-    found = cli("diff", source, out, "--json", "-")
+    found = cli("diff", source, out, "--report", "-")
     data = json.loads(found.stdout)
     assert found.exit_code == 1 and data["stamped"]
     assert [row["line"] for row in data["rows"]] == [5, 7, 8]
@@ -64,7 +64,7 @@ def test_directions_and_statuses_are_those_of_the_report(desk):
     source = desk.put("job.pdl", program(FIRST, POSE, FAR, NEXT))
     out = desk.folder / "out.pdl"
     report = desk.report(source, "-o", out)["targets"]
-    found = json.loads(cli("diff", source, out, "--json", "-").stdout)
+    found = json.loads(cli("diff", source, out, "--report", "-").stdout)
     told = {row["line"]: row for row in (*found["rows"], *found["uncorrected"])}
     assert sorted(told) == [5, 6, 7, 8] and [
         r["line"] for r in found["uncorrected"]
@@ -87,7 +87,7 @@ def test_a_line_with_several_statuses_counts_its_visits(desk):
     report = desk.report(source, "-o", out)["targets"]
     found = [row["status"] for row in report]
     assert found == ["corrected", "corrected", "corrected", "runtime", "corrected"]
-    *others, row = json.loads(cli("diff", source, out, "--json", "-").stdout)["rows"]
+    *others, row = json.loads(cli("diff", source, out, "--report", "-").stdout)["rows"]
     assert not any(other["visits"] for other in others)
     assert row["visits"] == {"runtime": 1, "corrected": 1}
     assert (row["status"], row["reason"]) == ("runtime", report[3]["reason"])

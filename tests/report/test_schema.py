@@ -11,22 +11,26 @@ from tests.plant import program
 from tests.written import cli
 
 COMMANDS = {
-    "check": ("check", "out", "--json", "-"),
-    "comparison": ("compare", "rows.csv", "--cell", "cell.toml", "--json", "-"),
-    "difference": ("diff", "job.pdl", "out/job.pdl", "--json", "-"),
-    "explanation": ("explain", "job.pdl", "--cell", "cell.toml", "--json", "-"),
+    "check": ("check", "out", "--report", "-"),
+    "comparison": ("compare", "rows.csv", "--cell", "cell.toml", "--report", "-"),
+    "difference": ("diff", "job.pdl", "out/job.pdl", "--report", "-"),
+    "explanation": ("explain", "job.pdl", "--cell", "cell.toml", "--report", "-"),
     "fit": (
         "fit", "rows.csv", "--cell", "cell.toml", "-o", "m.json",
-        "--effects", "geometry", "--json", "-",
+        "--effects", "geometry", "--report", "-",
     ),
-    "history": ("history", "model.json", "--json", "-"),
+    "history": ("history", "model.json", "--report", "-"),
     "report": (
         "compensate", "job.pdl", "--cell", "cell.toml", "--model", "model.json",
         "-o", "new.pdl", "--report", "-",
     ),
     "simulation": (
         "simulate", "job.pdl", "--cell", "cell.toml", "--reference", "job.pdl",
-        "--json", "-",
+        "--report", "-",
+    ),
+    "tree": (
+        "batch", "nominal", "tree", "--cell", "cell.toml", "--model", "model.json",
+        "--jobs", "1", "--report", "-",
     ),
 }  # fmt: skip
 SLOW = {"diagnosis"}  # looked at where one is made: tests/cli/test_diagnose_path.py
@@ -40,7 +44,9 @@ def folder(job_folder, tmp_path_factory):
         (place / name).write_bytes((job_folder / name).read_bytes())
     (place / "rows.csv").write_bytes((job_folder / "survey.csv").read_bytes())
     (place / "job.pdl").write_bytes(program("job", 2, 1))
-    (place / "out").mkdir()
+    for name in ("out", "nominal"):
+        (place / name).mkdir()
+    (place / "nominal" / "job.pdl").write_bytes(program("job", 2, 1))
     given = ("--cell", place / "cell.toml", "--model", place / "model.json")
     cli("compensate", place / "job.pdl", *given, "-o", place / "out" / "job.pdl")
     return place

@@ -12,6 +12,7 @@ from tests.conftest import CELL
 from tests.written import FIRST, POSE, cli, program
 
 EFFECTS = "payload,thermal"
+ARM = "--set", "simulation.seed=3", "--set", f"simulation.effects={EFFECTS}"
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +33,8 @@ def campaign(tmp_path_factory):
         lines.append(f"{k + 1},{q},{side},{state},{k % 3}")
     (folder / "rows.csv").write_text("\n".join(lines) + "\n")
     cell = ("--cell", folder / "loaded.toml")
-    assert run("simulate", folder / "rows.csv", *cell, "--seed", 3, "--effects",
-               EFFECTS, "-o", folder / "s.csv") == 0  # fmt: skip
+    assert run("simulate", folder / "rows.csv", *cell, *ARM,
+               "-o", folder / "s.csv") == 0  # fmt: skip
     assert run("fit", folder / "s.csv", *cell, "-o", folder / "m.json", "--effects",
                f"geometry,backlash,backlash_profile,{EFFECTS}") == 0  # fmt: skip
     (folder / "job.pdl").write_bytes(program(FIRST, POSE))
@@ -72,8 +73,8 @@ def test_a_job_is_compensated_for_the_state_that_the_cell_declares(
     rows = compensate(campaign, payload, temperature)
     assert [row["status"] for row in rows] == ["corrected", "corrected"]
     found = cli("simulate", campaign / "out.pdl", "--cell", campaign / "now.toml",
-                "--reference", campaign / "job.pdl", "--seed", 3, "--effects", EFFECTS,
-                "--json", "-")  # fmt: skip
+                "--reference", campaign / "job.pdl", *ARM,
+                "--report", "-")  # fmt: skip
     error = json.loads(found.stdout)["true_error"]
     # Where the arm was before its first move is not known: its backlash stays.
     later = (error["mean_mm"] * error["n"] - error["max_mm"]) / (error["n"] - 1)

@@ -35,10 +35,10 @@ def tree_case() -> Case:
         texts = {name: archive.read(name) for name in archive.namelist()}
     commands = (
         "batch src new --plan plan.toml --log new.jsonl --jobs 1",
-        "check new --source src --json new.json",
-        "check dst --model abb/model.json --json old.json",
-        "diff src/pdl/odd.pdl dst/pdl/odd.pdl --json diff.json",
-        "explain src/pdl/odd.pdl --cell desk/cell.toml --json explained.json",
+        "check new --source src --report new.json",
+        "check dst --model abb/model.json --report old.json",
+        "diff src/pdl/odd.pdl dst/pdl/odd.pdl --report diff.json",
+        "explain src/pdl/odd.pdl --cell desk/cell.toml --report explained.json",
         "restore dst/pdl/odd.pdl -o back/odd.pdl",
     )
     return Case("tree", commands, texts=texts)

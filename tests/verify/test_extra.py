@@ -13,6 +13,8 @@ from postproc.exceptions import PostprocError
 from postproc.verify import extra
 from tests.verify.judged import PROGRAMS
 
+INSIST = ("--set", "verify.second_opinion=true")
+ALONE = ("--set", "verify.second_opinion=false")
 KINDS = (
     "raise ImportError('libboost.so: not found')",
     "raise OSError('libhdf5.so: not found')",
@@ -52,11 +54,11 @@ def test_who_did_not_ask_gets_a_note(library, tmp_path, bench_model) -> None:
     bench_model.save(model)
     given = "--cell", str(PROGRAMS / "cell.toml"), "--model", str(model)
     done = CliRunner().invoke(app, ["check", str(tree), *given])
-    plain = CliRunner().invoke(app, ["check", str(tree), *given, "--no-second-opinion"])
+    plain = CliRunner().invoke(app, ["check", str(tree), *given, *ALONE])
     assert done.exit_code == plain.exit_code == 0
     note = f"no second opinion: a library is broken ({library}: "
     assert done.stderr.count(note) == 1
-    asked = CliRunner().invoke(app, ["check", str(tree), *given, "--second-opinion"])
+    asked = CliRunner().invoke(app, ["check", str(tree), *given, *INSIST])
     assert asked.exit_code == 2 and "pip install pin toppra" in asked.stderr
 
 

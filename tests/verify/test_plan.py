@@ -12,6 +12,8 @@ from typer.testing import CliRunner, Result
 from postproc.cli.commands import app
 from tests.verify.judged import PROGRAMS
 
+INSIST = ("--set", "verify.second_opinion=true")
+
 
 def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, list(map(str, arguments)))
@@ -33,12 +35,12 @@ def desk(tmp_path_factory, bench_model) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(("asked", "code"), [((), 0), (("--second-opinion",), 2)])
+@pytest.mark.parametrize(("asked", "code"), [((), 0), (INSIST, 2)])
 def test_a_program_without_a_rule_is_named(desk, tmp_path, asked, code) -> None:
     told = tmp_path / "told.json"
     done = run(
         "check", desk / "made", "--allow-uncorrected", "--plan", desk / "plan.toml",
-        "--json", told, *asked,
+        "--report", told, *asked,
     )  # fmt: skip
     assert done.exit_code == code, done.stderr
     assert done.stderr.count("handling.pdl: no second opinion: no rule") == 1
@@ -50,7 +52,7 @@ def test_a_cell_for_the_rest_gives_an_opinion_on_all(desk) -> None:
     rest = "--cell", desk / "cell.toml", "--model", desk / "model.json"
     done = run(
         "check", desk / "made", "--allow-uncorrected", "--plan", desk / "plan.toml",
-        *rest, "--second-opinion",
+        *rest, *INSIST
     )  # fmt: skip
     assert done.exit_code == 0, done.stderr
     assert "no second opinion" not in done.stderr

@@ -121,7 +121,7 @@ class FrameReader:
                 return self.read_numbered(
                     "$base", self.task.number(first, self.row, self.here)
                 )
-            case "ek" | "lk" | "ey":
+            case "ek" | "lk" | "ey" | "eb" | "eb_abs":
                 return no_frame(_CHAINED.format(name.upper()), Code.EXTERNAL_AXES)
         return no_frame(f"what {name.upper()} gives is not known")
 

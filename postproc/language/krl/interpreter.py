@@ -9,7 +9,13 @@ from functools import cached_property
 
 from postproc.diagnostics import Code, Reason
 from postproc.language.control_flow import HeadedRows
-from postproc.language.interpreter import Arrived, CallContext, Scope, TaskMachine
+from postproc.language.interpreter import (
+    NOWHERE,
+    Arrived,
+    CallContext,
+    Scope,
+    TaskMachine,
+)
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import HELD
 from postproc.language.krl.external_routines import AHEAD, ASSUMED, package_routines
@@ -253,6 +259,7 @@ class KrlMachine(TaskMachine):
                 "out if it is not needed"
             )
             return self.unknown(context, row, here, what)
+        here = replace(here, origins=NOWHERE) if _is_tracking(one.value) else here
         return replace(here, modes=modes)
 
     def _call(
@@ -559,6 +566,11 @@ def _puts_out(one: said.Instruction) -> bool:
     """Return True if a call of BAS switches outputs, which may stop the arm."""
     command = one.arguments[0].value if one.arguments else None
     return isinstance(command, said.EnumValue) and command.name.startswith("#out_")
+
+
+def _is_tracking(operand: said.Operand) -> bool:
+    """Return True if a base follows a conveyor, which takes the arm along."""
+    return isinstance(operand, said.FunctionCall) and operand.name in ("eb", "eb_abs")
 
 
 def _is_modal(name: str) -> bool:

@@ -53,6 +53,7 @@ class KrlModes:
         distance: ``$APO.CDIS`` [mm].
         overlap: ``$APO.CPTP`` [%].
         orientation: ``$ORI_TYPE``: #var, #constant, #joint or "" where not known.
+        circle: ``$CIRC_TYPE``: #base, #path or "" where not known.
         through: Arcs of the spline planner take the tool through the orientation of
             their points (``$CIRC_MODE``).
         ahead: ``$ADVANCE`` is not 0; None where that is not known.
@@ -78,6 +79,7 @@ class KrlModes:
     distance: float = UNKNOWN
     overlap: float = UNKNOWN
     orientation: str = "#var"
+    circle: str = ""
     through: bool = False
     ahead: bool | None = True
     fdat: KrlValue | None = None
@@ -211,6 +213,7 @@ _FIELDS: Mapping[str, Mapping[str, Any]] = {
     "$vel": {"speed": UNKNOWN},
     "$vel_axis": {"share": UNKNOWN},
     "$apo": {"distance": UNKNOWN, "overlap": UNKNOWN},
+    "$circ_type": {"circle": ""},
     "$advance": {"ahead": None},
 }
 """What is not known of modes where something beside the program sets a variable."""
@@ -273,6 +276,8 @@ class ModeReader:
                 return replace(modes, interpolation=self._word(value, "ipo_frame"))
             case "$ori_type":
                 return replace(modes, orientation=self._word(value, "ori_typ"))
+            case "$circ_type":
+                return replace(modes, circle=self._word(value, "circ_typ"))
             case "$circ_mode":
                 return replace(modes, through=self._goes_through(one))
             case "$vel" | "$vel_axis" | "$apo":
@@ -550,9 +555,15 @@ class ModeReader:
             distance=number_or_unknown(given("def_apo_cdis")),
             overlap=number_or_unknown(given("def_apo_cptp")),
             orientation="#var",
+            circle=self._default_circle,
             through=False,
             ahead=math.isnan(advance) or advance > 0,
         )
+
+    @property
+    def _default_circle(self) -> str:
+        """Return ``DEF_CIRC_TYP`` of ``$config.dat``, "" where it is not known."""
+        return self._word(said.DataObject("def_circ_typ"), "")
 
     def _default(self, name: str) -> float:
         """Return a number of ``$config.dat``, NaN where it is not known."""
@@ -583,13 +594,22 @@ class ModeReader:
 
     def _path_data(self, modes: KrlModes) -> KrlModes:
         """Take blending and orientation of LDAT_ACT."""
-        held = modes.ldat if isinstance(modes.ldat, KrlRecord) else KrlRecord(())
+        lost = KrlRecord((), whole=False)
+        held = modes.ldat if isinstance(modes.ldat, KrlRecord) else lost
         word = held.get("ori_typ")
         return replace(
             modes,
             distance=number_or_unknown(held.number("apo_dist")),
             orientation=word if isinstance(word, str) else "",
+            circle=self._circle(held),
         )
+
+    def _circle(self, held: KrlRecord) -> str:
+        """Return how the tool turns on arcs by LDAT_ACT, which may leave it out."""
+        word = held.get("circ_typ")
+        if isinstance(word, str):
+            return word
+        return self._default_circle if held.whole and word is None else ""
 
 
 def load_of(record: KrlRecord) -> tuple[float, ...]:

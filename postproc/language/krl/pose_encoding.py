@@ -61,6 +61,7 @@ TERMS = Terms(
 class KrlNumbers(Dialect):
     """Position [mm], angles [deg], S and T of a position, or six joint angles."""
 
+    runs_alone: bool = True
     terms: Terms = TERMS
     heads: tuple[str, ...] = HEADS
     reflags: bool = True
@@ -143,9 +144,17 @@ class KrlNumbers(Dialect):
         """Tell where signs of T are not those of joints (k, 6) [rad], (k,)."""
         return np.asarray(_beyond(turn_bits(values[:, TURN]), q).any(axis=1))
 
-    def near_border(self, q: Floats) -> Bools:
-        """Tell which joints (k, 6) [rad] are so near 0 that T may be wrong, (k, 6)."""
-        return np.asarray(np.abs(q) <= BORDER)
+    def near_border(self, values: Floats, q: Floats, before: Floats) -> Bools:
+        """Tell which joints are so near 0 that T may be wrong, see `Dialect`.
+
+        One that the correction takes away from 0, to the side that its bit names, is
+        there on the controller, too, if the source is.
+        """
+        bits = turn_bits(values[:, TURN])
+        inwards = np.where(bits > 0, -1.0, 1.0)  # to the side of the bit
+        away = (q - before) * inwards >= SURE
+        away &= before * inwards >= -SURE
+        return np.asarray((np.abs(q) <= BORDER) & ~away)
 
 
 KRL_DIALECT = KrlNumbers()

@@ -93,8 +93,8 @@ FUNCTIONS = frozenset(
     strlen strdeclen strcomp strfind varstate cast_from_bits get_system_data
     stool stool2 sbase sipo_mode sload svel_cp svel_joint sacc_cp sacc_joint sapo
     sapo_ptp sori_typ scirc_typ sjerk sgear_jerk use_cm_pro_values exists_kuka_msg
-    ek lk ey euler mat_to_rpy rpy_to_mat scirc_m s_exax_ign s_exax_ign2 k_root k_type
-    k_offs lk_offs k_addr k_name k_shift sync arcgetdelay arcgetpath
+    ek lk ey eb eb_abs euler mat_to_rpy rpy_to_mat scirc_m s_exax_ign s_exax_ign2
+    k_root k_type k_offs lk_offs k_addr k_name k_shift sync arcgetdelay arcgetpath
     """.split()
 )
 KEEPING = ((STILL - WRITING) | FUNCTIONS | package_routines().keys()) | {"bas"}

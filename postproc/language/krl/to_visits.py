@@ -169,8 +169,13 @@ def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
     """Tell how the tool turns on the way."""
     if v.motion != Motion.CIRCULAR or modes.orientation != "#var":
         return modes.law
-    through = modes.through and v.by_spline_planner
-    return OrientationLaw.ONE_AXIS if through else OrientationLaw.ALONG_PATH
+    if modes.circle == "#path":
+        return OrientationLaw.ALONG_PATH
+    if v.by_spline_planner:
+        law = OrientationLaw
+        return law.ONE_AXIS if modes.through else law.ALONG_PATH
+    known = modes.circle == "#base"
+    return OrientationLaw.START_TO_END if known else OrientationLaw.ALONG_PATH
 
 
 def _blending(v: KrlVisit, modes: KrlModes, end: str) -> _Blending:

@@ -34,7 +34,7 @@ MOST_CANDIDATES = 25
 
 
 def diagnosis_report(diagnosis: Mapping[str, Any]) -> str:
-    """Make the page of what ``diagnose --json`` wrote.
+    """Make the page of what ``diagnose --report`` wrote as JSON.
 
     Beyond the keys that every diagnosis has, the page shows, where they are given:
     ``evidence`` of an effect (``covariate``, ``unit``, ``direction``, and lists ``x``,

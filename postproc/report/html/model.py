@@ -263,7 +263,7 @@ def _lists(values: Floats, digits: int) -> list[list[float]]:
 
 
 def comparison_report(comparison: Mapping[str, Any]) -> str:
-    """Make the page of what ``compare --json`` wrote.
+    """Make the page of what ``compare --report`` wrote as JSON.
 
     Raises:
         KeyError, ValueError, TypeError: It is no such report.

@@ -29,7 +29,9 @@ from postproc.robot.trajectory import Motion
 from postproc.simulation import DEFAULT, virtual_arm
 from postproc.simulation.program import land
 from tests.compensation.paths.test_path_error import (
+    ARM,
     CELL,
+    DESIGN,
     LINES,
     SEED,
     START,
@@ -61,17 +63,17 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("points")
     (folder / "job.pdl").write_bytes(timed().encode())
     survey, measured = folder / "survey.pdl", folder / "survey.csv"
-    done("survey", "--cell", CELL, "--poses", 250, "--seed", 9, "-o", survey)
-    done("simulate", survey, "--cell", CELL, "--seed", SEED, "-o", measured)
+    done("survey", "--cell", CELL, *DESIGN, "-o", survey)
+    done("simulate", survey, "--cell", CELL, *ARM, "-o", measured)
     done("fit", measured, "--cell", CELL, "-o", folder / "model.json")
     known(folder, "confirmed")
     asked = ("--path-tolerance", TOLERANCE)
     for name, more in (("plain", ()), ("points", asked),
                        ("stops", (*asked, "--set", STOPS))):  # fmt: skip
         compensated(folder, "job.pdl", name, *more)
-        done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+        done("simulate", folder / f"{name}.pdl", "--cell", CELL, *ARM,
              "--reference", folder / "job.pdl", "--path",
-             "--json", folder / f"{name}.true.json")  # fmt: skip
+             "--report", folder / f"{name}.true.json")  # fmt: skip
     return folder
 
 
@@ -474,7 +476,7 @@ def test_diff_tells_points_apart(shop: Path) -> None:
 def test_a_budget_holds(shop: Path) -> None:
     report = compensated(shop, "job.pdl", "few", "--path-tolerance", TOLERANCE,
                          "--set", "compensation.max_inserted=2",
-                         "--html", shop / "few.html")  # fmt: skip
+                         "--report", shop / "few.html")  # fmt: skip
     assert (shop / "few.html").stat().st_size > 10_000
     assert sum(path["inserted"] for path in report["path"]) <= 2
     assert any("max_inserted" in d["message"] for d in report["diagnostics"])
@@ -518,9 +520,9 @@ def drilled(shop: Path) -> Path:
         ),
     ):
         compensated(shop, "holes.pdl", name, *more)
-        done("simulate", shop / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+        done("simulate", shop / f"{name}.pdl", "--cell", CELL, *ARM,
              "--reference", shop / "holes.pdl", "--path",
-             "--json", shop / f"{name}.true.json")  # fmt: skip
+             "--report", shop / f"{name}.true.json")  # fmt: skip
     return shop
 
 

@@ -27,6 +27,8 @@ from tests.written import cli
 ROOT = Path(__file__).parents[3]
 CELL = ROOT / "programs/cell.toml"
 SEED = 41  # of the virtual arm
+ARM = ("--set", f"simulation.seed={SEED}")
+DESIGN = ("--poses", 250, "--set", "survey.seed=9")
 LINES = 12
 START = (
     "MOVE JOINT TO {4.0, -6.0, -84.0, 9.0, 53.0, -12.0}",
@@ -78,16 +80,16 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("paths")
     (folder / "job.pdl").write_text(job())
     survey, model = folder / "survey.pdl", folder / "model.json"
-    done("survey", "--cell", CELL, "--poses", 250, "--seed", 9, "-o", survey)
+    done("survey", "--cell", CELL, *DESIGN, "-o", survey)
     measured = folder / "survey.csv"
-    done("simulate", survey, "--cell", CELL, "--seed", SEED, "-o", measured)
+    done("simulate", survey, "--cell", CELL, *ARM, "-o", measured)
     done("fit", measured, "--cell", CELL, "-o", model)
     done("compensate", folder / "job.pdl", "--cell", CELL, "--model", model,
          "-o", folder / "out.pdl", "--report", folder / "report.json")  # fmt: skip
     for name in ("job", "out"):
-        done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+        done("simulate", folder / f"{name}.pdl", "--cell", CELL, *ARM,
              "--reference", folder / "job.pdl", "--path",
-             "--json", folder / f"{name}.json")  # fmt: skip
+             "--report", folder / f"{name}.json")  # fmt: skip
     return folder
 
 
@@ -166,7 +168,7 @@ def test_rounded_corners_are_passed_as_the_virtual_arm_does(shop: Path) -> None:
     (shop / "round.pdl").write_text(rounded())
     done("compensate", shop / "round.pdl", "--cell", CELL, "--model",
          shop / "model.json", "-o", shop / "round.out.pdl",
-         "--report", shop / "round.json", "--html", shop / "round.html")  # fmt: skip
+         "--report", shop / "round.json", "--report", shop / "round.html")  # fmt: skip
     assert "Cornering round-off" in (shop / "round.html").read_text()
     report = json.loads((shop / "round.json").read_bytes())
     told = {p["visit"]: p["corner_mm"] for p in report["path"] if "corner_mm" in p}

@@ -198,3 +198,37 @@ def test_a_point_of_another_list_is_known_to_its_moves(bench_cell, bench_model):
     found = run(files, bench_cell, bench_model, EXPORTED)
     assert len(notes(found, "cloned")) == 1, found.diagnostics
     assert b"DECL GLOBAL E6POS XP9__2={" in found.outputs["more.dat"]
+
+
+def test_a_point_that_other_programs_know_stays_and_its_move_gets_another(
+    bench_cell, bench_model
+):
+    others = {"more_dat": ABROAD, "more_src": CALLED}
+    files = moves(bench_cell, SIDES[0], "PTP XP9", data="", **others)
+    plain = run(files, bench_cell, bench_model, Options())
+    found = run(files, bench_cell, bench_model)
+    assert corrected(plain) == 1 and corrected(found) == 2
+    point = next(x for x in files["more.dat"].splitlines() if b"XP9=" in x)
+    assert (
+        point in found.outputs["more.dat"] and b"PTP XP9__2" in found.outputs["job.src"]
+    )
+    again = read_program({**files, **found.outputs}, bench_cell).visits
+    assert again.names[again.name[1]] == "xp9__2"
+
+
+def test_of_an_inline_form_such_a_point_is_left(bench_cell, bench_model):
+    others = {"more_dat": ABROAD, "more_src": CALLED}
+    lines = [SIDES[0], FORM, "PTP XP9", ";ENDFOLD"]
+    files = moves(bench_cell, *lines, data="", **others)
+    found = run(files, bench_cell, bench_model)
+    assert corrected(found) == 1 and "more.dat" not in found.outputs
+    reason = found.decisions.reasons[found.decisions.why[1]]
+    assert "other programs may read" in reason.text
+
+
+def test_a_point_that_a_submit_program_sets_is_not_cloned(bench_cell, bench_model):
+    beside = "DEF sps( )\nLOOP\nXP9.Z=5\nENDLOOP\nEND\n"
+    others = {"more_dat": ABROAD, "more_src": CALLED, "sps_sub": beside}
+    files = moves(bench_cell, SIDES[0], "PTP XP9", data="", **others)
+    found = run(files, bench_cell, bench_model)
+    assert corrected(found) == 1 and not notes(found, "cloned")

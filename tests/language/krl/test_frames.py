@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.language.visits import ZoneRule
+from postproc.language.visits import ELSEWHERE, ZoneRule
 from tests.language.krl.test_visits import CONFIG, NEW, frame, job, reasons
 
 SHIFT = "{X 0,Y 0,Z 5,A 0,B 0,C 0}"
@@ -301,3 +301,24 @@ def test_what_is_handed_over_may_be_changed(call, left):
 )
 def test_what_moves_or_loads_the_arm_besides_leaves_targets(line):
     assert reasons(job(line, "LIN XP1"))[0]
+
+
+BELT = "MACHINE_DEF[3].ROOT,MACHINE_DEF[3].NAME[],BASE_DATA[2],1"
+
+
+@pytest.mark.parametrize("name", ["EB", "EB_ABS"])
+def test_a_base_on_a_conveyor_leaves_the_tool_and_the_load(name):
+    lines = [INIT, "BAS(#TOOL,1)", f"$BASE={name}({BELT})", "LIN XP1",
+             "BAS(#BASE,2)", "PTP XP1"]  # fmt: skip
+    found = job(*lines)
+    v = found.visits
+    assert "another axis or arm" in reasons(found)[0] and reasons(found)[1] == ""
+    assert frame(found, "tool", 1)[:3].tolist() == [10, 20, 300]
+    assert v.loads[v.load[1]][0] == 40.0
+    assert v.predecessors(0).tolist() == [ELSEWHERE]
+
+
+def test_the_arm_may_be_taken_along_before_another_base_is_set():
+    found = job(INIT, "BAS(#TOOL,1)", "PTP XA", f"$BASE=EB({BELT})", "BAS(#BASE,2)",
+                "LIN XP1")  # fmt: skip
+    assert found.visits.predecessors(1).tolist() == [ELSEWHERE]

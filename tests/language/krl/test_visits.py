@@ -302,6 +302,58 @@ def test_arcs():
     assert v.orientation_law.tolist() == known
 
 
+CIRCLES = {
+    "not known": ([], "ALONG_PATH"),
+    "set": (["$CIRC_TYPE=#BASE"], "START_TO_END"),
+    "along the path": (["$CIRC_TYPE=#PATH"], "ALONG_PATH"),
+    "of an unknown value": (["$CIRC_TYPE=#BASE", "$CIRC_TYPE=N"], "ALONG_PATH"),
+    "of path data": (["LDAT_ACT=LCPDAT1", "BAS(#CP_DAT)"], "START_TO_END"),
+    "of path data along it": (["LDAT_ACT=LPATH", "BAS(#CP_PARAMS,1)"], "ALONG_PATH"),
+    "left out of path data": (["LDAT_ACT=LNONE", "BAS(#CP_DAT)"], "ALONG_PATH"),
+    "of data that are not known": (
+        ["LDAT_ACT=LCPDAT1", "LDAT_ACT.VEL=N", "BAS(#CP_DAT)"], "UNKNOWN"),
+    "forgotten": (["$CIRC_TYPE=#BASE", "grip( )"], "UNKNOWN"),
+    "the default of no file": (["$CIRC_TYPE=#BASE", "BAS(#INITMOV,0)"], "ALONG_PATH"),
+}  # fmt: skip
+LDATS = """
+DECL LDAT LPATH={VEL 2,ACC 100,APO_DIST 5,ORI_TYP #VAR,CIRC_TYP #PATH}
+DECL LDAT LNONE={VEL 2,ACC 100,APO_DIST 5,ORI_TYP #VAR}
+"""
+
+
+@pytest.mark.parametrize(("lines", "law"), CIRCLES.values(), ids=CIRCLES)
+def test_how_the_tool_turns_on_arcs(lines, law):
+    found = job(*lines, "CIRC XP1,XP2", data=DATA + LDATS)
+    assert found.visits.orientation_law.tolist() == [OrientationLaw[law]] * 2
+
+
+@pytest.mark.parametrize("first", ["LDAT_ACT=LNONE\nBAS(#CP_DAT)", "BAS(#INITMOV,0)"])
+def test_the_default_of_the_controller_for_arcs(first):
+    config = CONFIG.replace("ENDDAT", "DECL CIRC_TYPE DEF_CIRC_TYP=#BASE\nENDDAT")
+    found = job(first, "CIRC XP1,XP2", data=DATA + LDATS, config=config)
+    law = OrientationLaw
+    assert found.visits.orientation_law.tolist() == [law.START_TO_END] * 2
+
+
+def test_arcs_of_the_spline_planner_along_the_path():
+    through = "$CIRC_MODE={AUX_PT {ORI #INTERPOLATE},TARGET_PT {ORI #INTERPOLATE}}"
+    found = job(through, "$CIRC_TYPE=#PATH", "SCIRC XP1,XP2", "$CIRC_TYPE=#BASE",
+                "SCIRC XP1,XP2", "SCIRC XP1,XP2 WITH $CIRC_TYPE=SCIRC_TYP(LPATH)",
+                data=DATA + LDATS)  # fmt: skip
+    law = OrientationLaw
+    known = [law.ALONG_PATH] * 2 + [law.ONE_AXIS] * 2 + [law.ALONG_PATH] * 2
+    assert found.visits.orientation_law.tolist() == known
+
+
+def test_a_submit_program_may_set_how_the_tool_turns_on_arcs():
+    text = "DEF m ( )\n$CIRC_TYPE=#BASE\nCIRC XP1,XP2\nEND\n"
+    sources = [Source("m.src", text.encode()),
+               Source("m.dat", f"DEFDAT m\n{DATA}\nENDDAT\n".encode()),
+               Source("sps.sub", b"DEF sps( )\n$CIRC_TYPE=#PATH\nEND\n")]  # fmt: skip
+    found = Krl().read(sources, Start())
+    assert found.visits.orientation_law.tolist() == [OrientationLaw.ALONG_PATH] * 2
+
+
 def test_orientation_joint_by_joint():
     found = job("LDAT_ACT=LJOINT", "FDAT_ACT=FP1", "BAS(#CP_PARAMS,1)", "LIN XP1")
     assert found.visits.orientation_law.tolist() == [OrientationLaw.WRIST_JOINTS]
