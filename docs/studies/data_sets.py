@@ -219,7 +219,7 @@ def _splits(
 def _title(said: SplitSection) -> str:
     """Describe a draw."""
     if said.test not in (None, said.fit):
-        where = "registered anew" if said.registered == "anew" else "same set-up"
+        where = "registered again" if said.registered == "anew" else "same set-up"
         return f"{said.test}, by a fit of {said.fit}, {where}"
     share = f"{said.share * 100:g} %"
     many = f", {len(said.seeds)} draws" if len(said.seeds) > 1 else ""

@@ -286,7 +286,7 @@ def _turn_again(targets: Targets, visits: Visits, rows: Ints) -> Targets:
     if len(arcs) == 0:
         return targets
     joints = targets.joints[arcs.via]
-    return targets.move_to(arcs.via, arcs.turned(targets.tcp), joints)
+    return targets.move_to(arcs.via, arcs.turn(targets.tcp), joints)
 
 
 def _frames(visits: Visits) -> Frames:
