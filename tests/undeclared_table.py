@@ -48,8 +48,8 @@ hold at 95 % (Clopper and Pearson).
 """
 DRIFT = """`tracker_drift`, `azimuth` and `refraction` move nothing of the arm and are
 never compensated. What an extended model misses there is mostly one rigid displacement:
-the place of the base cannot be separated from the start of a drift of unknown shape, nor from
-the direction of a circle. The informed fit knows the shape and the phase. Such a
+the place of the base cannot be separated from the start of a drift of unknown shape,
+nor from the direction of a circle. The informed fit knows shape and phase. Such a
 displacement moves all targets of a cell together, as an error of its registration does,
 and changes nothing between them. So in campaigns with one of these three the rigid
 displacement that fits best is removed from the errors of both fits, here and in the

@@ -319,7 +319,7 @@ frame = "tracker"             # or "base", with tool_mm = [..] of the reflector
 licence = "MIT"
 source = "who measured it, and where it was published"
 get = "where others get it"   # optional, as are notes = [..]
-[columns]                     # as for fit --columns; left out where the header is known
+[columns]                     # as measurements.columns; not needed for known headers
 q1_deg = "joint_1"            # .. q6_deg
 x_mm = ["x_t", {{ column = "x_dif", factor = -1.0 }}]   # y_mm, z_mm; a list is a sum
 [[series]]                    # a file: one set-up, rows in the order of visits
@@ -331,7 +331,7 @@ fit = "grid"
 draw = "random"
 share = 0.3
 seeds = [0, 1, 2]
-[[split]]                     # all of another series, registered "anew" or "as fitted"
+[[split]]                     # all of another series, registered "again" or "as fitted"
 fit = "grid"
 test = "random"
 registered = "as fitted"

@@ -235,8 +235,8 @@ def _targets(
 
 UNNAMED = Reason(
     Code.CONFIGURATION_UNKNOWN,
-    "which branch its flags name is known for arms with a closed form alone: go there "
-    "by joint angles, or on a line",
+    "the branch that its flags name is not known for an arm without a closed form of "
+    "the inverse kinematics: go there by joint angles, or on a line",
 )
 
 
