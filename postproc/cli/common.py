@@ -50,7 +50,8 @@ class SharedPoints(StrEnum):
 SharedPointsOption = Annotated[
     SharedPoints | None,
     typer.Option(
-        "--shared-points", help="What is done with a point that several moves go to."
+        "--shared-points",
+        help="Points of several moves: mean correction, clone or none.",
     ),
 ]
 SetOption = Annotated[
@@ -66,12 +67,12 @@ OrientationOption = Annotated[
     typer.Option("--orientation", help="Correct orientations too, not only places."),
 ]
 EveryOption = Annotated[
-    bool, typer.Option("--all", help="A line for every finding, also for equal ones.")
+    bool, typer.Option("--all", help="List equal findings one by one, not grouped.")
 ]
 ProcessesOption = Annotated[
     int,
     typer.Option(
-        "--jobs", "-j", min=0, help="Processes; 0: one for a core, 8 at the most."
+        "--jobs", "-j", min=0, help="Number of processes; 0: one per core, at most 8."
     ),
 ]
 PathToleranceOption = Annotated[

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from postproc.batch.second_opinion import TreeOpinion
 
 CellFile = Annotated[
-    Path | None, typer.Option("--cell", help="Cell of programs that no rule fits.")
+    Path | None, typer.Option("--cell", help="Cell of programs that no rule matches.")
 ]
 ModelFile = Annotated[
-    Path | None, typer.Option("--model", help="Model of programs that no rule fits.")
+    Path | None, typer.Option("--model", help="Model of programs that no rule matches.")
 ]
 PlanFile = Annotated[
     Path | None, typer.Option("--plan", help="Plan file: pattern -> cell, model.")
@@ -49,17 +49,17 @@ def batch(
     model: ModelFile = None,
     plan: PlanFile = None,
     jobs: Annotated[
-        int, typer.Option("--jobs", "-j", min=0, help="Processes; 0: one for a core.")
+        int, typer.Option("--jobs", "-j", min=0, help="Processes; 0: one per core.")
     ] = 0,
     scheduler: Annotated[
-        str | None, typer.Option("--scheduler", help="Dask: tls://host:8786.")
+        str | None, typer.Option("--scheduler", help="Dask, as tls://host:8786.")
     ] = None,
     tls: Annotated[
         Path | None,
         typer.Option("--tls", help="Folder with ca.pem, cert.pem and key.pem."),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Keep what is done and unchanged.")
+        bool, typer.Option("--resume", help="Skip finished, unchanged files.")
     ] = False,
     log: Annotated[
         Path | None, typer.Option("--log", help="Log; default: DST.batch.jsonl.")
@@ -70,7 +70,7 @@ def batch(
     path_tolerance: PathToleranceOption = None,
     changes: SetOption = None,
 ) -> None:
-    """Compensate a tree of programs; what could not be compensated is not in DST."""
+    """Compensate a tree of programs; programs that fail are not written to DST."""
     with report_errors():
         if scheduler is None:
             from postproc.batch.workers import start_server
@@ -155,25 +155,25 @@ def _write_reports(reports: Reports, title: str, log: Path) -> None:
 def check(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Compensated tree.")],
     model: Annotated[
-        Path | None, typer.Option("--model", help="The model that is current.")
+        Path | None, typer.Option("--model", help="Current model (JSON).")
     ] = None,
     plan: PlanFile = None,
     source: Annotated[
-        Path | None, typer.Option("--source", help="The tree it was made from.")
+        Path | None, typer.Option("--source", help="Its source tree.")
     ] = None,
     allow_uncorrected: Annotated[
         bool,
-        typer.Option("--allow-uncorrected", help="Let uncorrected targets pass."),
+        typer.Option("--allow-uncorrected", help="Accept uncorrected targets."),
     ] = False,
     changes: SetOption = None,
     report: ReportOption = None,
     cell: CellFile = None,
 ) -> None:
-    """Tell whether a tree may be uploaded: exit 0 yes, 1 no, 2 trouble.
+    """Check whether a tree may be uploaded: exit 0 yes, 1 no, 2 error.
 
     Every program must be compensated, with all its targets, with the current model,
-    from the source as it is now, and unchanged since. Where pin and toppra are
-    installed, and cells and models given, these and ruckig judge it too.
+    from the source as it is now, and unchanged since. If pin and toppra are installed
+    and cells and models are given, these and ruckig check the motion too.
     """
     from postproc.batch.check import check as look
     from postproc.robot.cell import verify_section

@@ -23,23 +23,23 @@ BEHIND = np.deg2rad(1.0)  # that the end lies behind the point on the way
 TURNED = np.deg2rad(0.5)  # between start and third point: it may count at either end
 NO_START = Reason(
     Code.ARC_UNDETERMINED,
-    "its arc ends at an angle, and begins where no single point with this tool is "
-    "known: write its end point, without the angle",
+    "its arc ends at an angle, and its start is not one known point with this tool: "
+    "write its end point, without the angle",
 )
 NO_END = Reason(
     Code.ARC_UNDETERMINED,
-    "its arc ends before the point on its way, nearly where it begins, or backwards: "
-    "divide it, without the angle",
+    "its arc ends before its middle point, near its start, or runs backwards: divide "
+    "it, without the angle",
 )
 TILTED = Reason(
     Code.ARC_UNDETERMINED,
-    "its arc ends at an angle, and the tool turns on it: how it stands there depends "
-    "on the controller; divide the arc, without the angle",
+    "its arc ends at an angle, and the tool turns on it: its orientation at the end "
+    "depends on the controller. Divide the arc, without the angle",
 )
 ASTRAY = Reason(
     Code.ARC_DISTORTED,
-    "its arc ends at an angle: corrected to end where it should, it would pass this "
-    "point farther off than it does now; divide it, without the angle",
+    "its arc ends at an angle: with a corrected end it would pass this point at a "
+    "larger distance than now. Divide the arc, without the angle",
 )
 
 

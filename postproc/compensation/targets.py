@@ -236,8 +236,8 @@ def _targets(
 
 UNNAMED = Reason(
     Code.CONFIGURATION_UNKNOWN,
-    "which branch its flags name is known for arms with a closed form alone: go there "
-    "by joint angles, or on a line",
+    "the branch that its flags name is not known for an arm without a closed form of "
+    "the inverse kinematics: go there by joint angles, or on a line",
 )
 
 
@@ -287,7 +287,7 @@ def _turn_again(targets: Targets, visits: Visits, rows: Ints) -> Targets:
     if len(arcs) == 0:
         return targets
     joints = targets.joints[arcs.via]
-    return targets.move_to(arcs.via, arcs.turned(targets.tcp), joints)
+    return targets.move_to(arcs.via, arcs.turn(targets.tcp), joints)
 
 
 def _frames(visits: Visits) -> Frames:
