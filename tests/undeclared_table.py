@@ -32,13 +32,13 @@ INTRODUCTION = """# Tracing effects that nobody declared
 
 Written by `{command}`. Each trial draws a virtual arm with geometry, tool and
 backlash errors and one undeclared effect (or two, or none) by seed, surveys it with 400
-rows, fits geometry and backlash, and diagnoses what is left. The virtual arm shares no
+rows, fits geometry and backlash, and diagnoses the residuals. The virtual arm shares no
 code with the model, and its link masses, load laws and shapes are not the model's
 nominal ones. Size is the effect's rms after projection on the base model, over the
 noise. An answer is right when it names the effect and its joint, alone or in the group
 that it says it cannot tell apart; an effect without a name is answered rightly by a
 `curve` on its joint or by the verdict `unexplained`. A name counts as given with
-confidence where p < 0.001 and no curve is told beside it. The true error is that of the
+confidence if p < 0.001 and no curve is listed with it. The true error is that of the
 arm at 200 fresh poses, without noise; the informed fit knows the shape of what was
 planted and fits its size. Campaigns of `elastic_flank` go straight from row to row and
 tell neither travels nor directions. Waves of motors and errors of coupled drives are
@@ -48,11 +48,11 @@ hold at 95 % (Clopper and Pearson).
 """
 DRIFT = """`tracker_drift`, `azimuth` and `refraction` move nothing of the arm and are
 never compensated. What an extended model misses there is mostly one rigid displacement:
-where the base stands cannot be told from where a drift of unknown shape began, nor from
-where a circle points. The informed fit knows the shape and the phase. Such a
+the place of the base cannot be separated from the start of a drift of unknown shape,
+nor from the direction of a circle. The informed fit knows shape and phase. Such a
 displacement moves all targets of a cell together, as an error of its registration does,
 and changes nothing between them. So in campaigns with one of these three the rigid
-displacement that fits best is taken out of what either fit leaves, here and in the
+displacement that fits best is removed from the errors of both fits, here and in the
 figure above; "as it stands" takes out nothing.
 """
 
@@ -84,7 +84,7 @@ def write_table(
         "",
         *_parts(by_kind.get("compliance", [])),
         "",
-        "## What was said first",
+        "## First findings",
         "",
         *_confusion(kinds, by_kind),
         "",
@@ -225,7 +225,7 @@ def _wrong(trials: Sequence[Trial]) -> list[str]:
             for f in t.found
         )
         lines.append(
-            f"- {t.kind}, seed {t.seed}, size {t.size:g}: {truth}; said {t.verdict}, "
+            f"- {t.kind}, seed {t.seed}, size {t.size:g}: {truth}; found {t.verdict}, "
             f"{found or 'nothing'}"
         )
     return lines or ["none"]

@@ -55,7 +55,7 @@ class SplitSection(Strict):
 
     fit: str
     test: str | None = None
-    registered: Literal["anew", "as fitted"] = "anew"
+    registered: Literal["again", "as fitted"] = "again"
     rows: tuple[str, ...] = ()
     draw: Literal["random", "blocks", "last"] | None = None
     share: float = Field(0.3, gt=0.0, lt=1.0)
@@ -219,7 +219,7 @@ def _splits(
 def _title(said: SplitSection) -> str:
     """Describe a draw."""
     if said.test not in (None, said.fit):
-        where = "registered anew" if said.registered == "anew" else "same set-up"
+        where = "registered again" if said.registered == "again" else "same set-up"
         return f"{said.test}, by a fit of {said.fit}, {where}"
     share = f"{said.share * 100:g} %"
     many = f", {len(said.seeds)} draws" if len(said.seeds) > 1 else ""

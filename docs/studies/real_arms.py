@@ -282,9 +282,9 @@ Written by `make real DATA=folder`{how} with postproc {version} and numpy {numpy
 {minutes:.0f} minutes of processor time, from public measurements of real arms. The data
 are not part of the project; every set below says where they come from.
 
-- **Nothing that is counted was seen by what is judged on it**: not by the fit, not by
+- **No tested row was seen before the test**: not by the fit, not by
   the diagnosis, not by the registration. Only where another series is *registered
-  anew*, its tracker and its probe (nine numbers) are found from the tested rows, with
+  again*, its tracker and its probe (nine numbers) are found from the tested rows, with
   the arm as the model knows it; this flatters all methods alike, small series more.
 - **Nothing is tuned**: every method runs with its defaults. The splits stand in the
   descriptions; those of the project (`docs/studies/real/*.toml`), with a hash of the
@@ -293,7 +293,7 @@ are not part of the project; every set below says where they come from.
 
 *{nominal}* is the arm as its maker gives it; *{geometry}* has its
 lengths and angles fitted; the next five are [published methods](reproduction.md)
-(40 neurons, seed 0; kriging of {centres} rows at the most, evenly taken);
+(40 neurons, seed 0; kriging of {centres} rows at the most, evenly chosen);
 *{default}* is `postproc fit` and `postproc predict`, on files{after}.
 Errors are distances in mm. *Intervals hold* is the share of coordinates in the 95 %
 interval that is stated for them (of a published method: by ten folds of
@@ -319,7 +319,7 @@ frame = "tracker"             # or "base", with tool_mm = [..] of the reflector
 licence = "MIT"
 source = "who measured it, and where it was published"
 get = "where others get it"   # optional, as are notes = [..]
-[columns]                     # as for fit --columns; left out where the header is known
+[columns]                     # as measurements.columns; not needed for known headers
 q1_deg = "joint_1"            # .. q6_deg
 x_mm = ["x_t", {{ column = "x_dif", factor = -1.0 }}]   # y_mm, z_mm; a list is a sum
 [[series]]                    # a file: one set-up, rows in the order of visits
@@ -331,7 +331,7 @@ fit = "grid"
 draw = "random"
 share = 0.3
 seeds = [0, 1, 2]
-[[split]]                     # all of another series, registered "anew" or "as fitted"
+[[split]]                     # all of another series, registered "again" or "as fitted"
 fit = "grid"
 test = "random"
 registered = "as fitted"

@@ -107,7 +107,7 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
     parser.add_argument("--series", nargs="+", help="names of series; all without it")
     asked = parser.parse_args()
-    print("| rows | taken away | before mm | after mm | whole fit mm | story |")
+    print("| rows | removed | before mm | after mm | whole fit mm | story |")
     print("|---|---|---|---|---|---|")
     for path, base in descriptions(asked.data):
         data = read_set(path, base)

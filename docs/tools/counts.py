@@ -132,10 +132,10 @@ def help_of(command: Command) -> str:
 
 
 def pages() -> Iterator[str]:
-    """Yield the pages of the documentation, those of its history not among them."""
+    """Yield the pages of the documentation, without its history and code in lines."""
     for path in (ROOT / "README.md", *sorted(DOCS.rglob("*.md"))):
         if "history" not in path.parts:
-            yield path.read_text("utf-8")
+            yield re.sub(r"`[^`\n]+`", "`", path.read_text("utf-8"))
 
 
 def documented() -> tuple[int, int]:

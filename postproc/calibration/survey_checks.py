@@ -85,8 +85,8 @@ def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
     wrong = wrong_directions(survey, arm, model)
     if wrong is not None:
         cure = (
-            "Correct the columns (lambda is 1 where a joint came forward, -1 back), or "
-            "fit a new model if the model's survey had them so"
+            "Change the sign of the columns (lambda is 1 if the joint arrived in its "
+            "positive direction), or fit a new model if the survey had the same error"
         )
         raise MeasurementError(survey.path, wrong, cure)
     _check_arm(survey, arm, error(survey.states))
@@ -129,8 +129,8 @@ def _check_kinds(survey: Measurements, arm: Arm, gap: Floats) -> None:
     if apart.mean() > MANY:
         line = int(survey.line[np.argmax(apart)])
         problem = (
-            f"{int(apart.sum())} of {len(survey)} rows are more than "
-            f"{limit / MM:.0f} mm off, the others are not"
+            f"{int(apart.sum())} of {len(survey)} rows have errors of more than "
+            f"{limit / MM:.0f} mm, the others have not"
         )
         cure = "Two tools or two units in one file? Add tool_id, or split the file"
         raise MeasurementError(survey.path, problem, cure, line=line)
@@ -157,9 +157,9 @@ def _check_arm(survey: Measurements, arm: Arm, error: Floats) -> None:
     if with_model > OTHER_ARM * nominal and with_model > LEAST_OF_ARM:
         raise MeasurementError(
             survey.path,
-            "the model explains nothing of these rows: it leaves "
-            f"{with_model / MM:.2f} mm, the nominal arm {nominal / MM:.2f} mm, base, "
-            "tool and zeros of the joints apart",
+            "the model does not fit these rows: its error is "
+            f"{with_model / MM:.2f} mm, that of the nominal arm {nominal / MM:.2f} mm "
+            "(base, tool and joint zeros fitted in both)",
             "Are they another arm's? After a crash or a repair, fit a new model",
         )
 
@@ -297,10 +297,10 @@ def check_stops(survey: Measurements, arm: Arm) -> None:
         where = ", all about one line," if poses >= STOPS else ""
         raise MeasurementError(
             survey.path,
-            f"{int(rows.sum())} rows{of} at {poses} poses{where} do not tell where the "
-            "tracker stands",
-            f"Measure {STOPS} poses or more, spread over the workspace. Files of one "
-            "station say so in a column station",
+            f"{int(rows.sum())} rows{of} at {poses} poses{where} do not determine the "
+            "place of the tracker",
+            f"Measure {STOPS} poses or more, spread over the workspace. If several "
+            "files are of one station, add a column station",
         )
 
 
@@ -353,8 +353,8 @@ def list_losses(arm: Arm, survey: Measurements) -> tuple[str, ...]:
         )
     if arm.file.joints.drive_coupling is None and survey.inferred.any():
         told.append(
-            "the arm file has no drive_coupling: directions of joints are inferred as "
-            "if no motor turned another joint's gear"
+            "the arm file has no drive_coupling: directions of joints are inferred for "
+            "drives without coupling"
         )
     return tuple(told)
 
@@ -379,7 +379,7 @@ def check_orientations(survey: Measurements, arm: Arm) -> Measurements:
     apart = Turns.of(batch, survey.rotation, None).typical
     if apart > TURNED:
         why = (
-            f"they scatter by {np.rad2deg(apart):.1f} deg about the arm's: not "
+            f"they differ by {np.rad2deg(apart):.1f} deg from the arm's and are not "
             "R = Rx Ry Rz of a probe on the flange"
         )
     elif survey.mounting is None:
@@ -391,7 +391,7 @@ def check_orientations(survey: Measurements, arm: Arm) -> Measurements:
         apart = Turns.of(batch, survey.rotation, survey.mounting).typical
         if apart > TURNED:
             problem = f"the probe is mounted {np.rad2deg(apart):.1f} deg off"
-            cure = "Correct [survey] euler_zyz_deg in the cell file, or leave it out"
+            cure = "Correct [survey] euler_zyz_deg in the cell file, or remove it"
             raise MeasurementError(survey.path, problem, cure)
         return survey
     told = f"measured orientations are not used: {why}"

@@ -478,7 +478,7 @@ def _check_clash(table: TextTable, order: Floats, time_s: Floats) -> None:
             f"order and time_s disagree: line {table.line[second]} follows line "
             f"{table.line[first]} by order, but is {np.ptp(time_s[[first, second]]):g} "
             f"s earlier ({len(back)} such pairs)",
-            "Which of them is the order of visits? Leave the other column out",
+            "Keep the column that is the order of visits, and remove the other",
             line=int(table.line[second]),
         )
 
@@ -562,8 +562,8 @@ def _against_the_rows(
         return ()
     return (
         f"{table.path}: {opposite} of {count} directions (lambda) are opposite to the "
-        "way from row to row. Right if the arm goes beyond each pose and comes back; "
-        "else lambda has the other sign: it is 1 where a joint came forward",
+        "motion from row to row. That is right if the arm goes beyond each pose and "
+        "returns. Otherwise change the sign: lambda is 1 for the positive direction",
     )
 
 
@@ -637,7 +637,7 @@ def _nest_column(table: TextTable) -> str:
     """
     found = [name for name in ("nest", "tool_id") if table.has(name)]
     if len(found) > 1:
-        cure = "They are one: leave one of them out"
+        cure = "Remove one of them: both name the probe point"
         problem = "has columns nest and tool_id"
         raise MeasurementError(table.path, problem, cure, line=1)
     return found[0] if found else ""
@@ -775,11 +775,11 @@ def _describe_order(table: TextTable) -> str:
         one_way = (step >= 0).all() or (step <= 0).all()
         if len(step) > MANY and one_way and step.any():
             return (
-                f". The rows are sorted by {name}: the order of visits is lost, and "
-                "backlash with it. Use the file as it was measured, or add a column "
-                "time_s or order"
+                f". The rows are sorted by {name}, so that the order of visits, and "
+                "with it the directions, are lost. Use the file as it was measured, or "
+                "add a column time_s or order"
             )
-    return ". Wrong if the rows were sorted: a column time_s or order tells"
+    return ". If the rows were sorted, that is wrong: add a column time_s or order"
 
 
 # The table that RoboDK's calibration project saves (SaveTable): 18 columns.

@@ -50,7 +50,8 @@ class SharedPoints(StrEnum):
 SharedPointsOption = Annotated[
     SharedPoints | None,
     typer.Option(
-        "--shared-points", help="What is done with a point that several moves go to."
+        "--shared-points",
+        help="Points of several moves: mean correction, clone or none.",
     ),
 ]
 SetOption = Annotated[
@@ -66,7 +67,7 @@ OrientationOption = Annotated[
     typer.Option("--orientation", help="Correct orientations too, not only places."),
 ]
 EveryOption = Annotated[
-    bool, typer.Option("--all", help="A line for every finding, also for equal ones.")
+    bool, typer.Option("--all", help="List equal findings one by one, not grouped.")
 ]
 PathToleranceOption = Annotated[
     float | None,

@@ -43,11 +43,11 @@ def diagnose(
     ] = None,
     path: Annotated[
         Path | None,
-        typer.Option("--path", help="TRACK.csv: readings while --program ran."),
+        typer.Option("--path", help="Tracker readings while --program ran (CSV)."),
     ] = None,
     changes: SetOption = None,
 ) -> None:
-    """Find what the model lacks, trace it to an effect, and add that effect."""
+    """Find the effects that a model lacks, and add them to the model."""
     from postproc.calibration.diagnosis.diagnose import dump_json, evidence_of
     from postproc.report.diagnosis import tell
     from postproc.report.measured_path import tell_path
@@ -108,7 +108,7 @@ def path_of_extension(model_path: Path) -> Path:
 
 @app.command()
 def history(model: Path, report: ReportOption = None) -> None:
-    """Print what was added to a model and its parents, with before and after."""
+    """List the effects added to a model, with the errors before and after."""
     from postproc.report.diagnosis import history_json, history_text
 
     with report_errors():
@@ -126,7 +126,7 @@ def report(
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="REPORT.html")],
 ) -> None:
-    """Make one self-contained page (HTML) of a report, model or diagnosis."""
+    """Write a self-contained HTML page of a report, model or diagnosis."""
     from postproc.report.html import report_file
 
     with report_errors():

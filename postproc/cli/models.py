@@ -78,12 +78,12 @@ def simulate(
     ] = False,
     track: Annotated[
         Path | None,
-        typer.Option("--track", help="TRACK.csv: readings while the arm moves."),
+        typer.Option("--track", help="Tracker readings while the arm moves (CSV)."),
     ] = None,
     changes: SetOption = None,
     report: ReportOption = None,
 ) -> None:
-    """Let the virtual arm run a program or a survey, and measure it."""
+    """Run a program or a survey on the virtual arm, and measure it."""
     from postproc.cli.simulate import simulate_file
     from postproc.robot.cell import load_cell
 
@@ -118,7 +118,7 @@ def fit(
     ] = None,
     program: Annotated[
         Path | None,
-        typer.Option("--program", help="The survey program, for id, x, y, z files."),
+        typer.Option("--program", help="Survey program, for files of id, x, y, z."),
     ] = None,
     changes: SetOption = None,
     report: PageOption = None,
@@ -160,7 +160,7 @@ def predict(
     output: Annotated[Path | None, typer.Option("-o", "--output")] = None,
     changes: SetOption = None,
 ) -> None:
-    """Add the predicted error of every row; with positions, also the residual."""
+    """Add the predicted error, and with positions the residual, to every row."""
     from postproc.calibration import predict as prediction
     from postproc.robot.cell import load_cell
 
@@ -187,7 +187,7 @@ def compare(
     ] = 0,
     changes: SetOption = None,
 ) -> None:
-    """Fit every method to the same rows, and test it on the same others."""
+    """Fit all methods to the same rows, and test them on held-out rows."""
     from postproc.calibration.comparison import Held, compare_files
     from postproc.report.fit import comparison_json, comparison_page, tell_comparison
     from postproc.robot.cell import load_cell

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from postproc.batch.second_opinion import TreeOpinion
 
 CellFile = Annotated[
-    Path | None, typer.Option("--cell", help="Cell of programs that no rule fits.")
+    Path | None, typer.Option("--cell", help="Cell of programs that no rule matches.")
 ]
 ModelFile = Annotated[
-    Path | None, typer.Option("--model", help="Model of programs that no rule fits.")
+    Path | None, typer.Option("--model", help="Model of programs that no rule matches.")
 ]
 PlanFile = Annotated[
     Path | None, typer.Option("--plan", help="Plan file: pattern -> cell, model.")
@@ -56,12 +56,12 @@ def batch(
         ),
     ] = "0",
     resume: Annotated[
-        bool, typer.Option("--resume", help="Keep what is done and unchanged.")
+        bool, typer.Option("--resume", help="Skip finished, unchanged files.")
     ] = False,
     report: PageOption = None,
     changes: SetOption = None,
 ) -> None:
-    """Compensate a tree of programs; what could not be compensated is not in DST."""
+    """Compensate a tree of programs; programs that fail are not written to DST."""
     with report_errors():
         if not _is_address(jobs):
             _count(jobs)
@@ -163,25 +163,25 @@ def _write_reports(reports: Reports, title: str, log: Path) -> None:
 def check(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Compensated tree.")],
     model: Annotated[
-        Path | None, typer.Option("--model", help="The model that is current.")
+        Path | None, typer.Option("--model", help="Current model (JSON).")
     ] = None,
     plan: PlanFile = None,
     source: Annotated[
-        Path | None, typer.Option("--source", help="The tree it was made from.")
+        Path | None, typer.Option("--source", help="Its source tree.")
     ] = None,
     allow_uncorrected: Annotated[
         bool,
-        typer.Option("--allow-uncorrected", help="Let uncorrected targets pass."),
+        typer.Option("--allow-uncorrected", help="Accept uncorrected targets."),
     ] = False,
     changes: SetOption = None,
     report: ReportOption = None,
     cell: CellFile = None,
 ) -> None:
-    """Tell whether a tree may be uploaded: exit 0 yes, 1 no, 2 trouble.
+    """Check whether a tree may be uploaded: exit 0 yes, 1 no, 2 error.
 
     Every program must be compensated, with all its targets, with the current model,
-    from the source as it is now, and unchanged since. Where pin and toppra are
-    installed, and cells and models given, these and ruckig judge it too.
+    from the source as it is now, and unchanged since. If pin and toppra are installed
+    and cells and models are given, these and ruckig check the motion too.
     """
     from postproc.batch.check import check as look
     from postproc.robot.cell import verify_section

@@ -82,7 +82,7 @@ def compensate(
     variables_out: Annotated[
         Path | None,
         typer.Option(
-            "--variables-out", help="Where the variable file goes, changed or not."
+            "--variables-out", help="Output of the variable file, changed or not."
         ),
     ] = None,
     report: PageOption = None,
@@ -98,7 +98,7 @@ def compensate(
     changes: SetOption = None,
     every: EveryOption = False,
 ) -> None:
-    """Rewrite a program so that the tool lands where its targets say."""
+    """Correct the targets of a program, so that the tool lands on them."""
     from postproc.cli.common import stages
     from postproc.cli.job_files import Destination
     from postproc.compensation import workers
@@ -198,7 +198,7 @@ def diff(
     compensated: Path,
     report: ReportOption = None,
 ) -> None:
-    """Compare the targets of two programs: exit 0 same, 1 different, 2 trouble."""
+    """Compare the targets of two programs: exit 0 same, 1 different, 2 error."""
     from postproc.report import diff as differ
     from postproc.report.diff_output import difference_pieces, print_difference
 
@@ -220,7 +220,7 @@ def restore(
         Path | None, typer.Option("-o", "--output", help="Default: over the program.")
     ] = None,
 ) -> None:
-    """Give back the original program, byte for byte, from the sidecar record."""
+    """Restore the original program, byte for byte, from its record."""
     from postproc.compensation.sidecar import restore_file
 
     with report_errors():
@@ -242,7 +242,7 @@ def explain(
     code: CodeOption = None,
     report: ReportOption = None,
 ) -> None:
-    """Show why every target moves: from where it is reached, and what that costs."""
+    """Show the approach, joint angles and correction of every target."""
     from postproc.compensation.explanation import explain as tell
     from postproc.compensation.options import Options
     from postproc.compensation.program_files import ProgramFiles

@@ -1,4 +1,4 @@
-"""Let the virtual arm run a program or a survey, and measure it."""
+"""Run a program or a survey on the virtual arm, and measure it."""
 
 from __future__ import annotations
 

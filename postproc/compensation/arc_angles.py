@@ -15,6 +15,7 @@ from postproc.robot.pose import lengths, rotation_from_vector, rotation_vector
 
 # The circle goes through the start, the point on the way and a third point that the
 # move names as its end. This one only shapes the circle; the arc ends at an angle.
+# One that goes nearly all around is left, but what comes behind begins at its end.
 
 WHOLE = np.deg2rad(300.0)  # from here on the end lies nearer to the start than the
 # centre does: what their corrections differ by would bend the arc by twice as much
@@ -22,23 +23,23 @@ BEHIND = np.deg2rad(1.0)  # that the end lies behind the point on the way
 TURNED = np.deg2rad(0.5)  # between start and third point: it may count at either end
 NO_START = Reason(
     Code.ARC_UNDETERMINED,
-    "its arc ends at an angle, and begins where no single point with this tool is "
-    "known: write its end point, without the angle",
+    "its arc ends at an angle, and its start is not one known point with this tool: "
+    "write its end point, without the angle",
 )
 NO_END = Reason(
     Code.ARC_UNDETERMINED,
-    "its arc ends before the point on its way, nearly where it begins, or backwards: "
-    "divide it, without the angle",
+    "its arc ends before its middle point, near its start, or runs backwards: divide "
+    "it, without the angle",
 )
 TILTED = Reason(
     Code.ARC_UNDETERMINED,
-    "its arc ends at an angle, and the tool turns on it: how it stands there depends "
-    "on the controller; divide the arc, without the angle",
+    "its arc ends at an angle, and the tool turns on it: its orientation at the end "
+    "depends on the controller. Divide the arc, without the angle",
 )
 ASTRAY = Reason(
     Code.ARC_DISTORTED,
-    "its arc ends at an angle: corrected to end where it should, it would pass this "
-    "point farther off than it does now; divide it, without the angle",
+    "its arc ends at an angle: with a corrected end it would pass this point at a "
+    "larger distance than now. Divide the arc, without the angle",
 )
 
 
@@ -97,9 +98,17 @@ class ArcAngles:
         tangent = np.cross(normal, radius)
         to_via = points[1] - centre
         via = np.arctan2((to_via * tangent).sum(1), (to_via * radius).sum(1))
-        behind = self.angle > np.mod(via, 2 * np.pi) + BEHIND
-        out[~(valid & behind & (self.angle < WHOLE) & (self.start >= 0))] = np.nan
+        before = np.mod(via, 2 * np.pi)
+        behind = self.angle > before + BEHIND
+        behind &= self.angle < before + 2 * np.pi - BEHIND
+        apart = np.abs(self.angle - 2 * np.pi) > BEHIND  # from where it begins
+        out[~(valid & behind & apart & (self.start >= 0))] = np.nan
         return out
+
+    @property
+    def is_whole(self) -> Bools:
+        """Whether they go nearly all around or farther, (k,)."""
+        return np.asarray(self.angle >= WHOLE)
 
 
 def place_ends(visits: Visits, tcp: Floats, reasons: Reasons) -> Bools:
@@ -123,15 +132,22 @@ def place_ends(visits: Visits, tcp: Floats, reasons: Reasons) -> Bools:
     turn = np.swapaxes(tcp[arcs.start, :3, :3], 1, 2) @ tcp[arcs.end, :3, :3]
     tilted = known & (lengths(rotation_vector(turn)) > TURNED)
     ends = arcs.ends(tcp)
+    nowhere = np.isnan(ends[:, 0, 3])
     for rows, why in (
-        (~known, NO_START), (tilted, TILTED), (np.isnan(ends[:, 0, 3]), NO_END)
+        (~known, NO_START), (tilted, TILTED), (nowhere | arcs.is_whole, NO_END)
     ):  # fmt: skip
         for visit in (arcs.end, arcs.via):
-            lost[visit[rows]] = True
             reasons.mark(np.isin(np.arange(len(visits)), visit[rows]), why)
-    lost[arcs.via] = False
+    lost[arcs.end[~known | tilted | nowhere]] = True
     tcp[arcs.end] = ends
     return lost
+
+
+def find_past_start(visits: Visits) -> Bools:
+    """Tell which visits are points of arcs that end past where they begin, (n,)."""
+    past: Bools = visits.arc_angle > 2 * np.pi
+    past[:-1] |= visits.via[:-1] & past[1:]
+    return past
 
 
 def points_to_write(

@@ -53,7 +53,7 @@ class ArcTurns:
         out[self.via] = moved[ways].any(axis=0)
         return out
 
-    def turned(self, tcp: Floats) -> Floats:
+    def turn(self, tcp: Floats) -> Floats:
         """Turn the points between, (k, 4, 4) [m]; NaN where that is not sure.
 
         Args:
@@ -98,7 +98,7 @@ def turn_between(visits: Visits, tcp: Floats) -> Bools:
     arcs = ArcTurns.of(visits)
     if len(arcs) == 0:
         return unsure
-    turned = arcs.turned(tcp)
+    turned = arcs.turn(tcp)
     sure = np.asarray(~np.isnan(turned).any(axis=(1, 2)))
     arcs, turned = arcs.among(sure), turned[sure]
     tcp[arcs.via] = turned

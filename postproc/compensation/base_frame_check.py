@@ -88,11 +88,11 @@ def check_base(visits: Visits, cell: Cell) -> list[Diagnostic]:
         if fitting.sum() * 2 > len(fitting):
             first = int(np.unique(pairs.visits)[np.argmax(fitting)])
             text = (
-                f"the base of the cell contradicts the program: at {len(fitting)} "
-                "Cartesian targets, the first here, the joint angles written beside "
-                f"them place the tool {_mm(far)} mm away, and {_mm(near)} mm with "
-                f"{name}. A post that writes no $BASE leaves it to the cell: give "
-                "[base] the frame that the program was made with"
+                f"the base of the cell does not fit the program: at {len(fitting)} "
+                "Cartesian targets, the first here, the joint angles beside them place "
+                f"the tool {_mm(far)} mm away, and {_mm(near)} mm with {name}. If the "
+                "post writes no $BASE, write the frame that the program was made with "
+                "into [base] of the cell"
             )
             file, line = visits.files[visits.file[first]], int(visits.line[first])
             return [Diagnostic(file, line, Code.BASE_FRAME_MISMATCH, text)]

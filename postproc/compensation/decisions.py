@@ -499,8 +499,9 @@ HELD = Reason(
 )
 SWUNG = Reason(
     Code.ARM_SWINGS,
-    "corrected, the way to it or on from it would swing a joint, the elbow or the "
-    "wrist centre by more than the cell's limits, or pass a singularity otherwise",
+    "with the correction a joint, the elbow or the wrist centre would move by more "
+    "than the cell's limits on the path to it or from it, or pass a singularity on "
+    "another side",
 )
 
 
@@ -510,8 +511,8 @@ SHIFTED_APART = (
 )
 NOT_ABSORBED = Reason(
     Code.ARRIVALS_DIFFER,
-    "the numbers of its shift cannot make up for how all of its points are corrected: "
-    "give each a move of its own",
+    "one set of numbers of its shift does not fit the corrections of all of its "
+    "points: give each a move of its own",
 )
 
 

@@ -18,8 +18,8 @@ from postproc.language.visits import Visits
 
 TURNS = Reason(
     Code.ARRIVALS_DIFFER,
-    "it would be turned otherwise than it must, as its shift keeps the orientation of "
-    "the point",
+    "its shift keeps the orientation of the point, and the correction needs another "
+    "orientation",
 )
 FLAGS = Reason(
     Code.ARRIVALS_DIFFER,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.arc_angles import ArcAngles, place_ends
+from postproc.compensation.arc_angles import ArcAngles, find_past_start, place_ends
 from postproc.compensation.arc_turns import ArcTurns, turn_between
 from postproc.compensation.eligibility import Reasons
 from postproc.diagnostics import Code, Reason
@@ -228,6 +228,7 @@ def _targets(
         block=visits.block,
         curved=visits.curved,
         along=along,
+        past_start=find_past_start(visits),
         pred_start=pred_start,
         pred=pred,
     )
@@ -235,8 +236,8 @@ def _targets(
 
 UNNAMED = Reason(
     Code.CONFIGURATION_UNKNOWN,
-    "which branch its flags name is known for arms with a closed form alone: go there "
-    "by joint angles, or on a line",
+    "the branch that its flags name is not known for an arm without a closed form of "
+    "the inverse kinematics: go there by joint angles, or on a line",
 )
 
 
@@ -286,7 +287,7 @@ def _turn_again(targets: Targets, visits: Visits, rows: Ints) -> Targets:
     if len(arcs) == 0:
         return targets
     joints = targets.joints[arcs.via]
-    return targets.move_to(arcs.via, arcs.turned(targets.tcp), joints)
+    return targets.move_to(arcs.via, arcs.turn(targets.tcp), joints)
 
 
 def _frames(visits: Visits) -> Frames:

@@ -94,11 +94,19 @@ def lines(begin: Floats, end: Floats) -> Segments:
     )  # fmt: skip
 
 
-def arcs(begin: Floats, via: Floats, end: Floats) -> tuple[Segments, Segments]:
-    """Build arcs through three TCP poses (m, 4, 4) [m]: start to VIA, VIA to end."""
+def arcs(
+    begin: Floats, via: Floats, end: Floats, past_start: Bools | None = None
+) -> tuple[Segments, Segments]:
+    """Build arcs through three TCP poses (m, 4, 4) [m]: start to VIA, VIA to end.
+
+    Those that go past their start, (m,), pass VIA and the start before they end;
+    default: none does.
+    """
     centre, normal, valid = circles(
         begin[:, :3, 3], via[:, :3, 3], end[:, :3, 3]
     )  # fmt: skip
+    if past_start is not None:
+        normal = np.where(past_start[:, None], -normal, normal)
     return (
         _arc(begin, via, centre, normal, valid),
         _arc(via, end, centre, normal, valid),
@@ -299,6 +307,7 @@ class _Ends:
             flange[self.source[first]] @ tool,
             flange[visit[first]] @ tool,
             flange[visit[first] + 1] @ tool,
+            self.targets.past_start[visit[first]],
         )
         row = np.full(len(visit) + 1, -1)  # the last one is that of no edge
         row[first] = np.arange(len(first))

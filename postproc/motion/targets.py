@@ -70,6 +70,8 @@ class Targets:
         curved: The way to it is bent so that a curve goes on smoothly, (n,).
         along: The tool turns on the way in a way that is not known, as along an arc,
             (n,).
+        past_start: A point of an arc that goes all around, and ends between its start
+            and the point on its way, (n,).
         pred_start: Predecessors of move v are pred[pred_start[v] : pred_start[v + 1]].
         pred: Predecessors; negative for a place that is not known.
     """
@@ -95,6 +97,7 @@ class Targets:
     block: Ints
     curved: Bools
     along: Bools
+    past_start: Bools
     pred_start: Ints
     pred: Ints
 
@@ -194,6 +197,7 @@ def make_targets(
         "block": np.full(n, -1),
         "curved": np.zeros(n, dtype=bool),
         "along": np.zeros(n, dtype=bool),
+        "past_start": np.zeros(n, dtype=bool),
         "pred_start": np.arange(n + 1),
         "pred": np.arange(n) - 1,
     }

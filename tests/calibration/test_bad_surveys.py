@@ -132,11 +132,11 @@ def test_sorted_rows_have_lost_their_directions(survey, fit):
     assert found.exit_code == 0
     assert re.search(
         r"warning: .*s\.csv: no lambda columns.*sorted by q2_deg: the order of visits "
-        "is lost.*Use the file as it was measured",
+        "are lost.*Use the file as it was measured",
         found.stdout,
     )
     bare = fit(without(survey, *SIDES, "time_s"))
-    assert "Wrong if the rows were sorted" in bare.stdout
+    assert "If the rows were sorted" in bare.stdout
     assert "no lambda" not in fit(survey).stdout
 
 

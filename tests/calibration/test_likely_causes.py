@@ -209,5 +209,5 @@ def test_an_arm_that_changed_is_left_to_the_search(name: str, n: int) -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_rows_of_another_arm_are_refused(seed: int) -> None:
     other = random_arm(np.random.default_rng(100 + seed))
-    with pytest.raises(MeasurementError, match="explains nothing of these rows"):
+    with pytest.raises(MeasurementError, match="does not fit these rows"):
         check_against(measured(9, N, other), NJ, our_model())

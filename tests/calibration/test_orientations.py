@@ -126,7 +126,7 @@ def test_orientations_that_do_not_belong_to_the_arm() -> None:
     assert checked.rotation is survey.rotation
     turned = replace(survey, rotation=np.swapaxes(survey.rotation, 1, 2))
     checked = check_orientations(turned, NJ)
-    assert checked.rotation is None and "they scatter by" in checked.warnings[-1]
+    assert checked.rotation is None and "they differ by" in checked.warnings[-1]
     with pytest.raises(MeasurementError, match=r"mounted .* deg off.*euler_zyz_deg"):
         check_orientations(replace(survey, mounting=np.eye(3)), NJ)
 

@@ -313,5 +313,5 @@ def test_two_fixed_points_leave_stations_apart() -> None:
 def test_a_fixed_point_that_was_moved_ties_nothing() -> None:
     survey = concatenate(with_pillars((60, 60), 4, apart=2e-3))
     assert len(survey.stations) == 2
-    (said,) = [w for w in survey.warnings if "stations stay apart" in w]
+    (said,) = [w for w in survey.warnings if "stations are not joined" in w]
     assert "1.csv" in said and "otherwise than in 0.csv" in said

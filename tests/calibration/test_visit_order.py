@@ -150,7 +150,7 @@ def test_directions_against_all_ways_are_asked_about(
         f"lambda{j + 1}": sign * right.states.direction[:, j] + 0.0 for j in range(6)
     }
     found = read(written(tmp_path / "s.csv", np.arange(N), **side))
-    assert any("opposite to the way" in w for w in found.warnings) == asked
+    assert any("opposite to the motion" in w for w in found.warnings) == asked
 
 
 # Rows whose moment is unknown.

@@ -170,3 +170,47 @@ def test_a_similarity_keeps_the_angle():
         found = circle(after[0, 0], via[0], end[0], np.rad2deg(angle))
         assert np.allclose(found, after[2, 0], atol=1e-9)
         assert np.linalg.norm(via[0] - after[1, 0]) < 0.05
+
+
+def followed(old: np.ndarray, deg: float, q: np.ndarray, turn: np.ndarray):
+    """Follow an arc in small steps from joint angles, (k, 6) [rad]."""
+    poses = np.tile(np.eye(4), (int(2 * deg), 1, 1))
+    poses[:, :3, :3] = turn
+    poses[:, :3, 3] = [circle(*old, a) for a in np.linspace(0.0, deg, len(poses))]
+    found = KR.inverse(poses @ np.linalg.inv(tool_pose())).q
+    found = found[:, int(KR.branch(q[None])[0])]
+    return np.unwrap(np.vstack([q, found]), axis=0)[1:]
+
+
+@pytest.mark.parametrize(("deg", "past"), [(330, 250), (365, 250), (420, 300)])
+def test_what_comes_behind_a_whole_circle_begins_at_its_end(
+    cell, truth, model, deg, past
+):
+    sure = 0
+    for seed in range(8):
+        lines = drawn(np.random.default_rng(seed), float(deg), float(past))
+        start = lines[0].removeprefix("LIN ")
+        place = [float(x) for x in re.findall(r"[XYZ] ([-.\d]+)", start)]
+        there = start.replace(f"Z {place[2]:.4f}", f"Z {place[2] + 60.0:.4f}")
+        source = job(*lines, f"LIN {there}")
+        done, (wanted, made) = plans(source, cell, model)
+        decided = done.decisions
+        assert not (decided.status[2:5] == Status.CORRECTED).any()
+        assert decided.status[5] == Status.CORRECTED, decided.reasons[decided.why[5]]
+        way = followed(points(source)[:3], deg, wanted.q[2], wanted.tcp[2, :3, :3])
+        assert np.allclose(wanted.q[4], way[-1], atol=1e-4)
+        last = way[-1] - way[-1 - int(deg) // 15]
+        clear = np.abs(last) > 3.0 * KR.play.max()
+        assert (decided.direction[4] * np.sign(last) >= 0)[clear].all()
+        sure += int((clear & (decided.direction[4] != 0)).sum())
+        side = decided.side[5][None]
+        landing = truth.tcp(made.q[5][None], side, tool_pose()[None, :3, 3])[0]
+        if (np.abs(side) > 0.999).all():
+            assert np.linalg.norm(landing - wanted.tcp[5, :3, 3]) < 2e-5
+    assert sure > 10
+
+
+def test_a_circle_that_ends_where_it_begins_leads_nowhere_known(cell, model):
+    lines = drawn(np.random.default_rng(1), 360.0, 250.0)
+    decided = plans(job(*lines, lines[0]), cell, model)[0].decisions
+    assert not (decided.status[2:] == Status.CORRECTED).any()

@@ -142,6 +142,22 @@ def test_a_shift_that_is_taught_holds_its_point(shop):
     assert status == ["CONFLICT", "UNCHANGED", "CORRECTED"]
 
 
+@pytest.mark.parametrize("x", ["", "1+"])
+def test_a_shift_of_points_that_are_not_all_known_stays(shop, x):
+    """The shift makes up for what its points do not, as far as that is known."""
+    files = krl(shop, ["FOR I=1 TO 2", f"LIN XL[I]:{by()}", "ENDFOR"])
+    data = files["job.dat"].decode()
+    point = re.search(r"Xp1=\{X (.*?)\}", data)[1]
+    number, rest = point.split(",", 1)
+    other = f"X {float(number) - 1.0 if x else number}"
+    more = ["DECL INT I", "DECL E6POS XL[2]", f"XL[1]={{X {point}}}",
+            f"XL[2]={{{other.replace('X ', 'X ' + x)},{rest}}}"]  # fmt: skip
+    files["job.dat"] = data.replace("ENDDAT", "\r\n".join([*more, "ENDDAT"])).encode()
+    done = shop.compensate(files)
+    move = f"LIN XL[I]:{by()}".encode()
+    assert (move in done.outputs.get("job.src", files["job.src"])) == bool(x)
+
+
 def test_a_shared_point_stays_and_its_shift_makes_up_for_it(shop):
     files = krl(shop, [P1, f"LIN Xp1:{by()}"])
     files["job.dat"] = (

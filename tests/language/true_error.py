@@ -174,8 +174,9 @@ def differing(
 def table(found: Sequence[Landed]) -> list[str]:
     """Write a table, a row for an arm and a language."""
     lines = [
-        "| arm | language | corrected stops | mean mm | max mm | side not sure | "
-        "max mm there | left | before, mean | flags anew |",
+        "| arm | language | corrected stops | mean mm | max mm | "
+        "direction uncertain | max mm there | not corrected | before, mean | "
+        "new flags |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for arm, file in sorted({(one.arm, one.file) for one in found}):

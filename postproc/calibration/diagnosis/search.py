@@ -16,6 +16,7 @@ from postproc.calibration.diagnosis.held_out import (
     regions,
 )
 from postproc.calibration.diagnosis.jumps import jumps
+from postproc.calibration.diagnosis.load_jumps import place_load_jump
 from postproc.calibration.diagnosis.model_update import revises
 from postproc.calibration.diagnosis.score import Null, Score, rank
 from postproc.calibration.diagnosis.table import Causes, free_carrier
@@ -62,7 +63,7 @@ def refine(projection: Projection, score: Score) -> Score:
         idle = idle + 1 if turns == 1 else 0
         if idle > IDLE:
             break
-    return _plainer(projection, score)
+    return _plainer(projection, place_load_jump(projection, score))
 
 
 def _finer(projection: Projection, score: Score, width: float) -> tuple[Score, float]:

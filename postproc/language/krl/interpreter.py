@@ -54,6 +54,10 @@ _INTERRUPT = Reason(
     "an interrupt or a trigger may move the arm, or change its settings",
 )
 _RESUMED = Reason(Code.ENDS_ELSEWHERE, "RESUME or BRAKE may end the way to it anywhere")
+_ENDED = Reason(
+    Code.ENDS_ELSEWHERE,
+    "RESUME may end the way to it anywhere, while its interrupt is on",
+)
 MOVES, BRAKES, RESUMES = "moves", "brake", "resume"
 """What statements may do to moves that are under way."""
 _Effects = tuple[frozenset[str], list[tuple[int, HeadedRows]]]
@@ -345,16 +349,127 @@ class KrlMachine(TaskMachine):
         modes, number = here.modes, self._number_of(context, row, one.number)
         others = frozenset(d for d in modes.declared if d[0] != number)
         modes = replace(modes, declared=others)
-        if RESUMES in effects:
+        ends = RESUMES in effects
+        if ends and (MOVES in effects or not self._ends_routines(number)):
             self._begin_early(_RESUMED, here)
             return replace(here, modes=modes.with_(blocked=modes.blocked | {_RESUMED}))
         if effects:
-            own = number, _INTERRUPT if MOVES in effects else _RESUMED
+            moves = _INTERRUPT if MOVES in effects else _RESUMED
+            own = number, _ENDED if ends else moves
             modes = replace(modes, declared=others | {own})
             if not {number, EVERY} & self._enabled_interrupts:
                 self._begin_early(own[1], here)
                 modes = replace(modes, active=modes.active | {own})
         return replace(here, modes=modes)
+
+    # RESUME ends all routines that have been called where its interrupt is declared,
+    # and the program goes on behind the call, wherever the arm is.
+
+    def _ends_routines(self, number: int) -> bool:
+        """Return True if an interrupt is switched on in routines alone that are called.
+
+        They do not declare it, and nothing switches it on where it is declared.
+        """
+        switching = {
+            (file, routine.first) for file, routine, own, word in self._switches
+            if word == "on" and own in (number, EVERY)
+        }  # fmt: skip
+        known = number != EVERY and bool(switching)
+        return known and self._declaring(number).isdisjoint(switching)
+
+    def _declaring(self, number: int) -> set[tuple[int, int]]:
+        """Return the routines that may declare an interrupt: file and first row."""
+        return {
+            (file, routine.first) for file, routine, own, _ in self._declarations
+            if own in (number, EVERY)
+        }  # fmt: skip
+
+    @cached_property
+    def _declarations(
+        self,
+    ) -> list[tuple[int, HeadedRows, int, said.InterruptDeclared]]:
+        """List interrupts: file, routine, number, and how they are declared."""
+        found = []
+        for file, routine, row, one in self._in_routines():
+            if isinstance(one, said.InterruptDeclared):
+                here = Scope(file, self.task.files[file].name, "")
+                number = whole(self.task.number(one.number, row, here))
+                found.append((file, routine, EVERY if number is None else number, one))
+        return found
+
+    @cached_property
+    def _switches(self) -> list[tuple[int, HeadedRows, int, str]]:
+        """List what switches interrupts: file, routine, number, and word."""
+        found = []
+        for file, routine, row, one in self._in_routines():
+            if isinstance(one, said.InterruptSwitched) and one.word in ("on", "off"):
+                here = Scope(file, self.task.files[file].name, "")
+                number = whole(self.task.number(one.number, row, here))
+                found.append(
+                    (file, routine, EVERY if number is None else number, one.word)
+                )
+        return found
+
+    def _in_routines(
+        self,
+    ) -> Iterator[tuple[int, HeadedRows, int, said.SourceStatement]]:
+        """Yield all statements of routines: file, routine, row."""
+        for file, text in self._robot_texts():
+            for routine in self.task.files[file].routines:
+                for row in range(routine.first + 1, routine.last):
+                    yield file, routine, row, text.statement(row)
+
+    def at_return(self, context: CallContext, here: Arrived) -> Arrived:
+        """Allow for a RESUME in the routine, see `TaskMachine.at_return`."""
+        ending = {own for own in here.modes.declared if own[1] == _ENDED}
+        numbers = {number for number, _ in ending}
+        at = context.scope.file, context.routine
+        active = bool(ending & here.modes.active)
+        if not ending or not (active or self._may_switch(*at, numbers)):
+            return here
+        ended = replace(here, origins=NOWHERE, modes=here.modes.forget())
+        on = {own for own in ending if own[0] in self._left_on}
+        left = (ended.modes.active - ending) | on
+        return here.join(replace(ended, modes=ended.modes.with_(active=left)))
+
+    def _may_switch(self, file: int, routine: HeadedRows, numbers: set[int]) -> bool:
+        """Return True if a routine, or one that it calls, switches interrupts."""
+        waiting, seen = [(file, routine)], set[tuple[int, int]]()
+        numbers = numbers | {EVERY}
+        switching = {(k, r.first) for k, r, own, _ in self._switches if own in numbers}
+        while waiting:
+            at, one = waiting.pop()
+            if (at, one.first) in switching:
+                return True
+            if (at, one.first) not in seen:
+                seen.add((at, one.first))
+                waiting += self._direct(at, one)[1]
+        return False
+
+    @cached_property
+    def _left_on(self) -> set[int]:
+        """Numbers of interrupts whose routines may leave them on, EVERY for unknown."""
+        return {number for file, _, number, one in self._declarations
+                if not self._switches_itself_off(file, number, one)}  # fmt: skip
+
+    def _switches_itself_off(
+        self, file: int, number: int, declared: said.InterruptDeclared
+    ) -> bool:
+        """Return True if the routine of an interrupt first of all switches it off."""
+        name = getattr(declared.action, "name", "")
+        found = self.task.routine(name, Scope(file, self.task.files[file].name, ""))
+        if found is None:
+            return False
+        at, _, routine = found
+        here = Scope(at, self.task.files[at].name, "")
+        for row in range(routine.first + 1, routine.last):
+            one = self.texts[at].statement(row)
+            if isinstance(one, said.InterruptSwitched) and one.word == "off":
+                own = whole(self.task.number(one.number, row, here))
+                return one.number is None or own == number
+            if not isinstance(one, said.KrlDeclaration):
+                return False
+        return False
 
     def _switch(
         self, context: CallContext, row: int, one: said.InterruptSwitched, here: Arrived

@@ -84,7 +84,7 @@ def test_a_row_of_the_page(lines, result):
         last = len(names) - 1
     why, fly = reasons(found), found.visits.fly.tolist()
     lost = origins(found)[last] == [ELSEWHERE]
-    assert bool(why[last]) == (result in ("left", "lost"))
+    assert bool(why[last]) == (result in ("not corrected", "lost"))
     assert lost == (result == "lost")
     if result in ("nothing", "stops"):
         assert why[first] == "" and fly[first] == (result == "nothing")

@@ -8,7 +8,7 @@ from postproc.diagnostics import Code
 from postproc.language.krl.external_routines import package_routines
 from postproc.language.language import Start
 from postproc.language.visits import ELSEWHERE, START
-from tests.language.krl.test_visits import codes, job, origins, reasons
+from tests.language.krl.test_visits import codes, job, names, origins, reasons
 
 SEARCH = "INTERRUPT DECL 10 WHEN $IN[1]==TRUE DO found_it( )"
 FRAMES = ["FDAT_ACT=FP1", "LDAT_ACT=LCPDAT1", "BAS(#CP_PARAMS,2)"]
@@ -42,6 +42,71 @@ def test_resume_leaves_everything_from_the_declaration_on():
     lines = ["LIN XP1", "WAIT SEC 0", SEARCH, "INTERRUPT ON 10", "LIN XP1",
              "INTERRUPT OFF 10", *FRAMES, "LIN XP1"]  # fmt: skip
     assert left(job(*lines, more=RESUMES)) == [False, True, True]
+
+
+FOUND = "DEF found_it( )\nINTERRUPT OFF 10\nBRAKE F\nRESUME\nEND\n"
+SEEK = "DEF seek( )\nINTERRUPT ON 10\nLIN XP2\nWAIT SEC 0\nINTERRUPT OFF 10\nEND\n"
+SEARCHES = [SEARCH, *FRAMES, "LIN XP1", "WAIT SEC 0", "seek( )", "LIN XP1", *FRAMES,
+            "LIN XP1"]  # fmt: skip
+
+
+def test_resume_ends_the_routine_in_which_it_may_come():
+    found = job(*SEARCHES, more=SEEK + FOUND)
+    assert left(found) == [False, True, False, False]
+    assert "which $TOOL and $BASE" in reasons(found)[2] and reasons(found)[3] == ""
+    assert origins(found)[2] == [ELSEWHERE]
+
+
+def test_routines_between_are_ended_too():
+    more = SEEK + FOUND + "DEF around( )\nseek( )\nPTP XA\nEND\n"
+    found = job(*[x.replace("seek", "around") for x in SEARCHES], more=more)
+    assert names(found) == ["xp1", "xp2", "xa", "xp1", "xp1"]
+    assert origins(found)[3] == [ELSEWHERE, 2]
+    assert "which $TOOL and $BASE" in reasons(found)[3] and reasons(found)[4] == ""
+
+
+def test_other_routines_end_where_they_say():
+    lines = [*SEARCHES, "plain( )", "LIN XP1"]
+    found = job(*lines, more=SEEK + FOUND + "DEF plain( )\nPTP XA\nEND\n")
+    assert names(found)[-2:] == ["xa", "xp1"]
+    assert origins(found)[-1] == [4] and reasons(found)[-1] == ""
+
+
+KEPT_ON = {
+    "not switched off": RESUMES,
+    "another is": FOUND.replace("OFF 10", "OFF 11"),
+    "on one way alone": FOUND.replace(
+        "INTERRUPT OFF 10", "IF $IN[3] THEN\nINTERRUPT OFF 10\nENDIF"),
+    "of a number that is not known": FOUND.replace("OFF 10", "OFF N2"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("action", KEPT_ON.values(), ids=KEPT_ON)
+def test_an_interrupt_that_stays_on_leaves_what_comes_behind(action):
+    found = job(*SEARCHES, "N2=1", more=SEEK + action)
+    assert left(found) == [False, True, True, True]
+
+
+EVERYTHING = {
+    "switched on where it is declared": ["INTERRUPT ON 10", "INTERRUPT OFF 10"],
+    "all are": ["INTERRUPT ON", "INTERRUPT OFF"],
+    "of a number that is not known": ["INTERRUPT ON N2", "N2=3"],
+}
+
+
+@pytest.mark.parametrize("lines", EVERYTHING.values(), ids=EVERYTHING)
+def test_resume_leaves_everything_where_it_may_end_the_program_itself(lines):
+    assert all(left(job(*SEARCHES, *lines, more=SEEK + FOUND)))
+
+
+def test_resume_of_a_routine_that_moves_leaves_everything():
+    found = job(*SEARCHES, more=SEEK + FOUND.replace("BRAKE F", "LIN XP2"))
+    assert all(left(found))
+
+
+def test_a_resume_may_come_in_moves_before_the_routine_that_awaits_it():
+    lines = [x for x in SEARCHES if x != "WAIT SEC 0"]
+    assert left(job(*lines, more=SEEK + FOUND)) == [True, True, False, False]
 
 
 def test_an_interrupt_that_does_no_harm_leaves_nothing():

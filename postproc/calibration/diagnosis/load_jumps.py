@@ -1,0 +1,155 @@
+"""Jumps at a load: where one is and what the links weigh are found together.
+
+Whether a row is before or after a jump depends on the load, and the load on the first
+moments of the links, which an arm file states to a tenth or so. A step has no slope in
+either. It therefore begins as a wide tanh, which has one, and is narrowed; at each
+width Gauss-Newton steps move its place and all moments, which have the normal prior of
+`moments`. They cost what Laplace's approximation says: their prior, and the share of it
+that the rows leave.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.calibration.diagnosis.candidates import Projection, reduce_some
+from postproc.calibration.diagnosis.score import Score, rank
+from postproc.model.covariate import JOINTS, by_weight, covariate
+from postproc.model.effects.compliance import moments
+from postproc.model.effects.part_motion import PartMotion
+
+WIDTHS = 0.3 * 0.6 ** np.arange(9)  # of half of the load's range
+TURNS = 4  # Gauss-Newton steps at a width
+SHORTEST = 0.05  # part of a step that is tried
+SEEN = 8  # rows within a width that still shows what the moments cost
+
+
+@dataclass(frozen=True, eq=False)
+class _Jump:
+    """The rows about a jump at a load.
+
+    Attributes:
+        projection: The fit without it.
+        moved: Motion of the tool point per unit of the carrier's motion, (n, 3).
+        load: The load of nominal links, (n,), in halves of its range.
+        by_moment: Its slopes by the links' moments, each per its spread, (n, m).
+    """
+
+    projection: Projection
+    moved: Floats
+    load: Floats
+    by_moment: Floats
+
+    def filtered(self, values: Floats) -> Floats:
+        """Whiten and filter the motion by some values (n, k), (3 n, k)."""
+        rows = self.moved[:, :, None] * values[:, None, :]
+        return self.projection.filter(self.projection.fit.whiten(rows))
+
+    def solve(self, at: Floats, width: float) -> tuple[float, Floats, Floats]:
+        """Fit the size of the jump where place and moments are given.
+
+        Args:
+            at: Place, in halves of the range, and moments, in spreads, (1 + m,).
+            width: Of the tanh.
+
+        Returns:
+            What is to be made small; the next step of place and moments; the slopes of
+            the rows by size, place, and moments, (3 n, 2 + m).
+        """
+        level = np.tanh((self.load + self.by_moment @ at[1:] - at[0]) / width)
+        column = self.filtered(level[:, None])[:, 0]
+        size = float(column @ self.projection.rest) / float(column @ column)
+        rest = self.projection.rest - size * column
+        slope = size * (1.0 - level**2) / width
+        inner = np.column_stack([-slope, slope[:, None] * self.by_moment])
+        slopes = np.column_stack([column, self.filtered(inner)])
+        prior = np.r_[0.0, 1e-6, np.ones(len(at) - 1)]
+        gradient = slopes.T @ rest - prior * np.r_[0.0, at]
+        step = np.linalg.solve(slopes.T @ slopes + np.diag(prior), gradient)
+        return float(rest @ rest + at[1:] @ at[1:]), step[1:], slopes
+
+
+def place_load_jump(projection: Projection, score: Score) -> Score:
+    """Move a step at a load to where it is with other weights of links.
+
+    Args:
+        projection: The fit without it.
+        score: Of a step; any other is returned as it is.
+
+    Returns:
+        The better score, the weights charged.
+    """
+    cell = score.best.effect
+    if not isinstance(cell, PartMotion) or cell.law != "step" or cell.factor:
+        return score
+    per_moment = by_weight(projection.at, cell.source)
+    if per_moment is None:
+        return score
+    first = int(cell.source.split()[1][0])
+    spreads = np.array(
+        [moments(projection.at.arm, k)[0][1] for k in JOINTS[first - 1 :]]
+    )
+    load = covariate(projection.at, cell.source)
+    half = float(np.ptp(load)) / 2
+    slopes = per_moment[:, first - 1 :] * spreads[:, None] / half
+    jump = _Jump(
+        projection,
+        cell.carrier.move(projection.at),
+        load / half,
+        slopes.reshape(len(load), -1),
+    )
+    known = dict(cell.heavier)
+    begun = [known.get(first + k, np.zeros(3)) for k in range(len(spreads))]
+    start = np.array(begun) / spreads[:, None]
+    at, charge = _narrow(jump, np.r_[cell.middle / half, start.reshape(-1)])
+    more = at[1:].reshape(-1, 3) * spreads[:, None]
+    heavier = tuple((first + k, tuple(map(float, m))) for k, m in enumerate(more))
+    tried = replace(cell, middle=float(at[0]) * half, heavier=heavier)
+    square = float(projection.rest @ projection.rest)
+    blocks = reduce_some(projection, [replace(score.best, effect=tried)])
+    (found,) = rank(blocks, square, projection.rows)
+    gained = found.best_evidence - charge - score.best_evidence + cell.doubt()
+    if gained <= 0.0:
+        return score
+    return replace(found, evidence=score.evidence + gained)
+
+
+def _narrow(jump: _Jump, at: Floats) -> tuple[Floats, float]:
+    """Narrow a jump, and say what its moments cost [nats]."""
+    charge = 0.0
+    for width in WIDTHS:
+        for _ in range(TURNS):
+            better = _step(jump, at, width)
+            if better is None:
+                break
+            at = better
+        away = jump.load + jump.by_moment @ at[1:] - at[0]
+        if int((np.abs(away) < width).sum()) >= SEEN:
+            charge = _cost(jump.solve(at, width)[2])
+    return at, charge + float(at[1:] @ at[1:]) / 2
+
+
+def _step(jump: _Jump, at: Floats, width: float) -> Floats | None:
+    """Take one step, shortened until it is better, None where none is."""
+    before, step, _ = jump.solve(at, width)
+    part = 1.0
+    while part > SHORTEST:
+        if jump.solve(at + part * step, width)[0] < before:
+            return at + part * step
+        part /= 2
+    return None
+
+
+def _cost(slopes: Floats) -> float:
+    """Return half the logarithm of what rows leave of the moments' prior [nats].
+
+    Args:
+        slopes: By size and place, which are free, and the moments, (3 n, 2 + m).
+    """
+    basis, _ = np.linalg.qr(slopes[:, :2])
+    own = slopes[:, 2:] - basis @ (basis.T @ slopes[:, 2:])
+    values = np.linalg.svd(own, compute_uv=False)
+    return float(np.log1p(values**2).sum()) / 2
