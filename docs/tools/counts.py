@@ -36,7 +36,7 @@ IRREGULAR = frozenset(
     "seen sent shown spun stood swept taken taught thought thrown "
     "told torn turned understood unsaid unsure woven worn written".split()
 )
-NO_PARTICIPLES = frozenset("need seed speed feed bed".split())
+NO_PARTICIPLES = frozenset("need seed speed feed bed embed".split())
 Command = Any  # click's, which typer brings along
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 

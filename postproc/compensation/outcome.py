@@ -347,7 +347,7 @@ class LineOutcomes:
         status = _places(told["status"], DIGIT).astype(np.int64)
         sides = (_places(told["direction"], SIGNS) - 1).reshape(len(line), 6)
         size = np.array(told["correction_mm"], dtype=np.float64)
-        why = np.array(_told_why(told), dtype=np.int64)
+        why = np.array(_read_reason_index(told), dtype=np.int64)
         rank = np.argsort(URGENCY)[status]
         order = np.lexsort((rank, line))
         first = np.flatnonzero(np.diff(line[order], prepend=-1))
@@ -360,7 +360,7 @@ class LineOutcomes:
             line=line[lead],
             status=status[lead],
             why=why[lead],
-            reasons=_told_reasons(told),
+            reasons=_read_reasons(told),
             direction=np.where(least == most, least, BOTH),
             correction_mm=np.maximum.reduceat(size[order], first)
             if len(line)
@@ -370,13 +370,13 @@ class LineOutcomes:
         )
 
 
-def _told_why(told: Mapping[str, Any]) -> Sequence[int]:
+def _read_reason_index(told: Mapping[str, Any]) -> Sequence[int]:
     """Take the index of the reason of every visit; `why` in records of 0.1.0."""
     found: Sequence[int] = told.get("reason", told.get("why", ()))
     return found
 
 
-def _told_reasons(told: Mapping[str, Any]) -> tuple[Reason, ...]:
+def _read_reasons(told: Mapping[str, Any]) -> tuple[Reason, ...]:
     """Take the reasons of a record; those of version 0.1.0 are texts without codes."""
     texts = [str(text) for text in told["reasons"]]
     codes = [str(code) for code in told.get("codes", [""] * len(texts))]
@@ -549,7 +549,7 @@ def add_uncorrected(
         "direction": str(told.get("direction", "")) + SIGNS[1] * 6 * len(left),
         "correction_mm": [*told.get("correction_mm", ()), *[0.0] * len(left)],
         "reason": [
-            *_told_why(told),
+            *_read_reason_index(told),
             *(len(known) + whys.index(why) for _, _, why in left),
         ],
         "codes": [*codes, *(why.name for why in whys)],

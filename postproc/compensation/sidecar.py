@@ -241,7 +241,9 @@ def _record(path: Path, text: bytes) -> Sidecar:
         if not all(map(_is_name, files)):
             raise ValueError("a name that no file has")
         version, model = str(data["postproc"]), str(data["model"])
-        left = tuple(map(_left_line, data.get("uncorrected", data.get("left", ()))))
+        left = tuple(
+            map(_read_uncorrected_line, data.get("uncorrected", data.get("left", ())))
+        )
         assumed = tuple(
             (str(f), int(n), str(text)) for f, n, text in data.get("assumed", ())
         )
@@ -253,7 +255,7 @@ def _record(path: Path, text: bytes) -> Sidecar:
         raise ProgramError(path, "is not a record of postproc", CURE) from None
 
 
-def _left_line(told: Sequence[Any]) -> LeftLine:
+def _read_uncorrected_line(told: Sequence[Any]) -> LeftLine:
     """Take a line that was left; version 0.1.0 gave its text without a code."""
     file, line, text, *code = told
     return str(file), int(line), Reason.named(str(code[0]) if code else "", str(text))

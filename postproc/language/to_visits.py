@@ -583,7 +583,7 @@ def _find_taught(
         return [False] * count
     places = [{(v.goal.writes[0], v.goal.writes[1][0]), v.goal.point} for v in found]
     written = {place for some in places for place in some if place[1] >= 0}
-    marked = _marked(written, machine, lines)
+    marked = _find_marked(written, machine, lines)
     out = [False] * count
     for v, own, some in zip(found, literal.tolist(), places, strict=True):
         if own >= 0 and not out[own]:
@@ -595,7 +595,7 @@ def _find_taught(
     return out
 
 
-def _marked(
+def _find_marked(
     places: Collection[tuple[int, int]],
     machine: TaskMachine,
     lines: Sequence[Collection[int]],

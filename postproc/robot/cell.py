@@ -526,7 +526,7 @@ def load_cell(
     else:
         path, read = Path(file), read_toml(Path(file), CellFile, CellError)
     for change in changes:
-        read = _changed(read, change)
+        read = _with_change(read, change)
     return _cell_of(path, read)
 
 
@@ -542,7 +542,7 @@ CHANGEABLE: Mapping[str, type[Strict]] = {
 }
 
 
-def _changed(file: CellFile, change: str) -> CellFile:
+def _with_change(file: CellFile, change: str) -> CellFile:
     """Return a cell file with one key changed for a run.
 
     Raises:
@@ -577,7 +577,7 @@ def verify_section(changes: Sequence[str]) -> tuple[VerifySection, tuple[str, ..
     own = [change for change in changes if change.strip().startswith("verify.")]
     file = CellFile.model_construct()
     for change in own:
-        file = _changed(file, change)
+        file = _with_change(file, change)
     return file.verify, tuple(change for change in changes if change not in own)
 
 

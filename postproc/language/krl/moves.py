@@ -393,7 +393,7 @@ class _Goal:
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, said.DataObject):
             return _unknown_goal(AT_RUN_TIME)
-        base, held = self._point(point), self._held(other)
+        base, held = self._point(point), self._find_own_shift(other)
         frames = FrameReader(self.task, self.row, self.here, _NO, _NO)
         shift = frames.frame(other)
         if base.target != Meaning.POSE or not shift.pose:
@@ -419,7 +419,7 @@ class _Goal:
             held if found.slots[0] < 0 else (-1, -1),
         )  # fmt: skip
 
-    def _held(self, other: said.Operand) -> tuple[int, int]:
+    def _find_own_shift(self, other: said.Operand) -> tuple[int, int]:
         """Return where the numbers of a shift begin that stand in the move itself."""
         value = self.task.value(other, self.row, self.here)
         numbers = _numbers(value, PLACE) if isinstance(value, KrlRecord) else None

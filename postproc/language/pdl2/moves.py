@@ -232,7 +232,7 @@ def from_value(value: Value, system: bool = False) -> Goal:
     if not value.complete:
         return Goal(Meaning.UNKNOWN, position=value, reason=IN_PART)
     target = Meaning.JOINTS if value.joints else Meaning.POSE
-    return Goal(target, value.numbers, value, reason=_computed(value, system))
+    return Goal(target, value.numbers, value, reason=_explain_computed(value, system))
 
 
 NO_POSITION = Reason(Code.RUNTIME_VALUE, "the target is no position")
@@ -245,7 +245,7 @@ COMPUTED = Reason(
 )
 
 
-def _computed(value: Position, system: bool) -> Reason:
+def _explain_computed(value: Position, system: bool) -> Reason:
     """Say why the numbers of a known position cannot be written."""
     if value.derived:
         text = f"the target is computed: {value.derived}"

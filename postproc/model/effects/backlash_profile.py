@@ -98,12 +98,12 @@ class BacklashProfile(JointEffect):
         sizes = p.reshape(len(self.joints), self.constant + 2 * len(self.orders))
         states = batch.states.q, batch.states.direction
         return _native.profile(
-            tuple(map(np.ascontiguousarray, states)), self._profiled_joints.tolist(),
+            tuple(map(np.ascontiguousarray, states)), self._profile_joints.tolist(),
             self.orders, self.constant, sizes, (self.lower, self.upper),
         )  # fmt: skip
 
     @property
-    def _profiled_joints(self) -> NDArray[np.int64]:
+    def _profile_joints(self) -> NDArray[np.int64]:
         """Return the 0-based joints that have a profile, (j,)."""
         return np.array(self.joints, dtype=int) - 1
 
@@ -113,7 +113,7 @@ class BacklashProfile(JointEffect):
         Sine and cosine of k theta come from those of (k - 1) theta, which takes a
         quarter of the time and is as good but for the last digit.
         """
-        angle = np.ascontiguousarray(q[:, self._profiled_joints].T)
+        angle = np.ascontiguousarray(q[:, self._profile_joints].T)
         waves = np.ones((len(angle), self.constant + 2 * len(self.orders), len(q)))
         sin, cos = np.sin(angle), np.cos(angle)
         s, c = np.zeros_like(sin), np.ones_like(cos)
@@ -124,5 +124,5 @@ class BacklashProfile(JointEffect):
                 waves[:, at], waves[:, at + 1] = s, c
         within = fade_turns(q, np.array(self.lower), np.array(self.upper))
         if (within != 1.0).any():
-            waves[:, int(self.constant) :] *= within.T[self._profiled_joints, None]
+            waves[:, int(self.constant) :] *= within.T[self._profile_joints, None]
         return waves
