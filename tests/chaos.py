@@ -136,7 +136,7 @@ class LongRun:
         """Start it, with a report and a page."""
         tool = [sys.executable, "-c", "from postproc.cli import main; main()"]
         files = ["--cell", self.cell, "--model", self.model]
-        pages = ["--report", "job.json", "--report", "job.html", "--jobs", "2"]
+        pages = ["--report", "job.json", "--report", "job.html"]
         command = [*tool, "compensate", "job.pdl", *map(str, files), *pages]
         env = {**os.environ, "XDG_CACHE_HOME": str(self.folder / "cache")}
         pipe = subprocess.PIPE

@@ -122,7 +122,7 @@ def cluster(plant: Plant, found: Findings) -> None:
     """Compare a cluster with as many local workers; kill one of its."""
     local, there = plant.root / "local", plant.root / "cluster"
     with Cluster(plant.root / "scratch", workers=plant.jobs) as dask:
-        scheduler = ("--scheduler", dask.address)
+        scheduler = ("--jobs", dask.address)
         runs: dict[str, Callable[[], float]] = {
             "local": lambda: _seconds(plant.command(local)),
             "cluster": lambda: _seconds(plant.command(there, *scheduler)),

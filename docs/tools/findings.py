@@ -17,7 +17,8 @@ Written from `postproc/diagnostics.py` by `python docs/tools/findings.py`.
 A finding is one message about a program, or about a tree of compensated programs. It
 names a file and a line, and has a code: `job.pdl:12: unknown-routine: ..`. JSON outputs
 carry the code; `postproc explain --code CODE` prints its meaning and cure. Equal
-findings at many lines are printed as one, with the first lines; `--all` lists each.
+findings at many lines are printed as one, with the first; `compensate --all` lists
+each.
 
 The reason why a target is not corrected has a code of the same registry. JSON
 outputs carry that code (`code`) beside the text.

@@ -9,7 +9,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from importlib.util import find_spec
-from pathlib import Path
 from time import monotonic
 from typing import Any
 
@@ -29,27 +28,25 @@ class ClusterPool:
 
     losses: tuple[type[BaseException], ...]
 
-    def __init__(
-        self, setups: Sequence[JobSetup], address: str, tls: Path | None = None
-    ) -> None:
-        """Connect to a scheduler.
+    def __init__(self, setups: Sequence[JobSetup], address: str) -> None:
+        """Connect to a scheduler, with the certificates that Dask's configuration has.
 
         Args:
             setups: What units mean by their `setup`.
             address: For instance ``tls://host:8786``.
-            tls: Folder with ``ca.pem``, ``cert.pem`` and ``key.pem``; default: what
-                Dask's own configuration says.
 
         Raises:
             PostprocError: Dask is not installed, or nobody answers.
         """
         if find_spec("distributed") is None:
-            raise PostprocError("--scheduler needs: pip install 'postproc[cluster]'")
+            raise PostprocError(
+                "A Dask scheduler needs: pip install 'postproc[cluster]'"
+            )
         from distributed import KilledWorker
 
         self.losses = (KilledWorker,)
         try:
-            self._client = _connect(address, tls)
+            self._client = _connect(address)
         except (OSError, ValueError, RuntimeError) as exc:
             raise PostprocError(
                 f"{address}: no scheduler with workers answers ({exc}). Start them as "
@@ -86,7 +83,7 @@ class ClusterPool:
         self._client.close(timeout=CONNECT)
 
 
-def _connect(address: str, tls: Path | None) -> Any:
+def _connect(address: str) -> Any:
     """Connect to a scheduler, and wait for its first worker.
 
     Raises:
@@ -102,16 +99,11 @@ def _connect(address: str, tls: Path | None) -> Any:
             """Leave it."""
 
     security = Security()
-    if tls is not None:
-        security = Security(
-            tls_ca_file=str(tls / "ca.pem"),
-            tls_client_cert=str(tls / "cert.pem"),
-            tls_client_key=str(tls / "key.pem"),
-            require_encryption=True,
-        )
     context = security.get_connection_args("client").get("ssl_context")
     if address.startswith("tls:") and context is None:
-        raise ValueError("tls:// needs certificates: give their folder with --tls")
+        raise ValueError(
+            "tls:// needs certificates: name them in the configuration of Dask"
+        )
     client = OwnClient(
         address, timeout=CONNECT, security=security, set_as_default=False
     )

@@ -336,7 +336,7 @@ class BatchRun:
         """
         if is_stream(order.log):
             problem = "is no file that a later run could read"
-            raise OutputError(order.log, problem, "Give a file as --log")
+            raise OutputError(order.log, problem, "Remove it, or name another DST")
         self.order, self.tree, self.told = order, tree, told
         self.target = TargetTree(order.target)
         self.earlier = read_entries(order.log)

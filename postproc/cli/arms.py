@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.common import app, as_path, report_errors, say, write_text
-from postproc.exceptions import PostprocError
 from postproc.files import check_places
 
 if TYPE_CHECKING:
     from postproc.robot.arm import Arm
     from postproc.robot.urdf import UrdfChain
+
+MADE = "new"  # of --verify: the arm that is made of the URDF
+ASSUMED_MM = 0.1  # repeatability, which no source of arm files states
 
 arm = typer.Typer(
     no_args_is_help=True,
@@ -62,24 +64,13 @@ def from_urdf(
     tip: Annotated[
         str | None, typer.Option("--tip", help="Link of the flange, default tool0.")
     ] = None,
-    name: Annotated[
-        str | None, typer.Option("--name", help="Of the arm, default the robot's.")
-    ] = None,
-    repeatability: Annotated[
-        float, typer.Option("--repeatability", min=0.001, help="RP of ISO 9283 [mm].")
-    ] = 0.1,
     verify: Annotated[
-        bool,
-        typer.Option(
-            "--verify",
-            help="Compare with Pinocchio's reading of the URDF. If they differ, no "
-            "file is written, exit 1.",
-        ),
-    ] = False,
-    arm: Annotated[
         str | None,
         typer.Option(
-            "--arm", help="With --verify: compare this arm, and write no file."
+            "--verify",
+            metavar="ARM",
+            help="Compare an arm with Pinocchio's reading of the URDF, and write no "
+            "file. new: compare what is made of the URDF, and write it if they agree.",
         ),
     ] = None,
 ) -> None:
@@ -89,19 +80,17 @@ def from_urdf(
 
     with report_errors(urdf):
         check_places([as_path(output)], [urdf])
-        if arm is not None and not verify:
-            raise PostprocError("--arm: it is compared alone. Add --verify")
-        if verify:
+        if verify is not None:
             from postproc.verify.extra import load
 
             load()
         chain = read_chain(urdf, base, tip)
         for assumed in (*chain.rounded, *chain.endless):
             say(f"{urdf}: {assumed}")
-        text = None if arm is not None else arm_text(chain, repeatability, name)
+        text = arm_text(chain, ASSUMED_MM) if verify in (None, MADE) else None
         if text is not None:
             _say_what_lacks(chain)
-        if verify and not _verify_arm(chain, text, arm):
+        if verify and not _verify_arm(chain, text, verify):
             raise typer.Exit(1)
         if text is not None:
             write_text(output, text)
@@ -120,7 +109,7 @@ def _say_what_lacks(chain: UrdfChain) -> None:
         say(f"{chain.path}: {problem}. [links] is not written")
 
 
-def _verify_arm(chain: UrdfChain, text: str | None, arm: str | None) -> bool:
+def _verify_arm(chain: UrdfChain, text: str | None, arm: str) -> bool:
     """Compare the text of an arm file, or an arm, with Pinocchio's reading of a URDF.
 
     Raises:
@@ -130,7 +119,7 @@ def _verify_arm(chain: UrdfChain, text: str | None, arm: str | None) -> bool:
     from postproc.robot.arm import arm_of_text, load_arm
     from postproc.verify.urdf import ArmClaim, UrdfChainNames, judge_urdf
 
-    ours = load_arm(arm or "") if text is None else arm_of_text(chain.path, text)
+    ours = load_arm(arm) if text is None else arm_of_text(chain.path, text)
     names = tuple(joint.name for joint in chain.moving)
     stated = chain.path.read_text("utf-8", "replace")
     theirs = UrdfChainNames(stated, chain.base, chain.tip, names)
@@ -148,20 +137,13 @@ def from_machine_dat(
     output: Annotated[
         str, typer.Option("-o", "--output", help="ARM.toml, - for stdout.")
     ] = "-",
-    name: Annotated[
-        str | None,
-        typer.Option("--name", help="Of the arm, default the transformation's."),
-    ] = None,
-    repeatability: Annotated[
-        float, typer.Option("--repeatability", min=0.001, help="RP of ISO 9283 [mm].")
-    ] = 0.1,
 ) -> None:
     """Write the arm file of a KUKA arm: six axes with a spherical wrist."""
     from postproc.robot.machine_data import machine_arm_text, read_machine_data
 
     with report_errors(machine):
         check_places([as_path(output)], [machine])
-        text = machine_arm_text(read_machine_data(machine), repeatability, name)
+        text = machine_arm_text(read_machine_data(machine), ASSUMED_MM)
         write_text(output, text)
         if output != "-":
             say(f"written {output}")

@@ -29,6 +29,9 @@ KEYS = {
     "--unit": "measurements.unit=UNIT",
     "--temperature": "environment.temperature_c=C",
     "--seed": "simulation.seed=N",
+    "--orientation": "compensation.orientation=true",
+    "--shared-points": "compensation.shared_points=KIND",
+    "--path-tolerance": "compensation.path_tolerance_mm=MM",
     "survey --seed": "survey.seed=N",
     "--mode": "survey.mode=MODE",
     "--reversals": "survey.reversals=N",
@@ -44,6 +47,8 @@ KEYS = {
 }
 OLD_OPTIONS = {
     **{old: f"--set {key}" for old, key in KEYS.items()},
+    "--scheduler": "--jobs tls://HOST:8786",
+    "--arm": "--verify ARM",
     "--json": "--report FILE.json",
     "--html": "--report FILE.html",
     "--plot": "--report FILE.svg",
@@ -57,6 +62,19 @@ OLD_OPTIONS = {
 }
 
 
+ENDED = {
+    "--tls": "name the certificates in the configuration of Dask",
+    "--log": "the log is DST.batch.jsonl",
+    "--name": "change it in the arm file",
+    "--repeatability": "change it in the arm file",
+    "compensate --jobs": "limit the processors, as taskset does",
+    "compensate -j": "limit the processors, as taskset does",
+    "fit --all": "--report FILE.json has all parameters and rows",
+    "explain --all": "--report FILE.json has all findings",
+    "explain --variables": "the file is PROGRAM.lsv, beside the program",
+}
+
+
 class Command(TyperCommand):
     """A command that names the new word where an old one is given."""
 
@@ -65,10 +83,18 @@ class Command(TyperCommand):
         known = {word for param in self.params for word in param.opts}
         for arg in args:
             word = arg.partition("=")[0]
-            new = OLD_OPTIONS.get(f"{ctx.info_name} {word}", OLD_OPTIONS.get(word))
-            if new is not None and word not in known:
-                ctx.fail(f"{word} is called {new}")
+            if word not in known:
+                _name_the_new_way(ctx, word)
         return super().parse_args(ctx, args)
+
+
+def _name_the_new_way(ctx: Any, word: str) -> None:
+    """End with 2 where a word is an option of an earlier version."""
+    for name in (f"{ctx.info_name} {word}", word):
+        if new := OLD_OPTIONS.get(name):
+            ctx.fail(f"{word} is called {new}")
+        if instead := ENDED.get(name):
+            ctx.fail(f"{word} is no option any more: {instead}")
 
 
 class Groups(TyperGroup):

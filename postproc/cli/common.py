@@ -69,12 +69,6 @@ OrientationOption = Annotated[
 EveryOption = Annotated[
     bool, typer.Option("--all", help="List equal findings one by one, not grouped.")
 ]
-ProcessesOption = Annotated[
-    int,
-    typer.Option(
-        "--jobs", "-j", min=0, help="Number of processes; 0: one per core, at most 8."
-    ),
-]
 PathToleranceOption = Annotated[
     float | None,
     typer.Option(
@@ -289,7 +283,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "arm from-urdf": (
         "postproc arm from-urdf robot.urdf -o arm.toml",
         "postproc arm from-urdf robot.urdf --base base_link --tip flange",
-        "postproc arm from-urdf robot.urdf -o arm.toml --verify",
+        "postproc arm from-urdf robot.urdf -o arm.toml --verify new",
     ),
     "arm from-machine-dat": (
         "postproc arm from-machine-dat 'R1/Mada/$machine.dat' -o arm.toml",

@@ -122,9 +122,6 @@ def fit(
     ] = None,
     changes: SetOption = None,
     report: PageOption = None,
-    everything: Annotated[
-        bool, typer.Option("--all", help="List all parameters and rows.")
-    ] = False,
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
     from postproc.calibration import fit as calibration
@@ -150,7 +147,7 @@ def fit(
                 reports.write_pages(lambda: fit_page(found))
         reports.write_json(lambda: fit_json(found))
         if not reports.on_stdout:
-            typer.echo(tell_fit_files(found, output, everything))
+            typer.echo(tell_fit_files(found, output))
         if found.rejected:
             raise typer.Exit(2)
 

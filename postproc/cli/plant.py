@@ -11,10 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.common import (
-    OrientationOption,
-    PathToleranceOption,
     SetOption,
-    SharedPointsOption,
     app,
     changes_of,
     report_errors,
@@ -22,6 +19,7 @@ from postproc.cli.common import (
 )
 from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
 from postproc.compensation.options import DEFAULT_OPTIONS
+from postproc.exceptions import PostprocError
 from postproc.files import check_places, is_program
 
 if TYPE_CHECKING:
@@ -49,30 +47,24 @@ def batch(
     model: ModelFile = None,
     plan: PlanFile = None,
     jobs: Annotated[
-        int, typer.Option("--jobs", "-j", min=0, help="Processes; 0: one per core.")
-    ] = 0,
-    scheduler: Annotated[
-        str | None, typer.Option("--scheduler", help="Dask, as tls://host:8786.")
-    ] = None,
-    tls: Annotated[
-        Path | None,
-        typer.Option("--tls", help="Folder with ca.pem, cert.pem and key.pem."),
-    ] = None,
+        str,
+        typer.Option(
+            "--jobs",
+            "-j",
+            metavar="N",
+            help="Processes, 0: one for a core; or a Dask scheduler, tls://host:8786.",
+        ),
+    ] = "0",
     resume: Annotated[
         bool, typer.Option("--resume", help="Skip finished, unchanged files.")
     ] = False,
-    log: Annotated[
-        Path | None, typer.Option("--log", help="Log; default: DST.batch.jsonl.")
-    ] = None,
     report: PageOption = None,
-    orientation: OrientationOption = False,
-    shared_points: SharedPointsOption = None,
-    path_tolerance: PathToleranceOption = None,
     changes: SetOption = None,
 ) -> None:
     """Compensate a tree of programs; programs that fail are not written to DST."""
     with report_errors():
-        if scheduler is None:
+        if not _is_address(jobs):
+            _count(jobs)
             from postproc.batch.workers import start_server
 
             start_server()
@@ -80,17 +72,15 @@ def batch(
         from postproc.batch.plan import make_plan
         from postproc.report.terminal import progress_bar
 
-        asked = changes_of(changes, orientation, shared_points, path_tolerance)
+        asked = changes_of(changes)
         made = make_plan(plan, cell, model, DEFAULT_OPTIONS, asked)
         reports = Reports.of(report, PAGE)
         check_places(reports.files, [cell, model, plan])
         for line in _archive_lines(source, made):
             say(line)
-        order = run.BatchOptions(
-            source, target, made, log or run.default_log(target), resume
-        )
+        order = run.BatchOptions(source, target, made, run.default_log(target), resume)
         with progress_bar(f"{source} -> {target}") as told:
-            summary = run.batch(order, _workers(jobs, scheduler, tls), told)
+            summary = run.batch(order, _workers(jobs), told)
         _print_summary(summary, table=not reports.on_stdout)
         say(f"log: {order.log}")
         _write_reports(reports, f"{source} -> {target}", order.log)
@@ -113,16 +103,34 @@ def _archive_lines(source: Path, plan: BatchPlan) -> list[str]:
     return found
 
 
-def _workers(jobs: int, scheduler: str | None, tls: Path | None) -> Gather:
+def _count(jobs: str) -> int:
+    """Return how many processes are asked for.
+
+    Raises:
+        PostprocError: It is neither a number nor the address of a scheduler.
+    """
+    if not jobs.isascii() or not jobs.isdigit():
+        raise PostprocError(
+            f"--jobs {jobs}: give the number of processes, 0 for one for a core, or "
+            "the address of a Dask scheduler, such as tls://host:8786"
+        )
+    return int(jobs) or os.cpu_count() or 1
+
+
+def _is_address(jobs: str) -> bool:
+    """Return True if work goes to a cluster."""
+    return "://" in jobs
+
+
+def _workers(jobs: str) -> Gather:
     """Choose who does the work."""
-    if scheduler is None:
-        from postproc.batch.workers import LocalPool
+    if _is_address(jobs):
+        from postproc.batch.cluster import ClusterPool
 
-        count = jobs or os.cpu_count() or 1
-        return lambda plan: LocalPool(plan.setups, count)
-    from postproc.batch.cluster import ClusterPool
+        return lambda plan: ClusterPool(plan.setups, jobs)
+    from postproc.batch.workers import LocalPool
 
-    return lambda plan: ClusterPool(plan.setups, scheduler, tls)
+    return lambda plan: LocalPool(plan.setups, _count(jobs))
 
 
 def _print_summary(summary: Summary, table: bool) -> None:

@@ -15,7 +15,6 @@ from postproc.cli.common import (
     ModelOption,
     OrientationOption,
     PathToleranceOption,
-    ProcessesOption,
     SetOption,
     SharedPointsOption,
     VariablesOption,
@@ -97,7 +96,6 @@ def compensate(
     shared_points: SharedPointsOption = None,
     path_tolerance: PathToleranceOption = None,
     changes: SetOption = None,
-    processes: ProcessesOption = 0,
     every: EveryOption = False,
 ) -> None:
     """Correct the targets of a program, so that the tool lands on them."""
@@ -125,7 +123,7 @@ def compensate(
         files = ProgramFiles.open(program, variables)
         if variables_out is not None:
             _check_values(variables_out, files)
-        crowd = processes or min(workers.available(), CROWD)
+        crowd = min(workers.available(), CROWD)
         with stages() as progress:
             outcome = run(
                 files, loaded, fitted, options=options, progress=progress,
@@ -237,12 +235,10 @@ def explain(
     model: Annotated[
         Path | None, typer.Option("--model", help="Model file (JSON).")
     ] = None,
-    variables: VariablesOption = None,
     line: Annotated[
         int | None, typer.Option("--line", help="Only the visits of this line.")
     ] = None,
     changes: SetOption = None,
-    every: EveryOption = False,
     code: CodeOption = None,
     report: ReportOption = None,
 ) -> None:
@@ -255,16 +251,16 @@ def explain(
     from postproc.report.findings import list_findings
     from postproc.robot.cell import load_cell
 
-    with report_errors(program, variables):
+    with report_errors(program):
         reports = Reports.of(report)
-        check_places(reports.files, [program, cell, model, variables])
+        check_places(reports.files, [program, cell, model])
         with busy("plan"):
-            files = ProgramFiles.open(program, variables)
+            files = ProgramFiles.open(program)
             loaded = load_cell(cell, changes=changes_of(changes))
             options = Options(timing=loaded.compensation.timing)
             fitted = None if model is None else load_model(model)
             found = tell(files, loaded, fitted, options=options)
-        for text in list_findings(found.findings(line), every):
+        for text in list_findings(found.findings(line), every=False):
             say(text)
         reports.write_json(lambda: explanation_json(found, line))
         if not reports.on_stdout:

@@ -18,14 +18,6 @@ from postproc.report.diagnosis import tell_directions
 from postproc.report.json import finite
 from postproc.report.terminal import Column, table_text
 
-COLUMNS = (
-    Column("parameter", "left"),
-    Column("value"),
-    Column("std error"),
-    Column("unit", "left"),
-    Column("share"),
-    Column("seen"),
-)
 FOUND = (
     Column("found", "left"),
     Column("joint"),
@@ -35,7 +27,6 @@ FOUND = (
     Column("", "left"),
 )
 MOST, FEW = 20, 8  # findings, and rows, that a short report lists
-ROWS = 10**6  # directions that a long report lists
 SHOWN_MM = 0.0005  # of poses: less is not listed
 ENOUGH = 3.0  # nats from which a finding is listed: 20 to 1
 COMPARED = (
@@ -46,15 +37,14 @@ COMPARED = (
 )
 
 
-def tell_fit_files(found: Calibration, output: Path, everything: bool = False) -> str:
+def tell_fit_files(found: Calibration, output: Path) -> str:
     """Write the report of a fit, and where its model is, for a terminal.
 
     Args:
         found: The fit.
         output: The file its model was written to.
-        everything: Whether the report lists all parameters and rows.
     """
-    report = tell_fit(found.report, everything)
+    report = tell_fit(found.report)
     if found.rejected:
         return f"{report}\nno model is written: {found.rejected}"
     return f"{report}\nmodel {found.model.id} written to {output}"
@@ -91,26 +81,13 @@ def comparison_page(found: Comparison) -> str:
     return comparison_report(asdict(found))
 
 
-def tell_fit(report: FitReport, everything: bool = False) -> str:
-    """Write the report of a fit for a terminal.
-
-    Args:
-        report: The report.
-        everything: Whether to list every parameter, pair, direction and row.
-    """
-    if everything:
-        lines = [_tell_parameters(report), _tell_found(report.found)]
-        lines += [
-            f"{k}: {share:.1%} of the error" for k, share in report.shares.items()
-        ]
-        lines += [f"correlated {r:+.3f}: {a} and {b}" for a, b, r in report.correlated]
-        lines += [f"not determined by these rows: {d}" for d in report.unseen]
-    else:
-        lines = [_tell_found(_large(report.found)), *_tell_rest(report)]
+def tell_fit(report: FitReport) -> str:
+    """Write the report of a fit for a terminal."""
+    lines = [_tell_found(_large(report.found)), *_tell_rest(report)]
     if report.held_out is not None:
         lines.insert(0, report.held_out.describe())
-    lines += _tell_rows(report, len(report.dropped) if everything else FEW)
-    lines += tell_directions(report.directions, ROWS if everything else FEW)
+    lines += _tell_rows(report)
+    lines += tell_directions(report.directions, FEW)
     lines += [report.flanks, *(f"warning: {warning}" for warning in report.warnings)]
     lines += [] if report.free is None else [report.free.tell()]
     lines += _tell_scatter(report)
@@ -166,7 +143,7 @@ def _tell_rest(report: FitReport) -> list[str]:
         names = _count_names(a.partition(".")[0] for a, _, _ in report.correlated)
         lines.append(f"strongly correlated, {len(report.correlated)} pairs: {names}")
     if lines:
-        lines.append("all parameters, directions and rows: --all")
+        lines.append("all parameters, directions and rows: --report FILE.json")
     return lines
 
 
@@ -195,15 +172,15 @@ def _group_names(names: Iterable[str]) -> str:
     )
 
 
-def _tell_rows(report: FitReport, most: int) -> list[str]:
+def _tell_rows(report: FitReport) -> list[str]:
     """List rows that count less, and those that stand out and count all the same."""
     rows = report.dropped
-    lines = [f"row {row.id} (line {row.line}): {row.why}" for row in rows[:most]]
-    if len(rows) > most:
-        lines.append(f"and {len(rows) - most} more rows that count less (--all)")
+    lines = [f"row {row.id} (line {row.line}): {row.why}" for row in rows[:FEW]]
+    if len(rows) > FEW:
+        lines.append(f"and {len(rows) - FEW} more rows that count less")
     if report.spared:
-        ids = ", ".join(report.spared[: max(most, FEW)])
-        more = len(report.spared) - max(most, FEW)
+        ids = ", ".join(report.spared[:FEW])
+        more = len(report.spared) - FEW
         ids += f" and {more} more" if more > 0 else ""
         lines.append(f"suspect, but used, because nearby rows agree: row {ids}")
     return lines
@@ -227,22 +204,6 @@ def _tell_scatter(report: FitReport) -> list[str]:
     lines.append(f"measured error  {report.before.tell()}")
     lines.append(f"error after fit {report.after.tell()}")
     return lines
-
-
-def _tell_parameters(report: FitReport) -> str:
-    """Write the table of all parameters."""
-    cells = (
-        (
-            p.name,
-            f"{p.value:.4f}",
-            f"{p.std_error:.4f}",
-            p.unit,
-            f"{p.share:.1%}",
-            f"{p.determined:.0%}",
-        )
-        for p in report.parameters
-    )
-    return table_text(COLUMNS, cells)
 
 
 def comparison_json(found: Comparison) -> str:

@@ -80,7 +80,10 @@ def test_same_bytes_as_here_although_a_worker_is_killed(
 
 @pytest.mark.parametrize(
     ("address", "why"),
-    [("tcp://127.0.0.1:9", "workers answers"), ("tls://127.0.0.1:9", "--tls")],
+    [
+        ("tcp://127.0.0.1:9", "workers answers"),
+        ("tls://127.0.0.1:9", "configuration of Dask"),
+    ],
 )
 def test_nobody_answers(address, why, monkeypatch):
     monkeypatch.setattr("postproc.batch.cluster.CONNECT", 0.2)
@@ -89,8 +92,20 @@ def test_nobody_answers(address, why, monkeypatch):
 
 
 def test_certificates_that_are_not_there(tmp_path):
-    with pytest.raises(PostprocError, match="No such file"):
-        ClusterPool((), "tls://127.0.0.1:9", tmp_path)
+    import dask
+
+    names = {"ca-file": "ca.pem", "client": {"cert": "cert.pem", "key": "key.pem"}}
+    named = {"distributed.comm.tls": _below(tmp_path, names)}
+    with dask.config.set(named), pytest.raises(PostprocError, match="No such file"):
+        ClusterPool((), "tls://127.0.0.1:9")
+
+
+def _below(folder, names):
+    """Return names as places in a folder."""
+    return {
+        key: _below(folder, name) if isinstance(name, dict) else str(folder / name)
+        for key, name in names.items()
+    }
 
 
 def listeners(pid):

@@ -48,12 +48,12 @@ def batch(folder, job_folder, *more):
 
 
 def test_files_of_the_controller_are_copied_without_a_word(archive, job_folder):
-    run = batch(archive, job_folder, "--log", archive / "log.jsonl")
+    run = batch(archive, job_folder)
     assert run.exit_code in (0, 1), run.output
     for name, data in SYSTEM.items():
         assert (archive / "out" / "R1" / "System" / name).read_bytes() == data
         assert name.removesuffix(".src") not in run.output.replace("$config.dat", "")
-    lines = map(json.loads, (archive / "log.jsonl").read_text().splitlines())
+    lines = map(json.loads, (archive / "out.batch.jsonl").read_text().splitlines())
     programs = {line["program"] for line in lines if "program" in line}
     assert programs <= {"R1/Program/weld/job.src"}
     assert b"postproc" in (archive / "out/R1/Program/weld/job.src").read_bytes()

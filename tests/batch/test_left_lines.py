@@ -69,9 +69,8 @@ def test_targets_in_a_program_of_which_only_the_values_change_are_found(desk):
     out = desk.folder / "out" / "s.pdl"
     out.parent.mkdir()
     assert desk.compensate(job, "-o", out).exit_code == 1
-    (finding,) = json.loads(cli("check", out.parent, "--report", "-").stdout)[
-        "findings"
-    ]
+    checked = cli("check", out.parent, "--report", "-")
+    (finding,) = json.loads(checked.stdout)["findings"]
     assert "ext, which is not in the given files" in finding["message"]
     count = re.search(r"(\d+) visits", finding["message"])
     left = desk.report(job)["targets"]

@@ -23,7 +23,7 @@ from tests.written import cli
 
 ARCHIVE = Path(__file__).parents[1] / "cases" / "tree-0.1.0.zip"
 STATUSES = ("safe", "unsafe", "display", "guarded", "unchanged")  # as it named them
-SUFFIX = ".postproc.json"
+SUFFIX, LOG = ".postproc.json", "dst.batch.jsonl"
 CHANGED = ("abb/taught/job.mod",)  # whose comment TAUGHT holds for its statement since
 STAMP = re.compile(rb"(postproc )\S+(?= model=)")
 
@@ -33,13 +33,14 @@ def tree(tmp_path, monkeypatch):
     """The tree in a folder of its own, in which commands run."""
     with zipfile.ZipFile(ARCHIVE) as archive:
         archive.extractall(tmp_path)
+    (tmp_path / "log.jsonl").rename(tmp_path / LOG)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("postproc.batch.plan.__version__", "0.1.0")
     return tmp_path
 
 
 def resume(*options: str) -> int:
-    given = ("--plan", "plan.toml", "--log", "log.jsonl", "--jobs", 1)
+    given = ("--plan", "plan.toml", "--jobs", 1)
     return cli("batch", "src", "dst", *given, "--resume", *options).exit_code
 
 
@@ -105,8 +106,8 @@ def test_a_run_resumes_without_touching_a_file(tree):
 
 def test_a_run_that_was_cut_short_makes_the_same_programs(tree):
     before = programs_of(tree / "dst")
-    log = (tree / "log.jsonl").read_text().splitlines(keepends=True)
-    (tree / "log.jsonl").write_text("".join(log[:8]) + log[8][:40])
+    log = (tree / LOG).read_text().splitlines(keepends=True)
+    (tree / LOG).write_text("".join(log[:8]) + log[8][:40])
     shutil.rmtree(tree / "dst" / "kuka")
     shutil.rmtree(tree / "dst" / "abb")
     assert resume() == 1

@@ -91,4 +91,3 @@ def test_the_report_names_rate_and_rows(tmp_path) -> None:
     assert "fitted the other way" in told
     (rows,) = [line for line in lines if line.startswith("likeliest wrong: row ")]
     assert rows.count("joint") == 8 and rows.endswith(" more")
-    assert len(tell_fit(report, everything=True)) > len(tell_fit(report))

@@ -52,7 +52,7 @@ def test_all_shipped_arms_are_listed_with_their_reach():
 
 def test_an_arm_file_is_written_and_can_be_loaded(urdf):
     place = urdf.with_name("arm.toml")
-    found = cli("arm", "from-urdf", urdf, "-o", place, "--repeatability", "0.06")
+    found = cli("arm", "from-urdf", urdf, "-o", place)
     assert found.exit_code == 0 and f"written {place}" in found.stderr
     arm = load_arm(place)
     assert arm.name == "irb" and arm.file.opw is not None
@@ -61,8 +61,8 @@ def test_an_arm_file_is_written_and_can_be_loaded(urdf):
 
 def test_it_goes_to_standard_output_and_says_what_was_rounded(urdf):
     urdf.write_text(urdf_text(NJ130_SERIAL).replace("-1.5707963267948966", "-1.57"))
-    found = cli("arm", "from-urdf", urdf, "--name", "nj130", "--base", "l0")
-    assert found.exit_code == 0 and 'name = "nj130"' in found.stdout
+    found = cli("arm", "from-urdf", urdf, "--base", "l0")
+    assert found.exit_code == 0 and 'name = "robot"' in found.stdout
     assert found.stderr == (
         f"{urdf}: joint j3: -1.57 rad read as -90 deg\n"
         f"{urdf}: states no masses. [links] is not written\n"
@@ -100,27 +100,25 @@ def test_inputs_are_never_overwritten(urdf):
     assert found.exit_code == 2 and "is an input" in found.stderr
     assert urdf.read_bytes() == before
     assert cli("arm", "from-urdf", urdf.with_name("no.urdf")).exit_code == 2
-    found = cli("arm", "from-urdf", urdf, "--repeatability", "nan")
-    assert found.exit_code == 2 and "--repeatability" in found.stderr
+    found = cli("arm", "from-urdf", urdf, "--repeatability", "1")
+    assert found.exit_code == 2 and "change it in the arm file" in found.stderr
 
 
 def test_an_arm_file_is_verified_before_it_is_written(urdf):
     place = urdf.with_name("arm.toml")
-    found = cli("arm", "from-urdf", urdf, "-o", place, "--verify")
+    found = cli("arm", "from-urdf", urdf, "-o", place, "--verify", "new")
     assert found.exit_code == 0 and place.exists()
     assert "flange: place" in found.stderr and "second opinion: agrees" in found.stderr
 
 
 def test_another_arm_disagrees_and_nothing_is_written(urdf):
     place = urdf.with_name("arm.toml")
-    given = "arm", "from-urdf", urdf, "-o", place, "--verify", "--arm"
+    given = "arm", "from-urdf", urdf, "-o", place, "--verify"
     assert cli(*given, "irb6640-185-2.8").exit_code == 1
     same = cli(*given, "irb4600-60-2.05")
     assert same.exit_code == 1 and "joint limits" in same.stderr
     assert re.search(r"flange: place +1000 +< 1e-06 mm", same.stderr)
     assert not place.exists()
-    alone = cli("arm", "from-urdf", urdf, "--arm", "ur10")
-    assert alone.exit_code == 2 and "Add --verify" in alone.stderr
 
 
 def test_what_differs_is_not_written(urdf, monkeypatch):
@@ -132,7 +130,7 @@ def test_what_differs_is_not_written(urdf, monkeypatch):
         "arm_text",
         lambda *a: right(*a).replace("lower_deg = [-", "lower_deg = [-1"),
     )
-    found = cli("arm", "from-urdf", urdf, "-o", place, "--verify")
+    found = cli("arm", "from-urdf", urdf, "-o", place, "--verify", "new")
     assert found.exit_code == 1 and not place.exists()
 
 
@@ -140,14 +138,16 @@ def test_without_pinocchio_it_says_what_installs_it(urdf, monkeypatch):
     from postproc.verify import extra
 
     monkeypatch.setattr(extra, "find_spec", lambda name: None)
-    found = cli("arm", "from-urdf", urdf, "--verify")
+    found = cli("arm", "from-urdf", urdf, "--verify", "new")
     assert found.exit_code == 2 and "pip install pin toppra" in found.stderr
     assert cli("arm", "from-urdf", urdf).exit_code == 0
 
 
 def test_an_endless_joint_takes_the_range_that_is_stated(urdf):
     urdf.write_text(urdf.read_text().replace('"revolute"', '"continuous"', 1))
-    found = cli("arm", "from-urdf", urdf, "--verify", "-o", urdf.with_name("arm.toml"))
+    found = cli(
+        "arm", "from-urdf", urdf, "--verify", "new", "-o", urdf.with_name("arm.toml")
+    )
     assert (
         found.exit_code == 0
         and "is continuous: the given range is used" in found.stderr
@@ -163,7 +163,7 @@ def test_what_pinocchio_cannot_read_is_no_traceback(urdf, old, new):
     assert old in text
     urdf.write_text(text.replace(old, new))
     place = urdf.with_name("arm.toml")
-    found = cli("arm", "from-urdf", urdf, "-o", place, "--verify")
+    found = cli("arm", "from-urdf", urdf, "-o", place, "--verify", "new")
     assert found.exit_code == 2 and "leave --verify out" in found.stderr
     assert not place.exists()
     assert cli("arm", "from-urdf", urdf, "-o", place).exit_code == 0

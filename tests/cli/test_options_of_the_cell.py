@@ -13,13 +13,14 @@ from typer.testing import CliRunner
 
 import postproc
 from postproc.batch.plan import open_setup
-from postproc.cli.click_classes import GROUPS, OLD_OPTIONS
+from postproc.cli.click_classes import ENDED, GROUPS, OLD_OPTIONS
 from postproc.cli.commands import app
 from postproc.compensation.options import Options
 from postproc.exceptions import CellError, PostprocError
 from postproc.robot.cell import load_cell
 from tests.written import cli, program
 
+KEPT = ("--orientation", "--shared-points", "--path-tolerance")  # of compensate
 PLACE = "p := POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')"
 HIGH = "MOVE JOINT TO {12.0, 20.0, -85.0, 30.0, 60.0, 45.0}"
 LOW = "MOVE JOINT TO {-12.0, -8.0, -140.0, -40.0, 20.0, -60.0}"
@@ -35,12 +36,16 @@ def with_section(desk, text: str):
 
 def test_old_options_name_the_new_one(desk):
     job = desk.put("job.pdl", program(*TWICE))
-    for old, new in OLD_OPTIONS.items():
-        if " " in old:
-            continue
-        found = desk.compensate(job, old)
+    for given, new in OLD_OPTIONS.items():
+        command, _, old = given.rpartition(" ")
+        found = cli("batch" if old in KEPT else command or "compensate", job, old)
         assert found.exit_code == 2
         assert f"{old} is called {new}" in " ".join(found.stderr.split())
+    for given, instead in ENDED.items():
+        command, _, old = given.rpartition(" ")
+        found = cli(command or "compensate", job, old)
+        said = f"{old} is no option any more: {instead}"
+        assert found.exit_code == 2 and said in " ".join(found.stderr.split())
     assert not desk.names() - {"job.pdl"}
 
 

@@ -56,15 +56,13 @@ def all_cases() -> tuple[Case, ...]:
 
 
 def large() -> Iterator[Case]:
-    """A program long enough to be corrected in windows, by one process and by two."""
+    """A program long enough to be corrected in windows, by several processes."""
     whole = kept()["programs/milling.pdl"]
     head, begin, rest = whole.partition(b"ROUTINE R_milling\nBEGIN\n")
     body, end, tail = rest.partition(b"END R_milling")
     text = head + begin + body * 8 + end + tail
-    for processes in (1, 2):
-        command = f"{COMPENSATE} --report report.json --jobs {processes}"
-        files = {"job.pdl": text}
-        yield Case(f"large/jobs-{processes}", (command,), PLANT, files)
+    command = f"{COMPENSATE} --report report.json"
+    yield Case("large/windows", (command,), PLANT, {"job.pdl": text})
 
 
 def studies() -> Iterator[Case]:
@@ -115,7 +113,7 @@ def studies() -> Iterator[Case]:
 def trees() -> Iterator[Case]:
     """Trees of programs."""
     tree = {**PLANT, **DESK, **{f"src/{k}": v for k, v in below("tree").items()}}
-    batch = f"batch src dst {SETUP} --log log.jsonl"
+    batch = f"batch src dst {SETUP}"
     after = (
         "check dst --model model.json --source src --report check.json",
         "check dst --allow-uncorrected",
@@ -123,11 +121,13 @@ def trees() -> Iterator[Case]:
     )
     yield Case("batch/one", (f"{batch} --jobs 1 --report b.html", *after), tree)
     yield Case(
-        "batch/two", (f"{batch} --jobs 2 --shared-points clone", *after[:2]), tree
+        "batch/two",
+        (f"{batch} --jobs 2 --set compensation.shared_points=clone", *after[:2]),
+        tree,
     )
     plan = b'[[rule]]\npattern = "**/*.pdl"\ncell = "cell.toml"\nmodel = "model.json"\n'
     warm = "--set environment.temperature_c=30"
-    command = f"batch src dst --plan plan.toml --log log.jsonl --jobs 1 {warm}"
+    command = f"batch src dst --plan plan.toml --jobs 1 {warm}"
     yield Case("batch/plan", (command,), tree, {"plan.toml": plan})
 
 

@@ -149,8 +149,8 @@ def test_senses_and_ratios_must_be_there(tmp_path):
 
 def test_the_command(tmp_path):
     place, out = written(tmp_path), tmp_path / "arm.toml"
-    found = cli("arm", "from-machine-dat", place, "-o", out, "--repeatability", "0.06")
+    found = cli("arm", "from-machine-dat", place, "-o", out)
     assert found.exit_code == 0 and f"written {out}" in found.stderr
-    assert load_arm(out).file.opw is not None and load_arm(out).repeatability == 0.06e-3
+    assert load_arm(out).file.opw is not None and load_arm(out).repeatability == 0.1e-3
     assert cli("arm", "from-machine-dat", tmp_path / "no.dat").exit_code == 2
     assert cli("arm", "from-machine-dat", place, "-o", place).exit_code == 2

@@ -34,7 +34,7 @@ def tree_case() -> Case:
     with zipfile.ZipFile(TREE) as archive:
         texts = {name: archive.read(name) for name in archive.namelist()}
     commands = (
-        "batch src new --plan plan.toml --log new.jsonl --jobs 1",
+        "batch src new --plan plan.toml --jobs 1",
         "check new --source src --report new.json",
         "check dst --model abb/model.json --report old.json",
         "diff src/pdl/odd.pdl dst/pdl/odd.pdl --report diff.json",
