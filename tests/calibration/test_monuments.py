@@ -170,7 +170,7 @@ def test_without_fixed_points_nothing_of_a_warm_up_is_compensated(seed: int) -> 
     model, told = fitted(c, None)
     assert "thermal" in in_time(model.effects.effects)
     assert not in_time(model.compensable()[0].effects)
-    assert "may be tracker_drift, so nothing of it is compensated" in told[-1]
+    assert "may be tracker_drift, so it is not compensated" in told[-1]
     (thermal,) = (e for e in model.effects.effects if isinstance(e, Thermal))
     plain = fit_survey(survey_of(c, None), ARM, BASE_EFFECTS, TRACKER)
     without = model_of(plain, survey_of(c, None)).error(ARM, c.states)
