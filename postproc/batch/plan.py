@@ -198,7 +198,13 @@ def make_plan(
     """
     rules: list[Rule] = []
     if plan is not None:
-        rules += _read_rules(plan)
+        file = read_toml(plan, PlanFile, CellError)
+        if not file.rule:
+            raise CellError(plan, "holds no [[rule]]", "Add one", place="$.rule")
+        here = plan.parent
+        rules += [
+            Rule(r.pattern, r.arm, here / r.cell, here / r.model) for r in file.rule
+        ]
     if (cell is None) != (model is None) or (cell is None and plan is None):
         raise PostprocError("Give --cell and --model, or --plan, or all three")
     if cell is not None and model is not None:
@@ -214,19 +220,6 @@ class Rule:
     arm: int | None
     cell: Path
     model: Path
-
-
-def _read_rules(path: Path) -> list[Rule]:
-    """Read the rules of a plan file.
-
-    Raises:
-        CellError: The file cannot be read, or a key is wrong.
-    """
-    file = read_toml(path, PlanFile, CellError)
-    if not file.rule:
-        raise CellError(path, "holds no [[rule]]", "Add one", place="$.rule")
-    here = path.parent
-    return [Rule(r.pattern, r.arm, here / r.cell, here / r.model) for r in file.rule]
 
 
 def _open_rules(

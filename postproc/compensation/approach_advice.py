@@ -39,7 +39,11 @@ def advise(arm: Arm, cycle: ProgramCycle, rows: Ints) -> dict[int, str]:
     told = {}
     for v in rows.tolist():
         if edge[v] < 0 or source[v] < 0:
-            told[v] = _from_nowhere(arm)
+            most = np.rad2deg(2 * half_width(arm).max())
+            told[v] = (
+                "before it, add a JOINT move from a place in the program that moves "
+                f"every axis by {most:.2f} deg or more"
+            )
             continue
         path = cycle.path.edges
         samples = path.path[path.start[edge[v]] : path.start[edge[v] + 1]]
@@ -80,15 +84,6 @@ def _advise_joints(
     if cartesian and 0 < back <= FAR:
         return f"start the approach {np.ceil(back / MM):.0f} mm farther back"
     return f"start the approach where {names} still {turn} by {angle:.3f} deg more"
-
-
-def _from_nowhere(arm: Arm) -> str:
-    """Say what to do at a first move, from a place that the program does not tell."""
-    most = np.rad2deg(2 * half_width(arm).max())
-    return (
-        f"before it, add a JOINT move from a place in the program that moves every "
-        f"axis by {most:.2f} deg or more"
-    )
 
 
 # Targets that are approached anew: from a stop on the way already travelled.

@@ -294,7 +294,10 @@ def with_dependants(
     moves = np.array(shift)
     rows = np.flatnonzero((visits.follows >= 0) & any_in_rows(values != visits.values))
     if len(rows):
-        moves[rows] = _dependant_shift(visits, planned, cell, values, rows)
+        now = move_targets(
+            planned.targets, replace(visits, values=values), cell, rows
+        ).tcp[rows]
+        moves[rows] = np.nan_to_num((now - planned.targets.tcp[rows])[:, :3, 3])
     for v, sources in _steps(planned):
         source = sources[np.argmax(np.linalg.norm(moves[sources], axis=1))]
         moves[v] = _carry_step(planned, v, int(source), moves)
@@ -351,16 +354,6 @@ def with_origins(visits: Visits, planned: PlannedProgram, found: Bools) -> Bools
         found[sources] |= found[v]
     literals = visits.follows[found & (visits.follows >= 0)]
     return np.asarray(found | np.isin(visits.literal, literals))
-
-
-def _dependant_shift(
-    visits: Visits, planned: PlannedProgram, cell: Cell, values: Floats, rows: Ints
-) -> Floats:
-    """Tell what computed targets move by, (m, 3) [m]."""
-    now = move_targets(planned.targets, replace(visits, values=values), cell, rows).tcp[
-        rows
-    ]
-    return np.nan_to_num((now - planned.targets.tcp[rows])[:, :3, 3])
 
 
 def _turn_place(way: Floats, distance: float, by: Floats) -> Floats:
@@ -619,17 +612,16 @@ class Round:
             found = self.decide(strays)
             if not arcs:
                 return found
-            more = self._find_strayed(found) & ~strays
+            moves = np.where(found.corrected[:, None], self.shift, 0.0)
+            values = found.decisions.corrected
+            visits, planned = self.reading.visits, self.planned
+            more = (
+                find_bent_arcs(visits, planned, self.setting.cell, values, moves)
+                & ~strays
+            )
             if not more.any():
                 return found
             strays = strays | more
-
-    def _find_strayed(self, found: Proposal) -> Bools:
-        """Tell which targets must stay for every arc to stay what it is, (n,)."""
-        moves = np.where(found.corrected[:, None], self.shift, 0.0)
-        values = found.decisions.corrected
-        visits, planned = self.reading.visits, self.planned
-        return find_bent_arcs(visits, planned, self.setting.cell, values, moves)
 
     def decide(self, strays: Bools) -> Proposal:
         """Guard every solved visit, and compare the arrivals at every literal.

@@ -219,7 +219,9 @@ def _mark_either_way(
     branch = wrist | (joint & _is_doubtful(visits.care[:, CNFG]))
     turn = wrist | (joint & _turns_doubted(visits, targets))
     if branch.any():
-        branch &= _from_other_branch(visits, targets, plan, arm, branch)
+        edge, source = _edges(visits, plan, branch)
+        other = arm.branch(plan.q[source]) != targets.slot[edge]
+        branch &= _mark_rows(len(visits), edge[other])
     if turn.any():
         turn &= _other_turn(visits, targets, plan, arm)
     terms, code = visits.dialect.terms, Code.CONFIGURATION_UNKNOWN
@@ -244,15 +246,6 @@ def _turns_doubted(visits: Visits, targets: Targets) -> Bools:
     nearest = (checked == Switch.ON) | (checked == Switch.UNKNOWN)
     written = _is_doubtful(checked) | (multi == Switch.UNKNOWN)
     return np.asarray(np.where(targets.nearest_turn, nearest, written))
-
-
-def _from_other_branch(
-    visits: Visits, targets: Targets, plan: Plan, arm: Arm, rows: Bools
-) -> Bools:
-    """Tell which of some visits are reached from another branch than theirs, (n,)."""
-    edge, source = _edges(visits, plan, rows)
-    other = arm.branch(plan.q[source]) != targets.slot[edge]
-    return _mark_rows(len(visits), edge[other])
 
 
 def _other_turn(visits: Visits, targets: Targets, plan: Plan, arm: Arm) -> Bools:

@@ -81,16 +81,12 @@ def load_error(model: Model, cell: Cell, states: States) -> Floats:
             grown -= model.std_error(cell.arm, near) ** 2
             out[rows] = np.sqrt(np.maximum(grown, 0.0))
         else:
-            out[rows] = _usual_yield(cell, here, near)
+            # How far soft joints may yield to a change of the load, (n, 3) [m].
+            batch = ArmStates(cell.arm, here)
+            torque = batch.loads.payload - ArmStates(cell.arm, near).loads.payload
+            moved = batch.jacobian * (USUAL_SOFTNESS * torque)[:, None, :]
+            out[rows] = np.asarray(np.linalg.norm(moved, axis=2))
     return out
-
-
-def _usual_yield(cell: Cell, here: States, near: States) -> Floats:
-    """Return how far soft joints may yield to a change of the load, (n, 3) [m]."""
-    batch = ArmStates(cell.arm, here)
-    torque = batch.loads.payload - ArmStates(cell.arm, near).loads.payload
-    moved = batch.jacobian * (USUAL_SOFTNESS * torque)[:, None, :]
-    return np.asarray(np.linalg.norm(moved, axis=2))
 
 
 def load_reasons(model: Model, cell: Cell, states: States) -> dict[str, Bools]:

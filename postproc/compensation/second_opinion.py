@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Floats
 from postproc.compensation.outcome import directions_of_record
 from postproc.compensation.payload import payload_of
 from postproc.compensation.program import read_program
@@ -65,6 +65,10 @@ def _claim(label: str, visits: Visits, cell: Cell) -> Claim:
     timed = arm.file.joints.velocity_deg_s is not None
     planned = plan(arm, targets, np.deg2rad(cell.limits.wrist_deg), timed)
     q, load = planned.exact.q, _loads(visits, cell)
+    # Whether joints stay within their limits, -1 where they do not, 0: unknown.
+    beyond = np.isin(
+        planned.exact.reason, [CODE[one] for one in (*LIMITS, *PATH_LIMITS)]
+    )
     return Claim(
         label=label,
         visits=visits,
@@ -75,15 +79,9 @@ def _claim(label: str, visits: Visits, cell: Cell) -> Claim:
         payload=load,
         torque=_torque(cell, q, load),
         time=np.where(planned.untimed, np.nan, planned.time),
-        within=_within_limits(planned.exact.reason),
+        within=np.where(beyond, -1, np.where(planned.exact.reason == 0, 1, 0)),
         own=np.arange(len(visits)),
     )
-
-
-def _within_limits(reason: Ints) -> Ints:
-    """Say where joints stay within their limits, -1 where they do not, 0: unknown."""
-    beyond = np.isin(reason, [CODE[one] for one in (*LIMITS, *PATH_LIMITS)])
-    return np.where(beyond, -1, np.where(reason == 0, 1, 0))
 
 
 def _loads(visits: Visits, cell: Cell) -> Floats:

@@ -112,7 +112,9 @@ class InTime:
         before, after = (
             np.isin(c.path.reason, _LIMITS) for c in (self.before, self.after)
         )
-        return self.source(np.flatnonzero(after & ~before[self.source(_all(after))]))
+        return self.source(
+            np.flatnonzero(after & ~before[self.source(np.arange(len(after)))])
+        )
 
     def advice(self, rows: Ints) -> dict[int, str]:
         """Say how to approach some visits so that the sides of all joints are known."""
@@ -205,10 +207,6 @@ def _round_off(corners: RoundOff) -> str:
         f"; cornering round-off CR (systematic part) max {before:.3f} -> "
         f"{after:.3f} mm at {len(corners)} corners"
     )
-
-
-def _all(column: Bools) -> Ints:
-    return np.arange(len(column))
 
 
 def run_in_time(

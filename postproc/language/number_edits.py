@@ -82,7 +82,12 @@ def difference(
     """
     old, new = (s.source if isinstance(s, Skeleton) else s for s in (before, after))
     if not allowed.reproduces(old.data, new.data, stamp):
-        return _first_difference(apply(old.data, allowed), new, stamp)
+        meant = apply(old.data, allowed)
+        length = min(len(meant), len(new.data) - stamp)
+        pairs = zip(meant, new.data[stamp:], strict=False)
+        at = next((i for i, (a, b) in enumerate(pairs) if a != b), length)
+        line = new.line_of(min(at + stamp, max(len(new.data) - 1, 0)))
+        return f"line {line}: the text is not what was meant"
     try:
         a = before if isinstance(before, Skeleton) else Skeleton.read(before)
         b = after if isinstance(after, Skeleton) else (a.reread or Skeleton.read)(after)
@@ -127,14 +132,6 @@ def _number_elsewhere(
             line = before.source.line_of(int(start[wrong][0]))
             return f"line {line}: a number stands elsewhere than it should"
     return ""
-
-
-def _first_difference(meant: bytes, after: Source, stamp: int) -> str:
-    length = min(len(meant), len(after.data) - stamp)
-    pairs = zip(meant, after.data[stamp:], strict=False)
-    at = next((i for i, (a, b) in enumerate(pairs) if a != b), length)
-    line = after.line_of(min(at + stamp, max(len(after.data) - 1, 0)))
-    return f"line {line}: the text is not what was meant"
 
 
 # The edits, file by file.

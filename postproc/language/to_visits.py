@@ -587,7 +587,10 @@ def _find_taught(
     out = [False] * count
     for v, own, some in zip(found, literal.tolist(), places, strict=True):
         if own >= 0 and not out[own]:
-            named = _is_named(v.goal.name, machine.start.taught)
+            named = (
+                re.split(r"[{\[]", v.goal.name)[0].strip().lower()
+                in machine.start.taught
+            )
             out[own] = named or not marked.isdisjoint(some)
     return out
 
@@ -631,11 +634,6 @@ def _on_line(
         if at >= 0 and slot - own[at] < MOST_NUMBERS:
             found |= {own[at]} if text.row_of(slot) == rows[own[at]] else set()
     return found
-
-
-def _is_named(name: str, names: Collection[str]) -> bool:
-    """Tell whether data, or an element of an array, are among some names."""
-    return re.split(r"[{\[]", name)[0].strip().lower() in names
 
 
 def _predecessors(machine: TaskMachine, order: Sequence[int]) -> tuple[Ints, Ints]:

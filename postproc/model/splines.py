@@ -32,7 +32,10 @@ class Splines:
             return cls(np.zeros(0, dtype=np.int64), np.zeros((0, ORDER + 1)))
         along = (np.clip(x, lower, upper) - lower) / (upper - lower)
         along = np.clip(along, 0.0, 1.0)
-        found = BSpline.design_matrix(along, _knots(points), ORDER)
+        grid = np.linspace(0.0, 1.0, points)
+        ends = np.zeros(ORDER + 1), np.ones(ORDER + 1)
+        knots: Floats = np.concatenate([ends[0], grid[2:-2], ends[1]])
+        found = BSpline.design_matrix(along, knots, ORDER)
         first = found.indices[:: ORDER + 1].astype(np.int64)
         return cls(first, found.data.reshape(-1, ORDER + 1))
 
@@ -59,11 +62,3 @@ class Splines:
             weighed = self.weight[:, k] * values
             total += np.bincount(self.first + k, weighed, points)
         return total
-
-
-def _knots(points: int) -> Floats:
-    """Place the knots of interpolation on [0, 1], without those next to the ends."""
-    grid = np.linspace(0.0, 1.0, points)
-    ends = np.zeros(ORDER + 1), np.ones(ORDER + 1)
-    knots: Floats = np.concatenate([ends[0], grid[2:-2], ends[1]])
-    return knots

@@ -79,7 +79,11 @@ def zones(arm: Arm, targets: Targets, traced: Trace) -> Zones:
         _Ways.on(traced, to, way[rest], long[rest])
         for way, long in zip(edge, length, strict=True)
     ]
-    share[:, rest] = _by_overlap(arm, targets, visit[rest], ways)
+    # Moves overlap while the first brakes and the second starts, at full override: a
+    # path that changes with the override knob could not be proved.
+    ramps = [_ramp(arm, targets, way) for way in ways]
+    time = targets.overlap[visit[rest]] * np.minimum(ramps[0][1], ramps[1][1])
+    share[:, rest] = np.stack([push * time**2 / 2 for push, _ in ramps])
     found = Zones(visit, into, out, share[0], share[1])
     return found[np.asarray((share > 0).all(axis=0))]
 
@@ -108,15 +112,12 @@ def _lengths(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> Floats:
     used = np.zeros(len(to), dtype=bool)
     used[edge] = True
     at = np.flatnonzero(used)
-    chords = _chords(targets, traced.flange, traced.edges.source[at], to[at])
+    chords = _native.chords(
+        traced.flange, few_rows(targets.tool), traced.edges.source[at], to[at]
+    )
     length = np.zeros(len(to))
     length[at] = np.fmax(traced.length[at], chords)
     return length[edge]
-
-
-def _chords(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Floats:
-    """Measure the straight ways of the TCP from targets to others, (m,) [m]."""
-    return _native.chords(flange, few_rows(targets.tool), begin, end)
 
 
 def _by_distance(targets: Targets, visit: Ints, length: Floats) -> Floats:
@@ -154,16 +155,6 @@ class _Ways:
         """Describe the moves on edges of known lengths."""
         end, begin = to[edge], traced.edges.source[edge]
         return cls(end, length, np.abs(traced.q[end] - traced.q[begin]))
-
-
-def _by_overlap(arm: Arm, targets: Targets, visit: Ints, ways: list[_Ways]) -> Floats:
-    """Let the moves overlap while the first brakes and the second starts, (2, c).
-
-    At full override: a path that changes with the override knob could not be proved.
-    """
-    ramps = [_ramp(arm, targets, way) for way in ways]
-    time = targets.overlap[visit] * np.minimum(ramps[0][1], ramps[1][1])
-    return np.stack([push * time**2 / 2 for push, _ in ramps])
 
 
 def _ramp(arm: Arm, targets: Targets, way: _Ways) -> tuple[Floats, Floats]:
@@ -235,7 +226,9 @@ def corners(arm: Arm, targets: Targets, traced: Trace) -> Corners:
 def _pass_corners(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
     """Find where the path passes some corners, and keep to their tolerances."""
     tool = targets.tool.take(found.visit, axis=0)[:, :3, 3]
-    point = _tcp(traced.flange.take(found.visit, axis=0), tool)
+    flange = traced.flange.take(found.visit, axis=0)
+    turned: Floats = np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
+    point = turned + flange[:, :3, 3]
     within = targets.rounding[found.visit] == Fly.WITHIN
     wanted = np.where(within, targets.fly_distance[found.visit], np.inf)
     before, behind, nearest, q, aside, bend = _native.passed(
@@ -243,12 +236,6 @@ def _pass_corners(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Co
     )  # fmt: skip
     found = replace(found, before=before, behind=behind)
     return Corners(found, nearest, q, aside, bend)
-
-
-def _tcp(flange: Floats, tool: Floats) -> Floats:
-    """Place tools (c, 3) [m] at flange poses (c, 4, 4): (c, 3) [m]."""
-    turned: Floats = np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
-    return turned + flange[:, :3, 3]
 
 
 # Paths whose fly points are rounded: new samples, and where each point is passed.

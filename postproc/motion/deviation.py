@@ -143,22 +143,18 @@ def path_departure(
     other = other_branch(arm, some.old[way], some.new[way])
     branch[some.visit[way][other]] = True
     sizes = np.column_stack([at.elbow, at.wrist_centre, at.tcp])
-    farthest = np.abs(some.new - some.old) @ _levers(arm, tool)
+    # How far a turn of every joint can move the TCP at most, (6,) [m/rad].
+    length = np.abs(arm.dh.a) + np.abs(arm.dh.d)
+    beyond: Floats = np.cumsum(length[::-1])[::-1] + np.nan_to_num(
+        np.linalg.norm(tool, axis=1)
+    ).max(initial=0.0)
+    farthest = np.abs(some.new - some.old) @ beyond
     rows = np.flatnonzero(~(farthest <= np.nan_to_num(sizes[some.visit].min(axis=1))))
     inside = _measure_displacement(
         arm, some.old[rows], some.new[rows], tool[some.visit[rows]]
     )
     np.fmax.at(sizes, some.visit[rows], inside)
     return JointDeviation(joints, sizes[:, 0], sizes[:, 1], sizes[:, 2], branch)
-
-
-def _levers(arm: Arm, tool: Floats) -> Floats:
-    """Bound how far a turn of every joint can move the TCP, (6,) [m/rad]."""
-    length = np.abs(arm.dh.a) + np.abs(arm.dh.d)
-    beyond: Floats = np.cumsum(length[::-1])[::-1] + np.nan_to_num(
-        np.linalg.norm(tool, axis=1)
-    ).max(initial=0.0)
-    return beyond
 
 
 def _samples(move: Ints, old: Trace, new: Trace) -> _Samples:

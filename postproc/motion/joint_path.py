@@ -460,14 +460,9 @@ def choose(work: PathSolver, v: int, flange: Floats, near: Floats | None) -> Edg
     if near is None or (targets.slot[v] >= 0 and not targets.nearest_turn[v]):
         q = on_written_turns(q[None], targets.turns[v][None])[0]
     else:
-        q = _nearest_allowed(arm, q, near)
+        turned = nearest_turns(q, near)
+        q = np.where((turned >= arm.lower) & (turned <= arm.upper), turned, q)
     return EdgeEnd(q, flange, slot, q[None], 0)
-
-
-def _nearest_allowed(arm: Arm, q: Floats, near: Floats) -> Floats:
-    """Take the nearest turn of every axis that has it in its range."""
-    turned = nearest_turns(q, near)
-    return np.where((turned >= arm.lower) & (turned <= arm.upper), turned, q)
 
 
 # Stretches that begin behind a known target, followed all together.
@@ -527,7 +522,12 @@ def trace_stretches(work: PathSolver, smooth: Bools, most: int) -> Bools:
     q = work.arm.on_branch(flange, np.repeat(slot, some.size))
     q = work.arm.into_range(q)
     q = _unwrap(q, near, head, some.size)
-    good = _small_steps(q, near, head) & (slot >= 0)
+    # As in `follow`: no other branch makes a stretch of small steps shorter; the first
+    # step of a stretch may be larger.
+    step = largest_in_rows(_steps(q, near, head))
+    large = ~(step <= SUSPICIOUS)
+    large[head] = ~(step[head] <= LOST)
+    good = (~np.logical_or.reduceat(large, head)) & (slot >= 0)
     _settle(work, some[good], q[np.repeat(good, some.size)], slot[good])
     settled[some[good].targets] = True
     return settled
@@ -558,17 +558,6 @@ def _unwrap(q: Floats, near: Floats, head: Ints, size: Ints) -> Floats:
         rows = slice(head[i], head[i] + size[i])
         q[rows] = unwrap_samples(np.vstack([near[i], q[rows]]))[1:]
     return q
-
-
-def _small_steps(q: Floats, near: Floats, head: Ints) -> Bools:
-    """Tell which stretches take none but small steps, (r,); their first may be larger.
-
-    As in `follow`: no other branch makes it shorter.
-    """
-    step = largest_in_rows(_steps(q, near, head))
-    large = ~(step <= SUSPICIOUS)
-    large[head] = ~(step[head] <= LOST)
-    return ~np.logical_or.reduceat(large, head)
 
 
 def _settle(work: PathSolver, some: _Stretches, q: Floats, slot: Ints) -> None:

@@ -76,13 +76,9 @@ def time_laws(arm: Arm, q: Floats, s: Floats, limit: Floats, begins: Bools) -> R
     lasts = np.zeros(len(s))
     with np.errstate(divide="ignore"):
         lasts[inner] = 2 * step[inner] / (rate[inner] + rate[inner - 1])
-    return Runs(s, q, first, second, rate, _since(lasts, begins), fastest)
-
-
-def _since(lasts: Floats, begins: Bools) -> Floats:
-    """Add what every interval lasts within its run, (k,); NaN where one never ends."""
     run = np.cumsum(begins) - 1
+    # What every interval lasts within its run, (k,) [s]; NaN where one never ends.
     stuck = np.bincount(run[np.isinf(lasts)], minlength=run[-1] + 1) > 0
     total = np.cumsum(np.where(np.isinf(lasts), 0.0, lasts))
     since = total - total[begins][run]
-    return np.where(stuck[run], np.nan, since)
+    return Runs(s, q, first, second, rate, np.where(stuck[run], np.nan, since), fastest)

@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from postproc.arrays import Floats
 from postproc.calibration.baselines import Comparison
 from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.diagnose import Extension
@@ -123,7 +122,10 @@ def against_covariate(shown: Profile, title: str) -> Figure:
         (shown.after, AFTER, "o", "with it"),
     ):
         axes.plot(shown.values, values, mark, color=colour, markersize=3, alpha=0.5)
-        smooth = _running_median(values[order])
+        half = SMOOTHED // 2
+        padded = np.pad(values[order], half, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
+        smooth = np.asarray(np.median(windows, axis=1))
         axes.plot(shown.values[order], smooth, color=colour, label=label)
     limit = 1.5 * float(np.percentile(np.abs(shown.before), 98))
     axes.set_ylim(-limit, limit)
@@ -159,11 +161,3 @@ def _figure(x: str, y: str) -> tuple[Figure, Any]:
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     return figure, axes
-
-
-def _running_median(values: Floats) -> Floats:
-    """Smooth values in their order, (n,)."""
-    half = SMOOTHED // 2
-    padded = np.pad(values, half, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
-    return np.asarray(np.median(windows, axis=1))

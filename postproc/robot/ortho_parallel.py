@@ -267,8 +267,12 @@ def arm_text(chain: UrdfChain, repeatability_mm: float, name: str | None = None)
         obstacle, parts = exc, _numeric_parts(dh_of(chain))
     text = _fill_arm_file(chain, parts, repeatability_mm, name or chain.name)
     arm = arm_of_text(chain.path, text)
-    if obstacle is not None:
-        _check_mobility(arm, obstacle)
+    if obstacle is not None:  # likely what is wrong with an arm that is singular
+        J = arm.jacobian(Q, np.zeros(3))
+        if np.linalg.svd(J, compute_uv=False)[:, -1].max() < SINGULAR:
+            problem = f"{obstacle.problem}, and no joint angles move the flange freely"
+            cure = "Check origins and axes of the joints"
+            raise ArmError(obstacle.path, problem, cure, line=obstacle.line)
     _verify(chain, arm)
     return text + links_text(chain.weights, arm)
 
@@ -435,23 +439,6 @@ def _list(values: Floats) -> str:
 
 
 Q = np.linspace(-3.0, 3.0, 90).reshape(15, 6) * [1.0, -0.7, 0.5, -0.9, 0.6, 0.8]
-
-
-def _check_mobility(arm: Arm, obstacle: NoClosedFormError) -> None:
-    """Refuse an arm that is singular wherever its joints stand.
-
-    Args:
-        arm: The arm.
-        obstacle: Why it has no closed form: likely what is wrong.
-
-    Raises:
-        ArmError: No joint angles move the flange in all six directions.
-    """
-    J = arm.jacobian(Q, np.zeros(3))
-    if np.linalg.svd(J, compute_uv=False)[:, -1].max() < SINGULAR:
-        problem = f"{obstacle.problem}, and no joint angles move the flange freely"
-        cure = "Check origins and axes of the joints"
-        raise ArmError(obstacle.path, problem, cure, line=obstacle.line)
 
 
 def _verify(chain: UrdfChain, arm: Arm) -> None:

@@ -66,7 +66,8 @@ def joints_of_pose(
     if config is None:
         branches, free_turns = list(range(8)), True
     else:
-        branches = [_branch_of_flags(config)]
+        words = config.upper().split()
+        branches = [sum(weight for flag, weight in FLAGS.items() if flag in words)]
     found = np.vstack([solve_branch(chain, flange[None], b) for b in branches])
     found = _into_range(chain, found)
     if free_turns:
@@ -132,11 +133,6 @@ def _is_allowed(chain: Chain, q: Floats) -> NDArray[np.bool_]:
     slack = 1e-9
     inside = (q >= chain.lower - slack) & (q <= chain.upper + slack)
     return np.asarray(inside.all(axis=1))
-
-
-def _branch_of_flags(config: str) -> int:
-    words = config.upper().split()
-    return sum(weight for flag, weight in FLAGS.items() if flag in words)
 
 
 def _on_turns(q: Floats, config: str) -> Floats:
@@ -810,7 +806,8 @@ def plan_drives(
     """
     drives: list[Drive] = []
     for i in range(len(visits)):
-        came_from = _predecessor(visits, i)
+        known = [int(p) for p in visits.predecessors(i) if 0 <= p < i]
+        came_from = known[0] if known else START
         begin = start if came_from < 0 else drives[came_from].end
         before = start if came_from < 0 else drives[came_from].begin
         stands_there = came_from < 0 and setup.home is None
@@ -824,12 +821,6 @@ def plan_drives(
         except PlanError as error:
             drives.append(replace(drive, why=str(error)))
     return _round_fly_points(setup, visits, poses, drives)
-
-
-def _predecessor(visits: Visits, i: int) -> int:
-    """Return the visit that the arm comes from, or START."""
-    known = [int(p) for p in visits.predecessors(i) if 0 <= p < i]
-    return known[0] if known else START
 
 
 def _first_joints(

@@ -291,7 +291,9 @@ def measure_rows(arm: VirtualArm, setup: VirtualCell, rows: JointTargets) -> Cam
     """
     time = rows.time
     if np.isnan(time).any():
-        time = _usual_times(setup, rows.q)
+        # The way of the slowest joint, then ten seconds.
+        ways = np.abs(np.diff(rows.q, axis=0, prepend=rows.q[:1])) / setup.chain.speed
+        time = np.asarray(np.cumsum(ways.max(axis=1) + 10.0))
     known = ~np.isnan(rows.temperature)
     warm = arm.temperature(time, setup.temperature)
     way = np.where(np.isnan(rows.travel), USUAL_APPROACH, rows.travel)
@@ -338,12 +340,6 @@ def _read(
     rng = stream(arm.seed, "readings")
     measured = arm.measure(arrivals, setup.tracker, rng)
     return Campaign(tuple(ids), arrivals, tool_id, measured, arm.tcp(arrivals))
-
-
-def _usual_times(setup: VirtualCell, q: Floats) -> Floats:
-    """Return when each row is measured: the slowest joint's way, then ten seconds."""
-    ways = np.abs(np.diff(q, axis=0, prepend=q[:1])) / setup.chain.speed
-    return np.asarray(np.cumsum(ways.max(axis=1) + 10.0))
 
 
 def _distinct(ids: Sequence[str]) -> tuple[str, ...]:

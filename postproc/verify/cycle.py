@@ -182,7 +182,10 @@ def compare_limits(
     low, high = np.deg2rad(file.joints.lower_deg), np.deg2rad(file.joints.upper_deg)
     sizes, skipped = [], Counter[str]()
     for i in range(len(claim)):
-        q = _on_the_way(claim, ways, i)
+        before, none = int(claim.visits.before[i]), np.empty((0, 6))
+        whole = [before, i] if before >= 0 and claim.visits.via[before] else [i]
+        made = [ways[k].q[1:] for k in whole if k in ways and not ways[k].why]
+        q = np.concatenate(made) if len(made) == len(whole) else none
         if not len(q) and claim.within[i] > 0:
             q = confirmed[i][None]
         if claim.within[i] == 0 or not len(q) or np.isnan(q).any():
@@ -192,11 +195,3 @@ def compare_limits(
         sizes.append((max(0.0, beyond * float(claim.within[i])), i))
     what = f"{claim.label}: joint limits"
     return worst_of(what, "rad", LIMIT_RAD, claim, sizes, skipped)
-
-
-def _on_the_way(claim: Claim, ways: Mapping[int, MadeWay], i: int) -> Floats:
-    """Return the joint angles behind the begin of a way or of an arc, (k, 6)."""
-    before, none = int(claim.visits.before[i]), np.empty((0, 6))
-    whole = [before, i] if before >= 0 and claim.visits.via[before] else [i]
-    made = [ways[k].q[1:] for k in whole if k in ways and not ways[k].why]
-    return np.concatenate(made) if len(made) == len(whole) else none

@@ -100,10 +100,12 @@ def judge_directions(
     runs = list(runs_of(claim, ways))
     timed = runs_in_time(claim, train, ways, runs, until)
     arrived = arrivals(claim, train, ways, runs, timed)
+    skipped = Counter({NO_TIME: len(runs) - len(arrived)})
+    what = f"{claim.label}: runs in time"
     return [
         _compare_ends(claim, maker, ways),
         compare_limits(claim, facts.file, ways, maker.confirmed),
-        _count_times(claim, runs, arrived),
+        OpinionRow(what, COUNTED, len(arrived), 0, 0.0, 0.0, "", dict(+skipped)),
         *compare_times(claim, facts.file, ways, runs, timed),
         _compare_directions(claim, train, ways, arrived),
     ]
@@ -219,15 +221,6 @@ def _compare_ends(
     skipped[NOT_DRAWN] = len(claim) - len(ways)
     what = f"{claim.label}: end of the way"
     return worst_of(what, "rad", END_RAD, claim, ends, +skipped)
-
-
-def _count_times(
-    claim: Claim, runs: Sequence[list[int]], arrived: Mapping[int, PlayMemory]
-) -> OpinionRow:
-    """Say how many runs have a time law of toppra or ruckig."""
-    skipped = Counter({NO_TIME: len(runs) - len(arrived)})
-    what = f"{claim.label}: runs in time"
-    return OpinionRow(what, COUNTED, len(arrived), 0, 0.0, 0.0, "", dict(+skipped))
 
 
 def _compare_directions(

@@ -176,10 +176,6 @@ class PinocchioUrdf:
         self._data, self._zero = self._model.createData(), pin.neutral(self._model)
         body = pin.FrameType.BODY
         self._ends = tuple(self._model.getFrameId(name, body) for name in (base, tip))
-        self._weigh()
-
-    def _weigh(self) -> None:
-        """Let weight pull along -z of the base, as in an arm file."""
         self._pin.framesForwardKinematics(self._model, self._data, self._zero)
         down = self._data.oMf[self._ends[0]].rotation[:, 2]
         self._model.gravity.linear = -GRAVITY * down

@@ -94,18 +94,12 @@ def test_nobody_answers(address, why, monkeypatch):
 def test_certificates_that_are_not_there(tmp_path):
     import dask
 
-    names = {"ca-file": "ca.pem", "client": {"cert": "cert.pem", "key": "key.pem"}}
-    named = {"distributed.comm.tls": _below(tmp_path, names)}
+    tls = "distributed.comm.tls"
+    names = {f"{tls}.ca-file": "ca.pem", f"{tls}.client.cert": "cert.pem",
+             f"{tls}.client.key": "key.pem"}  # fmt: skip
+    named = {key: str(tmp_path / name) for key, name in names.items()}
     with dask.config.set(named), pytest.raises(PostprocError, match="No such file"):
         ClusterPool((), "tls://127.0.0.1:9")
-
-
-def _below(folder, names):
-    """Return names as places in a folder."""
-    return {
-        key: _below(folder, name) if isinstance(name, dict) else str(folder / name)
-        for key, name in names.items()
-    }
 
 
 def listeners(pid):
@@ -153,6 +147,9 @@ def test_the_first_example_is_encrypted_and_open_to_nobody_else(
     dask = {"scheduler": SCHEDULER, "worker": WORKER}
     try:
         for command in commands:
+            if command[0] == "export":
+                monkeypatch.setenv(*command[1].split("="))
+                continue
             if command[0] == "dask":
                 words = [*dask[command[1]], *command[2:]]
                 words = ["2" if word == "auto" else word for word in words]

@@ -122,15 +122,12 @@ class CutArc:
                 at_via = half == 0 and end == 1.0
                 kept = at_via and not self._turn(half, end).any()
                 place = None if kept else self._at(half, end)
-                chord = self._is_chord(half, begin, end)
+                chord = (self.via + half, end) in self.chords or bool(
+                    self.sagitta(half, begin, end) < FLAT
+                )
                 via = None if chord else self._at(half, (begin + end) / 2)
                 found.append(ArcPiece(place, via, at_via))
         return found, self._at(1, (1.0 + max(self.cuts[1], default=0.0)) / 2)
-
-    def _is_chord(self, half: int, begin: float, end: float) -> bool:
-        return (self.via + half, end) in self.chords or bool(
-            self.sagitta(half, begin, end) < FLAT
-        )
 
     def sagitta(self, half: int, begin: float, end: float) -> float:
         """Return how far a piece bends away from its chord [m]."""

@@ -311,7 +311,9 @@ class BestPoints:
         """Give moves back the points that did better than those they have."""
         work, now = self._work, self._now()
         bad = self._unfit(bending(work), self._refusals())
-        worse = [v for v in now if v in bad or self._was_better(v, now[v])]
+        worse = [
+            v for v in now if v in bad or (now[v].size > self._best[v].size + BETTER)
+        ]
         for v in worse:
             has, best = now[v], self._best[v]
             others = {k: s for k, s in work.points.items() if k not in has.points}
@@ -322,9 +324,6 @@ class BestPoints:
             work.left[v] = self._refused[v]
         if worse:
             work.make()
-
-    def _was_better(self, v: int, tried: _Tried) -> bool:
-        return tried.size > self._best[v].size + BETTER
 
     def _refusals(self) -> dict[int, str]:
         """Say why points of moves cannot be corrected, by their visits."""

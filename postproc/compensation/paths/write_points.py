@@ -115,7 +115,9 @@ def _edits(
             found[file] += splitter.arc(file, line, pieces, via, config, visit in stops)
         elif not is_arc(visits, visit):
             numbers = between(visits, visit, np.array(points[visit]))
-            numbers = _rotate_tool(visits, numbers, _turns(visit, points, stops, meant))
+            tool = visits.dialect.poses(numbers)[:, :3, :3]
+            axis = np.einsum("kij,kj->ki", tool, _turns(visit, points, stops, meant))
+            numbers = visits.dialect.rotate(numbers, rotation_from_vector(axis))
             found[file].append(
                 splitter.points(file, line, numbers, config, visit in stops)
             )
@@ -163,13 +165,6 @@ def between(visits: Visits, visit: int, share: Floats) -> Floats:
     out = np.tile(ends[0], (len(share), 1))
     out[:, :3] += share[:, None] * (ends[1, :3] - ends[0, :3])
     return visits.dialect.rotate(out, rotation_from_vector(share[:, None] * axis))
-
-
-def _rotate_tool(visits: Visits, numbers: Floats, turn: Floats) -> Floats:
-    """Turn the tool at places (k, w) by rotation vectors (k, 3) of its own [rad]."""
-    tool = visits.dialect.poses(numbers)[:, :3, :3]
-    axis = np.einsum("kij,kj->ki", tool, turn)
-    return visits.dialect.rotate(numbers, rotation_from_vector(axis))
 
 
 def _aims(

@@ -275,7 +275,12 @@ class ProgramPoint:
             case ast.Binary("+" | "-" as sign, ast.Reference() as left, right):
                 part = self._part(left)
                 if part is not None:
-                    return _add_shift(part, self.real(right), sign)
+                    by = self.real(right)
+                    if part.number is None or by is None or abs(by) > FARTHEST:
+                        return replace(part, number=None)
+                    return replace(
+                        part, number=part.number + (by if sign == "+" else -by)
+                    )
         return SourceNumber(self.real(expression))
 
     def _part(self, reference: ast.Reference) -> SourceNumber | None:
@@ -342,12 +347,6 @@ def component_index(target: Location) -> int:
         case (str(name), _) if name in COMPONENTS:
             return COMPONENTS[name]
     return -1
-
-
-def _add_shift(part: SourceNumber, by: float | None, sign: str) -> SourceNumber:
-    if part.number is None or by is None or abs(by) > FARTHEST:
-        return replace(part, number=None)
-    return replace(part, number=part.number + (by if sign == "+" else -by))
 
 
 # Whole records, arrays and nodes: what they hold is copied part by part.

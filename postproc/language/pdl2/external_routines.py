@@ -69,7 +69,9 @@ def effect_of(world: World, program: Program, name: str) -> RoutineEffect:
     start = world.start
     if name in start.frame_tables:
         return RoutineEffect.TABLE
-    full = _full_names(program, name)
+    exporter = program.outside.get(name)
+    holders = [exporter] if exporter else [*map(base_name, program.imports)]
+    full = (f"{holders[0]}.{name}",) if len(set(holders)) == 1 else ()
     for said in (start.routines.get(one) for one in (name, *full)):
         if said is not None:
             return RoutineEffect(said)
@@ -81,13 +83,6 @@ def effect_of(world: World, program: Program, name: str) -> RoutineEffect:
         return RoutineEffect.STILL
     known = not start.assume_motion and name in list_motionless()
     return RoutineEffect.KNOWN if known else RoutineEffect.UNKNOWN
-
-
-def _full_names(program: Program, name: str) -> tuple[str, ...]:
-    """Return ``program.routine`` where one program can hold it, else nothing."""
-    exporter = program.outside.get(name)
-    holders = [exporter] if exporter else [*map(base_name, program.imports)]
-    return (f"{holders[0]}.{name}",) if len(set(holders)) == 1 else ()
 
 
 @lru_cache(maxsize=8192)

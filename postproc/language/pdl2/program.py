@@ -350,7 +350,7 @@ class Variables(Mapping[str, Variable]):
         Args:
             test: What no name decides.
         """
-        passed = self._test_each(test)
+        passed = np.array([test(said) for said in self._said], dtype=bool)
         if not passed.any():
             return []
         found = passed[self._declaration(np.array(self._at, dtype=np.int32))]
@@ -366,9 +366,6 @@ class Variables(Mapping[str, Variable]):
             passed[k] = test(self._said[k])
         found[found] = passed[own]
         return found
-
-    def _test_each(self, test: Callable[[Variable], bool]) -> Bools:
-        return np.array([test(said) for said in self._said], dtype=bool)
 
     def _declaration(self, index: Indices) -> Ints:
         begins = np.array(self._begins, dtype=np.int32)

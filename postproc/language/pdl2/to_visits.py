@@ -131,7 +131,8 @@ def find_literals(
     literal = np.full(len(columns.slots), -1, dtype=np.int32)
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
     slots = columns.slots[_as_slice(rows)]
-    if _ascend(slots) and not numbering.apart(slots).any():
+    numbers = slots.ravel()
+    if bool((numbers[1:] > numbers[:-1]).all()) and not numbering.apart(slots).any():
         literal[rows] = np.arange(len(rows), dtype=np.int32)
         return _literals(columns, numbering, names, slots, rows, literal), literal
     _, example, inverse = np.unique(slots[:, 0], return_index=True, return_inverse=True)
@@ -153,12 +154,6 @@ def _as_slice(rows: Ints) -> Ints | slice:
     if len(rows) and rows[-1] - rows[0] == len(rows) - 1:
         return slice(int(rows[0]), int(rows[-1]) + 1)
     return rows
-
-
-def _ascend(slots: Indices) -> bool:
-    """Tell whether all numbers stand in the order in which they are gone to, once."""
-    numbers = slots.ravel()
-    return bool((numbers[1:] > numbers[:-1]).all())
 
 
 def _literals(

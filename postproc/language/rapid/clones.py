@@ -89,7 +89,9 @@ class RapidCloner(Cloner):
         at, datum = found
         _check(datum)
         span = self._find_name(file, move.row, operand.name)
-        return RapidPoint(at, datum, self._spell(at, datum), (file, span))
+        text = self.task.files[at].text
+        start, end = self._find_name(at, datum.row, datum.declared.name)
+        return RapidPoint(at, datum, text.source.text[start:end], (file, span))
 
     def _move(self, file: int, line: int) -> MotionCall:
         """Return the only move that begins on a line."""
@@ -117,12 +119,6 @@ class RapidCloner(Cloner):
         if len(found) != 1:
             raise CloneError(f"{name} stands {len(found)} times in the move")
         return Span(begin + found[0].start(), begin + found[0].end())
-
-    def _spell(self, file: int, datum: Datum) -> str:
-        """Return the name of data as its declaration writes it."""
-        text = self.task.files[file].text
-        start, end = self._find_name(file, datum.row, datum.declared.name)
-        return text.source.text[start:end]
 
     def find_declaration(self, named: NamedPoint) -> int:
         """Return the 1-based line that declares data."""
