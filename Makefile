@@ -1,5 +1,6 @@
 # make demo    survey, fit, compensate and check the sample programs on a virtual arm
-# make test    all tests
+# make test    all tests but the slow ones
+# make slow    whole searches and fits of many drawn surveys, which `make test` leaves out
 # make lint    ruff, mypy, and the words of names, help, messages and pages
 # make lock    pin what is installed, in requirements/; UPGRADE=1: to the newest versions
 # make chaos   kill 200 batches of 300 files at random moments and resume them; end 50 long runs by signals
@@ -35,7 +36,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench evidence reproduce accuracy intervals detection undeclared paths blind real chaos fuzz docs clean
+.PHONY: help demo test slow lint format bench evidence reproduce accuracy intervals detection undeclared paths blind real chaos fuzz docs clean
 .PHONY: campaigns languages plant-bench generated growth awkward native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
@@ -51,6 +52,9 @@ demo: $(STAMP)
 
 test: $(STAMP)
 	@$(PYTHON_BIN) -m pytest -n 2
+
+slow: $(STAMP)
+	@$(PYTHON_BIN) -m pytest -n 2 -m slow
 
 lint: $(STAMP)
 	@$(VENV)/bin/ruff check .

@@ -17,7 +17,7 @@ run() {
     "$@"
 }
 
-# The same, where exit code 1 is a result: targets were left, files differ.
+# The same, where exit code 1 is a result: targets are not corrected, files differ.
 run_or_1() { run "$@" || [ $? -eq 1 ]; }
 
 title() { printf '\n== %s\n' "$*"; }

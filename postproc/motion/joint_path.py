@@ -335,7 +335,7 @@ def along_late_arc(
     if np.isnan(places).any():
         return replace(unknown, reason=end.reason or CODE[ARC_END])
     begin, between, last = (places @ t.tool[v])[:, None]
-    parts = arcs(begin, between, last, t.past_start[[v]])
+    parts = arcs(begin, between, last, past_start=t.past_start[[v]])
     part = parts[0 if t.via[v] else 1]
     if not part.valid[0]:
         return replace(unknown, reason=CODE[NO_CIRCLE])

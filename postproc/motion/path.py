@@ -95,7 +95,7 @@ def lines(begin: Floats, end: Floats) -> Segments:
 
 
 def arcs(
-    begin: Floats, via: Floats, end: Floats, past_start: Bools | None = None
+    begin: Floats, via: Floats, end: Floats, *, past_start: Bools | None = None
 ) -> tuple[Segments, Segments]:
     """Build arcs through three TCP poses (m, 4, 4) [m]: start to VIA, VIA to end.
 
@@ -307,7 +307,7 @@ class _Ends:
             flange[self.source[first]] @ tool,
             flange[visit[first]] @ tool,
             flange[visit[first] + 1] @ tool,
-            self.targets.past_start[visit[first]],
+            past_start=self.targets.past_start[visit[first]],
         )
         row = np.full(len(visit) + 1, -1)  # the last one is that of no edge
         row[first] = np.arange(len(first))

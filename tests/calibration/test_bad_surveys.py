@@ -131,8 +131,8 @@ def test_sorted_rows_have_lost_their_directions(survey, fit):
     found = fit(rows)
     assert found.exit_code == 0
     assert re.search(
-        r"warning: .*s\.csv: no lambda columns.*sorted by q2_deg: the order of visits "
-        "are lost.*Use the file as it was measured",
+        r"warning: .*s\.csv: no lambda columns.*sorted by q2_deg, so that the order of "
+        "visits.*are lost.*Use the file as it was measured",
         found.stdout,
     )
     bare = fit(without(survey, *SIDES, "time_s"))

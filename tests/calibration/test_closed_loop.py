@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from postproc.robot.pose import pose_from_record
+from tests.slow import slow
 from tests.written import cli
 
 CELL = """
@@ -108,7 +109,7 @@ FRAMES = {
 }
 
 
-@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize("frame", ["base", *slow(["uframe", "tracker"])])
 def test_points_of_a_job_find_the_effect_and_mend_the_job(
     shop: Path, frame: str
 ) -> None:

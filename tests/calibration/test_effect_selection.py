@@ -67,6 +67,7 @@ def test_the_tracker_reads_nothing_wrongly_without_evidence() -> None:
         assert names_of(virtual_arm(seed, BASE), old) == BASE_EFFECTS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["azimuth", "refraction"])
 def test_what_a_tracker_reads_wrongly_is_the_set_up_s(kind: str) -> None:
     """Where its place is known it is named, and the arm is not taken to err so."""
@@ -95,6 +96,7 @@ def names_of(arm: VirtualArm, old: VirtualArrivals) -> tuple[str, ...]:
     return tuple(e.name for e in fit.combination.effects)
 
 
+@pytest.mark.slow
 def test_gravity_shows_beside_waves_that_are_larger() -> None:
     rng = np.random.default_rng(4)
     states = random_states(400, rng)
@@ -176,6 +178,7 @@ def test_waves_in_what_splines_follow_are_named_with_order_and_size() -> None:
         assert abs(size - mrad) < 4 * error
 
 
+@pytest.mark.slow
 def test_waves_are_named_before_splines_are_fine_enough_to_take_them_up() -> None:
     rng = np.random.default_rng(9)
     states, held = (narrow(random_states(n, rng)) for n in (900, 300))
@@ -250,6 +253,7 @@ def test_a_wave_of_few_rows_predicts_regions_that_it_was_not_found_in() -> None:
     assert waves_needed(fitted, kept) == (*fitted.combination.effects[:-2], true)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["joint_product", "worn_spot"])
 def test_free_forms_of_hardly_any_rows_must_carry_over(law: str) -> None:
     """A product of angles is none that they follow; a worn spot is one."""

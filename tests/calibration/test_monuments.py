@@ -123,6 +123,7 @@ def test_a_drift_of_the_tracker_is_never_compensated(
     assert model.statistics["reference_drift_mm"] > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [308, 333])
 def test_a_tracker_that_was_knocked_is_no_step_of_the_base(seed: int) -> None:
     """Three fixed points show the jump: neither arm nor base has moved."""
@@ -161,6 +162,7 @@ def test_a_tracker_that_drifts_slowly_did_not_jump() -> None:
         assert motion is not None and motion.jump is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [305, 321])
 def test_without_fixed_points_nothing_of_a_warm_up_is_compensated(seed: int) -> None:
     """Predictions are those of the rows' mean, as without the effect."""
@@ -168,7 +170,7 @@ def test_without_fixed_points_nothing_of_a_warm_up_is_compensated(seed: int) -> 
     model, told = fitted(c, None)
     assert "thermal" in in_time(model.effects.effects)
     assert not in_time(model.compensable()[0].effects)
-    assert "may be tracker_drift, so nothing of it is compensated" in told[-1]
+    assert "may be tracker_drift, so it is not compensated" in told[-1]
     (thermal,) = (e for e in model.effects.effects if isinstance(e, Thermal))
     plain = fit_survey(survey_of(c, None), ARM, BASE_EFFECTS, TRACKER)
     without = model_of(plain, survey_of(c, None)).error(ARM, c.states)
@@ -182,6 +184,7 @@ def _untimed(c: Campaign):  # type: ignore[no-untyped-def]
     return c.states.with_(time=np.full(len(c.states), np.nan))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("places", [None, THREE], ids=["none", "three"])
 def test_a_diagnosis_says_whose_the_warm_up_is(places: np.ndarray | None) -> None:
     survey = survey_of(campaign(321, ("warmup",), 1.0), places)

@@ -91,6 +91,7 @@ def cell(tmp_path) -> Cell:  # type: ignore[no-untyped-def]
     return load_cell(path)
 
 
+@pytest.mark.slow
 def test_a_nest_that_slips_is_told_with_its_row(cell: Cell) -> None:
     after = (np.arange(240) >= 150).astype(float)
     effects = ("geometry", "backlash", "backlash_profile")

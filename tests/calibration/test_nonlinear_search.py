@@ -12,6 +12,7 @@ from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.joint_spline import JointSpline
 from postproc.model.kinematics import ArmStates
 from tests.calibration.planted import TRACKER, campaign
+from tests.slow import slow
 
 SOUGHT = {
     "joint_step": "joint_step",
@@ -19,9 +20,10 @@ SOUGHT = {
     "motor_wave": "transmission",
     "base_shift": "tracker_drift",  # whose step it is nobody knows
 }
+QUICK = ["joint_step", "motor_wave", "base_shift"]
 
 
-@pytest.mark.parametrize("kind", SOUGHT)
+@pytest.mark.parametrize("kind", [*QUICK, *slow(["base_tilt"])])
 def test_what_must_be_found_first_is_named_without_being_asked_for(kind: str) -> None:
     """No drift and no chain of other laws stands in for it."""
     c = campaign(331, (kind,), 1.5)

@@ -78,6 +78,7 @@ def test_heavy_tails_fall_with_the_distance() -> None:
     assert (np.diff(w) < 0).all() and w[-1] < 1e-3
 
 
+@pytest.mark.slow
 def test_a_worn_spot_survives_beside_a_broken_beam() -> None:
     """Both are some thirty sigma; only the row without neighbours is dropped."""
     spot = Planted("worn_spot", 2, peak_mm=1.5)

@@ -53,6 +53,7 @@ def sharp(folder: Path) -> Path:
     return surveyed(folder, "sharp")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gears", "seeds"), [("sharp", (SEED, 44)), ("elastic", (SEED, 44))]
 )
@@ -165,6 +166,7 @@ def test_joints_without_new_reversals_stay_as_they_were_known(sharp: Path) -> No
     assert newer_widths(known, model, cell.arm, None) == known
 
 
+@pytest.mark.slow
 def test_diagnose_reads_the_reversals_of_a_new_survey(
     sharp: Path, tmp_path: Path
 ) -> None:

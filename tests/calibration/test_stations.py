@@ -28,6 +28,7 @@ from tests.calibration.simulator import (
     random_states,
     survey_of,
 )
+from tests.slow import slow
 
 EFFECTS = ("geometry", "backlash")
 PLACES = (((4.0, -3.0, 1.5), 2.0), ((-2.5, 2.6, 1.1), -0.7), ((0.5, 4.0, 0.8), 1.0))
@@ -206,9 +207,9 @@ def test_a_tool_that_never_turned_leaves_its_probe_at_the_prior(  # type: ignore
     assert len(told) == 1 and how in told[0] and "+- 300 mm" in told[0]
 
 
-@pytest.mark.parametrize("wobble", [0.0, 0.003, 0.01])
+@pytest.mark.parametrize("wobble", [0.0, *slow([0.003, 0.01])])
 @pytest.mark.parametrize("free", [False, True])
-@pytest.mark.parametrize("far", [0.0, 0.05, 0.2])
+@pytest.mark.parametrize("far", [0.05, *slow([0.0, 0.2])])
 def test_readings_with_the_tool_turned_otherwise_are_as_unsure_as_the_probe(  # type: ignore[no-untyped-def]
     cell, tmp_path: Path, wobble: float, free: bool, far: float
 ) -> None:

@@ -22,6 +22,7 @@ from postproc.robot.cell import load_cell
 from tests.calibration.simulator import random_arm, random_states, survey_of
 from tests.campaign_rows import Habit, draw_habit, measure, unseen
 from tests.campaigns import judge
+from tests.slow import slow
 
 CELL = load_cell("programs/cell.toml")
 PLAIN = ("geometry", "backlash")
@@ -119,7 +120,7 @@ def test_few_poses_are_said_to_be_unchecked() -> None:
     assert any("too few to hold some out" in w for w in found.report.warnings)
 
 
-@pytest.mark.parametrize("seed", [7, 9, 112])
+@pytest.mark.parametrize("seed", [112, *slow([7, 9])])
 def test_the_default_is_never_worse_than_geometry_and_backlash(seed: int) -> None:
     """Of three short campaigns, two of which it once left twice as much of."""
     rng = np.random.default_rng([20261126, seed])

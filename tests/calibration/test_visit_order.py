@@ -96,7 +96,7 @@ def test_without_a_clock_the_rows_count(
     found = read(written(tmp_path / "s.csv", np.arange(N), **NO_CLOCK[clock]))
     assert found.ids == right.ids
     assert "the order of the rows" in found.warnings[0]
-    assert "a column time_s or order tells" in found.warnings[0]
+    assert "add a column time_s or order" in found.warnings[0]
 
 
 REFUSED = {

@@ -59,6 +59,7 @@ def test_nothing_yields_that_does_not(seed: int) -> None:
     assert names == set()
 
 
+@pytest.mark.slow
 def test_the_law_of_a_torque_comes_before_its_curve() -> None:
     c = campaign(402, ("compliance",), 2.0)
     found = trace(c.base_fit(), seed=0).findings

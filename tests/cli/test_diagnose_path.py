@@ -45,6 +45,7 @@ def diagnosed(folder, track, *more):
     return cli("diagnose", "--path", folder / track, *program, *given, *places, *more)
 
 
+@pytest.mark.slow
 def test_a_path_confirms_the_flanks_and_lacks_nothing(tracked):
     found = diagnosed(tracked, "plain.csv")
     assert found.exit_code == 0, found.output
@@ -79,6 +80,7 @@ def test_one_run_tells_nothing_of_how_poses_repeat_nor_of_the_rest_of_the_range(
     assert set(better.ranges.tools) >= set(given.ranges.tools)
 
 
+@pytest.mark.slow
 def test_an_effect_that_nobody_declared_is_found_on_the_way(tracked):
     found = diagnosed(tracked, "planted.csv")
     assert found.exit_code == 0, found.output

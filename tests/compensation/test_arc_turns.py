@@ -163,6 +163,6 @@ def test_half_a_turn_has_two_ways_round():
     arc = Arc(3, deg=176.0)
     poses = np.array([arc.start, arc.via, arc.end])
     one = ArcTurns(*np.array([[0], [1], [2]]))
-    assert np.isnan(one.turned(poses)).all()
+    assert np.isnan(one.turn(poses)).all()
     poses[2] = Arc(3, deg=160.0).end
-    assert not np.isnan(one.turned(poses)).any()
+    assert not np.isnan(one.turn(poses)).any()

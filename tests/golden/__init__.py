@@ -3,9 +3,10 @@
 A case is a few commands run one after the other in a folder of their own. What they
 print and write is recorded, with times, versions and paths masked, and compared:
 
-    make golden BASE=<commit>          all cases, here and at a commit
+    make golden BASE=<commit>          all cases, and their cost, here and at a commit
+    python -m tests.golden cost COMMIT  processor time and memory alone
     python -m tests.golden check       a quick set against manifest.json
-    python -m tests.golden update      write manifest.json anew
+    python -m tests.golden update      write manifest.json again
 
 What a rename changes stands in translation.toml: the other commit is run in its own
 words, and what it writes is compared in those of this version.

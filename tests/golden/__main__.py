@@ -1,6 +1,7 @@
 """Compare what the command line writes: with another commit, or with the manifest.
 
 python -m tests.golden against COMMIT [--only TEXT] [--quick] [--fresh]
+python -m tests.golden cost COMMIT
 python -m tests.golden check
 python -m tests.golden update
 """
@@ -14,6 +15,7 @@ import time
 from tests.golden.against import against
 from tests.golden.case import ROOT
 from tests.golden.cases import all_cases
+from tests.golden.cost import compare_costs
 from tests.golden.manifest import changed, write_manifest
 
 
@@ -22,7 +24,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("action", choices=("against", "check", "update"))
+    parser.add_argument("action", choices=("against", "check", "cost", "update"))
     parser.add_argument("base", nargs="?", default="HEAD", help="commit to compare to")
     parser.add_argument("--only", default="", help="cases whose names contain this")
     parser.add_argument("--quick", action="store_true", help="the set of the tests")
@@ -38,8 +40,12 @@ def main() -> int:
         return 0
     if given.action == "check":
         found = changed(cases, ROOT, given.workers)
+    elif given.action == "cost":
+        found = compare_costs(given.base)
     else:
         found = against(given.base, cases, given.workers, given.fresh)
+        if not (given.only or quick):
+            found |= compare_costs(given.base)
     for name, lines in found.items():
         print(f"DIFFERS {name}", *(f"  {line}" for line in lines), sep="\n")
     seconds = time.perf_counter() - start

@@ -9,7 +9,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import distributions
 from pathlib import Path
 
@@ -57,7 +58,14 @@ def records_of(
 
 
 def run_at(commit: str, cases: Sequence[Case], workers: int) -> dict[str, Record]:
-    """Run cases on the package of a commit, with the core that is built here.
+    """Run cases on the package of a commit, see `package_of`."""
+    with package_of(commit) as root:
+        return run_all(cases, root, workers)
+
+
+@contextmanager
+def package_of(commit: str) -> Iterator[Path]:
+    """Give the folder of a commit's package, with the core that is built here.
 
     Raises:
         SystemExit: The core was another one then.
@@ -68,7 +76,7 @@ def run_at(commit: str, cases: Sequence[Case], workers: int) -> dict[str, Record
         archive = git("archive", commit, "postproc", "grammars")
         subprocess.run(["tar", "-x", "-C", name], input=archive, check=True)
         shutil.copy(str(_native.__file__), Path(name) / "postproc")
-        return run_all(cases, Path(name).resolve(), workers)
+        yield Path(name).resolve()
 
 
 def setup() -> str:

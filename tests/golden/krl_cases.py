@@ -10,6 +10,7 @@ KUKA = {"cell.toml": "kuka/cell.toml", "model.json": "kuka/model.json"}
 SETUP = "--cell cell.toml --model model.json"
 COMPENSATE = f"compensate job.src {SETUP} -o out/job.src --report report.json"
 
+LONG = 1000  # rounds of the large program
 _POINTS = {
     "XPA": "X -111.6676,Y -764.1819,Z -59.9192,A 141.9888,B 53.8917,C -175.7776",
     "XPB": "X -188.5834,Y -1000.1209,Z -79.7095,A 158.4874,B 47.5205,C -158.8517",
@@ -158,6 +159,10 @@ def krl() -> Iterator[Case]:
     back = "restore out/job.src -o back/job.src"
     files = job([*_START, *_PLAIN["calls"]])
     yield Case("krl/commands", (COMPENSATE, *after, back), KUKA, files, quick=True)
+    inline = [f"LIN {{{place}}}" for place in _POINTS.values()][:4]
+    yield Case(
+        "krl/large", (COMPENSATE,), KUKA, job([*_START, "PTP XPA", *inline * LONG])
+    )
     yield from _refused()
 
 

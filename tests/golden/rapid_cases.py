@@ -17,6 +17,7 @@ POINTS = {
     "p5": "[[138.98,599.19,209.53],[-0.360047,-0.028125,0.930372,-0.063120],[0,-1,0,0]",
     "p6": "[[600.87,1001.8,431.21],[-0.081612,-0.324244,0.939801,-0.070560],[0,0,-1,0]",
 }  # fmt: skip
+LONG = 1000  # rounds of the large program
 TARGETS = {name: f"{text},{NOTHING}]" for name, text in POINTS.items()}
 TOOL = (
     "[TRUE,[[95.3,-2.1,352.7],[0.923879533,0,0.382683432,0]],"
@@ -162,6 +163,9 @@ def rapid() -> Iterator[Case]:
         texts = {**files, "job.mod": text}
         back = ("restore out/job.mod -o back/job.mod",)
         yield Case(f"rapid/{name}", (COMPENSATE, *back), texts=texts, quick=True)
+    inline = [go(TARGETS[f"p{k}"]) for k in (1, 2, 3, 4)]
+    long = {**files, "job.mod": module(*inline * LONG)}
+    yield Case("rapid/large", (COMPENSATE,), texts=long)
 
 
 GIVEN = ("cell.toml", "model.json")

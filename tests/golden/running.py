@@ -38,6 +38,7 @@ class Worker:
         """Start it on the package that lies in a folder."""
         self.scratch = Path(tempfile.mkdtemp(dir=scratch))
         self.count = 0
+        self.answers: list[dict[str, Any]] = []
         given = {
             "PYTHONPATH": str(root),
             "XDG_CACHE_HOME": str(scratch / "cache"),
@@ -87,8 +88,9 @@ class Worker:
             printed = {way: self.scratch / way for way in ("stdout", "stderr")}
             order = {"folder": str(folder), "command": command, "stdin": stdin}
             order |= {way: str(path) for way, path in printed.items()}
-            code = self._ask({**order, "here": here})["exit"]
-            found[f"{number} exit"] = str(code).encode()
+            answer = self._ask({**order, "here": here})
+            self.answers.append(answer)
+            found[f"{number} exit"] = str(answer["exit"]).encode()
             for way, path in printed.items():
                 found[f"{number} {way}"] = path.read_bytes()
         found |= written(folder, staged)

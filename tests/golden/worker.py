@@ -28,7 +28,7 @@ def main() -> None:
         if order["here"]:
             tell(answers, {"exit": loaded(command_line, order)})
         else:
-            tell(answers, {"exit": forked(command_line, order)})
+            tell(answers, forked(command_line, order))
 
 
 def tell(answers: TextIO, answer: Order) -> None:
@@ -37,11 +37,16 @@ def tell(answers: TextIO, answer: Order) -> None:
     answers.flush()
 
 
-def forked(command_line: Any, order: Order) -> int:
-    """Run a command in a process of its own; return its exit code."""
+def forked(command_line: Any, order: Order) -> Order:
+    """Run a command in a process of its own; return its exit code and its cost."""
     child = os.fork()
     if child:
-        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        _, status, used = os.wait4(child, 0)
+        return {
+            "exit": os.waitstatus_to_exitcode(status),
+            "seconds": used.ru_utime + used.ru_stime,
+            "megabytes": used.ru_maxrss / 1024,
+        }
     code = 99
     try:
         redirect(order)

@@ -43,7 +43,7 @@ class _Jump:
     load: Floats
     by_moment: Floats
 
-    def filtered(self, values: Floats) -> Floats:
+    def filter_values(self, values: Floats) -> Floats:
         """Whiten and filter the motion by some values (n, k), (3 n, k)."""
         rows = self.moved[:, :, None] * values[:, None, :]
         return self.projection.filter(self.projection.fit.whiten(rows))
@@ -60,12 +60,12 @@ class _Jump:
             the rows by size, place, and moments, (3 n, 2 + m).
         """
         level = np.tanh((self.load + self.by_moment @ at[1:] - at[0]) / width)
-        column = self.filtered(level[:, None])[:, 0]
+        column = self.filter_values(level[:, None])[:, 0]
         size = float(column @ self.projection.rest) / float(column @ column)
         rest = self.projection.rest - size * column
         slope = size * (1.0 - level**2) / width
         inner = np.column_stack([-slope, slope[:, None] * self.by_moment])
-        slopes = np.column_stack([column, self.filtered(inner)])
+        slopes = np.column_stack([column, self.filter_values(inner)])
         prior = np.r_[0.0, 1e-6, np.ones(len(at) - 1)]
         gradient = slopes.T @ rest - prior * np.r_[0.0, at]
         step = np.linalg.solve(slopes.T @ slopes + np.diag(prior), gradient)

@@ -65,7 +65,7 @@ def _uneven(v: Visits, via: Ints) -> Bools:
     """Tell on which arcs (k,) the tool does not turn evenly about one axis."""
     start = np.maximum(v.before[via], 0)
     poses = [v.dialect.poses(v.values[rows]) for rows in (start, via, via + 1)]
-    first, second = arcs(*poses)
+    first, second = arcs(poses[0], poses[1], poses[2])
     whole = np.maximum(first.angle + second.angle, 1e-12)
     base = np.swapaxes(poses[0][:, :3, :3], 1, 2)
     turns = [rotation_vector(base @ pose[:, :3, :3]) for pose in poses[1:]]
@@ -108,7 +108,7 @@ class CutArc:
         """Look at the arc with the point `via` on its way."""
         rows = [int(visits.before[via]), via, via + 1]
         poses = visits.dialect.poses(visits.values[rows])
-        halves = arcs(*(poses[k : k + 1] for k in range(3)))
+        halves = arcs(poses[0:1], poses[1:2], poses[2:3])
         cuts = points.get(via, ()), points.get(via + 1, ())
         still = [np.zeros((len(own), 3)) for own in cuts]
         turned = turns.get(via, still[0]), turns.get(via + 1, still[1])

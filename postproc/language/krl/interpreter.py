@@ -428,7 +428,7 @@ class KrlMachine(TaskMachine):
         if not ending or not (active or self._may_switch(*at, numbers)):
             return here
         ended = replace(here, origins=NOWHERE, modes=here.modes.forget())
-        on = {own for own in ending if own[0] in self._left_on}
+        on = {own for own in ending if own[0] in self._still_enabled}
         left = (ended.modes.active - ending) | on
         return here.join(replace(ended, modes=ended.modes.with_(active=left)))
 
@@ -447,7 +447,7 @@ class KrlMachine(TaskMachine):
         return False
 
     @cached_property
-    def _left_on(self) -> set[int]:
+    def _still_enabled(self) -> set[int]:
         """Numbers of interrupts whose routines may leave them on, EVERY for unknown."""
         return {number for file, _, number, one in self._declarations
                 if not self._switches_itself_off(file, number, one)}  # fmt: skip

@@ -150,6 +150,7 @@ def test_next_measurements_stay_where_the_survey_was(
     assert len(np.unique(q.round(6), axis=0)) == len(q)
 
 
+@pytest.mark.slow
 def test_same_rows_same_answer(
     planted: tuple[Measurements, Model], found: Extension
 ) -> None:
@@ -183,6 +184,7 @@ def test_other_methods_and_other_arms_are_refused(
         extend_model(rows[np.arange(5)], ARM, model)
 
 
+@pytest.mark.slow
 def test_few_points_revise_a_model_and_find_what_changed() -> None:
     seed = 333
     clean = virtual_arm(seed, BASE)
@@ -212,6 +214,7 @@ def test_few_points_revise_a_model_and_find_what_changed() -> None:
     assert errors[1] < 0.4 * errors[0]
 
 
+@pytest.mark.slow
 def test_a_given_model_of_other_data_is_judged_as_it_is() -> None:
     seed = 334
     arm = virtual_arm(seed, BASE)
@@ -293,6 +296,7 @@ def test_whole_curves_have_functions_of_each_covariate_alone() -> None:
     assert "0.1" in [p.name.split()[-1] for p in whole.parameters()]
 
 
+@pytest.mark.slow
 def test_what_has_no_name_is_told_by_where_it_lives(tmp_path: Path) -> None:
     c = campaign(341, ("joint_product",), 1.5, rows=200)
     rows = measurements(c.states, c.position, "nameless")
@@ -310,6 +314,7 @@ def test_what_has_no_name_is_told_by_where_it_lives(tmp_path: Path) -> None:
     assert "n-finding1.svg" in names
 
 
+@pytest.mark.slow
 def test_wrong_directions_are_listed_and_held_out_rows_keep_theirs() -> None:
     clean, _ = flipped(2, 0.0)
     model = model_of(fit_survey(clean, NJ, BASE_EFFECTS, None), clean)

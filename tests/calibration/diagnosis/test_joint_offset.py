@@ -21,6 +21,7 @@ from tests.calibration.planted import (
     states_of,
     survey,
 )
+from tests.slow import slow
 
 SEED, ROWS = 61, 60
 NESTS = np.array([[0.1, 0.0, 0.2], [-0.08, 0.06, 0.2]])  # [m]
@@ -41,7 +42,7 @@ def remastered(joint: int) -> VirtualArm:
     return virtual_arm(SEED, (*map(Planted, BASE), planted), tracker=TRACKER)
 
 
-@pytest.mark.parametrize("joint", [1, 2, 3, 6])
+@pytest.mark.parametrize("joint", [1, *slow([2, 3, 6])])
 def test_it_is_named_and_unseen_poses_are_left_less(joint: int) -> None:
     arm, model = remastered(joint), surveyed()
     fresh = survey(arm, SEED + 1, ROWS)
@@ -73,6 +74,7 @@ def test_two_nests_tell_joint_6_from_a_tool() -> None:
     assert six.list_tied(ArmStates(ARM, two)) == ()
 
 
+@pytest.mark.slow
 def test_joints_that_always_yielded_are_no_offsets() -> None:
     """The zeros of a model without compliance hold its mean: fresh rows know both."""
     yields = (Planted("compliance", j, mm) for j, mm in ((2, 0.5), (3, 0.3), (5, 0.15)))

@@ -149,6 +149,7 @@ def later() -> Later:
     return revisited(SEED)
 
 
+@pytest.mark.slow
 def test_rows_of_one_corner_sharpen_a_model_there_and_spoil_nothing() -> None:
     corner, range_, held = [], [], []
     for seed in range(SEED, SEED + 6):
@@ -170,6 +171,7 @@ def test_rows_of_one_corner_sharpen_a_model_there_and_spoil_nothing() -> None:
     assert np.mean(held) > 0.93 and min(held) > 0.85
 
 
+@pytest.mark.slow
 def test_a_base_that_moved_is_told_and_compensated(later: Later) -> None:
     found = later.diagnosed(MOVED)
     assert found.diagnosis.verdict == "noise"

@@ -70,6 +70,7 @@ def lead(c: Campaign, found: Investigation, more: VirtualArrivals | None) -> flo
     return truth - other
 
 
+@pytest.mark.slow
 def test_measuring_the_proposed_poses_separates_a_group(
     unsure: tuple[Campaign, Investigation],
 ) -> None:

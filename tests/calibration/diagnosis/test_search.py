@@ -17,6 +17,7 @@ from postproc.calibration.regression import fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import ArmStates
 from tests.calibration.planted import ARM, TRACKER, campaign, states_of, survey
+from tests.slow import slow
 from tests.undeclared_score import close, ok
 from tests.undeclared_trial import moved, run, without_rigid
 
@@ -24,6 +25,9 @@ PLANTED = [
     ("compliance", 300, 0.5),
     ("payload", 301, 0.5),
     ("transmission_free", 302, 0.5),
+    ("joint_step", 313, 0.3),
+]
+MORE_PLANTED = [
     ("coupling", 303, 1.0),
     ("load_backlash", 304, 1.0),
     ("warmup", 305, 1.0),
@@ -31,7 +35,6 @@ PLANTED = [
     ("tool_shift", 307, 0.5),
     ("tracker_drift", 308, 1.0),
     ("worn_spot", 309, 1.0),
-    ("joint_step", 313, 0.3),
     ("base_tilt", 314, 0.3),
     ("elastic_flank", 315, 0.5),
     ("azimuth", 316, 0.3),
@@ -42,7 +45,7 @@ PLANTED = [
 ]
 
 
-@pytest.mark.parametrize(("kind", "seed", "size"), PLANTED)
+@pytest.mark.parametrize(("kind", "seed", "size"), [*PLANTED, *slow(MORE_PLANTED)])
 def test_an_undeclared_effect_is_named(kind: str, seed: int, size: float) -> None:
     trial = run(kind, seed, size)
     assert ok(trial), trial
@@ -52,7 +55,9 @@ def test_an_undeclared_effect_is_named(kind: str, seed: int, size: float) -> Non
 
 
 @pytest.mark.parametrize("drift", [True, False])
-@pytest.mark.parametrize(("kind", "seed"), [("thermal", 6001), ("warmup", 6009)])
+@pytest.mark.parametrize(
+    ("kind", "seed"), [("thermal", 6001), *slow([("warmup", 6009)])]
+)
 def test_a_warm_arm_follows_its_temperature(kind: str, seed: int, drift: bool) -> None:
     """Time explains both a little better: it counts where the tracker stands still."""
     fit = campaign(seed, (kind,), 0.5).base_fit()
@@ -65,6 +70,7 @@ def test_a_warm_arm_follows_its_temperature(kind: str, seed: int, drift: bool) -
     assert left[0].best.source == found.source
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", ["compliance", "load_backlash"])
 def test_of_names_alike_the_one_that_predicts_other_regions_is_taken(
     first: str,
@@ -101,6 +107,7 @@ def test_nothing_is_asked_of_visits_before_where_all_are_missing() -> None:
     assert not any("before" in x.source for x in tried)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "seed", "size"), [("tracker_drift", 308, 2.0), ("azimuth", 405, 1.0)]
 )
@@ -113,6 +120,7 @@ def test_a_tracker_leaves_only_where_the_base_stands_unsure(
     assert trial.true_mm[1] < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "seed", "size"), [("azimuth", 410, 1.0), ("refraction", 411, 0.5)]
 )
@@ -135,7 +143,7 @@ def test_a_tracker_that_stands_anywhere_is_named_and_not_compensated(
     assert mean < 1.2 * run("none", seed, 0.0).registered_mm[2]
 
 
-@pytest.mark.parametrize("seed", [320, 321, 322, 323, 324])
+@pytest.mark.parametrize("seed", [320, *slow([321, 322, 323, 324])])
 def test_nothing_is_found_where_nothing_is(seed: int) -> None:
     trial = run("none", seed, 0.0)
     assert trial.verdict == "noise", trial

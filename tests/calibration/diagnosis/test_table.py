@@ -99,6 +99,7 @@ def test_a_free_column_is_taken_out_as_one_of_any_size_is(base: Fit) -> None:
     assert loose.rest @ loose.rest == pytest.approx(base.target @ wanted @ base.target)
 
 
+@pytest.mark.slow
 def test_an_empty_campaign_adds_no_cell() -> None:
     for seed in range(462, 466):
         empty = campaign(seed, (), 0.0, rows=200).base_fit()

@@ -53,7 +53,9 @@ SEARCHES = [SEARCH, *FRAMES, "LIN XP1", "WAIT SEC 0", "seek( )", "LIN XP1", *FRA
 def test_resume_ends_the_routine_in_which_it_may_come():
     found = job(*SEARCHES, more=SEEK + FOUND)
     assert left(found) == [False, True, False, False]
-    assert "which $TOOL and $BASE" in reasons(found)[2] and reasons(found)[3] == ""
+    assert (
+        "$TOOL and $BASE are not known" in reasons(found)[2] and reasons(found)[3] == ""
+    )
     assert origins(found)[2] == [ELSEWHERE]
 
 
@@ -62,7 +64,9 @@ def test_routines_between_are_ended_too():
     found = job(*[x.replace("seek", "around") for x in SEARCHES], more=more)
     assert names(found) == ["xp1", "xp2", "xa", "xp1", "xp1"]
     assert origins(found)[3] == [ELSEWHERE, 2]
-    assert "which $TOOL and $BASE" in reasons(found)[3] and reasons(found)[4] == ""
+    assert (
+        "$TOOL and $BASE are not known" in reasons(found)[3] and reasons(found)[4] == ""
+    )
 
 
 def test_other_routines_end_where_they_say():
