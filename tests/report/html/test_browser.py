@@ -369,7 +369,7 @@ def test_100_000_targets_are_usable(browser: Any, folder: Path) -> None:
         ".reduce((n, t) => n + (t.customdata || []).length, 0)"
     )
     assert 5_000 < drawn <= 20_000
-    assert "evenly" in browser.find_element("css selector", "#view-note").text
+    assert "every k-th" in browser.find_element("css selector", "#view-note").text
     type_search(browser, "singularity")
     where = browser.find_element("css selector", "#where").text
     assert where == "1 to 100 of 2500"
