@@ -77,6 +77,8 @@ KNOWING = {
     # The given model's zero of a joint holds the mean of what the model lacks.
     "calibration.diagnosis.model_update": {"joint_offset"},
     "calibration.diagnosis.jumps": {"part_motion", "step"},
+    # Where a load jumps depends on what the links weigh.
+    "calibration.diagnosis.load_jumps": {"compliance", "part_motion"},
     # A law of the weight goes on to further joints; a cell is told beside no name.
     "calibration.diagnosis.search": {
         "compliance",
