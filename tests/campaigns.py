@@ -273,8 +273,8 @@ KINDS: dict[str, Kind] = {
     "rows newest first, or shuffled": lambda h, s: s.rows != "as measured",
     "directions by the order of visits": lambda h, s: not s.directions,
     "joints yield, on a floor": lambda h, s: s.yields and not s.tilted,
-    "wall, ceiling, incline, told": lambda h, s: s.tilted and s.said != "",
-    "wall, ceiling, incline, not told": lambda h, s: s.tilted and s.said == "",
+    "wall, ceiling, incline, stated": lambda h, s: s.tilted and s.said != "",
+    "wall, ceiling, incline, not stated": lambda h, s: s.tilted and s.said == "",
     "frame of one tracker": lambda h, s: s.stations == 1,
     "two stations": lambda h, s: s.stations == 2,
 }
@@ -284,7 +284,7 @@ def summary(trials: Sequence[Trial]) -> list[str]:
     """Write the table of the page, a line a kind of campaign."""
     out = [
         "| campaigns | n | default / `geometry,backlash`, mean and max | "
-        "default / told all, 95 % and max | "
+        "default / complete files, 95 % and max | "
         "default / best possible, median, 90 %, max | intervals hold | false names |",
         "|---|---|---|---|---|---|---|",
     ]
@@ -304,7 +304,7 @@ def summary(trials: Sequence[Trial]) -> list[str]:
     out.append("")
     out.append(f"Quartiles of the stated error: intervals hold {', '.join(held)}.")
     out.append(
-        f"At most 1.15 times what a fit of files that say all leaves: "
+        f"At most 1.15 times the error of a fit of complete files: "
         f"{(loss <= 1.15).mean():.1%} of {len(loss)}."
     )
     large = [t.full.mean / t.best for t in trials if t.full and t.habit.poses >= 60]
