@@ -645,7 +645,7 @@ def _handlers(machine: Machine, store: Store) -> None:
                 assert body is not None
                 place = Place(program, body)
                 reach = live_rows(world, place, first, last)
-                machine.volatile |= reach.assigned
+                machine.volatile |= reach.may_change
                 for part in reach.parts:
                     for name in part.effects.read:
                         root = world.root(part.place, name)
