@@ -138,15 +138,10 @@ class Store:
         found = self.values.get(key)
         if found is not None:
             return found
-        hidden = self._find_hidden(key)
-        return None if hidden is None else add_unknown(hidden, self.initial(key))
-
-    def _find_hidden(self, key: str) -> Nothing | None:
-        """Return the unknown array or record that an element belongs to."""
         for whole in wholes(key):
-            found = self.values.get(whole)
-            if isinstance(found, Nothing):
-                return found
+            hidden = self.values.get(whole)
+            if isinstance(hidden, Nothing):  # the array or record of the element
+                return add_unknown(hidden, self.initial(key))
         return None
 
     def write(self, key: str, value: Value) -> None:
@@ -154,14 +149,10 @@ class Store:
         if self.changing and (root := root_of(key)) in self.changing:
             self.exposed |= {root}
         if self.values.get(key) is None:
-            self._log(key)
+            for whole in wholes(key):
+                self.logs[whole] = (key, self.logs.get(whole))
+                self.compound.add(whole)
         self.values[key] = value
-
-    def _log(self, key: str) -> None:
-        """Enter a new key with all that it is an element or a field of."""
-        for whole in wholes(key):
-            self.logs[whole] = (key, self.logs.get(whole))
-            self.compound.add(whole)
 
     def parts(self, key: str) -> list[str]:
         """Return the keys of elements and fields that a key has."""
@@ -198,7 +189,10 @@ class Store:
         """Take in what may hold too; tell whether anything changed."""
         changed = False
         if MANY not in self.last and not other.last <= self.last:
-            self.last = _merge_origins(self.last, other.last)
+            both = self.last | other.last
+            many = MANY in both or len(both) > MOST_ORIGINS
+            # The sum of the sizes of such sets stays linear in the program.
+            self.last = frozenset({MANY}) if many else both
             changed = True
         if other.settings is not self.settings and other.settings != self.settings:
             merged = _merge_settings(self.settings, other.settings)
@@ -238,13 +232,6 @@ def wholes(key: str) -> Iterator[str]:
     at = len(key)
     while (at := max(key.rfind("[", 0, at), key.rfind(".", 0, at))) > 0:
         yield key[:at]
-
-
-def _merge_origins(a: frozenset[int], b: frozenset[int]) -> frozenset[int]:
-    """Unite two sets of origins; the sum of their sizes stays linear in the program."""
-    both = a | b
-    many = MANY in both or len(both) > MOST_ORIGINS
-    return frozenset({MANY}) if many else both
 
 
 def _merge_settings(a: Settings, b: Settings) -> Settings:

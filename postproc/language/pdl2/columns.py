@@ -477,8 +477,9 @@ class Collector:
         for at, k, goal in zip(visit.tolist(), index.tolist(), goals, strict=True):
             if goal.position is not None:
                 self._position(at, moves.program, goal.target, goal.position)
-                problem = self.aux_problem(_aux_axes(goal.position))
-                moves.last[k] = self.reasons[problem]
+                aux = goal.position.aux
+                axes = None if aux is None else tuple(axis for axis, _ in aux)
+                moves.last[k] = self.reasons[self.aux_problem(axes)]
 
     def _position(
         self, at: int, program: Program, target: Meaning, position: Position
@@ -602,10 +603,6 @@ def _set(names: list[str], numbers: list[float]) -> dict[str, Value]:
     unread = Nothing("the number cannot be read")
     pairs = zip(names, numbers, strict=True)
     return {name: unread if n != n else n for name, n in pairs}
-
-
-def _aux_axes(position: Position) -> tuple[int, ...] | None:
-    return None if position.aux is None else tuple(axis for axis, _ in position.aux)
 
 
 def _find_measured(program: Program) -> tuple[Ints, list[str]]:

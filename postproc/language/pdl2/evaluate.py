@@ -361,7 +361,10 @@ def copy_parts(
 ) -> bool:
     """Let a variable hold the parts of another one; tell whether it has parts."""
     origin = bare(value)
-    if origin is None or not _may_have_parts(here, origin):
+    if origin is None:
+        return False
+    type_ = here.world.type_of(here.place, origin.name)
+    if type_ and not (type_.array or type_.path) and type_.name in SINGLE:
         return False
     parts = parts_of(here, origin)
     place, source = here.locate(target), here.locate(origin)
@@ -383,13 +386,6 @@ def bare(value: ast.Expression | None) -> ast.Reference | None:
         value = value.operand
     named = isinstance(value, ast.Reference) and not value.name.startswith("$")
     return value if named and isinstance(value, ast.Reference) else None
-
-
-def _may_have_parts(here: ProgramPoint, origin: ast.Reference) -> bool:
-    type_ = here.world.type_of(here.place, origin.name)
-    if type_ is None or type_.array or type_.path:
-        return True
-    return type_.name not in SINGLE
 
 
 def parts_of(here: ProgramPoint, origin: ast.Reference) -> dict[str, Value]:

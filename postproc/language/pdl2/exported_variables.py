@@ -24,7 +24,12 @@ def changing_variables(world: World) -> frozenset[str]:
 
     Another program may write them whenever this one waits. Records may hold such.
     """
-    found = {key for _, key, said in _list_exported(world) if not _is_point(said.type)}
+    found = {
+        key
+        for program in world.programs()
+        for key, said in _of(world, program)
+        if not (_is_constant(world, key) or _is_point(said.type))
+    }
     found |= set(_list_exported_by_file(world))
     return frozenset(found)
 
@@ -46,14 +51,6 @@ def find_imported_points(world: World) -> frozenset[str]:
         return frozenset()
     kept = {key for key in imported if _is_constant(world, key)} - _find_written(world)
     return frozenset(imported - kept)
-
-
-def _list_exported(world: World) -> Iterator[tuple[Program, str, Variable]]:
-    """Yield the exported variables that may change: program, key, declaration."""
-    for program in world.programs():
-        for key, said in _of(world, program):
-            if not _is_constant(world, key):
-                yield program, key, said
 
 
 def _of(world: World, program: Program) -> Iterator[tuple[str, Variable]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -474,12 +474,18 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
     known = np.array(places, dtype=bool)[entries.layout]
     known &= np.isfinite(entries.numbers).all(axis=1)
     known &= np.isin(entries.arm, (0, world.arm))
-    known[_list_other_arm_rows(world, place.program, entries)] = False
+    of_other_arm = _list_rows_where(
+        lambda v: v.arm not in (0, world.arm), place.program, entries
+    )
+    known[of_other_arm] = False
     shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
     shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
     named = entries.row.rows
     own, other = known.copy(), {}
-    for row in _list_declared_rows(place.program, entries):
+    marked = _list_rows_where(
+        lambda v: v.taught or bool(v.exported), place.program, entries
+    )
+    for row in marked:
         name = entries.name[row].lower()
         root = root_of(name)
         declared = place.program.variables[root]
@@ -504,20 +510,14 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
     world.initial.points = FilePoints(prefix, own, other, entries, base, shared, taught)
 
 
-def _list_declared_rows(program: Program, entries: Entries) -> list[int]:
-    """List the rows of variables that are exported, or marked as taught."""
-    marked = {*program.variables.which(lambda v: v.taught or bool(v.exported))}
-    if not marked:
+def _list_rows_where(
+    holds: Callable[[Variable], bool], program: Program, entries: Entries
+) -> list[int]:
+    """List the rows of variables whose declaration fulfils a condition."""
+    names = {*program.variables.which(holds)}
+    if not names:
         return []
-    return [row for name, row in entries.row.items() if root_of(name) in marked]
-
-
-def _list_other_arm_rows(world: World, program: Program, entries: Entries) -> list[int]:
-    """List the rows of variables that are declared for another arm."""
-    other = {*program.variables.which(lambda v: v.arm not in (0, world.arm))}
-    if not other:
-        return []
-    return [row for name, row in entries.row.items() if root_of(name) in other]
+    return [row for name, row in entries.row.items() if root_of(name) in names]
 
 
 def _enter(world: World, file: ValueFile, entry: Entry, key: str, arm: int) -> None:
@@ -645,7 +645,7 @@ def _handlers(machine: Machine, store: Store) -> None:
                 assert body is not None
                 place = Place(program, body)
                 reach = live_rows(world, place, first, last)
-                machine.volatile |= reach.assigned
+                machine.volatile |= reach.may_change
                 for part in reach.parts:
                     for name in part.effects.read:
                         root = world.root(part.place, name)

@@ -69,7 +69,9 @@ class Pdl2(Language):
                 variables = _variables(source, known)
                 texts.append(Skeleton.of(variables.lines))
             else:
-                pages.append(_name_page(_parse(source, known)))
+                page = _parse(source, known)
+                # Where its PROGRAM line is not understood, its file names it.
+                pages.append(page if page.name else replace(page, name=_file(page)))
                 texts.append(Skeleton.of(pages[-1].lines))
         others = _by_name(program, pages)
         release_memory(sum(len(text.numbers) for text in texts))
@@ -185,11 +187,6 @@ def _without_values(one: Parsed) -> Parsed:
     if isinstance(one, VariableFile):
         return replace(one, entries=one.entries.without_numbers())
     return replace(one, lines=one.lines.without_values())
-
-
-def _name_page(page: Program) -> Program:
-    """Name a page whose PROGRAM line is not understood after its file."""
-    return page if page.name else replace(page, name=_file(page))
 
 
 def _file(program: Program) -> str:

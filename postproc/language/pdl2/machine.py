@@ -221,15 +221,12 @@ class Machine:
         key = (here.context, self.position(here.place.program, here.row), sub)
         self.arrivals[key] = arrival
         if MANY in arrival.predecessors:
-            self._report_many(here)
+            here.world.report_once(
+                here.place.program, here.row, Code.MANY_ORIGINS, str(here.row),
+                f"more than {MOST_ORIGINS} moves may come before this one: they are "
+                "not followed separately, and the approach direction is not known",
+            )  # fmt: skip
         return self.visit_id(key, len(arrival))
-
-    def _report_many(self, here: Execution) -> None:
-        here.world.report_once(
-            here.place.program, here.row, Code.MANY_ORIGINS, str(here.row),
-            f"more than {MOST_ORIGINS} moves may come before this one: they are not "
-            "followed separately, and the approach direction is not known",
-        )  # fmt: skip
 
     def predecessors(self, here: Execution) -> frozenset[int]:
         """Return where the arm may come from."""
@@ -348,7 +345,8 @@ class Machine:
         if not by_return and blocks.cycle >= 0 and not here.place.body.name:
             self.push(context, blocks.cycle, here.store)
         elif context.kind == CALLED:
-            _invalidate_locals(here)
+            for name in here.place.body.own_names:
+                here.store.drop(here.world.root(here.place, name))
             caller = self.places[context.outer]
             row = context.at - self._offsets[id(caller.program)]
             self.go_on(context.outer, row + 1, here.store)
@@ -360,12 +358,6 @@ class Machine:
         self.enter(context, place)
         self.rows += 1
         self.push(context, place.body.first + 1, here.store)
-
-
-def _invalidate_locals(here: Execution) -> None:
-    body = here.place.body
-    for name in body.own_names:
-        here.store.drop(here.world.root(here.place, name))
 
 
 OTHERS_WRITE = (

@@ -132,7 +132,10 @@ def find_plain_moves(
         tuple(said),
         tuple(_form(one) if isinstance(one, ast.Move) else None for one in said),
         tuple(any(_calls(world, place, one)) for one in said),
-        tuple(_goes_to_point(one) for one in said),
+        tuple(
+            isinstance(one, ast.Move) and isinstance(one.where[0], ast.Reference)
+            for one in said
+        ),
         variants.points,
         variants.prefix,
         variants.names,
@@ -166,10 +169,6 @@ def _is_plain(move: ast.Move) -> bool:
         case ast.Reference(name, () | (ast.Index(_),)):
             return not name.startswith("$")
     return False
-
-
-def _goes_to_point(said: ast.Statement) -> bool:
-    return isinstance(said, ast.Move) and isinstance(said.where[0], ast.Reference)
 
 
 def _form(move: ast.Move) -> MoveForm:
@@ -311,7 +310,8 @@ class _Variants:
         variant = self._known.get(key)
         if variant is None:
             variant = -1
-            if self._is_quiet(said[shape]):
+            calls = _calls(self.world, self.place, said[shape])
+            if all(self._does_nothing(call) for call in calls):
                 variant = len(self.statements)
                 self.statements.append(said[shape])
             self._known[key] = variant
@@ -322,9 +322,6 @@ class _Variants:
         if name in self._parameters or name in self.volatile:
             return False
         return _is_point(self.world.type_of(self.place, name), array)
-
-    def _is_quiet(self, said: ast.Statement) -> bool:
-        return all(self._does_nothing(c) for c in _calls(self.world, self.place, said))
 
     def _does_nothing(self, call: ast.Invoke) -> bool:
         """Tell whether a call neither moves the arm nor sets what moves depend on."""

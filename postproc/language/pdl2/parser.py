@@ -182,10 +182,6 @@ def _destination(c: Children) -> DestinationPart:
     return DestinationPart((c[0].kind, where, None, frame))
 
 
-def _clause(c: Children) -> Any:
-    return TilPart(c[0].terms) if c and isinstance(c[0], ast.Still) else None
-
-
 _CONDITION_WORDS = frozenset(
     "and at before by condition div error event for in mod not of or percent segment "
     "signal time to until via when with xor after distance end start".split()
@@ -227,10 +223,6 @@ def _for(c: Children) -> ast.For:
 def _beside(c: Children) -> BesidePart:
     inside = c[0] if len(c) == 1 else ast.Invoke(_name(c[0]), c[1])
     return BesidePart((inside,))
-
-
-def _io(c: Children) -> ast.Transfer:
-    return ast.Transfer(str(c[0]).upper(), tuple(c[1:]))
 
 
 def _case(c: Children) -> ast.Case:
@@ -291,7 +283,9 @@ RULES: dict[str, Rule] = {
     "arm": lambda c: ArmPart((c[0].subscripts[0],)),
     "absolute": _absolute,
     "destination": _destination,
-    "clause": _clause,
+    "clause": lambda c: (
+        TilPart(c[0].terms) if c and isinstance(c[0], ast.Still) else None
+    ),
     "with": lambda c: c[0],
     "sync": lambda c: SyncPart((_move(False, c),)),
     "item": SettingPart,
@@ -299,7 +293,7 @@ RULES: dict[str, Rule] = {
     "assign": lambda c: ast.Assign(c[0], str(c[1]), c[2]),
     "call": _call,
     "call_program": lambda c: ast.Call(_name(c[0]), c[1] if len(c) > 1 else (), True),
-    "io": _io,
+    "io": lambda c: ast.Transfer(str(c[0]).upper(), tuple(c[1:])),
     "format": lambda c: c[0],
     "open": lambda c: ast.Still("OPEN"),
     "open_clause": lambda c: None,

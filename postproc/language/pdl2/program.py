@@ -153,9 +153,11 @@ class _BlockReader:
             self._refuse(row, statement)
 
     def _refuse(self, row: int, statement: ast.Statement) -> None:
-        self._problems.append(
-            (row, _describe_unmatched(statement, self._open, self._lines))
-        )
+        text = f"this {_word(statement)} closes or divides no block"
+        if self._open:
+            begin, open_one = self._open[-1]
+            text += f" (line {self._lines.line[begin]} opens {_word(open_one)})"
+        self._problems.append((row, text))
 
     @property
     def problems(self) -> list[tuple[int, str]]:
@@ -214,16 +216,6 @@ def _behind(statement: ast.Statement) -> ast.Statement:
 
 def _word(statement: ast.Statement) -> str:
     return type(statement).__name__.upper()
-
-
-def _describe_unmatched(
-    statement: ast.Statement, stack: list[tuple[int, ast.Statement]], lines: Lines
-) -> str:
-    text = f"this {_word(statement)} closes or divides no block"
-    if stack:
-        row, open_one = stack[-1]
-        text += f" (line {lines.line[row]} opens {_word(open_one)})"
-    return text
 
 
 # Declared variables: a list of names is one declaration, whatever its length.

@@ -275,7 +275,7 @@ class CallGraph:
         return frozenset().union(*(part.effects.cancels for part in self.parts))
 
     @property
-    def assigned(self) -> frozenset[str]:
+    def may_change(self) -> frozenset[str]:
         """Names of variables and settings (with ``$``) that may change."""
         names = frozenset().union(*(part.effects.assigned for part in self.parts))
         return names | {f"${frame}" for frame in FRAMES if self.frames}

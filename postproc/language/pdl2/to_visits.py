@@ -267,7 +267,10 @@ APART = Reason(
 
 def collect(machine: Machine) -> Visits:
     """Put the visits in program order and make arrays of them."""
-    ordered = sorted(machine.arrivals.items(), key=lambda item: _order(item[0]))
+    ordered = sorted(
+        machine.arrivals.items(),
+        key=lambda item: (Point(item[0][0], item[0][1]), item[0][2]),
+    )
     runs, world = [run for _, run in ordered], machine.world
     offsets = np.concatenate([[0], np.cumsum([len(run) for run in runs])])
     offsets = offsets.astype(np.int64)
@@ -343,11 +346,6 @@ def _mark_torn(collector: Collector, numbering: Numbering, literal: Indices) -> 
     c.reason[torn] = collector.reasons[TORN]
     if apart.any():
         c.reason[apart] = collector.reasons[APART]
-
-
-def _order(key: Key) -> tuple[Point, int]:
-    context, at, sub = key
-    return Point(context, at), sub
 
 
 def _most_axes(runs: list[MoveRun], world: World) -> int:
