@@ -16,9 +16,13 @@ from postproc.model.effects.curve import Curve
 from postproc.model.kinematics import ArmStates
 from tests.awkward import draw, run
 from tests.calibration.simulator import NJ, random_states, survey_of
+from tests.slow import slow
+
+LONG = [0, 3, 6, 9, 10]
+SHORT = [seed for seed in range(14) if seed not in LONG]
 
 
-@pytest.mark.parametrize("seed", range(14))
+@pytest.mark.parametrize("seed", [*SHORT, *slow(LONG)])
 def test_a_campaign_is_fitted_or_refused_in_words(seed: int) -> None:
     end = run(seed, diagnosed=False)
     assert re.match(r"fitted|refused: .*\S\. \S", end), end

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from postproc import _native
-from postproc.arrays import floats
+from postproc.arrays import few_rows, floats
 from postproc.compensation.compensate import compensate
 from postproc.model.effect_sum import Combination
 from postproc.model.effects.backlash import Backlash
@@ -245,9 +245,10 @@ def test_straight_ways(bench_cell, random):
     assert np.allclose(found.centre, begin, **CLOSE)
     assert np.allclose(found.chord, chord, **CLOSE)
     length = np.linalg.norm(chord, axis=1)
-    assert np.allclose(blending._chords(targets, flange, *ends), length, **CLOSE)
+    tools = few_rows(targets.tool)
+    assert np.allclose(_native.chords(flange, tools, *ends), length, **CLOSE)
     with pytest.raises(IndexError, match="not there"):
-        blending._chords(targets, flange, np.array([-1]), np.array([0]))
+        _native.chords(flange, tools, np.array([-1]), np.array([0]))
 
 
 def test_poses(random, laid_out):

@@ -158,6 +158,7 @@ def test_a_warm_up_in_time_is_told_with_the_state_that_predictions_are_for() -> 
     assert not drifts(fit_effects(ArmStates(NJ, states), measured, effects[:-1]))
 
 
+@pytest.mark.slow
 def test_waves_in_what_splines_follow_are_named_with_order_and_size() -> None:
     rng = np.random.default_rng(5)
     states = random_states(700, rng)
@@ -232,6 +233,7 @@ def waved(seed: int, rows: int) -> tuple[States, Floats]:
     )
 
 
+@pytest.mark.slow
 def test_a_wave_is_named_in_a_short_survey() -> None:
     states, measured = waved(9, 300)
     waves = [f.wave for f in find(fit_best(NJ, states, measured, None)) if f.wave]

@@ -171,6 +171,7 @@ def test_all_of_a_fit_is_in_its_report(tmp_path: Path) -> None:
     assert re.fullmatch(said, dropped[11])
 
 
+@pytest.mark.slow
 def test_what_free_forms_predict_is_told(
     job_folder, free_model, tmp_path: Path
 ) -> None:

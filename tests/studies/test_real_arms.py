@@ -98,6 +98,7 @@ def described(folder: Path, tmp_path: Path, old: str, new: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_page_comes_from_a_folder_and_a_description(
     drawn: Path, tmp_path: Path
 ) -> None:

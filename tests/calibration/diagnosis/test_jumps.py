@@ -45,6 +45,7 @@ def test_any_part_may_jump_at_what_varies_smoothly(base: Fit) -> None:
     assert {s.best.source for s in found} == {"temperature"}
 
 
+@pytest.mark.slow
 def test_one_jump_comes_before_steps_of_two_joints() -> None:
     bends = campaign(50178, ("rotation:link4:y by temperature sign",), 2.0, rows=240)
     (finding,) = trace(bends.base_fit(), seed=0).findings

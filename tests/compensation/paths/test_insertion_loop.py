@@ -106,6 +106,7 @@ def real(folder: Path, name: str) -> dict[int, dict[str, Any]]:
     return {move["visit"]: move for move in told(folder, f"{name}.true")["path"]}
 
 
+@pytest.mark.slow
 def test_the_virtual_arm_keeps_closer_to_its_lines(shop: Path) -> None:
     sizes = {}
     for name in ("plain", "points", "stops"):

@@ -107,6 +107,7 @@ def ran(shop: Path) -> tuple[InTime, Job]:
     return run_in_time(*readings, position, setting), setting
 
 
+@pytest.mark.slow
 def test_it_is_what_the_virtual_arm_does(shop: Path) -> None:
     report = json.loads((shop / "report.json").read_bytes())
     assert len(report["path"]) == LINES + 4  # an arc is two paths
