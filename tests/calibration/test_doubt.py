@@ -98,7 +98,7 @@ def test_a_fit_names_what_is_left_open(tmp_path: Path) -> None:
         assert found.model.doubt is not None
         told[said] = [w for w in found.report.warnings if "do not show whether" in w]
     (free,), (stated,) = told[""], told["mounting"]
-    assert "compliance: not corrected" in free
+    assert "compliance: it is not corrected" in free
     assert free.endswith("state mounting under [robot]")
     assert "mounting" not in stated
 

@@ -284,7 +284,10 @@ def test_a_lost_beam_on_a_fixed_point_is_left_out(tmp_path: Path) -> None:
         ([*LINES, "r3,,,,,,,1500,,500,30,m1"], r":7: .*has no y_mm"),
         (LINES[:-1], r":3: monument 'm1' was read once"),
         ([LINES[1], LINES[4]], r"has rows on monuments only"),
-        ([*LINES, "r3,,,,,,,1600,1000,500,30,m1"], r":7: .* is 100\.0 mm from where"),
+        (
+            [*LINES, "r3,,,,,,,1600,1000,500,30,m1"],
+            r":7: .* is 100\.0 mm from its place",
+        ),
         ([*LINES, "d,,0,0,0,20,0,1900,300,2100,30,"], r":7: '' in column q1_deg"),
     ],
     ids=["no coordinate", "once", "only", "apart", "no angle"],

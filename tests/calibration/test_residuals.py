@@ -29,7 +29,7 @@ def test_means_over_readings_are_given_beside_the_rows() -> None:
     said = beside_all(rows_of(30, 4), left)
     mean = np.linalg.norm(left.reshape(30, 4, 3).mean(axis=1), axis=1).mean() * 1e3
     assert "120 readings, 30 means" in said
-    assert f"left {mean:.4f} mm on average" in said and "far off" not in said
+    assert f"means is {mean:.4f} mm on average" in said and "far off" not in said
 
 
 def test_strays_are_named_the_worst_first_and_taken_off() -> None:

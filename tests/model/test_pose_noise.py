@@ -151,7 +151,7 @@ def test_rows_of_a_pose_are_not_taken_apart() -> None:
     blocks = RowBlocks(((np.array([[0, 2]]), np.eye(6)[None]),))
     assert blocks.at_rows(np.array([1, 2, 0]), 4).parts[0][0].tolist() == [[2, 1]]
     assert not blocks.at_rows(np.array([1, 3]), 4)
-    with pytest.raises(ValueError, match="apart"):
+    with pytest.raises(ValueError, match="separated"):
         blocks.at_rows(np.array([0, 1]), 4)
 
 
