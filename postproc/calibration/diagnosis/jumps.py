@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from postproc.calibration.diagnosis.candidates import Projection, reduce_some
-from postproc.calibration.diagnosis.score import Score, rank
+from postproc.calibration.diagnosis.candidates import Projection
+from postproc.calibration.diagnosis.score import Score, rank_some
 from postproc.model.carrier import every_carrier
 from postproc.model.covariate import covariate, varies, varies_enough
 from postproc.model.effects.effect import Candidate, Effect
@@ -30,9 +30,7 @@ def jumps(effect: Effect, projection: Projection) -> list[Score]:
     """
     if not isinstance(effect, CampaignStep):
         return []
-    square = float(projection.rest @ projection.rest)
-    reduced = reduce_some(projection, list(_candidates(effect, projection.at)))
-    return rank(reduced, square, projection.rows)
+    return rank_some(projection, list(_candidates(effect, projection.at)))
 
 
 def _candidates(step: CampaignStep, batch: ArmStates) -> Iterator[Candidate]:

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.calibration.diagnosis.candidates import Projection, reduce_some
-from postproc.calibration.diagnosis.score import Score, rank
+from postproc.calibration.diagnosis.candidates import Projection
+from postproc.calibration.diagnosis.score import Score, rank_some
 from postproc.model.covariate import JOINTS, by_weight, covariate
 from postproc.model.effects.compliance import moments
 from postproc.model.effects.part_motion import PartMotion
@@ -48,28 +48,63 @@ class _Jump:
         rows = self.moved[:, :, None] * values[:, None, :]
         return self.projection.filter(self.projection.fit.whiten(rows))
 
-    def solve(self, at: Floats, width: float) -> tuple[float, Floats, Floats]:
-        """Fit the size of the jump where place and moments are given.
+    def level(self, at: Floats, width: float) -> Floats:
+        """Evaluate a tanh of some width, (n,).
 
         Args:
             at: Place, in halves of the range, and moments, in spreads, (1 + m,).
-            width: Of the tanh.
+            width: Of the tanh, in halves of the range.
+        """
+        values: Floats = np.tanh((self.load + self.by_moment @ at[1:] - at[0]) / width)
+        return values
+
+    def misfit(self, at: Floats, width: float) -> float:
+        """Return twice the negative log posterior, the size of the jump at its best."""
+        column = self.filter_values(self.level(at, width)[:, None])[:, 0]
+        rest = self.projection.rest
+        left = rest - column * (column @ rest) / (column @ column)
+        return float(left @ left + at[1:] @ at[1:])
+
+    def slopes(self, at: Floats, width: float) -> tuple[Floats, float]:
+        """Differentiate the rows by size, place and moments, (3 n, 2 + m), at the size.
 
         Returns:
-            What is to be made small; the next step of place and moments; the slopes of
-            the rows by size, place, and moments, (3 n, 2 + m).
+            The slopes, and the size.
         """
-        level = np.tanh((self.load + self.by_moment @ at[1:] - at[0]) / width)
+        level = self.level(at, width)
         column = self.filter_values(level[:, None])[:, 0]
         size = float(column @ self.projection.rest) / float(column @ column)
-        rest = self.projection.rest - size * column
-        slope = size * (1.0 - level**2) / width
-        inner = np.column_stack([-slope, slope[:, None] * self.by_moment])
-        slopes = np.column_stack([column, self.filter_values(inner)])
+        steep = size * (1.0 - level**2) / width
+        inner = np.column_stack([-steep, steep[:, None] * self.by_moment])
+        return np.column_stack([column, self.filter_values(inner)]), size
+
+    def step(self, at: Floats, width: float) -> Floats:
+        """Return the Gauss-Newton step of place and moments, (1 + m,)."""
+        slopes, size = self.slopes(at, width)
+        rest = self.projection.rest - size * slopes[:, 0]
         prior = np.r_[0.0, 1e-6, np.ones(len(at) - 1)]
         gradient = slopes.T @ rest - prior * np.r_[0.0, at]
-        step = np.linalg.solve(slopes.T @ slopes + np.diag(prior), gradient)
-        return float(rest @ rest + at[1:] @ at[1:]), step[1:], slopes
+        found: Floats = np.linalg.solve(slopes.T @ slopes + np.diag(prior), gradient)
+        return found[1:]
+
+    def narrow(self, at: Floats) -> tuple[Floats, float]:
+        """Narrow the tanh to a jump, and return what its moments cost [nats]."""
+        charge = 0.0
+        for width in WIDTHS:
+            least = self.misfit(at, width)
+            for _ in range(TURNS):
+                step, part = self.step(at, width), 1.0
+                tried = self.misfit(at + step, width)
+                while tried >= least and part > 2.0 * SHORTEST:
+                    part /= 2.0
+                    tried = self.misfit(at + part * step, width)
+                if tried >= least:
+                    break
+                at, least = at + part * step, tried
+            away = self.load + self.by_moment @ at[1:] - at[0]
+            if int((np.abs(away) < width).sum()) >= SEEN:
+                charge = _cost(self.slopes(at, width)[0])
+        return at, charge + float(at[1:] @ at[1:]) / 2.0
 
 
 def place_load_jump(projection: Projection, score: Score) -> Score:
@@ -88,13 +123,29 @@ def place_load_jump(projection: Projection, score: Score) -> Score:
     per_moment = by_weight(projection.at, cell.source)
     if per_moment is None:
         return score
-    first = int(cell.source.split()[1][0])
-    spreads = np.array(
-        [moments(projection.at.arm, k)[0][1] for k in JOINTS[first - 1 :]]
-    )
+    tried, charge = _move(projection, cell, per_moment)
+    (found,) = rank_some(projection, [replace(score.best, effect=tried)])
+    gained = found.best_evidence - charge - score.best_evidence + cell.doubt()
+    if gained <= 0.0:
+        return score
+    return replace(found, evidence=score.evidence + gained)
+
+
+def _move(
+    projection: Projection, cell: PartMotion, per_moment: Floats
+) -> tuple[PartMotion, float]:
+    """Place a step with other moments of links, which cost some nats.
+
+    Args:
+        projection: The fit without it.
+        cell: The step.
+        per_moment: Slopes of its load by the moments of all links, (n, 6, 3).
+    """
+    links = JOINTS[int(cell.source.split()[1][0]) - 1 :]
+    spreads = np.array([[moments(projection.at.arm, k)[0][1]] for k in links])
     load = covariate(projection.at, cell.source)
     half = float(np.ptp(load)) / 2
-    slopes = per_moment[:, first - 1 :] * spreads[:, None] / half
+    slopes = per_moment[:, links[0] - 1 :] * spreads / half
     jump = _Jump(
         projection,
         cell.carrier.move(projection.at),
@@ -102,45 +153,11 @@ def place_load_jump(projection: Projection, score: Score) -> Score:
         slopes.reshape(len(load), -1),
     )
     known = dict(cell.heavier)
-    begun = [known.get(first + k, np.zeros(3)) for k in range(len(spreads))]
-    start = np.array(begun) / spreads[:, None]
-    at, charge = _narrow(jump, np.r_[cell.middle / half, start.reshape(-1)])
-    more = at[1:].reshape(-1, 3) * spreads[:, None]
-    heavier = tuple((first + k, tuple(map(float, m))) for k, m in enumerate(more))
-    tried = replace(cell, middle=float(at[0]) * half, heavier=heavier)
-    square = float(projection.rest @ projection.rest)
-    blocks = reduce_some(projection, [replace(score.best, effect=tried)])
-    (found,) = rank(blocks, square, projection.rows)
-    gained = found.best_evidence - charge - score.best_evidence + cell.doubt()
-    if gained <= 0.0:
-        return score
-    return replace(found, evidence=score.evidence + gained)
-
-
-def _narrow(jump: _Jump, at: Floats) -> tuple[Floats, float]:
-    """Narrow a jump, and say what its moments cost [nats]."""
-    charge = 0.0
-    for width in WIDTHS:
-        for _ in range(TURNS):
-            better = _step(jump, at, width)
-            if better is None:
-                break
-            at = better
-        away = jump.load + jump.by_moment @ at[1:] - at[0]
-        if int((np.abs(away) < width).sum()) >= SEEN:
-            charge = _cost(jump.solve(at, width)[2])
-    return at, charge + float(at[1:] @ at[1:]) / 2
-
-
-def _step(jump: _Jump, at: Floats, width: float) -> Floats | None:
-    """Take one step, shortened until it is better, None where none is."""
-    before, step, _ = jump.solve(at, width)
-    part = 1.0
-    while part > SHORTEST:
-        if jump.solve(at + part * step, width)[0] < before:
-            return at + part * step
-        part /= 2
-    return None
+    start = np.array([known.get(k, np.zeros(3)) for k in links]) / spreads
+    at, charge = jump.narrow(np.r_[cell.middle / half, start.reshape(-1)])
+    more = at[1:].reshape(-1, 3) * spreads
+    heavier = tuple((k, tuple(map(float, m))) for k, m in zip(links, more, strict=True))
+    return replace(cell, middle=float(at[0]) * half, heavier=heavier), charge
 
 
 def _cost(slopes: Floats) -> float:

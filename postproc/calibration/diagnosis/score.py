@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from postproc.arrays import Floats, floats
 from postproc.calibration.diagnosis.candidates import (
     Projection,
     ReducedCandidates,
+    reduce_some,
 )
 from postproc.model.effects.effect import PART_MOTION, Candidate, Family
 
@@ -144,6 +146,23 @@ def rank(
         total = float(weighed.max() + np.log(np.exp(weighed - weighed.max()).sum()))
         out.append(Score(family, total, top[2], float(top[0]), top[1]))
     return sorted(out, key=lambda s: -s.evidence)
+
+
+def rank_some(
+    projection: Projection,
+    candidates: Sequence[Candidate],
+    without: frozenset[str] = frozenset(),
+) -> list[Score]:
+    """Score a few candidates against what a fit leaves, the best family first.
+
+    Args:
+        projection: The fit.
+        candidates: Of any widths.
+        without: As in `rank`.
+    """
+    square = float(projection.rest @ projection.rest)
+    reduced = reduce_some(projection, candidates)
+    return rank(reduced, square, projection.rows, without)
 
 
 def family_maxima(

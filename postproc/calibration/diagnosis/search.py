@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from postproc.calibration.diagnosis.candidates import Projection, reduce_some
+from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.held_out import (
     Folds,
     Gain,
@@ -18,7 +18,7 @@ from postproc.calibration.diagnosis.held_out import (
 from postproc.calibration.diagnosis.jumps import jumps
 from postproc.calibration.diagnosis.load_jumps import place_load_jump
 from postproc.calibration.diagnosis.model_update import revises
-from postproc.calibration.diagnosis.score import Null, Score, rank
+from postproc.calibration.diagnosis.score import Null, Score, rank, rank_some
 from postproc.calibration.diagnosis.table import Causes, free_carrier
 from postproc.calibration.regression import Fit, beside, fit_effects
 from postproc.model.carrier import Carrier, carrier
@@ -72,9 +72,8 @@ def _finer(projection: Projection, score: Score, width: float) -> tuple[Score, f
     effects = [here, *here.refine(width * OFFSETS, projection.at)]
     if len(effects) == 1:
         return score, 0.0
-    square = float(projection.rest @ projection.rest)
     tries = [replace(score.best, effect=e, log_prior=-e.doubt()) for e in effects]
-    found = rank(reduce_some(projection, tries), square, projection.rows)[0]
+    found = rank_some(projection, tries)[0]
     charge = found.best.effect.doubt() - here.doubt()
     gained = found.best_evidence - score.best_evidence - charge
     if gained <= 0.0:
@@ -97,8 +96,7 @@ def lawful(projection: Projection, score: Score, law: Candidate | None) -> Score
     """Take a law with a place instead of a free curve that is not clearly ahead."""
     if law is None:
         return score
-    square = float(projection.rest @ projection.rest)
-    (found,) = rank(reduce_some(projection, [law]), square, projection.rows)
+    (found,) = rank_some(projection, [law])
     found = refine(projection, found)
     if found.best_evidence < score.best_evidence - NEAR:
         return score
@@ -119,9 +117,7 @@ def _instead(
     projection: Projection, score: Score, tried: Candidate, by: float
 ) -> Score:
     """Take another candidate of a family, unless its best is ahead by so many nats."""
-    square = float(projection.rest @ projection.rest)
-    blocks = reduce_some(projection, [tried])
-    found = rank(blocks, square, projection.rows)[0]
+    found = rank_some(projection, [tried])[0]
     if found.best_evidence < score.best_evidence - by:
         return score
     return replace(found, evidence=score.evidence)
@@ -675,8 +671,7 @@ def stand(found: Search, number: int) -> JudgedAddition:
     scores = ranking(projection, found.near)
     here = next((s for s in scores if s.family == own.family), None)
     if number >= len(found.additions) - found.waves:
-        square = float(projection.rest @ projection.rest)
-        here = rank(reduce_some(projection, [own]), square, projection.rows)[0]
+        here = rank_some(projection, [own])[0]
     if here is None:
         here = found.additions[number].score
     rivals = []

@@ -23,7 +23,6 @@ from postproc.calibration.diagnosis.candidates import (
     Projection,
     View,
     reduce_columns,
-    reduce_some,
 )
 from postproc.calibration.diagnosis.model_update import revises
 from postproc.calibration.diagnosis.score import (
@@ -32,7 +31,7 @@ from postproc.calibration.diagnosis.score import (
     draws,
     family_maxima,
     log_evidence,
-    rank,
+    rank_some,
 )
 from postproc.calibration.regression import Fit
 from postproc.model.carrier import Carrier, every_carrier
@@ -340,10 +339,7 @@ class Table:
             if c.part == "link"
             for cell in [PartMotion(str(c), law="constant")]
         ]
-        square = float(projection.rest @ projection.rest)
-        known = frozenset(projection.names)
-        reduced = reduce_some(projection, still)
-        return rank(reduced, square, projection.rows, without=known)
+        return rank_some(projection, still, without=frozenset(projection.names))
 
     def _score(self, view: Projection, family: MotionFamily) -> Score:
         """Put a family and its plainest law into a score."""
@@ -352,8 +348,7 @@ class Table:
         candidate = plain.on(family.carrier, loose)
         placed = family.find_located_law() if isinstance(plain.effect, Curve) else None
         law = None if placed is None else placed.on(family.carrier, loose)
-        square = float(view.rest @ view.rest)
-        score = rank(reduce_some(view, [candidate]), square, view.rows)[0]
+        score = rank_some(view, [candidate])[0]
         return replace(score, evidence=family.evidence, law=law)
 
     def maxima(self, projection: Projection, rows: Floats, square: Floats) -> Floats:

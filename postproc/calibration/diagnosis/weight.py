@@ -21,9 +21,9 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.calibration.backward_elimination import ENOUGH, SURE, keep_needed
-from postproc.calibration.diagnosis.candidates import Projection, reduce_some
+from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.held_out import compare_held_out
-from postproc.calibration.diagnosis.score import Score, rank
+from postproc.calibration.diagnosis.score import Score, rank_some
 from postproc.calibration.diagnosis.search import (
     NEAR,
     Addition,
@@ -137,7 +137,7 @@ def _with_laws(found: Search) -> Search:
 def _score_law(found: Search, fit: Fit, place: int, law: Candidate) -> Addition:
     """Score a law that a fit has."""
     seen = Projection.of(fit, without=place)
-    score = rank(reduce_some(seen, [law]), float(seen.rest @ seen.rest), seen.rows)[0]
+    score = rank_some(seen, [law])[0]
     gain = compare_held_out(fit, place, law)
     return Addition(score, found.null.p_of(score), gain, together=True)
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.calibration.diagnosis.candidates import Projection, reduce_some
+from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.load_jumps import place_load_jump
-from postproc.calibration.diagnosis.score import Score, rank
+from postproc.calibration.diagnosis.score import Score, rank_some
 from postproc.model.carrier import every_carrier
 from postproc.model.covariate import covariate
 from postproc.model.effects.effect import Candidate
@@ -31,8 +31,7 @@ def score(projection: Projection, law: str, source: str) -> Score:
     at, half = float(np.quantile(x, 0.3)), float(np.ptp(x)) / 2
     cell = PartMotion(str(LINK), source=source, law=law, middle=at, half=half)
     candidate = Candidate(family_of(LINK, source), cell, source, 0.0)
-    square = float(projection.rest @ projection.rest)
-    return rank(reduce_some(projection, [candidate]), square, projection.rows)[0]
+    return rank_some(projection, [candidate])[0]
 
 
 def test_weights_of_links_move_a_jump_to_where_it_is(projection: Projection) -> None:
@@ -42,11 +41,7 @@ def test_weights_of_links_move_a_jump_to_where_it_is(projection: Projection) -> 
     assert after.evidence > before.evidence + 20.0
     assert after.best_evidence > before.best_evidence + 20.0
     nominal = replace(after.best.effect, heavier=())
-    same = rank(
-        reduce_some(projection, [replace(after.best, effect=nominal)]),
-        float(projection.rest @ projection.rest),
-        projection.rows,
-    )[0]
+    same = rank_some(projection, [replace(after.best, effect=nominal)])[0]
     assert same.best_evidence < after.best_evidence - 20.0
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.calibration.diagnosis.candidates import Library, Projection, reduce_some
+from postproc.calibration.diagnosis.candidates import Library, Projection
 from postproc.calibration.diagnosis.investigate import Investigation, no_progress, trace
-from postproc.calibration.diagnosis.score import rank
+from postproc.calibration.diagnosis.score import rank_some
 from postproc.calibration.diagnosis.search import Search, ranking, search
 from postproc.calibration.diagnosis.table import Causes, Table
 from postproc.calibration.regression import Fit
@@ -32,9 +32,8 @@ def table(base: Fit) -> Table:
 def test_a_cell_is_scored_as_its_own_candidate_is(base: Fit, table: Table) -> None:
     view = Projection.of(base)
     scores = table.scores(lambda _: view)
-    square = float(view.rest @ view.rest)
     for score in scores[:5]:
-        alone = rank(reduce_some(view, [score.best]), square, view.rows)[0]
+        alone = rank_some(view, [score.best])[0]
         assert score.best_evidence == pytest.approx(alone.best_evidence, rel=1e-6)
         # a family is its laws, each with a share: never above the sum of all
         assert score.evidence < alone.best_evidence + 1.0
