@@ -8,11 +8,11 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import Meaning, OrientationLaw, Visits
-from postproc.motion.path import circles
+from postproc.motion.path import shares_before_via
 from postproc.robot.pose import lengths, rotation_from_vector, rotation_vector
 from postproc.robot.trajectory import Motion
 
-HALF = np.deg2rad(170.0)  # from here on the shorter way round is not sure
+HALF = np.deg2rad(170.0)  # from here on the shorter way round is uncertain
 
 
 @dataclass(frozen=True)
@@ -54,32 +54,18 @@ class ArcTurns:
         return out
 
     def turn(self, tcp: Floats) -> Floats:
-        """Turn the points between, (k, 4, 4) [m]; NaN where that is not sure.
+        """Turn the points between, (k, 4, 4) [m]; NaN where that is uncertain.
 
         Args:
             tcp: TCP poses of all visits, (n, 4, 4) [m].
         """
         begin, out, last = (np.array(tcp[k]) for k in (self.start, self.via, self.end))
-        share = _share_of_way(*(pose[:, :3, 3] for pose in (begin, out, last)))
+        share = shares_before_via(begin, out, last)
         turn = rotation_vector(np.swapaxes(begin[:, :3, :3], 1, 2) @ last[:, :3, :3])
         part = rotation_from_vector(share[:, None] * turn)
         out[:, :3, :3] = begin[:, :3, :3] @ part
         out[~(lengths(turn) < HALF)] = np.nan
         return out
-
-
-def _share_of_way(begin: Floats, via: Floats, end: Floats) -> Floats:
-    """Return how much of arcs lies before the points between, (k,)."""
-    centre, normal, valid = circles(begin, via, end)
-    radius = begin - centre
-    tangent = np.cross(normal, radius)
-    angles = [
-        np.mod(np.arctan2((x * tangent).sum(1), (x * radius).sum(1)), 2 * np.pi)
-        for x in (via - centre, end - centre)
-    ]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share: Floats = np.where(valid, angles[0] / angles[1], np.nan)
-    return share
 
 
 def turn_between(visits: Visits, tcp: Floats) -> Bools:

@@ -113,6 +113,20 @@ def arcs(
     )
 
 
+def shares_before_via(begin: Floats, via: Floats, end: Floats) -> Floats:
+    """Return how much of arcs lies before VIA, (m,); NaN where there is no circle.
+
+    Args:
+        begin: TCP poses at their starts, (m, 4, 4) [m].
+        via: Those between, likewise.
+        end: Those at their ends.
+    """
+    first, second = arcs(begin, via, end)
+    whole = np.maximum(first.angle + second.angle, 1e-12)
+    share: Floats = np.where(first.valid, first.angle / whole, np.nan)
+    return share
+
+
 def circles(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Bools]:
     """Find the circles through points (m, 3) [m]: centres, unit normals, which exist.
 

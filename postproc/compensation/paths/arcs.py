@@ -21,7 +21,7 @@ from postproc.language.language import ArcPiece
 from postproc.language.visits import Visits
 from postproc.motion.blending import zones
 from postproc.motion.cycle_time import ProgramCycle
-from postproc.motion.path import Segments, arcs, circles
+from postproc.motion.path import Segments, arcs, circles, shares_before_via
 from postproc.motion.targets import Fly, Targets
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM, lengths, rotation_from_vector, rotation_vector
@@ -65,12 +65,11 @@ def _uneven(v: Visits, via: Ints) -> Bools:
     """Tell on which arcs (k,) the tool does not turn evenly about one axis."""
     start = np.maximum(v.before[via], 0)
     poses = [v.dialect.poses(v.values[rows]) for rows in (start, via, via + 1)]
-    first, second = arcs(poses[0], poses[1], poses[2])
-    whole = np.maximum(first.angle + second.angle, 1e-12)
+    share = shares_before_via(poses[0], poses[1], poses[2])
     base = np.swapaxes(poses[0][:, :3, :3], 1, 2)
     turns = [rotation_vector(base @ pose[:, :3, :3]) for pose in poses[1:]]
-    off = turns[0] - turns[1] * (first.angle / whole)[:, None]
-    return np.asarray(~(lengths(off) < UNEVEN) | ~first.valid)
+    off = turns[0] - turns[1] * share[:, None]
+    return np.asarray(~(lengths(off) < UNEVEN))
 
 
 @dataclass(frozen=True)
