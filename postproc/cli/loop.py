@@ -67,13 +67,13 @@ def diagnose(
             )
             if not found.rejected:
                 found.save(output or path_of_extension(model))
-        told = evidence_of(found)
+        evidence = evidence_of(found) if reports.files else {}
         measured = {} if on_the_way is None else {"path": on_the_way.to_dict()}
-        reports.write_json(lambda: dump_json(schema("diagnosis") | told | measured))
+        reports.write_json(lambda: dump_json(schema("diagnosis") | evidence | measured))
         if reports.pages:
             from postproc.report.html import diagnosis_report
 
-            reports.write_pages(lambda: diagnosis_report(told))
+            reports.write_pages(lambda: diagnosis_report(evidence))
         if reports.plots:
             from postproc.report.plots import plot_diagnosis
 
