@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from typing import Any
 
 import numpy as np
+import pytest
 
 from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.compensation.compensate import compensate
@@ -14,6 +16,7 @@ from postproc.compensation.program import plan_visits, prepare_cell, read_progra
 from postproc.language.krl.pose_encoding import abc_from_rotation
 from postproc.model.model import Model
 from postproc.robot.arm import load_arm
+from postproc.robot.cell import load_cell
 from tests.calibration.simulator import random_arm, random_states, survey_of
 
 KR = load_arm("kr210-r2700-extra")
@@ -52,6 +55,29 @@ def surveyed(truth: Any, seed: int) -> Model:
     position, _ = truth.measure(states, rng)
     survey = survey_of(states, position)
     return model_of(fit_survey(survey, KR, None, None), survey)
+
+
+@pytest.fixture(scope="module", name="cell")
+def curved_cell(tmp_path_factory):
+    path = tmp_path_factory.mktemp("cell") / "cell.toml"
+    path.write_text(CELL)
+    return load_cell(path)
+
+
+@pytest.fixture(scope="module", name="truth")
+def curved_truth():
+    return drawn_arm(16)
+
+
+@pytest.fixture(scope="module", name="model")
+def curved_model():
+    return _fitted_model()
+
+
+@cache
+def _fitted_model() -> Model:
+    """Fit the model of that arm once for all modules that test with it."""
+    return surveyed(drawn_arm(16), 17)
 
 
 def tool_pose() -> np.ndarray:

@@ -17,36 +17,18 @@ from postproc.compensation.arc_angles import (
 )
 from postproc.compensation.continuity import ANGLED
 from postproc.compensation.outcome import Status
-from postproc.robot.cell import load_cell
-from tests.compensation.curved import (
-    CELL,
+from tests.compensation.curved import (  # noqa: F401
     CENTRE,
     KR,
-    drawn_arm,
+    curved_cell,
+    curved_model,
+    curved_truth,
     frame,
     job,
     plans,
     points,
-    surveyed,
     tool_pose,
 )
-
-
-@pytest.fixture(scope="module")
-def cell(tmp_path_factory):
-    path = tmp_path_factory.mktemp("cell") / "cell.toml"
-    path.write_text(CELL)
-    return load_cell(path)
-
-
-@pytest.fixture(scope="module")
-def truth():
-    return drawn_arm(16)
-
-
-@pytest.fixture(scope="module")
-def model(truth):
-    return surveyed(truth, 17)
 
 
 def circle(a: np.ndarray, b: np.ndarray, c: np.ndarray, deg: float) -> np.ndarray:

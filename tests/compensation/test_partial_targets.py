@@ -15,37 +15,19 @@ from postproc.compensation.program import plan_visits, prepare_cell, read_progra
 from postproc.compensation.windowing import cut_points
 from postproc.language.krl.moves import PARTIAL
 from postproc.motion.targets import AMBIGUOUS, CODE, NO_TARGET
-from postproc.robot.cell import load_cell
-from tests.compensation.curved import (
-    CELL,
+from tests.compensation.curved import (  # noqa: F401
     CENTRE,
     KR,
-    drawn_arm,
+    curved_cell,
+    curved_model,
+    curved_truth,
     frame,
     job,
     plans,
-    surveyed,
     tool_pose,
 )
 
 SPREAD = np.deg2rad([25.0, 8.0, 8.0, 30.0, 15.0, 30.0])
-
-
-@pytest.fixture(scope="module")
-def cell(tmp_path_factory):
-    path = tmp_path_factory.mktemp("cell") / "cell.toml"
-    path.write_text(CELL)
-    return load_cell(path)
-
-
-@pytest.fixture(scope="module")
-def truth():
-    return drawn_arm(16)
-
-
-@pytest.fixture(scope="module")
-def model(truth):
-    return surveyed(truth, 17)
 
 
 def places(k: int, seed: int) -> np.ndarray:
