@@ -27,7 +27,7 @@ from postproc.calibration.measurements import Measurements
 from postproc.exceptions import PostprocError
 
 POSES = (20, 40, 60, 100)
-TESTED = 400  # rows
+TESTED, LEAST = 400, 100  # rows, at most and at least
 SIMPLE = ("geometry", "backlash")
 DRAWS = 4000  # of the bootstrap
 
@@ -120,6 +120,8 @@ def campaigns(data: DataSet, draws: int) -> Iterator[list[Pair]]:
     """Fit all campaigns of a set, and print a line for each series and size."""
     for series in data.series:
         for poses in POSES:
+            if len(data.series[series]) < poses + LEAST:
+                continue
             found = [pair(data, series, poses, seed) for seed in range(draws)]
             pairs = [p for p in found if isinstance(p, Pair)]
             if pairs:
