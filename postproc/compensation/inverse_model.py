@@ -394,8 +394,11 @@ def new_numbers(
     if len(rows):
         by = rotation_from_vector(turns_in_file(visits, solved)[rows])
         numbers[rows] = dialect.rotate(numbers[rows], by)
-    if dialect.reflags:
-        q = _solve_written(visits, arm, poses, numbers[poses], solved.q[poses])
+    if dialect.flag_joints:
+        q = np.array(solved.q[poses])
+        close = np.flatnonzero(dialect.rounding_decides(q))
+        rows = poses[close]
+        q[close] = _solve_written(visits, arm, rows, numbers[rows], q[close])
         numbers[poses] = dialect.rewrite_flags(numbers[poses], q, plan.q[poses])
     return numbers
 

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, all_in_rows
+
+BESIDE = np.deg2rad(0.1)  # of a border of flags [rad]
+STRAIGHT = 0.02  # sine of axis 5
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,9 @@ class Dialect(ABC):
 
     Attributes:
         terms: Its words.
-        reflags: Flags depend on small moves, and are written anew.
+        flag_joints: Joints whose sides of a border flags say, which small moves decide:
+            such flags are written anew.
+        flag_step: From one border to the next [rad]; one of them is 0.
         flag_columns: Which numbers of a pose are flags.
         heads: What tables head the numbers of a pose with, w words.
         pose_decimals, joint_decimals: Least decimals of every written number, w each.
@@ -76,10 +81,22 @@ class Dialect(ABC):
     runs_alone: bool = False
     terms: Terms
     heads: tuple[str, ...]
-    reflags: bool = False
+    flag_joints: tuple[int, ...] = ()
+    flag_step: float = 2 * np.pi
     flag_columns: tuple[int, ...] = ()
     pose_decimals: tuple[int, ...]
     joint_decimals: tuple[int, ...]
+
+    def rounding_decides(self, q: Floats) -> Bools:
+        """Tell where the last digits of a target may decide its flags, (k,).
+
+        They move joints (k, 6) [rad] by far less than `BESIDE`, but where the wrist is
+        nearly straight.
+        """
+        own = q[:, list(self.flag_joints)]
+        off = own - self.flag_step * np.round(own / self.flag_step)
+        far = all_in_rows(np.abs(off) > BESIDE)  # false of NaN too
+        return ~(far & (np.abs(np.sin(q[:, 4])) > STRAIGHT))
 
     @property
     def width(self) -> int:

@@ -64,7 +64,8 @@ class KrlNumbers(Dialect):
     runs_alone: bool = True
     terms: Terms = TERMS
     heads: tuple[str, ...] = HEADS
-    reflags: bool = True
+    flag_joints: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+    flag_step: float = 1e6  # 0 alone
     flag_columns: tuple[int, ...] = (STATUS, TURN)
     pose_decimals: tuple[int, ...] = (
         *(MM_DECIMALS,) * 3,
