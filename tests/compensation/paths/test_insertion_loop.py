@@ -31,12 +31,12 @@ from postproc.simulation.program import land
 from tests.compensation.paths.test_path_error import (
     ARM,
     CELL,
-    DESIGN,
     LINES,
     SEED,
     START,
     done,
     drawn,
+    fitted,
     job,
     pos,
 )
@@ -62,10 +62,7 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An arm surveyed, and a job with points on its ways, with and without stops."""
     folder = tmp_path_factory.mktemp("points")
     (folder / "job.pdl").write_bytes(timed().encode())
-    survey, measured = folder / "survey.pdl", folder / "survey.csv"
-    done("survey", "--cell", CELL, *DESIGN, "-o", survey)
-    done("simulate", survey, "--cell", CELL, *ARM, "-o", measured)
-    done("fit", measured, "--cell", CELL, "-o", folder / "model.json")
+    (folder / "model.json").write_bytes(fitted())
     known(folder, "confirmed")
     asked = ("--path-tolerance", TOLERANCE)
     for name, more in (("plain", ()), ("points", asked),
