@@ -172,14 +172,25 @@ class Dialect(ABC):
         """
         return None
 
-    def near_border(self, values: Floats, q: Floats, before: Floats) -> Bools | None:
+    def near_border(
+        self, values: Floats, q: Floats, before: Floats, rounded: bool = False
+    ) -> Bools | None:
         """Tell which joints are too near a border of flags, (k, 6).
 
         None where flags there do no harm.
 
         Args:
-            values: Numbers of poses as they are written, (k, w).
+            values: Numbers of poses as they are in the source, (k, w).
             q: Joints that the commands reach, (k, 6) [rad].
             before: Joints that the source reaches, (k, 6) [rad].
+            rounded: The commands are those of numbers as they are written.
+        """
+        return None
+
+    def leave_border(self, values: Floats, q: Floats, before: Floats) -> Floats | None:
+        """Say how far joints must move to leave a border of flags, (k, 6) [rad].
+
+        0 where they need not, or where the side they are on is not known; None where
+        `near_border` finds none. For the arguments see there.
         """
         return None
