@@ -17,7 +17,7 @@ from postproc.compensation.continuity import (
     path_correction,
 )
 from postproc.compensation.eligibility import STRAYS, Reasons, find_strayed
-from postproc.compensation.flag_borders import flagged_poses
+from postproc.compensation.flag_borders import joints_written, poses_with_signs
 from postproc.compensation.inverse_model import (
     Commands,
     angles_astray,
@@ -633,8 +633,8 @@ class Round:
         passed make up for their corner: both differ from the commands.
         """
         visits, out = self.reading.visits, np.zeros((len(found.corrected), 6), bool)
-        rows = np.flatnonzero(found.corrected & flagged_poses(visits))
-        if len(rows) == 0 or not visits.dialect.reflags:
+        rows = np.flatnonzero(found.corrected & poses_with_signs(visits))
+        if len(rows) == 0:
             return out
         arm, given, new = (
             self.setting.cell.arm,
@@ -645,9 +645,7 @@ class Round:
             solve_written(visits, arm, rows, numbers[rows], near[rows])
             for numbers, near in ((given, self.planned.plan.q), (new, self.solved.q))
         )
-        borders = visits.dialect.near_border(given[rows], q, before, rounded=True)
-        if borders is not None:
-            out[rows] = borders
+        out[rows] = visits.dialect.near_border(given[rows], q, before, rounded=True)
         return out
 
     def decide(self, strays: Bools, border: Bools) -> Proposal:
@@ -709,11 +707,16 @@ class Round:
 
     def _guard_flags(self, reasons: Reasons, border: Bools) -> None:
         """Mark corrections that end where flags are not sure."""
-        visits, before = self.reading.visits, self.planned.plan.q
-        near = visits.dialect.near_border(visits.values, self.solved.q, before)
-        if near is None:
-            return
-        near = (near & flagged_poses(visits)[:, None]) | border
+        visits, plan = self.reading.visits, self.planned.plan
+        near = np.array(border)
+        rows = np.flatnonzero(poses_with_signs(visits))
+        q, before = (
+            joints_written(
+                self.setting.cell.arm, self.planned, rows, tcp[rows], q[rows]
+            )
+            for tcp, q in ((self.solved.command, self.solved.q), (plan.tcp, plan.q))
+        )
+        near[rows] |= visits.dialect.near_border(visits.values[rows], q, before)
         for axis, found in enumerate(near.T, start=1):
             text = visits.dialect.terms.border.format(axis)
             reasons.mark(found, Reason(Code.CONFIGURATION_BORDER, text))

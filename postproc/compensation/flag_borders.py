@@ -31,9 +31,29 @@ MOST_TURN = np.deg2rad(0.005)  # of the tool: 0.09 mm at 1 m from the TCP
 SINGULAR = 1e-12
 
 
-def flagged_poses(visits: Visits) -> Bools:
-    """Tell at which visits the controller heeds flags, (n,)."""
+def poses_with_signs(visits: Visits) -> Bools:
+    """Tell at which visits flags tell the controller the signs of axes, (n,)."""
+    if not visits.dialect.sign_flags:
+        return np.zeros(len(visits), dtype=bool)
     return np.asarray(visits.config_given & (visits.target == Meaning.POSE))
+
+
+def joints_written(
+    arm: Arm, planned: PlannedProgram, rows: Ints, tcp: Floats, q: Floats
+) -> Floats:
+    """Return the joints where targets lie whose corners pass by `tcp`, (k, 6) [rad].
+
+    Flags are those of the target that is written. `q` holds the joints at `tcp`.
+    """
+    aside, out = planned.plan.aside[rows], np.array(q)
+    off = np.flatnonzero(any_in_rows(aside != 0.0) & np.isfinite(q).all(axis=1))
+    if len(off) == 0:
+        return out
+    place = np.array(tcp[off])
+    place[:, :3, 3] -= aside[off]
+    flange = place @ inverse(take_rows(planned.plan.tool, rows[off]))
+    out[off] = nearest_joints(arm, flange, q[off], arm.branch(q[off]))
+    return out
 
 
 def turn_from_borders(
@@ -58,12 +78,12 @@ def turn_from_borders(
         states: Planned states, with the directions that are corrected for.
         orientation: The orientation is corrected as well as the position.
     """
-    some = np.flatnonzero(rows & solved.known & flagged_poses(visits))
+    some = np.flatnonzero(rows & solved.known & poses_with_signs(visits))
     plan, arm = planned.plan, cell.arm
-    q = _joints_written(arm, planned, some, solved.command[some], solved.q[some])
-    before = _joints_written(arm, planned, some, plan.tcp[some], plan.q[some])
+    q = joints_written(arm, planned, some, solved.command[some], solved.q[some])
+    before = joints_written(arm, planned, some, plan.tcp[some], plan.q[some])
     moves = visits.dialect.leave_border(visits.values[some], q, before)
-    if moves is None or not moves.any():
+    if not moves.any():
         return solved
     moving = any_in_rows(moves != 0.0)
     some, q, moves = some[moving], q[moving], moves[moving]
@@ -75,24 +95,6 @@ def turn_from_borders(
     wanted[:, :3, :3] = rotation_from_vector(turn) @ wanted[:, :3, :3]
     part = solve(model, arm, wanted, tool, states[some], orientation)
     return _with_commands(solved, some, part.q, part.command, part.residual, planned)
-
-
-def _joints_written(
-    arm: Arm, planned: PlannedProgram, rows: Ints, tcp: Floats, q: Floats
-) -> Floats:
-    """Return the joints where targets lie whose corners pass by `tcp`, (k, 6) [rad].
-
-    Flags are those of the target that is written. `q` holds the joints at `tcp`.
-    """
-    aside, out = planned.plan.aside[rows], np.array(q)
-    off = np.flatnonzero(any_in_rows(aside != 0.0) & np.isfinite(q).all(axis=1))
-    if len(off) == 0:
-        return out
-    place = np.array(tcp[off])
-    place[:, :3, 3] -= aside[off]
-    flange = place @ inverse(take_rows(planned.plan.tool, rows[off]))
-    out[off] = nearest_joints(arm, flange, q[off], arm.branch(q[off]))
-    return out
 
 
 def _with_commands(

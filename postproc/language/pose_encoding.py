@@ -66,6 +66,7 @@ class Dialect(ABC):
     Attributes:
         terms: Its words.
         reflags: Flags depend on small moves, and are written anew.
+        sign_flags: Flags name the signs of axes, also of axes near 0.
         flag_columns: Which numbers of a pose are flags.
         heads: What tables head the numbers of a pose with, w words.
         pose_decimals, joint_decimals: Least decimals of every written number, w each.
@@ -77,6 +78,7 @@ class Dialect(ABC):
     terms: Terms
     heads: tuple[str, ...]
     reflags: bool = False
+    sign_flags: bool = False
     flag_columns: tuple[int, ...] = ()
     pose_decimals: tuple[int, ...]
     joint_decimals: tuple[int, ...]
@@ -174,10 +176,10 @@ class Dialect(ABC):
 
     def near_border(
         self, values: Floats, q: Floats, before: Floats, rounded: bool = False
-    ) -> Bools | None:
+    ) -> Bools:
         """Tell which joints are too near a border of flags, (k, 6).
 
-        None where flags there do no harm.
+        Only where `sign_flags` says that flags name signs of axes.
 
         Args:
             values: Numbers of poses as they are in the source, (k, w).
@@ -185,12 +187,12 @@ class Dialect(ABC):
             before: Joints that the source reaches, (k, 6) [rad].
             rounded: The commands are those of numbers as they are written.
         """
-        return None
+        return np.zeros(q.shape, dtype=bool)
 
-    def leave_border(self, values: Floats, q: Floats, before: Floats) -> Floats | None:
+    def leave_border(self, values: Floats, q: Floats, before: Floats) -> Floats:
         """Say how far joints must move to leave a border of flags, (k, 6) [rad].
 
-        0 where they need not, or where the side they are on is not known; None where
-        `near_border` finds none. For the arguments see there.
+        0 where they need not, or where the side they are on is not known. For the
+        arguments see `near_border`.
         """
-        return None
+        return np.zeros(q.shape)

@@ -66,6 +66,7 @@ class KrlNumbers(Dialect):
     terms: Terms = TERMS
     heads: tuple[str, ...] = HEADS
     reflags: bool = True
+    sign_flags: bool = True
     flag_columns: tuple[int, ...] = (STATUS, TURN)
     pose_decimals: tuple[int, ...] = (
         *(MM_DECIMALS,) * 3,
