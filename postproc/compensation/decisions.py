@@ -707,15 +707,10 @@ class Round:
 
     def _guard_flags(self, reasons: Reasons, border: Bools) -> None:
         """Mark corrections that end where flags are not sure."""
-        visits, plan = self.reading.visits, self.planned.plan
-        near = np.array(border)
+        visits, near = self.reading.visits, np.array(border)
         rows = np.flatnonzero(poses_with_signs(visits))
-        q, before = (
-            joints_written(
-                self.setting.cell.arm, self.planned, rows, tcp[rows], q[rows]
-            )
-            for tcp, q in ((self.solved.command, self.solved.q), (plan.tcp, plan.q))
-        )
+        arm, solved = self.setting.cell.arm, self.solved
+        q, before = joints_written(arm, self.planned, rows, solved, self.aside)
         near[rows] |= visits.dialect.near_border(visits.values[rows], q, before)
         for axis, found in enumerate(near.T, start=1):
             text = visits.dialect.terms.border.format(axis)

@@ -39,21 +39,36 @@ def poses_with_signs(visits: Visits) -> Bools:
 
 
 def joints_written(
-    arm: Arm, planned: PlannedProgram, rows: Ints, tcp: Floats, q: Floats
-) -> Floats:
-    """Return the joints where targets lie whose corners pass by `tcp`, (k, 6) [rad].
+    arm: Arm, planned: PlannedProgram, rows: Ints, solved: Commands, aside: Floats
+) -> tuple[Floats, Floats]:
+    """Return the joints of targets as they are written, where flags count.
 
-    Flags are those of the target that is written. `q` holds the joints at `tcp`.
+    A blended target lies beside the path, and the tool is turned otherwise there.
+
+    Args:
+        arm: The arm.
+        planned: The program's plan, n visits.
+        rows: k visits with known targets.
+        solved: Where the path should pass them.
+        aside: From the targets to there, (n, 3) [m].
+
+    Returns:
+        Joints of the commands, and of the source, (k, 6) [rad].
     """
-    aside, out = planned.plan.aside[rows], np.array(q)
-    off = np.flatnonzero(any_in_rows(aside != 0.0) & np.isfinite(q).all(axis=1))
+    plan, q, before = planned.plan, solved.q[rows], planned.plan.q[rows]
+    known = np.isfinite(q).all(axis=1) & np.isfinite(before).all(axis=1)
+    off = np.flatnonzero(known & any_in_rows(plan.aside[rows] != 0.0))
     if len(off) == 0:
-        return out
-    place = np.array(tcp[off])
-    place[:, :3, 3] -= aside[off]
-    flange = place @ inverse(take_rows(planned.plan.tool, rows[off]))
-    out[off] = nearest_joints(arm, flange, q[off], arm.branch(q[off]))
-    return out
+        return q, before
+    some, pose = rows[off], planned.targets.tcp[rows[off]]
+    from_tcp = inverse(take_rows(plan.tool, some))
+    new = np.array(pose)
+    new[:, :3, :3] = rotation_from_vector(solved.turn[some]) @ pose[:, :3, :3]
+    new[:, :3, 3] = solved.command[some, :3, 3] - aside[some]
+    for out, written in ((q, new), (before, pose)):
+        near = out[off]
+        out[off] = nearest_joints(arm, written @ from_tcp, near, arm.branch(near))
+    return q, before
 
 
 def turn_from_borders(
@@ -64,6 +79,7 @@ def turn_from_borders(
     cell: Cell,
     planned: PlannedProgram,
     states: States,
+    aside: Floats,
     orientation: bool = False,
 ) -> Commands:
     """Turn the tool where that takes axes off the border of their flags.
@@ -76,18 +92,18 @@ def turn_from_borders(
         cell: The arm.
         planned: The program's plan.
         states: Planned states, with the directions that are corrected for.
+        aside: From targets to where the corrected path passes them, (n, 3) [m].
         orientation: The orientation is corrected as well as the position.
     """
     some = np.flatnonzero(rows & solved.known & poses_with_signs(visits))
     plan, arm = planned.plan, cell.arm
-    q = joints_written(arm, planned, some, solved.command[some], solved.q[some])
-    before = joints_written(arm, planned, some, plan.tcp[some], plan.q[some])
+    tool = take_rows(plan.tool, some)
+    q, before = joints_written(arm, planned, some, solved, aside)
     moves = visits.dialect.leave_border(visits.values[some], q, before)
     if not moves.any():
         return solved
     moving = any_in_rows(moves != 0.0)
-    some, q, moves = some[moving], q[moving], moves[moving]
-    tool = take_rows(plan.tool, some)
+    some, q, moves, tool = some[moving], q[moving], moves[moving], tool[moving]
     turn = turns_moving(arm, q, tool[:, :3, 3], moves)
     small = lengths(turn) <= MOST_TURN  # NaN is not
     some, tool, turn = some[small], tool[small], turn[small]

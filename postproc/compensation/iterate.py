@@ -188,10 +188,14 @@ class Iteration:
 
     def _keep_sides(self, solved: Commands, rows: Bools, states: States) -> Commands:
         """Let axes near 0 stay on the side that flags name."""
-        setting = self.setting
+        setting, plan = self.setting, self.planned.plan
+        if not self.reading.visits.dialect.sign_flags:
+            return solved
+        wanted = np.nan_to_num(solved.command[:, :3, 3] - plan.tcp[:, :3, 3])
         return turn_from_borders(
             solved, rows, self.reading.visits, setting.model, setting.cell,
-            self.planned, states, setting.options.orientation,
+            self.planned, states, passing_after(plan, wanted),
+            setting.options.orientation,
         )  # fmt: skip
 
     def measure_deviation(self, solved: Commands, rows: Ints) -> JointDeviation:
