@@ -82,18 +82,15 @@ def flow_of(
     last = next(outside, routine.last)
     flow = RoutineFlow(routine.first + 1, last, range(last, routine.last))
     stack: list[list[int]] = []
+    heads = []
     for row in range(flow.first, last):
-        _take(flow, stack, row, text.statement(row))
-    heads = [k for k in range(flow.first, last) if _is_loop(text.statement(k))]
+        one = text.statement(row)
+        _take(flow, stack, row, one)
+        loops = isinstance(one, said.Branch) and one.word in LOOPS
+        if loops or isinstance(one, said.ForLoop):
+            heads.append(row)
     _find_exits(flow, text, heads)
     return flow
-
-
-def _is_loop(one: said.SourceStatement) -> bool:
-    """Tell whether a loop begins with a statement."""
-    return isinstance(one, said.ForLoop) or (
-        isinstance(one, said.Branch) and one.word in LOOPS
-    )
 
 
 def _find_exits(
