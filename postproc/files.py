@@ -189,7 +189,10 @@ def write_all(files: Mapping[Path, Content]) -> None:
                     ready.write(_follow_link(path), data)
             for path, data in files.items():
                 if is_stream(path):
-                    _write_through(path, data)
+                    # What is open elsewhere: nothing that it holds is cut off.
+                    handle = os.open(path, os.O_WRONLY | os.O_APPEND)
+                    with os.fdopen(handle, "wb") as out:
+                        out.writelines([data] if isinstance(data, bytes) else data)
             ready.rename()
     except OSError as exc:
         raise disk_error(exc, path) from None
@@ -258,7 +261,12 @@ class _Temporaries:
             for name, place in self._ready:
                 os.replace(name, place)
         for folder in {place.parent for _, place in self._ready}:
-            _sync_folder(folder)
+            # Renames become durable with their folder.
+            handle = os.open(folder, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
 
 
 @contextmanager
@@ -294,27 +302,11 @@ def _follow_link(path: Path) -> Path:
     return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
-def _write_through(path: Path, data: Content) -> None:
-    """Write into what is open elsewhere; nothing that it holds is cut off."""
-    handle = os.open(path, os.O_WRONLY | os.O_APPEND)
-    with os.fdopen(handle, "wb") as out:
-        out.writelines([data] if isinstance(data, bytes) else data)
-
-
 def _umask() -> int:
     """Read the process's file mode mask."""
     mask = os.umask(0)
     os.umask(mask)
     return mask
-
-
-def _sync_folder(folder: Path) -> None:
-    """Make renames in a folder durable."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _reason(exc: OSError) -> str:
@@ -493,7 +485,8 @@ def find_shared_list(
     folder, listing = program.absolute().parent, listing or FolderListing()
     found = listing.named(folder, SHARED_LIST)
     for above in list(folder.parents)[:ARCHIVE_DEPTH]:
-        if found is not None or (within is not None and not _is_below(above, within)):
+        outside = within is not None and within not in (above, *above.parents)
+        if found is not None or outside:
             break
         found = listing.named(above / "System", SHARED_LIST)
     return found
@@ -523,10 +516,6 @@ def find_shared(
         submits += listing.submits(place)
     names = {path.name.lower(): path for path in submits}
     return (*(() if found is None else (found,)), *names.values())
-
-
-def _is_below(folder: Path, root: Path) -> bool:
-    return folder == root or root in folder.parents
 
 
 def _beside(place: Path, name: str) -> Path | None:

@@ -3,7 +3,9 @@
     python docs/tools/counts.py
 
 A participle name is one whose first word ends in "ed" or is an irregular participle. A
-small private function has a body of five lines or less and one mention in the package.
+private function has one caller if the package mentions it once, and calls it there: a
+callback, a rule in a table or a property has no caller that could take its body in. It
+is small with a body of five lines or less.
 Words are those that FORBIDDEN lists, in pages, in the help of commands, and in texts
 of the package that hold a blank and are no docstrings.
 """
@@ -13,7 +15,7 @@ from __future__ import annotations
 import ast
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -64,13 +66,18 @@ def functions(tree: ast.AST) -> Iterator[Defined]:
             yield Defined(node.name, size)
 
 
-def mentions(tree: ast.AST) -> Iterator[str]:
-    """Yield the names that a module mentions, other than by defining them."""
-    for node in ast.walk(tree):
+def names_of(nodes: Iterable[ast.AST]) -> Iterator[str]:
+    """Yield the names that nodes mention, other than by defining them."""
+    for node in nodes:
         if isinstance(node, ast.Name):
             yield node.id
         elif isinstance(node, ast.Attribute):
             yield node.attr
+
+
+def calls(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield what a module calls."""
+    return (node.func for node in ast.walk(tree) if isinstance(node, ast.Call))
 
 
 def is_participle(name: str) -> bool:
@@ -155,8 +162,10 @@ def main() -> None:
     """Print the counts."""
     trees = list(modules())
     known = [f for tree in trees for f in functions(tree)]
-    mentioned = Counter(name for tree in trees for name in mentions(tree))
-    private = [f for f in known if is_private(f.name) and mentioned[f.name] == 1]
+    mentioned = Counter(name for tree in trees for name in names_of(ast.walk(tree)))
+    called = {name for tree in trees for name in names_of(calls(tree))}
+    once = {name for name, count in mentioned.items() if count == 1} & called
+    private = [f for f in known if is_private(f.name) and f.name in once]
     every = commands()
     lines = sum(len(p.read_text("utf-8").splitlines()) for p in PACKAGE.rglob("*.py"))
     done, codes = documented()

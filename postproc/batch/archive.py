@@ -34,21 +34,13 @@ def missing_in_cell(archive: Archive, cell: Cell) -> list[str]:
     return found
 
 
-def _arm_pose_record(cell: Cell, archive: Archive) -> np.ndarray:
-    """Return where the cell places the arm, as a position record."""
-    if not archive.root:
-        return np.array(NO_SHIFT)
-    return np.asarray(record_from_pose(cell.base.pose[None])[0])
-
-
 def _lines(archive: Archive, cell: Cell) -> Iterator[str]:
     """Yield lines for the cell file."""
     file = cell.file
     if "absolute_accuracy" not in file.robot.model_fields_set:
         yield "absolute_accuracy = false   # under [robot], if it is off on this arm"
-    apart = np.abs(
-        np.subtract(archive.root or NO_SHIFT, _arm_pose_record(cell, archive))
-    )
+    base = record_from_pose(cell.base.pose[None])[0] if archive.root else NO_SHIFT
+    apart = np.abs(np.subtract(archive.root or NO_SHIFT, base))
     if apart.max() > NEAR:
         numbers = [round(v, 4) for v in archive.root]
         yield "[base]   # of the arm, by the archive"

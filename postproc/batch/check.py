@@ -273,7 +273,10 @@ class _Look:
             yield CheckFinding(
                 place, Code.UNFINISHED, "is a temporary file of a run that was killed"
             )
-        elif is_program(place) or self._is_own_list(place):
+        elif is_program(place) or (
+            is_data_list(place)
+            and any(self._existing(place[: -len(KRL_DATA)] + s) for s in KRL_PROGRAMS)
+        ):
             yield from self._program(place)
         elif is_variables(place) and not self._existing(program_of(place)):
             if holds_targets(read_input(self.root / place)):
@@ -281,18 +284,14 @@ class _Look:
                     place, Code.UNCOMPENSATED, "its program is not beside it"
                 )
         elif is_compiled(place) and self._existing(program_of(place)):
-            yield from self._check_compiled(place)
+            if self.source is not None and (self.source / place).is_file():
+                if read_input(self.source / place) == read_input(self.root / place):
+                    text = "is compiled from the uncompensated program: translate it "
+                    yield CheckFinding(place, Code.UNCOMPENSATED, f"{text}again")
 
     def _existing(self, place: str) -> str | None:
         """Return the file of a name, whatever its case."""
         return self.places.get(place.lower())
-
-    def _is_own_list(self, place: str) -> bool:
-        """Tell whether a file is the data list of a source beside it."""
-        if not is_data_list(place):
-            return False
-        stem = place[: -len(KRL_DATA)]
-        return any(self._existing(stem + suffix) for suffix in KRL_PROGRAMS)
 
     def _program(self, place: str) -> Iterator[CheckFinding]:
         """Check a program and the variable file that was written with it."""
@@ -315,7 +314,10 @@ class _Look:
             return
         yield from self._model(place, sidecar)
         if self.assume_motion:
-            yield from _find_assumed_routines(place, sidecar)
+            for file, line, message in sidecar.assumed:
+                text = f"line {line} of {file}: {message}; compensate it with "
+                code = Code.ROUTINE_ASSUMED_MOTIONLESS
+                yield CheckFinding(place, code, f"{text}assume_motion")
         yield from self._content(place, data, sidecar)
         if values := self._existing(variables_of(place)):
             yield from self._content(values, read_input(self.root / values), sidecar)
@@ -365,13 +367,6 @@ class _Look:
             text = "its source has changed since: compensate it again"
             yield CheckFinding(place, Code.SOURCE_CHANGED, text)
 
-    def _check_compiled(self, place: str) -> Iterator[CheckFinding]:
-        """Check that a compiled file is not that of the uncompensated program."""
-        if self.source is not None and (self.source / place).is_file():
-            if read_input(self.source / place) == read_input(self.root / place):
-                text = "is compiled from the uncompensated program: translate it again"
-                yield CheckFinding(place, Code.UNCOMPENSATED, text)
-
 
 def _find_uncorrected(
     place: str, targets: Mapping[str, Any], left: tuple[LeftLine, ...]
@@ -388,13 +383,6 @@ def _find_uncorrected(
         yield CheckFinding(
             place, Code.LEFT_ALONE, f"{text}: {cure}; {_by_reason(rows, told)}"
         )
-
-
-def _find_assumed_routines(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
-    """Find routines that were assumed motionless because the shipped list says so."""
-    for file, line, message in sidecar.assumed:
-        text = f"line {line} of {file}: {message}; compensate it with assume_motion"
-        yield CheckFinding(place, Code.ROUTINE_ASSUMED_MOTIONLESS, text)
 
 
 def _by_reason(rows: list[tuple[str, int, int]], told: Mapping[str, Any]) -> str:

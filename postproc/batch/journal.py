@@ -129,6 +129,7 @@ class Journal:
 
 # What came of a run: the table, the lists, the exit code.
 
+NEVER_REACHED = "moves that are never reached"
 LISTED = 20  # programs that are listed on the terminal; the log lists all
 
 ROWS = {
@@ -206,23 +207,18 @@ class Summary:
 
     def lists(self) -> list[str]:
         """Return which programs are absent, have uncorrected targets, were removed."""
+        left = (
+            (place, f"{n} visits" if n else NEVER_REACHED) for place, n in self.left
+        )
         return [
             *_some("absent", (f"{place}: {why}" for place, why in self.problems)),
-            *_some(
-                "not corrected",
-                (f"{p}: {_describe_uncorrected(n)}" for p, n in self.left),
-            ),
+            *_some("not corrected", (f"{place}: {why}" for place, why in left)),
             *_some("note", (f"{place}: {why}" for place, why in self.notes)),
             *_some("removed, its source is gone", self.removed),
         ]
 
 
 TITLES = ("programs and files", "files", "unchanged", "visits", "not corrected")
-
-
-def _describe_uncorrected(visits: int) -> str:
-    """Return what of a program was not corrected."""
-    return f"{visits} visits" if visits else "moves that are never reached"
 
 
 def _some(title: str, items: Iterable[str]) -> list[str]:

@@ -44,12 +44,18 @@ class JobSetup:
         Contents count, places do not: a copy of the same cell file is the same cell.
         It is made in the words that logs began with, so that they are resumed.
         """
+        told = self.options.to_dict()
+        options = {FIRST_WORDS.get(name, name): value for name, value in told.items()}
+        shared = options.pop("shared_points")
+        options["clone"] = shared == "clone"  # version 0.1.0 knew mean and clone
+        if shared == "leave":
+            options["shared_points"] = shared
         parts = {
             "version": __version__,
             "cell": _in_first_words(self.cell.file.model_dump(mode="json")),
             "arm": self.cell.arm.file.model_dump(mode="json"),
             "model": self.model.id,
-            "options": _options_in_first_words(self.options.to_dict()),
+            "options": options,
         }
         text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
@@ -79,14 +85,6 @@ def _in_first_words(content: Any) -> Any:
             if key not in NOT_DECIDING
         }
     return FIRST_WORDS[MOTIONLESS] if content == MOTIONLESS else content
-
-
-def _options_in_first_words(told: Mapping[str, object]) -> dict[str, object]:
-    """Return options in the words of version 0.1.0, which knew mean and clone."""
-    found = {FIRST_WORDS.get(name, name): value for name, value in told.items()}
-    shared = found.pop("shared_points")
-    found["clone"] = shared == "clone"
-    return found | ({"shared_points": shared} if shared == "leave" else {})
 
 
 def open_setup(

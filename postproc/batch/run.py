@@ -131,11 +131,6 @@ class StopRequest:
         self._end.daemon = True
         self._end.start()
 
-    def _end_in_order(self) -> None:
-        """Come to the end in good order."""
-        if self._end is not None:
-            self._end.cancel()
-
 
 @contextmanager
 def stoppable() -> Iterator[StopRequest]:
@@ -146,7 +141,8 @@ def stoppable() -> Iterator[StopRequest]:
     try:
         yield stop
     finally:
-        stop._end_in_order()
+        if stop._end is not None:
+            stop._end.cancel()
         for number, handler in zip(signals, before, strict=True):
             signal.signal(number, handler)
 

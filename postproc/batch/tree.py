@@ -87,7 +87,11 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
     listing = FolderListing()
     found = [_sort(root, names, plan, listing) for names in folders.values()]
     units = [unit for part in found for unit in part.units]
-    only_read = {place for unit in units for place in _rewritten_nowhere(unit)}
+    # What a program reads and is not rewritten beside it: other tasks have programs.
+    read = [
+        (place, PurePosixPath(unit.program)) for unit in units for place in unit.reads
+    ]
+    only_read = {place for place, by in read if not is_beside(PurePosixPath(place), by)}
     kept = [p for unit in units if unit.program in only_read for p in unit.own]
     units = [unit for unit in units if unit.program not in only_read]
     # The largest first: no worker is left alone with one at the end.
@@ -169,12 +173,6 @@ def _sort(
         reads = _find_shared(root, programs[main], listing)
         _add_unit(programs[main], own, reads, variables, setup, part)
     return part
-
-
-def _rewritten_nowhere(unit: Unit) -> list[str]:
-    """Return what a program reads and nobody rewrites: other tasks have programs."""
-    program = PurePosixPath(unit.program)
-    return [p for p in unit.reads if not is_beside(PurePosixPath(p), program)]
 
 
 def _find_shared(root: Path, program: str, listing: FolderListing) -> tuple[str, ...]:

@@ -184,7 +184,11 @@ class DesignMatrix:
         """Sum products of columns over all rows, (p, p)."""
         if self.blocks:
             alone = np.delete(np.arange(len(self.jacobian)), self.blocks.rows)
-            return self[alone].gram() + self._gram_of_blocks()
+            whole = np.zeros((self.size, self.size))
+            for X in self._columns_of_blocks():
+                flat = X.reshape(-1, self.size)
+                whole += flat.T @ flat
+            return self[alone].gram() + whole
         plain, splines = _native.gram(*self._features())
         plain[: plain.shape[1]] += np.tril(plain[: plain.shape[1]], -1).T
         out = np.empty((self.size, self.size))
@@ -198,14 +202,6 @@ class DesignMatrix:
                 block = a.mix.T @ splines[own, others] @ b.mix
                 out[np.ix_(b.places, a.places)] = block.T
                 out[np.ix_(a.places, b.places)] = block
-        return out
-
-    def _gram_of_blocks(self) -> Floats:
-        """Sum products of columns over the rows that are taken at once, (p, p)."""
-        out = np.zeros((self.size, self.size))
-        for X in self._columns_of_blocks():
-            flat = X.reshape(-1, self.size)
-            out += flat.T @ flat
         return out
 
     def _columns_of_blocks(self) -> Iterator[Floats]:
@@ -237,7 +233,8 @@ class DesignMatrix:
             with_others = [covariance[np.ix_(a.places, b.places)] @ b.mix.T
                            for b, _ in sets]  # fmt: skip
             splines.append(a.mix @ np.concatenate(with_others, axis=1))
-        plain = 2.0 * np.tril(plain) - _diagonal(plain)
+        plain = 2.0 * np.tril(plain)
+        plain[np.diag_indices(len(places))] /= 2.0
         form = plain, np.concatenate([np.zeros((0, count)), *splines])
         total = _native.uncertainty(*self._features(), form)
         variance: Floats = np.maximum(total, 0.0)
@@ -277,13 +274,6 @@ class DesignMatrix:
                 sum(len(c.mix) for c in self.splines),
             ),
         )
-
-
-def _diagonal(of: Floats) -> Floats:
-    """Keep the diagonal alone."""
-    out = np.zeros_like(of)
-    np.fill_diagonal(out, np.diag(of))
-    return out
 
 
 def _splines(

@@ -113,7 +113,12 @@ def doubt_of(fitted: Fit, mounted: bool = True) -> Doubt | None:
     Returns:
         None where new poses are hardly less sure for them.
     """
-    asked = [*_of_base(fitted), *_of_weight(fitted, mounted)]
+    batch, have = fitted.batch, {e.name for e in fitted.combination.effects}
+    names = [n for n in BASE_EFFECTS if n not in have]
+    lacking = propose(names, batch.arm, batch.states)
+    shown = [e for e in lacking if e.may_show(batch.states)]
+    asked: list[Rivals] = [((e,), (Alternative.of(e),)) for e in shown]
+    asked += _of_weight(fitted, mounted)
     effects = tuple(e for more, _ in asked for e in more)
     if not effects:
         return None
@@ -123,16 +128,10 @@ def doubt_of(fitted: Fit, mounted: bool = True) -> Doubt | None:
     way = np.concatenate([-taken, np.eye(len(moments))])
     way *= laid.combination.scales[:, None]
     doubt = Doubt(Combination(effects), way @ moments @ way.T)
-    return doubt if _matters(fitted, laid, doubt) else None
-
-
-def _of_base(fitted: Fit) -> list[Rivals]:
-    """List base effects that a fit does not have."""
-    batch, have = fitted.batch, {e.name for e in fitted.combination.effects}
-    names = [n for n in BASE_EFFECTS if n not in have]
-    lacking = propose(names, batch.arm, batch.states)
-    shown = [e for e in lacking if e.may_show(batch.states)]
-    return [((e,), (Alternative.of(e),)) for e in shown]
+    known = fitted.design.variance(fitted.stated)
+    known = known + fitted.noise.pose_variance(fitted.design.jacobian)
+    more = laid.design.variance(doubt.covariance)
+    return doubt if more.mean() > NEGLIGIBLE * known.mean() else None
 
 
 def _of_weight(fitted: Fit, mounted: bool) -> list[Rivals]:
@@ -171,17 +170,11 @@ def _second_moments(normal: Normal, asked: Sequence[Rivals]) -> Floats:
     for effects, rivals in asked:
         part = slice(first, first + len(Combination(effects).parameters))
         own = replace(normal, gram=normal.gram[part, part], moment=normal.moment[part])
-        moments[part, part] = _average_moments(own, rivals)
+        gains, own_moments = zip(*(r.vary_masses(own) for r in rivals), strict=True)
+        probable = softmax(np.array([0.0, *gains]))[1:]  # perhaps none is there
+        moments[part, part] = np.tensordot(probable, np.stack(own_moments), axes=1)
         first = part.stop
     return moments
-
-
-def _average_moments(normal: Normal, rivals: Sequence[Alternative]) -> Floats:
-    """Average second moments over rivals, and over none of them being there, (q, q)."""
-    weighed = [rival.vary_masses(normal) for rival in rivals]
-    probable = softmax(np.array([0.0, *(gain for gain, _ in weighed)]))[1:]
-    mixed: Floats = np.tensordot(probable, np.stack([m for _, m in weighed]), axes=1)
-    return mixed
 
 
 def _apart(laid: Fit, count: int) -> tuple[Normal, Floats]:
@@ -200,11 +193,3 @@ def _apart(laid: Fit, count: int) -> tuple[Normal, Floats]:
     across = normal.gram[np.ix_(own, ~own)]
     taken = s[:, None] * (inside @ (s[:, None] * across))
     return normal.marginalise(own, s), taken
-
-
-def _matters(fitted: Fit, laid: Fit, doubt: Doubt) -> bool:
-    """Return True if surveyed poses are notably less sure for a doubt."""
-    known = fitted.design.variance(fitted.stated)
-    known = known + fitted.noise.pose_variance(fitted.design.jacobian)
-    more = laid.design.variance(doubt.covariance)
-    return float(more.mean()) > NEGLIGIBLE * float(known.mean())

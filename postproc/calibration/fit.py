@@ -51,7 +51,6 @@ from postproc.exceptions import MeasurementError, ModelError
 from postproc.model.doubt import Doubt
 from postproc.model.effect_sum import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
-from postproc.model.effects.effect import Effect
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
 from postproc.model.effects.station_shift import StationShift
@@ -420,17 +419,13 @@ def _left_open(doubt: Doubt | None, fitted: Fit) -> tuple[str, ...]:
     if size < OPEN:
         return ()
     names = " or ".join(dict.fromkeys(e.name for e in effects))
-    state = ", and state mounting under [robot]" if _any_direction(effects) else ""
+    otherwise = any(e.settings().get("along") is not None for e in effects)
+    state = ", and state mounting under [robot]" if otherwise else ""
     return (
         f"these rows do not show whether there is {names}: it is not corrected, but "
         f"stated standard errors include {size:.3f} mm at the tool (rms) for it. "
         f"Measure more poses, with more decimals of joint angles{state}",
     )
-
-
-def _any_direction(effects: tuple[Effect, ...]) -> bool:
-    """Return True if effects are of weight along another direction than stated."""
-    return any(e.settings().get("along") is not None for e in effects)
 
 
 def drifts(fitted: Fit) -> tuple[str, ...]:
@@ -465,7 +460,10 @@ def wrong_nests(fitted: Fit, points: Floats | None = None) -> tuple[str, ...]:
     for effect, part in zip(c.effects, c.slices, strict=True):
         turned = np.zeros((1, 1))
         if isinstance(effect, Placement) and points is not None:
-            part, turned = effect.points(part), TURNED**2 * _as_turned(points)
+            arms = points - points.mean(axis=0)
+            moved = np.cross(np.eye(3)[:, None], arms).reshape(3, -1)
+            turning: Floats = moved.T @ moved
+            part, turned = effect.points(part), TURNED**2 * turning
             beside = _points(fitted.batch.states) - points
         elif isinstance(effect, Probe):
             beside = np.zeros(3)
@@ -476,14 +474,6 @@ def wrong_nests(fitted: Fit, points: Floats | None = None) -> tuple[str, ...]:
         found = find_wrong_nest(effect.tools, offset, covariance)
         told += [] if found is None else [str(found)]
     return tuple(told)
-
-
-def _as_turned(points: Floats) -> Floats:
-    """Covariance of points (k, 3) that turn together by 1 rad about any axis."""
-    arms = points - points.mean(axis=0)
-    moved = np.cross(np.eye(3)[:, None], arms).reshape(3, -1)
-    covariance: Floats = moved.T @ moved
-    return covariance
 
 
 def points_of_cell(survey: Measurements) -> Floats | None:

@@ -190,7 +190,13 @@ def _explanation(before: Floats, after: Floats) -> tuple[float, int, Bools, str]
 
 def _guesses(states: States, position: Floats) -> Iterator[Guess]:
     """List mistakes that rows may have, most frequent first, each undone."""
-    q = states.q
+    yield from _guess_units(states, position)
+    yield from _guess_rows(states, position)
+    yield from _guess_columns(states, position)
+
+
+def _guess_units(states: States, position: Floats) -> Iterator[Guess]:
+    """Guess units of positions and angles."""
     yield Guess(
         "The positions look like metres: write millimetres (of points: "
         "--set measurements.unit=m)",
@@ -207,8 +213,12 @@ def _guesses(states: States, position: Floats) -> Iterator[Guess]:
         "The joint angles look like radians: write degrees",
         "have joint angles that look like radians",
         "The others are in degrees: write all of them so",
-        states.with_(q=np.rad2deg(q)), position,
+        states.with_(q=np.rad2deg(states.q)), position,
     )  # fmt: skip
+
+
+def _guess_rows(states: States, position: Floats) -> Iterator[Guess]:
+    """Guess that positions stand one row above or below their own."""
     for name, step, move in (("next", 1, "down"), ("previous", -1, "up")):
         shifted = np.full_like(position, np.nan)
         if step > 0:
@@ -223,6 +233,11 @@ def _guesses(states: States, position: Floats) -> Iterator[Guess]:
             f"Move their positions {move} by one row, and remove the row without one",
             states, shifted,
         )  # fmt: skip
+
+
+def _guess_columns(states: States, position: Floats) -> Iterator[Guess]:
+    """Guess signs and order of the joints."""
+    q = states.q
     for j in range(6):
         sign = np.where(np.arange(6) == j, -1.0, 1.0)
         yield Guess(

@@ -16,7 +16,6 @@ from postproc.calibration.measurements import (
 from postproc.calibration.monuments import split_references
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.compensation.program import (
-    PlannedProgram,
     plan_visits,
     read_program,
     states_of,
@@ -67,9 +66,9 @@ def join_program(
     lost = np.flatnonzero(np.isnan(states.q).any(axis=1))
     if len(lost):
         row = order[lost[0]]
-        raise _error_without_plan(
-            table.path, ids[row], int(table.line[row]), planned, int(rows[row])
-        )
+        why, cure = planned.reasons[rows[row]], "Mend the program or leave the row out"
+        problem = f"the program's visit {ids[row]} cannot be planned: {why}"
+        raise MeasurementError(table.path, problem, cure, line=int(table.line[row]))
     stations, station = read_stations(table)
     return Measurements(
         path=table.path,
@@ -81,16 +80,6 @@ def join_program(
         inferred=np.zeros(len(rows), dtype=bool),
         sha256=table.sha256,
         references=references,
-    )
-
-
-def _error_without_plan(
-    data: Path, name: str, line: int, planned: PlannedProgram, visit: int
-) -> MeasurementError:
-    """Say that a measured visit has no planned state."""
-    problem = f"the program's visit {name} cannot be planned: {planned.reasons[visit]}"
-    return MeasurementError(
-        data, problem, "Mend the program or leave the row out", line=line
     )
 
 

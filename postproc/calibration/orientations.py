@@ -121,7 +121,10 @@ class Poses:
             order = np.argsort(self.q[:, j], kind="stable")
             rank = np.empty(count, dtype=int)
             rank[order] = np.arange(count)
-            near = order[_places_beside(rank[place], count)]
+            at = rank[place]  # their neighbours follow, NEIGHBOURS of each
+            first = np.clip(at - NEIGHBOURS // 2, 0, count - NEIGHBOURS - 1)[:, None]
+            beside = first + np.arange(NEIGHBOURS)
+            near = order[beside + (beside >= at[:, None])]
             signed = others[near, j] * np.sign(angle[:, j])[:, None]
             same = np.median(signed, axis=1) > AGREES * np.abs(angle[:, j])
             agrees |= same & (explained[:, j] > 0.5)
@@ -154,13 +157,6 @@ def _without(own: Ints, near: Ints) -> Ints:
     same = near == own[:, None]
     same[~same.any(axis=1), -1] = True
     return np.asarray(near[~same].reshape(len(own), -1))
-
-
-def _places_beside(place: Ints, n: int) -> Ints:
-    """Return the nearest other places in a row of n, (k, 6)."""
-    first = np.clip(place - NEIGHBOURS // 2, 0, n - NEIGHBOURS - 1)[:, None]
-    beside = first + np.arange(NEIGHBOURS)
-    return np.asarray(beside + (beside >= place[:, None]))
 
 
 # Measured orientations: what a 6D probe tells besides its position.

@@ -219,11 +219,15 @@ def design_survey(
     rng = np.random.default_rng(seed)
     wanted = poses * (1 if mode == "lhs" else POOL)
     pool = _candidates(arm, np.atleast_2d(probes), wanted, tracker, rng)
-    X, names = _whiten_columns(arm, pool)
+    # Columns of the base model per pose, three rows from either side.
+    base = Combination(propose(BASE_EFFECTS, arm, pool))
+    back = pool.with_(direction=-pool.direction)
+    both = [base.columns(ArmStates(arm, s)) for s in (pool, back)]
+    X = np.concatenate(both, axis=1) * base.scales / TYPICAL_NOISE
     if mode != "lhs":
         kept = choose(X, poses, gain_i(X) if mode == "optimal" else gain_d)
         pool, X = pool[kept], X[kept]
-    seen = observe(X.reshape(-1, X.shape[2]), names, floor=1.0)
+    seen = observe(X.reshape(-1, X.shape[2]), base.names, floor=1.0)
     return Design(pool.q, pool.direction, pool.tool_id, mode, seen)
 
 
@@ -252,7 +256,9 @@ def _candidates(
             keep = np.empty(count, dtype=np.int64)
             for k, rows in enumerate(turns):
                 keep[k :: len(probes)] = rng.permutation(rows)[: need[k]]
-            side = _balance_sides(count, rng)
+            # Every joint arrives as often from each side.
+            half = np.where(np.arange(count) % 2 == 0, 1.0, -1.0)
+            side = np.stack([rng.permutation(half) for _ in range(6)], axis=1)
             tools = probe[keep]
             return make_states(q[keep], side, probes[tools], tool_id=tools)
         drawn *= 2
@@ -260,21 +266,6 @@ def _candidates(
         "hardly any pose can be measured: the tracker does not see the probe or the "
         "arm cannot reach. Move the tracker or check the probe points"
     )
-
-
-def _balance_sides(count: int, rng: np.random.Generator) -> Floats:
-    """Draw directions, (count, 6): every joint as often from each side."""
-    half = np.where(np.arange(count) % 2 == 0, 1.0, -1.0)
-    return np.stack([rng.permutation(half) for _ in range(6)], axis=1)
-
-
-def _whiten_columns(arm: Arm, states: States) -> tuple[Floats, tuple[str, ...]]:
-    """Columns of the base model per pose, (n, 6, p): three rows from either side."""
-    base = Combination(propose(BASE_EFFECTS, arm, states))
-    back = states.with_(direction=-states.direction)
-    both = [base.columns(ArmStates(arm, s)) for s in (states, back)]
-    X = np.concatenate(both, axis=1) * base.scales / TYPICAL_NOISE
-    return X, base.names
 
 
 # Where drives turn back step by step.

@@ -206,15 +206,10 @@ def tell_widths(widths: tuple[Width, ...]) -> str:
         return ""
     joints = dict[str, list[str]]()
     for joint, width in enumerate(widths, start=1):
-        joints.setdefault(_describe_width(width), []).append(str(joint))
+        word = (
+            "uncertain" if np.isinf(width[1]) else f"{width[0]:g} to {width[1]:g} gaps"
+        )
+        word = "sharp" if verdict_at_stops(width) == CONFIRMED else word
+        joints.setdefault(word, []).append(str(joint))
     told = (f"joint {', '.join(own)} {word}" for word, own in joints.items())
     return f"flanks at stops: {'; '.join(told)}"
-
-
-def _describe_width(width: Width) -> str:
-    """Say of one joint what its width is."""
-    if verdict_at_stops(width) == CONFIRMED:
-        return "sharp"
-    if np.isinf(width[1]):
-        return "uncertain"
-    return f"{width[0]:g} to {width[1]:g} gaps"

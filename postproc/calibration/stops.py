@@ -40,7 +40,10 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
     if len(states) == 0:
         return np.zeros(0, dtype=np.int64)
     begins = _find_new_commands(states)
-    begins |= _long_gaps(states.time, begins)
+    gap = np.diff(states.time)
+    usual = gap[begins & np.isfinite(gap)]
+    if len(usual):  # the arm can have left a pose and returned in long gaps
+        begins |= np.nan_to_num(gap) > AWAY * float(np.median(usual))
     run = np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)
     if visit is None:
         return run
@@ -86,15 +89,6 @@ def restless(step: Floats) -> float:
     if moves.min() < CLEARLY * most or several.mean() < 0.5:
         return 0.0
     return most
-
-
-def _long_gaps(time: Floats, begins: Bools) -> Bools:
-    """Find the gaps in which the arm can have left a pose and returned, (n - 1,)."""
-    gap = np.diff(time)
-    usual = gap[begins & np.isfinite(gap)]
-    if not len(usual):
-        return np.zeros(len(gap), dtype=bool)
-    return np.asarray(np.nan_to_num(gap) > AWAY * float(np.median(usual)))
 
 
 def pool_readings(survey: Measurements) -> Measurements:
@@ -157,14 +151,10 @@ def labels_of(states: States, visit: Ints | None = None) -> Ints:
 
 def _labels(states: States, stop: Ints) -> Ints:
     """Number pairs of stops and probe points, (n,)."""
-    _, label = np.unique(_row_keys(states, stop), axis=0, return_inverse=True)
-    return label.reshape(-1)
-
-
-def _row_keys(states: States, stop: Ints) -> Floats:
-    """Tell stops and probe points apart, (n, 5)."""
     point = np.round(states.tool / SAME_POINT)
-    return np.column_stack([stop, states.tool_id, point])
+    keys = np.column_stack([stop, states.tool_id, point])
+    _, label = np.unique(keys, axis=0, return_inverse=True)
+    return label.reshape(-1)
 
 
 def _in_order(label: Ints) -> Ints:

@@ -62,7 +62,7 @@ def check_survey(survey: Measurements, arm: Arm) -> None:
     _check_cause(survey, find_cause(survey, arm, _no_error))
     _check_frame(survey, arm, gap, "nominal")
     check_tools(survey, arm)
-    _check_kinds(survey, arm, gap)
+    _check_kinds(survey, gap)
 
 
 def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
@@ -121,7 +121,7 @@ def _check_frame(survey: Measurements, arm: Arm, gap: Floats, what: str) -> None
         raise MeasurementError(survey.path, problem, cure)
 
 
-def _check_kinds(survey: Measurements, arm: Arm, gap: Floats) -> None:
+def _check_kinds(survey: Measurements, gap: Floats) -> None:
     """Refuse rows of which many are far off, and the others not."""
     size = np.linalg.norm(gap, axis=1)
     limit = max(APART * float(np.median(size)), CLOSE)

@@ -233,19 +233,14 @@ def _plain_rungs(task: FitTask, used: Bools) -> tuple[Rung, ...]:
     """
     refined = task.fit(REFINED)
     usual = REFINED if _weigh_addition(refined, USUAL, task) > SURE else USUAL
-    loaded = _with_weight(usual)
+    name = Compliance.name
+    loaded = Rung(f"{usual.name},{name}", (*(usual.effects or ()), name))
     if _weigh_addition(task.fit(loaded), usual, task) > SURE:
         usual = loaded
     independent = 3 * len(np.unique(task.survey.states.order[used]))
     if refined.effective < DETERMINED * independent:
         return (usual,)
     return SIMPLER, usual
-
-
-def _with_weight(rung: Rung) -> Rung:
-    """Return effects with joints that yield to the weight besides."""
-    name = Compliance.name
-    return Rung(f"{rung.name},{name}", (*(rung.effects or ()), name))
 
 
 def _weigh_addition(fitted: Fit, rung: Rung, task: FitTask) -> float:

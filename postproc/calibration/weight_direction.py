@@ -44,7 +44,8 @@ def direction_warning(fitted: Fit) -> tuple[str, ...]:
     if len(fitted.batch) < LEAST_ROWS:
         return ()
     arm = fitted.batch.arm
-    effects = tuple(e for e in fitted.combination.effects if _stays(e))
+    of_weight, every = ("torque", "payload"), fitted.combination.effects
+    effects = tuple(e for e in every if e.driven_by not in of_weight)
     laws = tuple(e for e in effects if not e.free)
     gains = np.array(_gains(fitted, laws))
     if gains.max() < CLEARLY:
@@ -145,11 +146,6 @@ def direction_evidence(
     std = np.sqrt(np.diag(found.covariance)[soft])
     above = found.mean[soft] / np.maximum(std, 1e-300)
     return value + float((log_ndtr(above) + np.log(2.0)).sum())
-
-
-def _stays(effect: Effect) -> bool:
-    """Return True if an effect has nothing to do with the direction of weight."""
-    return effect.driven_by not in ("torque", "payload")
 
 
 def unit_directions() -> list[tuple[str, Floats]]:

@@ -84,17 +84,12 @@ class Command(TyperCommand):
         for arg in args:
             word = arg.partition("=")[0]
             if word not in known:
-                _name_the_new_way(ctx, word)
+                for name in (f"{ctx.info_name} {word}", word):
+                    if new := OLD_OPTIONS.get(name):
+                        ctx.fail(f"{word} is called {new}")
+                    if instead := ENDED.get(name):
+                        ctx.fail(f"{word} is no option any more: {instead}")
         return super().parse_args(ctx, args)
-
-
-def _name_the_new_way(ctx: Any, word: str) -> None:
-    """End with 2 where a word is an option of an earlier version."""
-    for name in (f"{ctx.info_name} {word}", word):
-        if new := OLD_OPTIONS.get(name):
-            ctx.fail(f"{word} is called {new}")
-        if instead := ENDED.get(name):
-            ctx.fail(f"{word} is no option any more: {instead}")
 
 
 class Groups(TyperGroup):

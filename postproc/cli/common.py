@@ -293,13 +293,9 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 
 def epilog(command: str) -> str | None:
     """Write the examples of a command for the end of its help."""
-    lines = EXAMPLES.get(command)
-    return None if lines is None else "\n".join([KEEP, "Examples:", *_indent(lines)])
-
-
-def _indent(lines: tuple[str, ...]) -> list[str]:
-    """Indent the lines."""
-    return [f"  {line}" for line in lines]
+    if (lines := EXAMPLES.get(command)) is None:
+        return None
+    return "\n".join([KEEP, "Examples:", *(f"  {line}" for line in lines)])
 
 
 # The running stage, shown to a person who waits; others load nothing for it.
@@ -322,7 +318,9 @@ def stages(
     """
     out = out or sys.stderr
     if not out.isatty():
-        yield _log_stages(out) if log else lambda stage: None
+        from postproc.report.terminal import StageLog
+
+        yield StageLog(out) if log else lambda stage: None
         return
     told = _StageLine(out)
     timer = threading.Timer(PATIENCE, told.show)
@@ -334,13 +332,6 @@ def stages(
         timer.cancel()
         timer.join()  # it may be about to show something
         told.hide()
-
-
-def _log_stages(out: TextIO) -> Callable[[str], None]:
-    """Tell stages as lines."""
-    from postproc.report.terminal import StageLog
-
-    return StageLog(out)
 
 
 class _StageLine:

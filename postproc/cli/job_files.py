@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -103,13 +102,15 @@ class Destination:
                 files |= outcome.name_files({page.name: place}, place)
         own = self._own_places(outcome, target, values)
         variables = self.given.variables
-        if (
-            values
-            and variables is not None
-            and variables_of(self.given.name) not in own
-        ):
+        unchanged = variables_of(self.given.name) not in own
+        if values and variables is not None and unchanged:
             files[values] = variables
-        for places in _by_folder(own):
+        # A record speaks of the files beside it.
+        found: dict[Path, dict[str, Path]] = {}
+        for name, path in own.items():
+            folder = path if is_stream(path) else path.parent.resolve()
+            found.setdefault(folder, {})[name] = path
+        for places in found.values():
             files |= outcome.name_files(places, list(places.values())[-1])
         if target is not None and is_stream(target):
             files[target] = outcome.outputs[self.given.name]
@@ -147,15 +148,6 @@ def _file_of(target: Path | None, part: Path) -> Path:
             f"Give {how}the program a file with -o",
         )
     return target
-
-
-def _by_folder(own: Mapping[str, Path]) -> list[dict[str, Path]]:
-    """Group files by their folder, in order: a record speaks of files beside it."""
-    found: dict[Path, dict[str, Path]] = {}
-    for name, place in own.items():
-        folder = place if is_stream(place) else place.parent.resolve()
-        found.setdefault(folder, {})[name] = place
-    return list(found.values())
 
 
 def _page_place(page: Path, target: Path) -> Path:

@@ -233,7 +233,10 @@ def give_own_points(
     v = reading.visits
     problem = equivalent(v, again.visits, NOTHING, v.values, work.names)
     visits = None if problem else with_lines_of(reading, again, cloned)
-    visits = None if visits is None else _as_own(visits, list(work.names))
+    if visits is not None:  # no other program knows the points of clones
+        shared = np.array(visits.literals.shared)
+        shared[visits.literal[list(work.names)]] = False
+        visits = replace(visits, literals=replace(visits.literals, shared=shared))
     if visits is None or _stay(visits, list(work.names)):
         text = "clones would change what the program does: nothing is cloned"
         text = text if visits is None else STAYING
@@ -243,13 +246,6 @@ def give_own_points(
         again.texts, visits, notes, cloned, reading.sources, missed=reading.missed,
         untouched=reading.untouched,
     )  # fmt: skip
-
-
-def _as_own(visits: Visits, rows: Sequence[int]) -> Visits:
-    """Return visits to clones as those to points that no other program knows."""
-    shared = np.array(visits.literals.shared)
-    shared[visits.literal[rows]] = False
-    return replace(visits, literals=replace(visits.literals, shared=shared))
 
 
 def _stay(visits: Visits, rows: Sequence[int]) -> bool:

@@ -149,7 +149,7 @@ def pinned_targets(
     return found | {Reason(Code.DEPENDANT_WORSE, text): hurt}
 
 
-def mark_display(visits: Visits, planned: PlannedProgram, reasons: Reasons) -> Bools:
+def mark_display(visits: Visits, reasons: Reasons) -> Bools:
     """Mark targets whose value is known only at run time, (n,)."""
     holds = ~without_target(visits)
     display = holds & ((visits.reason > 0) | (visits.literal < 0))
@@ -656,7 +656,7 @@ class Round:
             border: Axes that would be on a border of flags, (n, 6).
         """
         visits, reasons = self.reading.visits, Reasons(len(self.reading.visits))
-        display = mark_display(visits, self.planned, reasons)
+        display = mark_display(visits, reasons)
         unchanged = mark_unchanged(visits, reasons, self.setting.options)
         self._guard(reasons, strays, border)
         usable = reasons.none

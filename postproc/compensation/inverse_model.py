@@ -155,7 +155,8 @@ def solve(
             break
         command[far, :3, 3] += (place - landing)[far]
         if orientation:
-            command[far, :3, :3] = _rotate(wanted[far, :3, :3], -turned[far])
+            back = rotation_from_vector(-turned[far])
+            command[far, :3, :3] = back @ wanted[far, :3, :3]
             allowed[far] = turned[far]
         own = None if branch is None else branch[far]
         q[far] = nearest_joints(arm, times(command[far], from_tcp[far]), q[far], own)
@@ -170,11 +171,6 @@ def solve(
 def _distance(a: Floats, b: Floats) -> Floats:
     """Distance between points (n, 3), (n,) [m]."""
     return lengths(a - b)
-
-
-def _rotate(rotation: Floats, by: Floats) -> Floats:
-    """Turn rotations (n, 3, 3) by rotation vectors (n, 3) [rad] in the base frame."""
-    return np.asarray(rotation_from_vector(by) @ rotation)
 
 
 def nearest_joints(
@@ -440,19 +436,16 @@ def angles_astray(visits: Visits, plan: Plan, solved: Commands, aside: Floats) -
     command = np.array(solved.command[:, :, 3])
     command[:, :3] -= aside
     arcs, via, _ = _end_at_angles(visits, plan, command)
-    missed = _across(via - command[arcs.via, :3], plan, arcs)
-    size = lengths(solved.command[arcs.via, :3, 3] - plan.tcp[arcs.via, :3, 3])
-    out[arcs.via] = missed > size
-    return out
-
-
-def _across(off: Floats, plan: Plan, arcs: ArcAngles) -> Floats:
-    """Measure across arcs how far places lie from the points on their ways, (k,)."""
+    # How far places lie from their arcs' points on the way, across the arcs.
+    off = via - command[arcs.via, :3]
     points = [plan.tcp[rows, :3, 3] for rows in (arcs.start, arcs.via, arcs.end)]
     centre, normal, _ = circles(*points)
     along = cross(normal, points[1] - centre)
     along /= np.maximum(lengths(along), 1e-12)[:, None]
-    return lengths(off - (off * along).sum(1)[:, None] * along)
+    missed = lengths(off - (off * along).sum(1)[:, None] * along)
+    size = lengths(solved.command[arcs.via, :3, 3] - plan.tcp[arcs.via, :3, 3])
+    out[arcs.via] = missed > size
+    return out
 
 
 def solve_written(

@@ -534,18 +534,11 @@ def _read_back(
     decided = replace(proposal.decisions, std_error=std_error)
     proposal = replace(proposal, decisions=decided)
     with setting.clock("verify"):
-        moved = _measure_deviation(iteration, last.targets, course.lead.begin)
+        job, plan = iteration.setting, iteration.planned.plan
+        arm, tool, offset = job.cell.arm, plan.tool[:, :3, 3], job.offset
+        new = trace(arm, last.targets, course.lead.begin.known)
+        moved = path_departure(arm, last.targets.move, tool, plan.exact, new, offset)
     return Converged(proposal, edits, last.reached, moved), flipped
-
-
-def _measure_deviation(
-    iteration: Iteration, targets: Targets, begin: StartState
-) -> JointDeviation:
-    """Trace all ways to targets as they are written, and compare them with the plan."""
-    setting, plan = iteration.setting, iteration.planned.plan
-    arm, tool, offset = setting.cell.arm, plan.tool[:, :3, 3], setting.offset
-    new = trace(arm, targets, begin.known)
-    return path_departure(arm, targets.move, tool, plan.exact, new, offset)
 
 
 def write_and_read_back(

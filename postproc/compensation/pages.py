@@ -6,6 +6,7 @@ programs share belongs to none of them, and is taken by itself.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -144,7 +145,7 @@ _MOVE = re.compile(rb"^[ \t]*(?:S?(?:PTP|LIN|CIRC)|SPL|(?:PTP_)?SPLINE)\b", re.I
 def _name_lists(path: Path, text: bytes) -> dict[str, int]:
     """Name sources without moves whose lists declare points that a source goes to."""
     found: dict[str, int] = {}
-    lists = [(other, _points_for_all(other, *_state(other)))
+    lists = [(other, _points_for_all(other, *_state(other.stat())))
              for other in sorted(path.parent.iterdir())
              if is_data_list(other.name) and other.stem.lower() != path.stem.lower()
              and other.is_file() and not other.is_symlink()]  # fmt: skip
@@ -161,9 +162,8 @@ def _name_lists(path: Path, text: bytes) -> dict[str, int]:
     return found
 
 
-def _state(path: Path) -> tuple[int, int]:
+def _state(status: os.stat_result) -> tuple[int, int]:
     """Return what changes with the content of a file."""
-    status = path.stat()
     return status.st_mtime_ns, status.st_size
 
 
@@ -188,9 +188,7 @@ def _modules_beside(path: Path) -> Iterator[Path]:
         if other.name == path.name or not is_module(other.name) or other.is_symlink():
             continue
         status = other.stat()
-        if S_ISREG(status.st_mode) and _is_part(
-            other, status.st_mtime_ns, status.st_size
-        ):
+        if S_ISREG(status.st_mode) and _is_part(other, *_state(status)):
             yield other
 
 

@@ -80,15 +80,21 @@ def find_pages(program: Path) -> Pages:
         for name, line in outside.items()
     ]
     main = program_key(program.name)
-    reads = (*find_shared(program), *_read_elsewhere(program))
+    reads = find_shared(program)
+    if is_program(program.name):  # of an archive, what it reads in other folders
+        reads = (*reads, *language_of(program.name).reads(program))
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes), reads)
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
     values = {base_name(p.name) for p in files if is_variables(p.name)}
-    outputs = _is_output(program)
+    stamped = read_stamp(read_head(program)) is not None
+    outputs = stamped or sidecar_path(program).is_file()
     programs = {program_key(p.name): p for p in files if _is_page(p, outputs)}
     programs |= {main: program}
-    named = {base: _list_named(path, main) for base, path in programs.items()}
+    named = {
+        base: {name: k for name, k in names_in(path)[0].items() if name != main}
+        for base, path in programs.items()
+    }
     arms = {base: program_arm(read_head(path)) for base, path in programs.items()}
     apart = dict.fromkeys(values, "it has a variable file of its own")
     for base, arm in arms.items():
@@ -101,11 +107,6 @@ def find_pages(program: Path) -> Pages:
     pages = group_pages(alone).get(main, ())
     notes += _list_omitted(programs, named, (main, *pages), apart)
     return Pages(tuple(programs[page] for page in pages), tuple(notes), reads)
-
-
-def _read_elsewhere(program: Path) -> tuple[Path, ...]:
-    """Return what a program of an archive reads in other folders."""
-    return language_of(program.name).reads(program) if is_program(program.name) else ()
 
 
 def archive_notes(program: Path, cell: Cell) -> tuple[Diagnostic, ...]:
@@ -139,16 +140,6 @@ def _is_page(path: Path, outputs: bool) -> bool:
     if is_system_file(path):
         return False
     return outputs or is_data_list(path.name) or not is_output(path)
-
-
-def _is_output(program: Path) -> bool:
-    """Tell whether a program was written by a compensation, changed or not."""
-    return read_stamp(read_head(program)) is not None or sidecar_path(program).is_file()
-
-
-def _list_named(path: Path, main: str) -> dict[str, int]:
-    """Return the programs that a program names, but for the main one, and the line."""
-    return {name: line for name, line in names_in(path)[0].items() if name != main}
 
 
 def _list_omitted(

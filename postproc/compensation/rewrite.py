@@ -17,7 +17,7 @@ from postproc.compensation.sidecar import FileRecord, Sidecar, block_checksums, 
 from postproc.compensation.workers import in_background
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
-from postproc.language.number_edits import Skeleton, difference
+from postproc.language.number_edits import difference
 from postproc.language.number_edits import edits as number_edits
 from postproc.language.source import (
     UTF8_MARK,
@@ -243,19 +243,16 @@ def check_output(
 def _in_texts(before: ParsedProgram, after: ParsedProgram, output: Output) -> str:
     """Say where the texts differ otherwise than by the edits, nothing if nowhere."""
     for old, new, edits in zip(before.texts, after.texts, output.edits, strict=True):
-        name = old.source.name
-        if problem := _in_text(old, new, edits, name in output.stamps):
+        name, data = old.source.name, new.source.data
+        stamp = stamp_span(data) if name in output.stamps else Span(0, 0)
+        if stamp.start or old.source.data.startswith(UTF8_MARK):  # a mark is no code
+            text = strip_stamp(data) if name in output.stamps else data
+            problem = difference(old, Source(new.source.name, text), edits)
+        else:
+            problem = difference(old, new, edits, stamp.end)
+        if problem:
             return f"{name}: {problem}; nothing is written"
     return ""
-
-
-def _in_text(old: Skeleton, new: Skeleton, edits: Replacements, stamped: bool) -> str:
-    """Compare two texts as they were read; the second may have a stamp line."""
-    stamp = stamp_span(new.source.data) if stamped else Span(0, 0)
-    if stamp.start or old.source.data.startswith(UTF8_MARK):  # a mark is no code
-        text = strip_stamp(new.source.data) if stamped else new.source.data
-        return difference(old, Source(new.source.name, text), edits)
-    return difference(old, new, edits, stamp.end)
 
 
 # Our own output, planned again: the same motion, to the limits of the cell.

@@ -90,41 +90,21 @@ def absorb(
     needed, off = shifts.find_shift(new, numbers[shifts.rows])
     own = shifts.literal >= 0
     rows, numbers = shifts.rows[own], np.array(numbers)
-    stay = {
-        TURNS: ~(off * LEVER_MM <= agree_mm),
-        FLAGS: _other_flags(shifts, shifts.carry(new, needed), numbers),
-    }
+    flags = list(shifts.dialect.flag_columns)
+    other = shifts.carry(new, needed) != numbers[shifts.rows]
+    stay = {TURNS: ~(off * LEVER_MM <= agree_mm), FLAGS: other[:, flags].any(axis=1)}
     numbers[rows] = 0.0
     numbers[rows, :NUMBERS] = needed[own]
-    change = _changes(rows, needed[own] - shifts.numbers[own], change)
+    # Visits with shifts agree on the shifts' numbers, turns beside them.
+    moved = needed[own] - shifts.numbers[own]
+    change = np.concatenate([change, np.zeros((len(change), 3))], axis=1)
+    change[rows] = 0.0
+    change[rows, :3] = moved[:, :3] + 0.0
+    change[rows, -3:] = np.deg2rad(moved[:, ANGLES]) * LEVER_MM
     found = agree(visits.literal, usable, numbers, change)
     at = {why: np.isin(found.literal, shifts.literal[own & bad])
           for why, bad in stay.items()}  # fmt: skip
     return Absorbed(change, found, {why: k for why, k in at.items() if k.any()})
-
-
-def _other_flags(shifts: Shifts, got: Floats, numbers: Floats) -> Bools:
-    """Tell which of k shifted targets get other flags than they need, (k,)."""
-    flags = list(shifts.dialect.flag_columns)
-    return np.asarray((got != numbers[shifts.rows])[:, flags].any(axis=1))
-
-
-def _changes(rows: Ints, moved: Floats, change: Floats) -> Floats:
-    """Say of shifts what must agree: how far their numbers change, turns beside it.
-
-    Args:
-        rows: The visits whose shifts are written, (k,).
-        moved: What their numbers change by, (k, 6).
-        change: What must agree of targets that are written, (n, j) [mm].
-
-    Returns:
-        It for all visits, (n, j + 3) [mm].
-    """
-    out = np.concatenate([change, np.zeros((len(change), 3))], axis=1)
-    out[rows] = 0.0
-    out[rows, :3] = moved[:, :3] + 0.0
-    out[rows, -3:] = np.deg2rad(moved[:, ANGLES]) * LEVER_MM
-    return out
 
 
 def shift_values(

@@ -113,16 +113,13 @@ class FileRecord:
             comma = b", "
         yield b'], "targets": {'
         for number, (key, value) in enumerate(targets.items()):
-            yield f"{', ' if number else ''}{json.dumps(key)}: ".encode() + _text(value)
+            yield f"{', ' if number else ''}{json.dumps(key)}: ".encode()
+            if isinstance(value, np.ndarray):  # a column of numbers
+                column = shortest(value, 9) if value.dtype.kind == "f" else whole(value)
+                yield b"[" + text_of(len(value), [column, Cells(b", ")])[:-2] + b"]"
+            else:
+                yield json.dumps(value).encode()
         yield b"}}"
-
-
-def _text(value: Any) -> bytes:
-    """Write a value as JSON; arrays are columns of numbers from 0 on."""
-    if not isinstance(value, np.ndarray):
-        return json.dumps(value).encode()
-    column = shortest(value, 9) if value.dtype.kind == "f" else whole(value)
-    return b"[" + text_of(len(value), [column, Cells(b", ")])[:-2] + b"]"
 
 
 def _rows(edits: Replacements) -> bytes:

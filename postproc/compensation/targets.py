@@ -175,7 +175,11 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     lost = (outside | visits.tool_remote) & (kind != TargetKind.JOINTS)
     lost |= _find_unplaced(kind, tcp, joints, frames)
     lost |= place_ends(visits, tcp, reasons)
-    lost |= _mark_unnamed(visits, cell, reasons)
+    # Joint moves to poses of arms whose branches no controller's flags name.
+    of_poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
+    rows = of_poses & (visits.motion == Motion.JOINT) & (cell.arm.file.opw is None)
+    reasons.mark(rows, UNNAMED)
+    lost |= rows
     along = turn_between(visits, tcp)
     slot, turns = visits.dialect.flags(visits.config, visits.configs, values)
     branch = np.where(visits.config_given & poses, slot, -1), turns
@@ -239,14 +243,6 @@ UNNAMED = Reason(
     "the branch that its flags name is not known for an arm without a closed form of "
     "the inverse kinematics: go there by joint angles, or on a line",
 )
-
-
-def _mark_unnamed(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
-    """Mark joint moves to poses of arms whose branches no controller's flags name."""
-    poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
-    rows = poses & (visits.motion == Motion.JOINT) & (cell.arm.file.opw is None)
-    reasons.mark(rows, UNNAMED)
-    return np.asarray(rows)
 
 
 def _find_unplaced(kind: Ints, tcp: Floats, joints: Floats, frames: Frames) -> Bools:

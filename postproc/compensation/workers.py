@@ -10,7 +10,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import pairwise
 from multiprocessing import parent_process
@@ -77,7 +77,9 @@ def in_worker(
     parent = os.getpid()
     here, there = os.pipe()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ASKED)
-    child = _fork()
+    child: int | None = None
+    with suppress(OSError):  # where there is no room, the work is done here
+        child = os.fork()
     if child == 0:
         os.close(here)
         _live(parent, work, there, ahead)
@@ -90,14 +92,6 @@ def in_worker(
         if child:
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
-
-
-def _fork() -> int | None:
-    """Fork, where there is room; return the child, 0 in it."""
-    try:
-        return os.fork()
-    except OSError:
-        return None
 
 
 def _live(

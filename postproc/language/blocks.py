@@ -88,18 +88,14 @@ class Outline:
 
     def _end(self, word: str, row: int, kinds: Sequence[str]) -> None:
         kind, scopes = self.words.ends[word], self.words.scopes
-        inner = kinds if kind in scopes else kinds[self._last_scope(kinds) :]
+        last = max((k + 1 for k, own in enumerate(kinds) if own in scopes), default=0)
+        inner = kinds if kind in scopes else kinds[last:]
         if kind not in inner:
             self._complain(row, f"ends no {kind.upper()}")
             return
         at = len(kinds) - 1 - list(reversed(kinds)).index(kind)
         self._close_until(at + 1, row - 1)
         self._close(self._open.pop(), row)
-
-    def _last_scope(self, kinds: Sequence[str]) -> int:
-        """Return the place behind the innermost module, routine or record."""
-        scopes = self.words.scopes
-        return max((k + 1 for k, kind in enumerate(kinds) if kind in scopes), default=0)
 
     def _close_until(self, depth: int, row: int) -> None:
         """Close what stands open deeper than a depth, with a message."""

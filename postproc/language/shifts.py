@@ -59,7 +59,9 @@ class Shift:
         by = frames_of(np.array([inner.numbers]), dialect)[0]
         match inner.kind:
             case ShiftKind.AXES:
-                left = _translation(by[:3, 3]) @ left
+                only_moved = np.eye(4)
+                only_moved[:3, 3] = by[:3, 3]
+                left = only_moved @ left
             case ShiftKind.OWN:
                 right = right @ by
             case ShiftKind.FRAME:
@@ -76,13 +78,6 @@ def _matrix(pose: Pose) -> Floats:
 
 def _flat(pose: Floats) -> Pose:
     return tuple(pose.ravel().tolist())
-
-
-def _translation(place: Floats) -> Floats:
-    """Return the pose that only moves, (4, 4)."""
-    out = np.eye(4)
-    out[:3, 3] = place
-    return out
 
 
 def frames_of(numbers: Floats, dialect: Dialect) -> Floats:

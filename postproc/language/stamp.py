@@ -106,14 +106,13 @@ def read_stamp(data: bytes) -> Stamp | None:
 def is_stamped(source: Source) -> bool:
     """Tell whether a program is an output of this tool, stamp moved or not."""
     data = source.data
-    return any(_leads(data, found.start()) for found in _BEGINS.finditer(data))
-
-
-def _leads(data: bytes, at: int) -> bool:
-    """Tell whether but blanks, or a header's end, nothing leads a line to an offset."""
-    before = data[:at] if at < _INDENT else data[at - _INDENT : at]
-    before = before.rstrip(b" \t").removesuffix(UTF8_MARK)
-    return not before or before.endswith((b"\n", b"\r", b"%%%"))
+    for found in _BEGINS.finditer(data):
+        # Nothing but blanks, or a header's end, may stand before it in its line.
+        before = data[max(found.start() - _INDENT, 0) : found.start()]
+        before = before.rstrip(b" \t").removesuffix(UTF8_MARK)
+        if not before or before.endswith((b"\n", b"\r", b"%%%")):
+            return True
+    return False
 
 
 def strip_stamp(data: bytes) -> bytes:

@@ -128,20 +128,16 @@ class Shapes(Sequence[str]):
         """Tell whether the masks are those of other shapes."""
         if not isinstance(other, Shapes):
             return NotImplemented
-        return (
-            self.texts == other.texts
-            and np.array_equal(self.form, other.form)
-            and np.array_equal(self.first, other.first)
-            and self._same_names(other)
-        )
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def _same_names(self, other: Shapes) -> bool:
+        if self.texts != other.texts or not np.array_equal(self.form, other.form):
+            return False
+        if not np.array_equal(self.first, other.first):
+            return False
         if self.names == other.names:
             return np.array_equal(self.name, other.name)
         pairs = zip(self.name.tolist(), other.name.tolist(), strict=True)
         return all(self.names[a] == other.names[b] for a, b in pairs)
+
+    __hash__ = None  # type: ignore[assignment]
 
     def names_of(self, shape: int) -> tuple[str, ...]:
         """Return the names in a shape."""

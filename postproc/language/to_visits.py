@@ -497,7 +497,10 @@ def _find_pinned(
 ) -> list[str]:
     """Say why literals must stay, "" where they need not; args as of `_literals`."""
     goals = [(v.goal, ANY_ELEMENT.format(v.goal.name)) for v in found]
-    elements = {goal.name: why for goal, why in (*goals, *other) if _is_loose(goal)}
+    # Of moves to an element of an array that is not known.
+    elements = {goal.name: why for goal, why in (*goals, *other)
+                if goal.name and max(goal.slots[0], goal.follows[0]) < 0
+                and not _array_of(goal.name)}  # fmt: skip
     stays = {goal.point: why for goal, why in other}
     stays |= {(f, slots[0]): why for g, why in other for f, slots in [g.writes]}
     pinned = []
@@ -553,12 +556,6 @@ def _goals_beside(
         why = BESIDE.format(text.line(row), text.source.name)
         for goal in machine.goals_of(file, row):
             yield goal, why
-
-
-def _is_loose(goal: FoundGoal) -> bool:
-    """Return True if a move goes to an element of an array that is not known."""
-    known = max(goal.slots[0], goal.follows[0]) >= 0
-    return not known and bool(goal.name) and not _array_of(goal.name)
 
 
 def _array_of(name: str) -> str:

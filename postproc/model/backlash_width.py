@@ -80,17 +80,13 @@ def verdicts_of_flanks(model: Model, arm: Arm) -> tuple[str, ...]:
     """
     at_stops = [verdict_at_stops(width) for width in model.flank_widths] or [""] * 6
     in_motion = (model.in_motion.get(str(joint), "") for joint in range(1, 7))
+    verdicts = []
     each = zip(at_stops, in_motion, ahead(model, arm).tolist(), strict=True)
-    return tuple(_verdict(*said) for said in each)
-
-
-def _verdict(at_stops: str, in_motion: str, leads: bool) -> str:
-    """Say what is known of one joint, "" for nothing."""
-    if at_stops == ELASTIC:
-        return ELASTIC
-    if in_motion not in ("", UNCERTAIN):
-        return in_motion
-    return UNCERTAIN if leads else at_stops or in_motion
+    for stops, motion, leads in each:
+        verdict = UNCERTAIN if leads else stops or motion
+        verdict = verdict if motion in ("", UNCERTAIN) else motion
+        verdicts.append(ELASTIC if stops == ELASTIC else verdict)
+    return tuple(verdicts)
 
 
 def on_the_way(side: Floats, width: Floats | float) -> Floats:

@@ -376,16 +376,11 @@ class Model:
         if self.noise.pose_joint or self.noise.pose:
             beyond = beyond + self.noise.pose_variance(at.jacobian)
         beyond += moment_variance(effects, at, values) + unknown_variance(effects, at)
-        if self.doubt is not None:
-            beyond += self._doubt_among(effects).variance(effects, at)
+        if (doubt := self.doubt) is not None:
+            if effects is not self.effects:
+                doubt = doubt.get_settings(self.effects.where(*COMPENSATED))
+            beyond += doubt.variance(effects, at)
         return side_variance(effects, at, values) + np.square(self.spread) + beyond
-
-    def _doubt_among(self, effects: Combination) -> Doubt:
-        """Return the doubt beside all effects, or beside those to be compensated."""
-        assert self.doubt is not None
-        if effects is self.effects:
-            return self.doubt
-        return self.doubt.get_settings(self.effects.where(*COMPENSATED))
 
     def without_clock(self, known: Collection[str]) -> Model:
         """Return it for rows of an unknown moment: what passes with time at its mean.
@@ -460,8 +455,7 @@ class Model:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the model file."""
-        std = np.sqrt(np.diag(self.covariance)) if len(self.covariance) else None
-        data: dict[str, Any] = {
+        data = {
             "format": FORMAT,
             "parent": self.parent,
             "method": self.method,
@@ -469,28 +463,41 @@ class Model:
             "data_sha256": self.data_sha256,
             "rows": self.rows,
             "effects": _list_effects(self.effects),
-            "parameters": [
-                {
-                    "name": name,
-                    "unit": p.unit,
-                    "value": float(self.values[k]),
-                    "std_error": 0.0 if std is None else float(std[k]),
-                    "prior_std": float(self.prior_std[k]),
-                }
-                for k, (name, p) in enumerate(
-                    zip(self.effects.names, self.effects.parameters, strict=True)
-                )
-            ],
+            "parameters": self._list_parameters(),
             "covariance": pack_symmetric(self.covariance),
             "spread": list(self.spread),
             "noise": asdict(self.noise),
             "ranges": asdict(self.ranges),
             "statistics": self.statistics,
             "history": list(self.history),
+            **self._optional_sections(),
         }
+        data = json.loads(json.dumps(data))
+        return {"id": content_id(data), **data}
+
+    def _list_parameters(self) -> list[dict[str, Any]]:
+        """List the parameters as the model file does."""
+        std = np.zeros(len(self.values))
+        if len(self.covariance):
+            std = np.sqrt(np.diag(self.covariance))
+        return [
+            {
+                "name": name,
+                "unit": p.unit,
+                "value": float(self.values[k]),
+                "std_error": float(std[k]),
+                "prior_std": float(self.prior_std[k]),
+            }
+            for k, (name, p) in enumerate(
+                zip(self.effects.names, self.effects.parameters, strict=True)
+            )
+        ]
+
+    def _optional_sections(self) -> dict[str, Any]:
+        """Return the sections of the model file that not every model has."""
+        data: dict[str, Any] = {}
         if self.registration is not None:
-            kept = RegistrationSection.of(self.registration)
-            data["registration"] = kept.content()
+            data["registration"] = RegistrationSection.of(self.registration).content()
         if self.flank_widths:
             data["flank_widths"] = [
                 None if width == UNTOLD else list(width) for width in self.flank_widths
@@ -508,8 +515,7 @@ class Model:
                 "effects": _list_effects(self.doubt.effects),
                 "covariance": pack_symmetric(self.doubt.covariance),
             }
-        data = json.loads(json.dumps(data))
-        return {"id": content_id(data), **data}
+        return data
 
     def save(self, path: str | Path) -> None:
         """Write the model file, whole or not at all.

@@ -303,7 +303,8 @@ class Whitener:
         log_det, parts = self.readings.log_noise(noise.tracker), []
         for block in self.find_correlated(noise):
             V = block.covariance(noise, self.own_variance(noise))
-            log_det += _log_det(V, used[block.rows]) - float(logs[block.rows].sum())
+            own = np.linalg.slogdet(_mask_rows(V, used[block.rows]))[1]
+            log_det += float(own.sum()) - float(logs[block.rows].sum())
             inflated = V + _inflation(v[block.rows], weight[block.rows])
             root = _inverse_root(_mask_rows(inflated, used[block.rows]))
             there = np.repeat(used[block.rows], 3, axis=1)
@@ -409,11 +410,6 @@ def _inverse_root(V: Floats) -> Floats:
     scaled = vectors / np.sqrt(values)[:, None]
     root: Floats = scaled @ np.swapaxes(vectors, 1, 2)
     return root
-
-
-def _log_det(V: Floats, used: Bools) -> float:
-    """Sum log determinants of covariances of the rows that are used."""
-    return float(np.linalg.slogdet(_mask_rows(V, used))[1].sum())
 
 
 def _condition_on_others(V: Floats, rotated: Floats, used: Bools) -> Floats:

@@ -150,9 +150,7 @@ class PathSolver:
         placed = ~is_unknown(self.flange)
         self.placed = placed & (targets.kind != TargetKind.JOINTS) & ~self.given
         self.told = np.zeros(n, dtype=bool)
-        self.by_string = self._by_string()
-        self.single = self._single_lines()
-        self.long = self.single & (_run_lengths(self.single) >= LONG)
+        self._find_simple()
 
     def _place(self) -> None:
         """Place the flange at poses and joint angles."""
@@ -198,19 +196,24 @@ class PathSolver:
         self.flange[known.rows] = known.flange
         self.given[known.rows] = True
 
-    def _by_string(self) -> Bools:
-        """Tell which targets need nothing but their configuration string."""
-        t = self.targets
-        told = (t.kind == TargetKind.POSE) & (t.slot >= 0) & ~t.nearest_turn
-        return np.asarray(told & (t.move == Motion.JOINT) & self.placed)
+    def _find_simple(self) -> None:
+        """Find what needs but its configuration string, or the one target before.
 
-    def _single_lines(self) -> Bools:
-        """Tell which targets continue a Cartesian path from the one before alone."""
-        samples, out = self.samples, np.zeros(len(self.q), dtype=bool)
-        single = np.flatnonzero(np.diff(self.targets.pred_start) == 1)
-        edge = self.targets.pred_start[single]
-        out[single] = samples.ready[edge] & (samples.source[edge] == single - 1)
-        return np.asarray(out & self.placed)
+        Of these, long runs of a Cartesian path are solved together.
+        """
+        t, samples = self.targets, self.samples
+        told = (t.kind == TargetKind.POSE) & (t.slot >= 0) & ~t.nearest_turn
+        self.by_string = told & (t.move == Motion.JOINT) & self.placed
+        single = np.flatnonzero(np.diff(t.pred_start) == 1)
+        edge = t.pred_start[single]
+        self.single = np.zeros(len(self.q), dtype=bool)
+        self.single[single] = samples.ready[edge] & (samples.source[edge] == single - 1)
+        self.single &= self.placed
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.single, [0]])))
+        begin, end = edges[::2], edges[1::2]
+        run = np.zeros(len(self.q), dtype=np.int64)  # length of that which each is in
+        run[self.single] = np.repeat(end - begin, end - begin)
+        self.long = self.single & (run >= LONG)
 
     def solve(self, settled: Bools) -> None:
         """Solve for all branches where there is no long stretch, in one batch.
@@ -288,15 +291,6 @@ class PathSolver:
     def span(self, edge: int) -> slice:
         """Return the samples of an edge."""
         return slice(int(self.samples.start[edge]), int(self.samples.start[edge + 1]))
-
-
-def _run_lengths(inside: Bools) -> Ints:
-    """Return the length of the run of True that each place lies in, (n,); else 0."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]])))
-    begin, end = edges[::2], edges[1::2]
-    out = np.zeros(len(inside), dtype=np.int64)
-    out[inside] = np.repeat(end - begin, end - begin)
-    return out
 
 
 # One arrival over a Cartesian path: a line, or a part of an arc.
@@ -807,7 +801,10 @@ def _finish(work: PathSolver) -> Trace:
     work.source[edge_of[holes]] = -1
     work.path[holes] = work.q[samples.visit[edge_of[holes]]]
     _limits(work, edge_of)
-    _arc_ends(work)
+    # Ends of arcs on whose way the arm strands already strand with it.
+    via = np.flatnonzero(work.targets.via[:-1])
+    via = via[STRANDS[work.reason[via]] & (work.reason[via + 1] == 0)]
+    work.reason[via + 1] = work.reason[via]
     written = (t.slot >= 0) & (t.move != Motion.JOINT) & (work.slot >= 0)
     turned = on_other_turns(work.q, t.turns)
     other = (work.slot != t.slot) | (turned & ~t.nearest_turn)
@@ -831,13 +828,6 @@ def _limits(work: PathSolver, edge_of: Ints) -> None:
         rows = np.flatnonzero(any_in_rows(over))
         for row in rows[work.reason[visit[rows]] == 0][::-1]:
             work.reason[visit[row]] = CODE[text[int(np.argmax(over[row]))]]
-
-
-def _arc_ends(work: PathSolver) -> None:
-    """Note ends of arcs on whose way the arm strands already."""
-    via = np.flatnonzero(work.targets.via[:-1])
-    via = via[STRANDS[work.reason[via]] & (work.reason[via + 1] == 0)]
-    work.reason[via + 1] = work.reason[via]
 
 
 # Where the arm stands somewhere: enough to go on.

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, read_only
 from postproc.diagnostics import Reason
-from postproc.motion.arrival_times import ArrivalTimes, no_time
+from postproc.motion.arrival_times import no_time
 from postproc.motion.blending import blend
 from postproc.motion.joint_path import NOWHERE, StartState, Trace, trace
 from postproc.motion.path import BlendCoupling
@@ -108,7 +108,11 @@ def plan(
     traced = blend(arm, targets, exact, timed)
     arrived = arrivals(arm, traced.q, traced.driven, lead)
     arrived = arrivals_on_curves(arm, targets, traced.q, arrived)
-    clock = _time_moves(arm, targets, traced) if timed else no_time(len(targets))
+    clock = no_time(len(targets))
+    if timed:
+        from postproc.motion.timing import tell_time  # with what only timed runs load
+
+        clock = tell_time(arm, targets, traced)
     tool = targets.tool
     tcp = where_passed(arm, points_of_plan(exact), traced.q) @ tool
     return Plan(
@@ -117,13 +121,6 @@ def plan(
         _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
         traced.pull, arrived.past, exact,
     )  # fmt: skip
-
-
-def _time_moves(arm: Arm, targets: Targets, traced: Trace) -> ArrivalTimes:
-    """Time all moves, with what only timed runs load."""
-    from postproc.motion.timing import tell_time
-
-    return tell_time(arm, targets, traced)
 
 
 def _guard(traced: Trace, wrist: float) -> Ints:

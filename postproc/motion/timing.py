@@ -377,14 +377,10 @@ def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
         found.since[rows], found.velocity[rows] = _estimate(points, rows)
         found.acceleration[rows] = 0.0
         found.fastest[rows] = np.inf
-        found.rate[rows] = _even_rate(found.since[rows], points.ds[rows])
+        # A run goes evenly from waypoint to waypoint at first.
+        rate = points.ds[rows][1:] / np.maximum(np.diff(found.since[rows]), SHORTEST)
+        found.rate[rows] = np.append(rate[:1], rate)
     return found
-
-
-def _even_rate(since: Floats, ds: Floats) -> Floats:
-    """Go evenly from waypoint to waypoint of one run: ds/dt, (k,)."""
-    rate = ds[1:] / np.maximum(np.diff(since), SHORTEST)
-    return np.append(rate[:1], rate)
 
 
 def _estimate(points: Waypoints, rows: slice) -> tuple[Floats, Floats]:

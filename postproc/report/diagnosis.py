@@ -195,9 +195,14 @@ def _origin(model: Model) -> str:
 
 def _step(name: str, record: Mapping[str, Any]) -> tuple[str, ...]:
     """Write one step of the history: the model that was made, and from what."""
+    added = []
+    for one in record["added"]:
+        where = f" of joint {one['joint']}" if one.get("joint") else ""
+        by = f" by {one['source']}" if one.get("source") else ""
+        p_value = f"{float(one['p_value']):.1e}"
+        added.append(f"{one['effect']}{where}{by}, p = {p_value}")
     return (
-        name, str(record["verdict"]),
-        "; ".join(_describe_addition(a) for a in record["added"]) or "nothing",
+        name, str(record["verdict"]), "; ".join(added) or "nothing",
         f"{record['before']['mean_mm']:.4f}", f"{record['after']['mean_mm']:.4f}",
         str(record["n_held_out"]), str(record["data_sha256"])[:12],
     )  # fmt: skip
@@ -205,13 +210,6 @@ def _step(name: str, record: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _list_effects(model: Model) -> str:
     return ", ".join(e.name for e in model.effects.effects)
-
-
-def _describe_addition(entry: dict[str, object]) -> str:
-    """Write one added effect of the history."""
-    where = f" of joint {entry['joint']}" if entry.get("joint") else ""
-    by = f" by {entry['source']}" if entry.get("source") else ""
-    return f"{entry['effect']}{where}{by}, p = {float(str(entry['p_value'])):.1e}"
 
 
 def history_json(model_path: Path) -> str:

@@ -591,7 +591,9 @@ def diff(
     found = [(f, told.get(f.original.name)) for f in files]
     rows = tuple(f.rows.with_record(own) for f, own in found)
     left = tuple(_list_uncorrected(f, own) for f, own in found if own is not None)
-    return Difference(rows, files[0].stamped, left, _counts(told))
+    statuses = [s.name.lower() for s in Status] if told else []
+    counts = {s: sum(a.counts[s] for a in told.values()) for s in statuses}
+    return Difference(rows, files[0].stamped, left, counts)
 
 
 def _list_uncorrected(file: Compared, told: LineOutcomes) -> DiffRows:
@@ -601,12 +603,3 @@ def _list_uncorrected(file: Compared, told: LineOutcomes) -> DiffRows:
     return DiffRows.bare(file.original.name, lines, file.targets(lines)).with_record(
         told
     )
-
-
-def _counts(told: Mapping[str, LineOutcomes]) -> dict[str, int]:
-    """Add up the visits of every status."""
-    return {
-        s.name.lower(): sum(a.counts[s.name.lower()] for a in told.values())
-        for s in Status
-        if told
-    }

@@ -110,14 +110,11 @@ def _objects(rows: DiffRows, some: slice, single: Sequence[int]) -> bytes:
     for key, column in columns.items():
         cells.append(column.behind(f'{lead}\n   "{key}": '.encode()))
         lead = ","
-    given = {row - some.start: _object(rows.row(row)) for row in single}
+    given = {}
+    for row in single:
+        told = json.dumps(rows.row(row)._asdict(), indent=1).replace("\n", "\n  ")
+        given[row - some.start] = f",\n  {told}".encode("ascii")
     return text_of(some.stop - some.start, [*cells, Cells(b"\n  }")], given)
-
-
-def _object(row: DiffRow) -> bytes:
-    """Write a row as a JSON object, a comma before it."""
-    told = json.dumps(row._asdict(), indent=1)
-    return (",\n  " + told.replace("\n", "\n  ")).encode("ascii")
 
 
 def _write_record_columns(rows: DiffRows, some: slice) -> dict[str, Cells]:

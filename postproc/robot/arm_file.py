@@ -67,7 +67,11 @@ def parse_toml(
     except UnicodeDecodeError:
         raise error(path, "is not UTF-8 text", "Save it as UTF-8") from None
     except tomllib.TOMLDecodeError as exc:
-        raise _syntax(path, str(exc), error) from None
+        text, _, place = str(exc).partition(" (at line ")
+        numbers = [int(n) for n in re.findall(r"\d+", place)]
+        line, column = numbers if len(numbers) == 2 else (None, None)
+        problem, cure = f"is not valid TOML: {text}", "Mend the syntax"
+        raise error(path, problem, cure, line=line, column=column) from None
     except RecursionError:
         raise error(path, "is nested too deeply", "Write it flat") from None
     except ValueError:
@@ -91,15 +95,6 @@ def validate(
         return schema.model_validate(data)
     except pydantic.ValidationError as exc:
         raise _explain(path, exc, schema, error) from None
-
-
-def _syntax(path: Path, message: str, error: type[FileError]) -> FileError:
-    """Take the place out of the message of the TOML reader."""
-    text, _, place = message.partition(" (at line ")
-    numbers = [int(n) for n in re.findall(r"\d+", place)]
-    line, column = numbers if len(numbers) == 2 else (None, None)
-    problem, cure = f"is not valid TOML: {text}", "Mend the syntax"
-    return error(path, problem, cure, line=line, column=column)
 
 
 def _explain(

@@ -81,16 +81,13 @@ class FrameSection(Strict):
                 raise ValueError('taught_deg needs source = "taught"')
             if len(self.taught_deg) != len(TAUGHT_POINTS):
                 raise ValueError(f"taught_deg needs {', '.join(TAUGHT_POINTS)}")
-        if self.taught_direction is not None:
-            self._check_sides(self.taught_direction)
+        if (rows := self.taught_direction) is not None:
+            name, given = "taught_direction", self.taught_deg
+            if given is None or len(rows) != len(given):
+                raise ValueError(f"{name} needs a row for each row of taught_deg")
+            if any(side not in (-1.0, 0.0, 1.0) for row in rows for side in row):
+                raise ValueError(f"{name} holds -1, 0 (not known) or 1 per joint")
         return self
-
-    def _check_sides(self, sides: list[Sextuple]) -> None:
-        """Refuse sides of other points than those of taught_deg."""
-        if self.taught_deg is None or len(sides) != len(self.taught_deg):
-            raise ValueError("taught_direction needs a row for each row of taught_deg")
-        if any(side not in (-1.0, 0.0, 1.0) for row in sides for side in row):
-            raise ValueError("taught_direction holds -1, 0 (not known) or 1 per joint")
 
     def record(self) -> tuple[float, ...]:
         """Return x, y, z [mm], a, e, r [deg]."""

@@ -220,7 +220,8 @@ def read_chain(
     links = [c.attributes.get("name", "") for c in robot.children if c.tag == "link"]
     if not links:
         raise ArmError(path, "has no links", "Give a URDF of an arm", line=robot.line)
-    base = _end(path, links, base, ("base", "base_link"), _roots(links, joints))
+    roots = [name for name in links if name not in joints]
+    base = _end(path, links, base, ("base", "base_link"), roots)
     tip = _end(path, links, tip, ("tool0", "flange"), _last(links, joints))
     up, down = _way(path, joints, base), _way(path, joints, tip)
     while up and down and up[-1] is down[-1]:
@@ -332,8 +333,12 @@ def _origin(path: Path, name: str, element: Element) -> tuple[Floats, tuple[str,
         (4, 4) [m], messages.
     """
     rpy = _numbers(path, element, "rpy", (0.0, 0.0, 0.0))
-    square = [_square(angle) for angle in rpy]
-    pose = _rotation(*square)
+    quarters = [round(angle / (math.pi / 2)) * (math.pi / 2) for angle in rpy]
+    square = [q if abs(angle - q) < SQUARE else angle
+              for q, angle in zip(quarters, rpy, strict=True)]  # fmt: skip
+    pose = np.eye(4)
+    for axis in (2, 1, 0):  # Rot_z(yaw) Rot_y(pitch) Rot_x(roll)
+        pose = pose @ rotate_about(np.eye(3)[axis], np.array([square[axis]]))[0]
     pose[:3, 3] = _numbers(path, element, "xyz", (0.0, 0.0, 0.0))
     rounded = (
         f"joint {name}: {given:g} rad read as {math.degrees(taken):g} deg"
@@ -366,24 +371,6 @@ def _numbers(
         cure = EXPAND if "$" in text else "Correct it"
         raise ArmError(path, problem, cure, line=element.line)
     return found
-
-
-def _square(angle: float) -> float:
-    """Take an angle that is a rounded quarter turn as the whole one.
-
-    >>> _square(1.57) == math.pi / 2, _square(1.5)
-    (True, 1.5)
-    """
-    nearest = round(angle / (math.pi / 2)) * (math.pi / 2)
-    return nearest if abs(angle - nearest) < SQUARE else angle
-
-
-def _rotation(roll: float, pitch: float, yaw: float) -> Floats:
-    """Return Rot_z(yaw) Rot_y(pitch) Rot_x(roll), (4, 4)."""
-    out = np.eye(4)
-    for axis, angle in ((2, yaw), (1, pitch), (0, roll)):
-        out = out @ rotate_about(np.eye(3)[axis], np.array([angle]))[0]
-    return out
 
 
 def rotate_about(axis: Floats, angle: Floats) -> Floats:
@@ -420,11 +407,6 @@ def _end(
         problem = f"does not say which link is the end of the chain ({several})"
         raise ArmError(path, problem, f"Name it with {option}")
     return found[0]
-
-
-def _roots(links: Sequence[str], joints: Mapping[str, UrdfJoint]) -> list[str]:
-    """List the links that hang on none."""
-    return [name for name in links if name not in joints]
 
 
 def _last(links: Sequence[str], joints: Mapping[str, UrdfJoint]) -> list[str]:

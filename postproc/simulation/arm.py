@@ -339,16 +339,13 @@ class VirtualArm:
         base = self.as_built.base + total(self.laws, Where.BASE, arrivals)
         mount = self.as_built.mount + total(self.laws, Where.TOOL, arrivals)
         chain = self.as_built.chain.grow(growth)
-        flange = chain.flange(angles, self._twists(arrivals))
+        twists = None
+        if any(law.where is Where.LINKS for law in self.laws):  # before every joint
+            twists = total(self.laws, Where.LINKS, arrivals).reshape(-1, 6, 6)
+        flange = chain.flange(angles, twists)
         return np.asarray(
             small_motion(base) @ flange @ small_motion(mount) @ arrivals.tool
         )
-
-    def _twists(self, arrivals: VirtualArrivals) -> Floats | None:
-        """Return by what links move before every joint, (n, 6, 6), None if not."""
-        if not any(law.where is Where.LINKS for law in self.laws):
-            return None
-        return total(self.laws, Where.LINKS, arrivals).reshape(-1, 6, 6)
 
     def error(self, arrivals: VirtualArrivals) -> Floats:
         """Return the true error, actual minus nominal TCP, (n, 3), without noise."""

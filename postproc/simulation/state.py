@@ -105,14 +105,12 @@ def make_arrivals(
     for name, (default, shape) in _DEFAULTS.items():
         value = np.broadcast_to(given.get(name, default), (n, *shape)).astype(float)
         values[name] = np.where(np.isnan(value), default, value)
-    return VirtualArrivals(q=q, order=order, tool=_tool_poses(tool, n), **values)
-
-
-def _tool_poses(tool: Floats | None, n: int) -> Floats:
     tool = np.zeros(3) if tool is None else np.asarray(tool, dtype=float)
     if tool.shape[-2:] != (4, 4):
         tool = pose(np.eye(3), tool)
-    return np.array(np.broadcast_to(tool, (n, 4, 4)))
+    return VirtualArrivals(
+        q=q, order=order, tool=np.array(np.broadcast_to(tool, (n, 4, 4))), **values
+    )
 
 
 class StatesLike(Protocol):

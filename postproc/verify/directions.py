@@ -65,7 +65,9 @@ class DriveTrain:
             return TimedRun(q, np.nan)
         if joint:
             return move_in_time(q[0], q[-1], self.limits)
-        return run_in_time(q, self.limits[0], self.limits[1], _least(ways))
+        steps = [np.full(len(w.q) - 1, w.least / (len(w.q) - 1)) for w in ways]
+        least = np.append(0.0, np.cumsum(np.concatenate(steps)))  # [s]
+        return run_in_time(q, self.limits[0], self.limits[1], least)
 
 
 def _limits(file: ArmFile) -> Floats:
@@ -76,12 +78,6 @@ def _limits(file: ArmFile) -> Floats:
     velocity = np.array(joints.velocity_deg_s)
     push = np.array(joints.acceleration_deg_s2 or velocity / TO_SPEED)
     return np.deg2rad([velocity, push, np.array(joints.jerk_deg_s3 or push / TO_PUSH)])
-
-
-def _least(ways: Sequence[MadeWay]) -> Floats:
-    """Return the time to every waypoint at the programmed speeds, (k,) [s]."""
-    steps = [np.full(len(w.q) - 1, w.least / (len(w.q) - 1)) for w in ways]
-    return np.append(0.0, np.cumsum(np.concatenate(steps)))
 
 
 def judge_directions(

@@ -18,7 +18,6 @@ from postproc.verify.opinion import (
 )
 from postproc.verify.pinocchio_arm import PinocchioArm
 from postproc.verify.positions import (
-    LoadedArms,
     confirm_angles,
     judge_branches,
     judge_motion,
@@ -52,7 +51,9 @@ def judge(
     for claim in (output, source):  # what was written counts, where time is short
         goals = goals_of(claim, facts)
         at = posture_of(arm, claim.q, begun + allowance.positions)
-        found = judge_positions(claim, goals, at, _build_loads(facts, claim))
+        loads = np.unique(claim.payload, axis=0)
+        arms = {tuple(own.tolist()): PinocchioArm.build(facts, own) for own in loads}
+        found = judge_positions(claim, goals, at, arms)
         rows[:0] = [*found, *judge_branches(claim, facts.file, at)]
         postures.append(at)
     if len(output.own) == len(source):
@@ -67,9 +68,3 @@ def judge(
     rows += judge_directions(output, maker, facts, placed + allowance.ways)
     ended = monotonic()
     return Opinion(program, tuple(rows), ended - begun, ended - placed)
-
-
-def _build_loads(facts: ArmFacts, claim: Claim) -> LoadedArms:
-    """Build the arm with every load that it carries."""
-    loads = np.unique(claim.payload, axis=0)
-    return {tuple(load.tolist()): PinocchioArm.build(facts, load) for load in loads}

@@ -129,6 +129,6 @@ def test_what_is_wrong_with_a_text_is_told_before_what_is_wrong_with_visits(
     monkeypatch.setattr(rewrite, "equivalent", lambda *given: "visits")
     with pytest.raises(VerificationError, match=r"\.pdl: visits$"):
         check(reading, after, output, rows)
-    monkeypatch.setattr(rewrite, "_in_text", lambda *given: "texts")
+    monkeypatch.setattr(rewrite, "difference", lambda *given: "texts")
     with pytest.raises(VerificationError, match="texts; nothing is written"):
         check(reading, after, output, rows)

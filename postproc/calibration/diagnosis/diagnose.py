@@ -149,7 +149,9 @@ def hold_out(
         inside = np.flatnonzero(part != k)
         if len(out) == 0:
             continue
-        less = _fit_of(base, inside)
+        batch = ArmStates(base.batch.arm, base.batch.states[inside])
+        effects = base.combination.effects
+        less = fit_effects(batch, base.position[inside], effects, base.noise.origin)
         causes = found.causes.at_rows(inside)
         more = investigate(less, causes, found.null, lambda *_: None).fit
         rows.append(out)
@@ -166,15 +168,6 @@ def hold_out(
         which, fitted, across(np.concatenate(before)), across(np.concatenate(after)),
         base.pose[which],
     )  # fmt: skip
-
-
-def _fit_of(base: Fit, rows: NDArray[np.int64]) -> Fit:
-    """Fit the effects of a fit to some of its rows only."""
-    batch, position = (
-        ArmStates(base.batch.arm, base.batch.states[rows]),
-        base.position[rows],
-    )
-    return fit_effects(batch, position, base.combination.effects, base.noise.origin)
 
 
 def predict_residuals(

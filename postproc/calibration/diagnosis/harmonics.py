@@ -360,7 +360,11 @@ class MatchingPursuit:
         family = Family(Transmission.name, self.joint, None, NAMED)
         effect = Transmission(((self.joint, order),))
         candidate = Candidate(family, effect, f"joint {self.joint}", share)
-        return Score(family, evidence, candidate, top, self._p_value(order))
+        # A wave alone is tested against the rows without the map.
+        wave = self.along.sums(np.array([order]))
+        blocks = _reduce_waves(wave.own, wave.rest)
+        p_value = float(score_p_value(blocks, self.square, self.whole.rows)[0])
+        return Score(family, evidence, candidate, top, p_value)
 
     def _refine_order(self, order: float, step: float) -> tuple[float, float]:
         """Move an order to its peak, or to a whole one that does hardly worse.
@@ -409,12 +413,6 @@ class MatchingPursuit:
         beside = log_evidence(blocks, square, self.whole.rows)
         gain = alone[:, None] + beside.reshape(len(alone), -1) - alone[-1]
         return np.asarray(gain.max(axis=0))
-
-    def _p_value(self, order: float) -> float:
-        """Test a wave alone against the rows without the map."""
-        wave = self.along.sums(np.array([order]))
-        blocks = _reduce_waves(wave.own, wave.rest)
-        return float(score_p_value(blocks, self.square, self.whole.rows)[0])
 
     def without(self, order: float, own: Floats) -> MatchingPursuit:
         """Take a wave out of the rows and of all columns, whatever its size.

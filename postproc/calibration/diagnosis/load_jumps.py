@@ -103,7 +103,12 @@ class _Jump:
                 at, least = at + part * step, tried
             away = self.load + self.by_moment @ at[1:] - at[0]
             if int((np.abs(away) < width).sum()) >= SEEN:
-                charge = _cost(self.slopes(at, width)[0])
+                # Half the logarithm of what rows leave of the moments' prior [nats].
+                slopes = self.slopes(at, width)[0]
+                basis, _ = np.linalg.qr(slopes[:, :2])
+                own = slopes[:, 2:] - basis @ (basis.T @ slopes[:, 2:])
+                values = np.linalg.svd(own, compute_uv=False)
+                charge = float(np.log1p(values**2).sum()) / 2
         return at, charge + float(at[1:] @ at[1:]) / 2.0
 
 
@@ -158,15 +163,3 @@ def _move(
     more = at[1:].reshape(-1, 3) * spreads
     heavier = tuple((k, tuple(map(float, m))) for k, m in zip(links, more, strict=True))
     return replace(cell, middle=float(at[0]) * half, heavier=heavier), charge
-
-
-def _cost(slopes: Floats) -> float:
-    """Return half the logarithm of what rows leave of the moments' prior [nats].
-
-    Args:
-        slopes: By size and place, which are free, and the moments, (3 n, 2 + m).
-    """
-    basis, _ = np.linalg.qr(slopes[:, :2])
-    own = slopes[:, 2:] - basis @ (basis.T @ slopes[:, 2:])
-    values = np.linalg.svd(own, compute_uv=False)
-    return float(np.log1p(values**2).sum()) / 2

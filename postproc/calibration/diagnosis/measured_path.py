@@ -177,7 +177,7 @@ def _diagnose_track(
         survey, cell.arm, model, tracker=tracker, setup=setup, seed=seed,
         progress=progress,
     )  # fmt: skip
-    extension = _with_verdicts(_as_surveyed(extension, model), joints)
+    extension = _as_surveyed(extension, model, joints)
     named = replace(extension.model, provenance=Provenance.today(cell))
     extension = replace(extension, model=named)
     size = ErrorStatistics.of_sizes(lengths(found.on_the_way.off))
@@ -342,25 +342,24 @@ def _move(sample: Ints, ways: PredictedWays) -> Ints:
     return np.asarray(np.searchsorted(ways.first, sample, side="right") - 1)
 
 
-def _as_surveyed(found: Extension, model: Model) -> Extension:
+def _as_surveyed(
+    found: Extension, model: Model, joints: tuple[JointInMotion, ...]
+) -> Extension:
     """Leave what one run tells nothing of: how poses repeat, where the tracker stood.
 
     Args:
         found: What a track says.
         model: The given model.
+        joints: What its joints do in motion, for its history.
     """
+    *earlier, record = found.model.history
+    record = {**record, "in_motion": {str(j.joint): j.verdict for j in joints}}
     told = {k: v for k, v in model.statistics.items() if k == READING}
     kept = replace(
         found.model,
         noise=model.noise,
         registration=model.registration,
         statistics=found.model.statistics | told,
+        history=(*earlier, record),
     )
     return replace(found, model=kept)
-
-
-def _with_verdicts(found: Extension, joints: tuple[JointInMotion, ...]) -> Extension:
-    """Let the extended model know what its joints do in motion."""
-    *earlier, record = found.model.history
-    record = {**record, "in_motion": {str(j.joint): j.verdict for j in joints}}
-    return replace(found, model=replace(found.model, history=(*earlier, record)))

@@ -297,7 +297,10 @@ def leftovers(projection: Projection, seed: int) -> tuple[ResidualTest, ...]:
         *_serial(projection, flipped),
         *_scatter(projection, rest, dealt),
     ]
-    spread = np.array([_standardise(values) for _, values in found])
+    every = np.array([values for _, values in found])
+    draws = every[:, 1:]
+    scale = np.maximum(draws.std(axis=1, keepdims=True), 1e-300)
+    spread = (every - draws.mean(axis=1, keepdims=True)) / scale
     null = Null(np.sort(spread[:, 1:].max(axis=0)))
     out = [
         ResidualTest(what, float(values[0]), null.p_value(float(values[0])))
@@ -326,12 +329,6 @@ def _draws(rest: Floats, rng: np.random.Generator) -> tuple[Floats, Dealt]:
     for order in dealt[1:]:
         order[:] = rng.permutation(n)
     return flipped.reshape(3 * n, -1), dealt
-
-
-def _standardise(values: Floats) -> Floats:
-    """Give values the scale of their draws (all but the first)."""
-    draws = values[1:]
-    return np.asarray((values - draws.mean()) / max(float(draws.std()), 1e-300))
 
 
 def _maps(

@@ -63,7 +63,12 @@ def refine(projection: Projection, score: Score) -> Score:
         idle = idle + 1 if turns == 1 else 0
         if idle > IDLE:
             break
-    return _plainer(projection, place_load_jump(projection, score))
+    score = place_load_jump(projection, score)
+    plain = score.best.effect.plainer()
+    if plain == score.best.effect:
+        return score
+    # A plainer effect, say a whole order of a gear, where it does hardly worse.
+    return _instead(projection, score, replace(score.best, effect=plain), HARDLY)
 
 
 def _finer(projection: Projection, score: Score, width: float) -> tuple[Score, float]:
@@ -82,14 +87,6 @@ def _finer(projection: Projection, score: Score, width: float) -> tuple[Score, f
     best = replace(found.best, log_prior=share)
     evidence = max(score.evidence, found.evidence + covered)
     return replace(found, best=best, evidence=evidence), gained
-
-
-def _plainer(projection: Projection, score: Score) -> Score:
-    """Take a plainer effect where it does hardly worse, a whole order of a gear say."""
-    plain = score.best.effect.plainer()
-    if plain == score.best.effect:
-        return score
-    return _instead(projection, score, replace(score.best, effect=plain), HARDLY)
 
 
 def lawful(projection: Projection, score: Score, law: Candidate | None) -> Score:
@@ -244,7 +241,11 @@ def choose(scores: list[Score]) -> Score:
     free = next((s for s in scores if s.family.tier == FREE), name)
     if free.evidence - name.evidence > find_margin(name, free):
         return _law(free, names) or plainest(free, scores)
-    return _forerunner(name, scores)
+    plain = (name.best.effect.variation_of, name.family.joint)
+    for s in scores:
+        if (s.family.effect, s.family.joint) == plain and s.evidence > CLEARLY[0]:
+            return s
+    return name
 
 
 def find_margin(name: Score, free: Score) -> float:
@@ -304,15 +305,6 @@ def ahead(evidence: float) -> float:
     return max(CLEARLY[0], CLEARLY[1] * evidence)
 
 
-def _forerunner(best: Score, scores: list[Score]) -> Score:
-    """Take the plain effect before what varies it, where the joint has none yet."""
-    plain = (best.best.effect.variation_of, best.family.joint)
-    for s in scores:
-        if (s.family.effect, s.family.joint) == plain and s.evidence > CLEARLY[0]:
-            return s
-    return best
-
-
 # A fit with other effects, refitted to the same rows.
 
 
@@ -367,10 +359,12 @@ def names_instead(
         level: Largest p-value of a name that is tried.
         scores: The ranking under the fit; its first is the free form.
     """
-    free, first = scores[0], None
-    alone = extend(fit, free.best).log_evidence if _of_one_cause(free) else -np.inf
+    free, first, joint = scores[0], None, scores[0].family.joint
+    one_cause = free.family.effect == PART_MOTION  # names must explain more than it
+    alone = extend(fit, free.best).log_evidence if one_cause else -np.inf
     for _ in range(CHAIN):
-        name = _best_name(scores, free.family.joint)
+        names = (s for s in scores if s.family.tier == NAMED)
+        name = next((s for s in names if joint in (None, s.family.joint)), None)
         if name is None or null.p_of(name) > level:
             return None
         first = first or name
@@ -379,19 +373,6 @@ def names_instead(
         left = next((s.evidence for s in scores if s.family == free.family), 0.0)
         if left < ahead(free.evidence):
             return first if fit.log_evidence > alone else None
-    return None
-
-
-def _of_one_cause(score: Score) -> bool:
-    """Tell whether it is one cause: several names must explain more than it."""
-    return score.family.effect == PART_MOTION
-
-
-def _best_name(scores: list[Score], joint: int | None) -> Score | None:
-    """Find the best name, of a joint if one is given."""
-    for s in scores:
-        if s.family.tier == NAMED and joint in (None, s.family.joint):
-            return s
     return None
 
 

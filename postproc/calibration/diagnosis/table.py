@@ -130,7 +130,8 @@ class MotionLaws:
         alike: dict[int, list[tuple[MotionLaw, Floats, int]]] = defaultdict(list)
         for k, driver in enumerate(drivers):
             for law in _laws_of(batch, driver, factor):
-                values = _scale_functions(law.effect, batch)
+                scale = np.array([p.scale for p in law.effect.parameters()])
+                values: Floats = (law.effect.turning(batch) * (scale / scale.max())).T
                 alike[values.shape[0]].append((law, values, k))
         widths = []
         for _, some in sorted(alike.items()):
@@ -245,7 +246,13 @@ class Table:
         factors += [f"torque {j}" for j in JOINTS if f"torque {j}" in drivers]
         laws = {"": MotionLaws.of(batch, drivers, "")}
         for factor in factors if len(batch) <= MANY else ():
-            other = [d for d in drivers if _may_multiply(factor, d)]
+            # With which drivers a factor is a cause of its own.
+            kinds = {d.partition(" ")[0] for d in drivers}
+            if factor.startswith("lambda"):
+                kinds -= {"lambda", *PASSING}
+            else:
+                kinds &= {"joint", "temperature", "way"}
+            other = [d for d in drivers if d.partition(" ")[0] in kinds]
             laws[factor] = MotionLaws.of(batch, other, factor)
         named: dict[str, set[tuple[str, str]]] = defaultdict(set)
         for kind in EFFECTS:
@@ -308,7 +315,10 @@ class Table:
     def _scan(self, view_of: Callable[[Carrier], Projection]) -> list[MotionFamily]:
         """Score the families that anything speaks for, the best first."""
         found = []
-        for carrier in self._carriers():
+        only = None if self.only is None else {carrier for carrier, _ in self.only}
+        for carrier in every_carrier():
+            if only is not None and carrier not in only:
+                continue
             view = view_of(carrier)
             square = np.array([view.rest @ view.rest])
             scored = self._evidence(view, carrier, view.twice, square)
@@ -319,13 +329,6 @@ class Table:
                     for k in np.flatnonzero(whole > 0.0)
                 ]
         return sorted(found, key=lambda family: -family.evidence)
-
-    def _carriers(self) -> tuple[Carrier, ...]:
-        """List the carriers that are tried."""
-        if self.only is None:
-            return every_carrier()
-        own = {carrier for carrier, _ in self.only}
-        return tuple(c for c in every_carrier() if c in own)
 
     def score_moved_parts(self, projection: Projection) -> list[Score]:
         """Score parts that have moved once since a given model was made."""
@@ -378,7 +381,9 @@ class Table:
         axes = JointAxes.of(view.fit, carrier.move(view.at))
         along = View(axes.size, axes.along(view.squares), axes.along(rows))
         for factor in _factors(carrier):
-            laws, each = self._list_laws(carrier, factor), []
+            laws, each = self.laws.get(factor, MotionLaws((), ())), []
+            if self.only is not None:
+                laws = laws.some(self.only.get((carrier, factor), NONE))
             for some, values, _ in laws.widths:
                 reduced = reduce_columns(along, (), axes.size.apply(values))
                 evidence = log_evidence(reduced, square, view.rows)
@@ -386,13 +391,6 @@ class Table:
                 each.append(evidence)
             if each:
                 yield factor, laws, tuple(each)
-
-    def _list_laws(self, carrier: Carrier, factor: str) -> MotionLaws:
-        """Return the laws of a factor that are tried on a carrier."""
-        laws = self.laws.get(factor, MotionLaws((), ()))
-        if self.only is None:
-            return laws
-        return laws.some(self.only.get((carrier, factor), NONE))
 
     def _shares(self, carrier: Carrier, laws: Sequence[MotionLaw]) -> Floats:
         """Return log shares of laws on a carrier, (c,); -inf of those with a name."""
@@ -441,23 +439,15 @@ def _drivers(batch: ArmStates) -> list[str]:
     names += PLAIN
     if varies(covariate(batch, "time")):
         names.remove("order")  # they tell the same
-    return [n for n in names if _varies(batch, n)]
-
-
-def _varies(batch: ArmStates, name: str) -> bool:
-    """Tell whether a driver varies enough to show."""
-    x = covariate(batch, name)
-    if name.startswith(LOADS):
-        return varies(x) and float(np.ptp(x)) > LEAST_MOMENT
-    return varies(x) and varies_enough(batch.states, name.partition(" ")[0])
-
-
-def _may_multiply(factor: str, driver: str) -> bool:
-    """Tell whether a factor times a driver is a cause of its own."""
-    kind = driver.partition(" ")[0]
-    if factor.startswith("lambda"):
-        return kind not in ("lambda", *PASSING)
-    return kind in ("joint", "temperature", "way")
+    drivers = []
+    for name in names:
+        x = covariate(batch, name)
+        enough = varies_enough(batch.states, name.partition(" ")[0])
+        if name.startswith(LOADS):
+            enough = float(np.ptp(x)) > LEAST_MOMENT
+        if enough and varies(x):
+            drivers.append(name)
+    return drivers
 
 
 def _laws_of(batch: ArmStates, driver: str, factor: str) -> list[MotionLaw]:
@@ -499,13 +489,6 @@ def _places(x: Floats, alone: bool) -> list[float]:
         part = part[1::2]
     even = x.min() + np.ptp(x) * part
     return sorted({*map(float, even), *map(float, np.quantile(x, part))})
-
-
-def _scale_functions(effect: PartMotion | Curve, batch: ArmStates) -> Floats:
-    """Evaluate the functions of an effect over their relative prior scales, (k, n)."""
-    scale = np.array([p.scale for p in effect.parameters()])
-    values: Floats = (effect.turning(batch) * (scale / scale.max())).T
-    return values
 
 
 # Everything that is searched: what has a name, and the rest of the table.

@@ -47,7 +47,11 @@ def weigh_laws(found: Search, progress: Progress) -> Search:
         found: The search.
         progress: Told what is being done.
     """
-    if not _lacking(found) or not _has_shape(found):
+    own = [a.candidate for a in found.additions if a.candidate.family.joint != 1]
+    shapes = [c for c in own if c.source == f"joint {c.family.joint}"]
+    if not _lacking(found) or not any(
+        isinstance(c.effect, JointEffect) for c in shapes
+    ):
         return found
     start = replace(found, fit=found.base, additions=(), refused=None, ranked=None)
     before = _drop_unneeded(grow_on(_with_laws(start), progress))
@@ -117,13 +121,6 @@ def _lacking(found: Search) -> list[Candidate]:
     ]
 
 
-def _has_shape(found: Search) -> bool:
-    """Tell whether a joint that carries weight was given a shape of its own angle."""
-    own = [a.candidate for a in found.additions]
-    return any(c.source == f"joint {c.family.joint}" and c.family.joint != 1
-               and isinstance(c.effect, JointEffect) for c in own)  # fmt: skip
-
-
 def _with_laws(found: Search) -> Search:
     """Add the laws that a search lacks, together."""
     laws = _lacking(found)
@@ -161,7 +158,8 @@ def _only(found: Search, kept: set[int]) -> Search:
     while True:
         out = set(_together(found)) - kept
         if out:
-            found, kept = _without(found, out), _renumber_laws(found, out, kept)
+            left = [k for k in range(len(found.additions)) if k not in out]
+            found, kept = _without(found, out), {left.index(k) for k in kept}
         bad = {k for k in kept if _impossible(found, k)}
         if not bad:
             return found
@@ -175,12 +173,6 @@ def _impossible(found: Search, number: int) -> bool:
     own[found.fit.combination.slices[place]] = True
     gain = compare_held_out(found.fit, place, found.additions[number].candidate)
     return bool(impossible(found.fit, own)) or not gain.sure
-
-
-def _renumber_laws(found: Search, out: set[int], kept: set[int]) -> set[int]:
-    """Number laws again once others are out."""
-    left = [k for k in range(len(found.additions)) if k not in out]
-    return {left.index(k) for k in kept}
 
 
 def _without(found: Search, out: set[int]) -> Search:

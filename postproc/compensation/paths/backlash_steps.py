@@ -87,7 +87,9 @@ class JointInMotion:
         """Say "confirmed", "refuted", "elsewhere" or "uncertain", at 95 %."""
         if self.steps < FEW:
             return UNCERTAIN
-        times = _student(self.steps - 1)
+        from scipy.special import stdtrit  # slow to load, and seldom wanted
+
+        times = float(stdtrit(self.steps - 1, SURE))
         off, wide = abs(self.share - 1.0), times * self.error
         away = abs(self.later)
         if off - wide > LIKE:
@@ -98,13 +100,6 @@ class JointInMotion:
             return "elsewhere"
         near = away <= THERE and away + times * self.later_error <= ELSEWHERE
         return CONFIRMED if near else UNCERTAIN
-
-
-def _student(freedom: int) -> float:
-    """Return how many standard errors a mean is known within, by few samples."""
-    from scipy.special import stdtrit  # slow to load, and seldom wanted
-
-    return float(stdtrit(freedom, SURE))
 
 
 def measure_steps(ways: PredictedWays, read: OnTheWay, scatter: float) -> FlankSteps:

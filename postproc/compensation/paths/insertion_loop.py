@@ -221,12 +221,6 @@ def _on_path(work: InsertionPlan, k: int, v: int) -> list[float]:
     return [share for _, share in sorted(found, reverse=True)]
 
 
-def _explain_uncorrected(work: InsertionPlan, v: int, why: str) -> str:
-    """Say why a move is left; what is said of one half of an arc is so of both."""
-    both = halves(work.source.reading.visits, v)
-    return work.left.get(v) or next((work.left[h] for h in both if h in work.left), why)
-
-
 def _result(work: InsertionPlan) -> CompensatedProgram:
     """Tell of the program as of the source's visits."""
     told = work.latest.in_time or work.first
@@ -246,6 +240,10 @@ def _report_insertions(work: InsertionPlan, told: InTime) -> Insertions:
     if work.crowded:
         why = "no more points may be inserted (max_inserted)"
     too_far = set(work.paths.visit[work.too_far].tolist()) - work.points.keys()
+    visits, left = work.source.reading.visits, {}
+    for v in sorted(too_far):  # what is known of one half of an arc is so of both
+        halved = (work.left[h] for h in halves(visits, v) if h in work.left)
+        left[v] = work.left.get(v) or next(halved, why)
     otherwise = {}
     if work.latest is not work.source:
         far = largest_on_moves(told.paths, told.paths.otherwise)
@@ -255,7 +253,7 @@ def _report_insertions(work: InsertionPlan, told: InTime) -> Insertions:
         work.tolerance,
         work.points,
         work.stops & work.points.keys(),
-        {v: _explain_uncorrected(work, v, why) for v in sorted(too_far)},
+        left,
         sizes_of(work.first.paths),
         otherwise,
         find_reapproaches(work, told),

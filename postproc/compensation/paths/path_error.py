@@ -179,7 +179,12 @@ def predict_paths(
     off = _shift(shift, pair[0], way)
     moved = commanded - wanted - off
     if owner is not None and len(rows):
-        moved += _off_the_arcs(arcs, owner, before, pair[0], wanted, way)
+        # What chords cut off of arcs, and what points are rounded by.
+        ways = pair[0]
+        whole = way[ways.first[1:] - 1][ways.way]
+        nearest = np.where(2 * way < whole, ways.source[ways.way], ways.visit[ways.way])
+        on_arc = arcs.pieces(owner, before.targets.fly)[nearest]
+        moved += arcs.off(wanted, owner[ways.visit][ways.way], on_arc)
     found = PathAccuracy(
         rows, pair[0].first, way, tangent,
         _deviations(runs[0], error, -off, tangent, way),
@@ -241,32 +246,6 @@ def _in_doubt(
         giving, _ = apart(moved + error(soft, slice(None), lying), tangent)
     far, doubtful = by_joint.max(axis=1), (by_joint * open_).max(axis=1)
     return replace(found, otherwise=far, doubtful=doubtful, giving=giving)
-
-
-def _off_the_arcs(
-    arcs: WantedArcs,
-    owner: Ints,
-    cycle: ProgramCycle,
-    ways: PathSamples,
-    wanted: Floats,
-    way: Floats,
-) -> Floats:
-    """Return how far pieces of arcs, not corrected, are from the arcs, (s, 3) [m].
-
-    That is what chords cut off, and what points are rounded by.
-
-    Args:
-        arcs: The arcs.
-        owner: As in `predict_paths`.
-        cycle: The program with points, not corrected.
-        ways: Its ways.
-        wanted: Where it leads, (s, 3) [m].
-        way: Path length up to every sample, (s,) [m].
-    """
-    whole = way[ways.first[1:] - 1][ways.way]
-    nearest = np.where(2 * way < whole, ways.source[ways.way], ways.visit[ways.way])
-    on_arc = arcs.pieces(owner, cycle.targets.fly)[nearest]
-    return arcs.off(wanted, owner[ways.visit][ways.way], on_arc)
 
 
 def _groups(owner: Ints) -> tuple[Ints, Ints]:

@@ -97,9 +97,13 @@ def _bad(
         return
     flat = bending(work)
     bent = {cut[0] for cut, far in flat.items() if not may_be_chord(work, cut, far)}
+    moved = told.before.path.aside[work.own] - work.first.before.path.aside
+    there = any_in_rows(np.abs(np.nan_to_num(moved)) > MOVED)
+    there[work.cut_arcs()] = False  # judged as the points that they are
+    before = work.source.reading.visits.before
     judged = _Judged(
         work, without, _worst(work, told), _if_otherwise(work, told, without),
-        _corners_moved(work, told), bent,
+        there | (there[before] & (before >= 0)), bent,
     )  # fmt: skip
     for v in sorted(_with_points(work)):
         if reason := judged.why_not(v):
@@ -278,15 +282,6 @@ def _list_roundings(work: InsertionPlan, told: InTime) -> dict[int, list[_Corner
         moved[: int(v in work.stops)] = beside[: int(v in work.stops)] = 0.0
         found[v] = [*map(_Corner, half, moved, done, beside)]
     return found
-
-
-def _corners_moved(work: InsertionPlan, told: InTime) -> Bools:
-    """Tell at which moves a rounded corner at an end is passed otherwise, (n,)."""
-    moved = told.before.path.aside[work.own] - work.first.before.path.aside
-    there = any_in_rows(np.abs(np.nan_to_num(moved)) > MOVED)
-    there[work.cut_arcs()] = False  # judged as the points that they are
-    before = work.source.reading.visits.before
-    return np.asarray(there | (there[before] & (before >= 0)))
 
 
 # How far moves are from their paths, by the visit at their end.

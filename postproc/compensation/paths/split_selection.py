@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.compensation.paths.arcs import halves
-from postproc.compensation.paths.backlash_preload import BacklashPreload, take_up
+from postproc.compensation.paths.backlash_preload import take_up
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.split_constraints import shortest_pieces
 from postproc.language.languages import language_of
@@ -33,7 +33,12 @@ def find_split(work: InsertionPlan) -> None:
         if v not in far:
             work.beside.add(v)
         if work.setting.options.preload_backlash and _can_stop(work, v):
-            _may_stop(work, v, take_up(work.first.after, work.setting, visits, v))
+            # What gives way before it carries is led off by what a sharp gap asks for.
+            taken = take_up(work.first.after, work.setting, visits, v)
+            if _in_doubt(work, v, taken.crossing, work.verdicts):
+                work.unconfirmed.add(v)
+            else:
+                work.idle[v] = taken
 
 
 def _explain_refusal(work: InsertionPlan, k: int, v: int) -> str:
@@ -58,18 +63,6 @@ def _can_stop(work: InsertionPlan, v: int) -> bool:
     if work.splitter is None or visits.fly[before] or visits.via[before]:
         return False
     return work.splitter.stops(int(visits.file[v]), int(work.lines[v]))
-
-
-def _may_stop(work: InsertionPlan, v: int, taken: BacklashPreload) -> None:
-    """Let the arm stop where a move begins, if flanks change there for certain.
-
-    What gives way before it carries, or lies where weight pushes it, would be led
-    off by what a sharp gap asks for, and nothing behind the stop mends that.
-    """
-    if _in_doubt(work, v, taken.crossing, work.verdicts):
-        work.unconfirmed.add(v)
-    else:
-        work.idle[v] = taken
 
 
 def _otherwise_in_motion(work: InsertionPlan, k: int, v: int) -> str:

@@ -195,7 +195,12 @@ class Store:
             self.last = frozenset({MANY}) if many else both
             changed = True
         if other.settings is not self.settings and other.settings != self.settings:
-            merged = _merge_settings(self.settings, other.settings)
+            a, b, unset = (
+                self.settings,
+                other.settings,
+                Nothing("it is set on one way only"),
+            )
+            merged = {n: join(a.get(n, unset), b.get(n, unset)) for n in {**a, **b}}
             changed |= merged != self.settings
             self.settings = merged
         for key, mine, before, after in self._join(other):
@@ -232,8 +237,3 @@ def wholes(key: str) -> Iterator[str]:
     at = len(key)
     while (at := max(key.rfind("[", 0, at), key.rfind(".", 0, at))) > 0:
         yield key[:at]
-
-
-def _merge_settings(a: Settings, b: Settings) -> Settings:
-    unset = Nothing("it is set on one way only")
-    return {name: join(a.get(name, unset), b.get(name, unset)) for name in {**a, **b}}

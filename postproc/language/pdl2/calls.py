@@ -373,7 +373,10 @@ def _setting(here: Execution, reference: ast.Reference, value: Value) -> None:
     """Change a frame or motion variable of our arm."""
     name = here.setting_name(reference)
     if name is None:
-        part = _disturbing_part(here, reference)
+        part = reference.name[1:]
+        if part == "arm_data" and _whose(here, reference) in (None, here.world.arm):
+            part = str((*reference.steps, "")[1]).lstrip("$")
+        part = part if part in DISTURBING else ""
         off = value is False and here.store.settings.get(part, False) is False
         if part and not off:
             here.store.set(**{part: Nothing("a part of it is assigned")})
@@ -389,14 +392,6 @@ def _setting(here: Execution, reference: ast.Reference, value: Value) -> None:
     if f"${name}" in here.volatile:
         value = Nothing("a condition handler changes it")
     here.store.set(**{name: value})
-
-
-def _disturbing_part(here: Execution, reference: ast.Reference) -> str:
-    """Return the disturbing setting that a part belongs to, "" for any other."""
-    name = reference.name[1:]
-    if name == "arm_data" and _whose(here, reference) in (None, here.world.arm):
-        name = str((*reference.steps, "")[1]).lstrip("$")
-    return name if name in DISTURBING else ""
 
 
 def _frame_part(

@@ -379,12 +379,11 @@ class Collector:
         numbers = lines.value[lines.first[moves.row[mine]][:, None] + slots]
         both = np.column_stack([setting, numbers])
         distinct, which = np.unique(both, axis=0, return_inverse=True)
-        index = [
-            self.settings.index(
-                {**self.settings.get_settings(int(base)), **_set(names, row)}
-            )
-            for base, *row in distinct.tolist()
-        ]
+        index, unread = [], Nothing("the number cannot be read")
+        for base, *row in distinct.tolist():
+            own = dict(self.settings.get_settings(int(base)))
+            own |= {n: unread if x != x else x for n, x in zip(names, row, strict=True)}
+            index.append(self.settings.index(own))
         return np.array(index, dtype=np.int64)[which.ravel()]
 
     def _fill_written(self, moves: ProgramMoves) -> None:
@@ -596,13 +595,6 @@ def _between(
     every, order = NameColumn(others.values()), np.argsort(places)
     every.extend(names)
     return places[order], every.take(order)
-
-
-def _set(names: list[str], numbers: list[float]) -> dict[str, Value]:
-    """Return the settings that WITH changes to some numbers."""
-    unread = Nothing("the number cannot be read")
-    pairs = zip(names, numbers, strict=True)
-    return {name: unread if n != n else n for name, n in pairs}
 
 
 def _find_measured(program: Program) -> tuple[Ints, list[str]]:

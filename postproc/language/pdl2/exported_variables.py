@@ -27,7 +27,7 @@ def changing_variables(world: World) -> frozenset[str]:
     found = {
         key
         for program in world.programs()
-        for key, said in _of(world, program)
+        for key, said in _of(program)
         if not (_is_constant(world, key) or _is_point(said.type))
     }
     found |= set(_list_exported_by_file(world))
@@ -44,8 +44,9 @@ def find_imported_points(world: World) -> frozenset[str]:
     imported = {
         key
         for program in world.programs()
-        for key, said in _of(world, program)
-        if said.exported not in own and not _is_scalar(said.type)
+        for key, said in _of(program)
+        if said.exported not in own and said.type is not None
+        if said.type.name not in _SCALARS or said.type.path
     }
     if not imported:
         return frozenset()
@@ -53,7 +54,7 @@ def find_imported_points(world: World) -> frozenset[str]:
     return frozenset(imported - kept)
 
 
-def _of(world: World, program: Program) -> Iterator[tuple[str, Variable]]:
+def _of(program: Program) -> Iterator[tuple[str, Variable]]:
     """Yield the exported variables of a program, constants of the text left out."""
     variables = program.variables
     for name in variables.which(lambda said: bool(said.exported)):
@@ -78,11 +79,6 @@ def _list_exported_by_file(world: World) -> Iterator[str]:
 _KINDS = frozenset({"INT", "REA", "BOO", "STR", "AINT", "AREA", "ABOO", "ASTR"})
 
 
-def _is_scalar(type_: ast.Type | None) -> bool:
-    """Tell whether a type holds numbers, texts or switches alone."""
-    return type_ is None or (type_.name in _SCALARS and not type_.path)
-
-
 def _is_point(type_: ast.Type | None) -> bool:
     """Tell whether a type holds positions and no more, in any number."""
     points = ("position", "xtndpos", "jointpos", "vector")
@@ -100,7 +96,7 @@ def _find_written(world: World) -> set[str]:
     found = set()
     for program in world.programs():
         assigned = rows_effects(program, 0, len(program.lines)).assigned
-        for key, _ in _of(world, program):
+        for key, _ in _of(program):
             if key.partition("/")[2] in assigned:
                 found.add(key)
     return found

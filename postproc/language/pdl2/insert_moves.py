@@ -81,9 +81,10 @@ class Pdl2Splitter(Splitter):
         """Tell whether the arm may stop once more, see `Splitter.stops`."""
         program = self.programs[file]
         row = int(np.searchsorted(program.lines.line, line)) - 1
-        while row >= 0 and _is_setting(program.statement(row)):
-            row -= 1
-        return row >= 0 and isinstance(program.statement(row), ast.Move)
+        for one in map(program.statement, range(row, -1, -1)):
+            if not isinstance(one, ast.Assign) or one.target.name not in _MOTION:
+                return isinstance(one, ast.Move)
+        return False
 
     def points(
         self, file: int, line: int, numbers: Floats, config: str, stop: bool
@@ -184,11 +185,6 @@ def _place(numbers: Floats, config: str) -> str:
         for k, x in enumerate(numbers.tolist())
     )
     return f"POS({told}, '{config}')"
-
-
-def _is_setting(statement: ast.Statement) -> bool:
-    """Tell whether a statement only sets how the arm moves: a port begins more."""
-    return isinstance(statement, ast.Assign) and statement.target.name in _MOTION
 
 
 def _in_its_text(program: Program, row: int) -> str:

@@ -405,7 +405,11 @@ def _report_drift(world: World, place: Place, file: ValueFile) -> None:
     """Say where a program and its variable file have drifted apart."""
     for found in file.diagnostics:
         world.diagnostics[found] = None
-    names, written = _bases(file.entries)
+    entries, names = file.entries, file.entries.row.names
+    written: Sequence[str] = entries.name.take(entries.row.rows.astype(np.int64))
+    if entries.parts:
+        bases = {base_variable(name): name.partition(".")[0] for name in written}
+        names, written = NameColumn(bases), [*bases.values()]
     used = place.program.statements.tell(names)
     declared = place.program.variables.names.find(names) >= 0
     if used.all() and declared.all():  # as nearly always
@@ -420,15 +424,6 @@ def _report_drift(world: World, place: Place, file: ValueFile) -> None:
     if undeclared:
         text = f"used by the program, but not declared there: {_some(undeclared)}"
         _say(world, file, Code.LSV_UNDECLARED, text)
-
-
-def _bases(entries: Entries) -> tuple[NameColumn, Sequence[str]]:
-    """Return the variables of a file, without their parts, and how they are written."""
-    written = entries.name.take(entries.row.rows.astype(np.int64))
-    if not entries.parts:
-        return entries.row.names, written
-    names = {base_variable(name): name.partition(".")[0] for name in written}
-    return NameColumn(names), [*names.values()]
 
 
 def _say(world: World, file: ValueFile, code: Code, text: str) -> None:

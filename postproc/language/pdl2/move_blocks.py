@@ -174,7 +174,12 @@ def _is_plain(move: ast.Move) -> bool:
 def _form(move: ast.Move) -> MoveForm:
     """Return what moves of a variant have in common, but for their trajectory."""
     slots: tuple[int, ...] = ()
-    items, where = _literal_items(move.where[0]), move.where[0]
+    items: tuple[ast.Expression | None, ...] = ()
+    where = move.where[0]
+    if isinstance(where, ast.Aggregate):
+        items = where.items
+    elif isinstance(where, ast.Invoke):
+        items = where.arguments
     if not isinstance(where, ast.Reference):
         slots = tuple(i.slot for i in items[:6] if isinstance(i, ast.Number))
     config = items[6] if len(items) > 6 else None
@@ -190,13 +195,6 @@ def _form(move: ast.Move) -> MoveForm:
             if isinstance(value, ast.Number)
         ),
     )
-
-
-def _literal_items(literal: ast.Expression) -> tuple[ast.Expression | None, ...]:
-    """Return what stands between the brackets of ``{..}`` or ``POS(..)``."""
-    if isinstance(literal, ast.Aggregate):
-        return literal.items
-    return literal.arguments if isinstance(literal, ast.Invoke) else ()
 
 
 def _six_numbers(items: object) -> bool:

@@ -154,18 +154,15 @@ class Nested:
             self._close(row)
             self._field(row, line)
         elif line.node >= 0 or line.element:
-            if self._open is not None or not self._is_element(line):
+            parts = self._words or (self.kind == "REC" and not self.array)
+            element = line.element and self._listed and parts  # no part can begin here
+            if self._open is not None or not element:
                 self._close(row)
                 self._begin_part(row, line)
         elif self._open is not None:
             self._value(row, line)
         elif not (self._listed or self._deeper):
             raise OddLine(row, "it is not clear whose value this is")
-
-    def _is_element(self, line: EntryPart) -> bool:
-        """Tell whether a line is an element of a field, and cannot be a part."""
-        parts = self._words or (self.kind == "REC" and not self.array)
-        return bool(line.element and self._listed and parts)
 
     def _begin_part(self, row: int, line: EntryPart) -> None:
         words = line.node >= 0

@@ -19,7 +19,7 @@ from postproc.language.pdl2.external_routines import (
     report_unknown_routine,
 )
 from postproc.language.pdl2.job import Place, World
-from postproc.language.pdl2.program import Body, Program
+from postproc.language.pdl2.program import Program
 from postproc.language.visits import Visits
 
 # What a statement or a routine may do, read off its text.
@@ -140,11 +140,6 @@ def list_changed_arguments(
 ) -> list[ast.Reference]:
     """Return the arguments that go by reference: variables by themselves."""
     return [a for a in arguments if isinstance(a, ast.Reference)]
-
-
-def body_effects(program: Program, body: Body) -> Effects:
-    """Return what a body may do, with all routines of its file that it reaches."""
-    return rows_effects(program, body.first, body.last)
 
 
 def rows_effects(program: Program, first: int, last: int) -> Effects:

@@ -130,7 +130,8 @@ def find_literals(
     """
     literal = np.full(len(columns.slots), -1, dtype=np.int32)
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
-    slots = columns.slots[_as_slice(rows)]
+    span = len(rows) > 0 and rows[-1] - rows[0] == len(rows) - 1  # a view, no copy
+    slots = columns.slots[rows[0] : rows[-1] + 1] if span else columns.slots[rows]
     numbers = slots.ravel()
     if bool((numbers[1:] > numbers[:-1]).all()) and not numbering.apart(slots).any():
         literal[rows] = np.arange(len(rows), dtype=np.int32)
@@ -147,13 +148,6 @@ def find_literals(
     literal[rows] = index[inverse]
     first = rows[example[kept]]
     return _literals(columns, numbering, names, distinct[kept], first, literal), literal
-
-
-def _as_slice(rows: Ints) -> Ints | slice:
-    """Return rows that follow each other as a slice: what is taken is no copy."""
-    if len(rows) and rows[-1] - rows[0] == len(rows) - 1:
-        return slice(int(rows[0]), int(rows[-1]) + 1)
-    return rows
 
 
 def _literals(
@@ -368,19 +362,16 @@ def _predecessors(
     ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
     visit = np.zeros(machine.next_id, dtype=np.int32)
     visit[spans(ids, np.diff(offsets))] = np.arange(n, dtype=np.int32)
-    origins = [_origins(machine, run, visit) for _, run in ordered]
+    origins = []
+    for _, run in ordered:  # the visits that its first move may come from
+        found = {int(visit[p]) if p >= 0 else p for p in run.predecessors - {MANY}}
+        if MANY in run.predecessors or id(run.place.body) in machine.recursive:
+            found.add(ELSEWHERE)
+        origins.append(sorted(found))
     del visit
     counts = np.ones(n, dtype=np.int32)
-    counts[first] = [len(found) for found in origins]
+    counts[first] = [len(own) for own in origins]
     start = np.append(np.int32(0), np.cumsum(counts, dtype=np.int32))
     pred = np.repeat(np.arange(-1, n - 1, dtype=np.int32), counts)
     pred[spans(start[first], counts[first])] = [*chain.from_iterable(origins)]
     return start, pred
-
-
-def _origins(machine: Machine, run: MoveRun, visit: Indices) -> list[int]:
-    """Return the visits that the first move of a run may come from, ascending."""
-    found = {int(visit[p]) if p >= 0 else p for p in run.predecessors - {MANY}}
-    if MANY in run.predecessors or id(run.place.body) in machine.recursive:
-        found.add(ELSEWHERE)
-    return sorted(found)

@@ -120,7 +120,9 @@ class RapidMachine(TaskMachine):
                 "are called, and with what settings, is not known. Give the module "
                 "that holds main, with the others of its task in the same folder",
             )  # fmt: skip
-        if self._has_active_trap():
+        every = [one for own in self.task.routines.values() for one in own]
+        traps = [one for one in every if _kind(one[2]) == "trap"]
+        if any(self._moves(*trap) for trap in traps):
             here = replace(here, modes=replace(here.modes, blocked=frozenset([_TRAP])))
         for file, module, routine in found:
             self.call(file, module, routine, None, -1, here)
@@ -146,38 +148,27 @@ class RapidMachine(TaskMachine):
 
     def _own_modes(self) -> set[str]:
         """Return the modes that the task sets to other values than it begins with."""
-        found = set[tuple[str, Any]]()
+        known, found = read_known_instructions(), set[tuple[str, Any]]()
+        modal = {name for name, kind in known.items() if kind == "modal"}
+        modal -= {*self.task.routines, *STOPPED}
         for file, module, routine in (
             one for routines in self.task.routines.values() for one in routines
         ):
             scope = self.task.scope_of(file, module, routine)
             text = self.texts[file]
-            rows = text.where(self._sets_modes, routine.first + 1, routine.last)
-            for row in rows:
+            for row in text.where(
+                lambda one: getattr(inside(one), "name", "") in modal,
+                routine.first + 1, routine.last,
+            ):  # fmt: skip
                 one = inside(text.statement(row))
-                assert isinstance(one, said.Instruction)
-                given = list_set_modes(partial(self._change_modes, one, row, scope))
-                found |= set() if given >= ANYTHING else given
+                if isinstance(one, said.Instruction):
+                    given = list_set_modes(partial(self._change_modes, one, row, scope))
+                    found |= set() if given >= ANYTHING else given
         return {name for name, value in found if value != getattr(AT_START, name)}
-
-    def _sets_modes(self, statement: said.RapidStatement) -> bool:
-        one = inside(statement)
-        if not isinstance(one, said.Instruction) or one.name in self.task.routines:
-            return False
-        known = read_known_instructions().get(one.name)
-        return known == "modal" and one.name not in STOPPED
 
     def _procedures(self) -> list[tuple[int, str, HeadedRows]]:
         routines = (one for found in self.task.routines.values() for one in found)
         return [one for one in routines if _kind(one[2]) == "proc"]
-
-    def _has_active_trap(self) -> bool:
-        """Tell whether a trap moves, or changes how moves are carried out."""
-        routines = (one for found in self.task.routines.values() for one in found)
-        return any(
-            _kind(one[2]) == "trap" and self._moves(one[0], one[1], one[2])
-            for one in routines
-        )
 
     def acts(self, one: said.RapidStatement) -> bool:
         """Tell instructions, see `TaskMachine.acts`."""
@@ -279,8 +270,8 @@ class RapidMachine(TaskMachine):
 
             clauses = clauses_of(text, context.flow, read)
             rows = context.flow.handlers
-            moves = self._any_moves(scope, rows, (EXIT_CYCLE,))
-            if moves:
+            moves, called = self._read_rows(scope, rows, (EXIT_CYCLE,))
+            if moves := moves or self._reach_moves(called):
                 self.beside.add((scope.file, rows.start, rows.stop))
             self._handlers[key] = ErrorHandlers(clauses, moves)
         return self._handlers[key]
@@ -599,19 +590,6 @@ class RapidMachine(TaskMachine):
         if key not in self._moving:
             self._moving[key] = self._reach_moves([(file, module, routine)])
         return self._moving[key]
-
-    def _any_moves(
-        self, scope: Scope, rows: range, passed: tuple[str, ...] = ()
-    ) -> bool:
-        """Return True if some statements may move the arm.
-
-        Args:
-            scope: Where they stand.
-            rows: Their rows.
-            passed: Instructions that do not count.
-        """
-        moves, called = self._read_rows(scope, rows, passed)
-        return moves or self._reach_moves(called)
 
     def _reach_moves(self, waiting: list[_Place]) -> bool:
         """Return True if routines, or those that they call, may move the arm."""

@@ -147,7 +147,8 @@ class Goals:
         ends = signature.operands(one.arguments)
         tool, wobj, zone, speed = self._conditions(one, ends, row, scope)
         motion = _motion(one.name, signature)
-        why = NO_REASON if signature.reaches else _ends_elsewhere(one.name)
+        why = _SEARCH if one.name.startswith("search") else _STAYS
+        why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
         total, untold = self._total(one, row, scope)
         why = why or untold
@@ -212,7 +213,9 @@ class Goals:
             return self._known[key][1]
         arguments = _Arguments(self.task, one.arguments, row, scope)
         zone = np.nan if one.name in AT_A_STOP else arguments.zone()
-        found = self._tool(arguments), self._wobj(arguments), zone, arguments.speed()
+        operand = arguments.option("wobj")
+        wobj = WORLD if operand is None else self._frame("wobj", operand, arguments)
+        found = self._tool(arguments), wobj, zone, arguments.speed()
         if named:
             self._known[key] = one, found  # it keeps its id from being used again
         return found
@@ -250,7 +253,12 @@ class Goals:
             ):
                 shifted = self._read_shifted(name, arguments, row, scope)
                 own = operand is written  # not given to a routine, which may read it
-                return shifted if own else _fix_shift(shifted)
+                if own or shifted.shift is None:
+                    return shifted
+                # Its numbers stay.
+                held, turned = shifted.shift.shift, "it is shifted and turned"
+                pins = shifted.pins or (turned if any(held.numbers[3:]) else "")
+                return replace(shifted, shift=FoundShift(held), pins=pins)
             case _:
                 return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
 
@@ -430,7 +438,10 @@ class Goals:
             shift = shift.around(base.shift.shift, RAPID_DIALECT)
         first = int(self.task.files[scope.file].text.first[row])
         slots = [first + n.slot if isinstance(n, said.Num) else -1 for n in numbers]
-        if base.why or _from(base)[0] < 0 or not _is_written(numbers):
+        # x, y, z, and all angles that are there, must be written as numbers.
+        written = all(isinstance(one, said.Num) for one in numbers[:3])
+        written &= all(one is None or isinstance(one, said.Num) for one in numbers)
+        if base.why or _from(base)[0] < 0 or not written:
             return FoundShift(shift)
         rest = (-1,) * (WIDTH - len(slots))
         pins = _SYSTEM if self.task.files[scope.file].is_system else ""
@@ -443,12 +454,6 @@ class Goals:
         if operand is None:
             return FrameOfMove((), True, _NO_TOOL)
         return self._frame("tool", operand, arguments)
-
-    def _wobj(self, arguments: _Arguments) -> FrameOfMove:
-        operand = arguments.option("wobj")
-        if operand is None:
-            return WORLD
-        return self._frame("wobj", operand, arguments)
 
     def _frame(
         self, kind: str, operand: said.Operand, arguments: _Arguments
@@ -476,23 +481,6 @@ class Goals:
             why = self._explain_unknown(name, arguments.scope)
             return FrameOfMove((), kind == "tool", why)
         return replace(read, taught=self.task.is_taught(name, found))
-
-
-def _is_written(numbers: Sequence[said.Operand | None]) -> bool:
-    """Tell whether x, y, z, and all angles that are there, are written as numbers."""
-    own = [isinstance(one, said.Num) for one in numbers]
-    return all(own[:3]) and all(
-        one is None or known for one, known in zip(numbers, own, strict=True)
-    )
-
-
-def _fix_shift(goal: FoundGoal) -> FoundGoal:
-    """Return a shifted goal whose shift keeps its numbers."""
-    if goal.shift is None:
-        return goal
-    turned = any(goal.shift.shift.numbers[3:])
-    pins = goal.pins or ("it is shifted and turned" if turned else "")
-    return replace(goal, shift=FoundShift(goal.shift.shift), pins=pins)
 
 
 def _from(base: FoundGoal) -> tuple[int, ...]:
@@ -601,11 +589,6 @@ class _Arguments:
         if isinstance(found, tuple) and found and isinstance(found[0], WrittenNumber):
             return found[0].value / 1000.0
         return np.nan
-
-
-def _ends_elsewhere(name: str) -> Reason:
-    """Say why a move does not end at its target."""
-    return _SEARCH if name.startswith("search") else _STAYS
 
 
 @cache

@@ -39,7 +39,9 @@ def visits_of(machine: RapidMachine) -> Visits:
     def conditions(v: RapidVisit) -> Conditions:
         key = v.wobj, v.modes.shift
         if key not in placed:
-            placed[key] = _displace(*key)
+            placed[key] = pose = v.wobj.pose if v.modes.shift != UNKNOWN_SHIFT else ()
+            if pose and v.modes.shift != NO_SHIFT:
+                placed[key] = compose_poses(pose, pose_of_numbers(v.modes.shift))
         return _conditions(v, base, placed[key])
 
     files = enumerate(machine.task.files)
@@ -81,15 +83,6 @@ def _load(v: RapidVisit) -> tuple[float, ...]:
     at = np.array(v.tool.pose).reshape(4, 4) @ np.array([*(x * MM for x in part), 1.0])
     centre = (mass * MM * np.array(own) + carried * at[:3]) / (mass + carried)
     return mass + carried, *centre.tolist()
-
-
-def _displace(wobj: FrameOfMove, shift: tuple[float, ...]) -> Pose:
-    """Place a work object with the program displacement in it."""
-    if shift == UNKNOWN_SHIFT or not wobj.pose:
-        return ()
-    if shift == NO_SHIFT:
-        return wobj.pose
-    return compose_poses(wobj.pose, pose_of_numbers(shift))
 
 
 def _explain_unknown_load(v: RapidVisit) -> Reason:

@@ -31,15 +31,14 @@ class Azimuth(Sighting):
         cls, batch: ArmStates, tracker: tuple[float, float, float] | None
     ) -> list[Candidate]:
         """Try it at the tracker's place, or where the tracker may stand."""
-        places = [cls(tracker)] if tracker else cls._anywhere(batch)
-        return alternatives([(place, "joint 1") for place in places])
-
-    @classmethod
-    def _anywhere(cls, batch: ArmStates) -> list[Effect]:
-        """List places round the base; their height changes nothing."""
+        if tracker:
+            return alternatives([(cls(tracker), "joint 1")])
+        # Round the base: its height changes nothing.
         rings = NEAREST * FARTHER ** np.arange(RINGS)
         turns = 2 * np.pi * np.arange(BEARINGS) / BEARINGS
-        return cls._clear(batch, [cls._at(r, t) for r, t in product(rings, turns)])
+        round_it = [cls._at(r, t) for r, t in product(rings, turns)]
+        places = cls._clear(batch, round_it)
+        return alternatives([(place, "joint 1") for place in places])
 
     @classmethod
     def _at(cls, reach: float, turn: float) -> Azimuth:

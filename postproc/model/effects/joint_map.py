@@ -122,15 +122,12 @@ class JointMap(JointEffect):
         each = self.width * 2.0 ** np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
         moved = centre + self.width * offsets
         single = [JointMap(((joint, float(c)),), float(w)) for c in moved for w in each]
-        return [*single, *(self._shape(half) for half in (2, 4))]
-
-    def _shape(self, half: int) -> JointMap:
-        """Replace a spot by narrower bumps over the same place, 2 half + 1 of them."""
-        ((joint, centre),) = self.bumps
-        reach = 2.0 * self.width
-        places = centre + reach * np.arange(-half, half + 1) / half
-        bumps = tuple((joint, float(c)) for c in places)
-        return JointMap(bumps, float(reach / half / SPACING))
+        shapes, reach = [], 2.0 * self.width
+        for half in (2, 4):  # 2 half + 1 narrower bumps over the same place
+            places = centre + reach * np.arange(-half, half + 1) / half
+            bumps = tuple((joint, float(c)) for c in places)
+            shapes.append(JointMap(bumps, float(reach / half / SPACING)))
+        return [*single, *shapes]
 
     def nonlinear(self) -> dict[str, tuple[float, str]]:
         """Tell where a spot is and how wide; a whole map has no one place."""

@@ -54,7 +54,10 @@ def diagnosis_report(diagnosis: Mapping[str, Any]) -> str:
     if candidates:
         figures["candidates"] = significance(candidates[:MOST_CANDIDATES])
     if diagnosis.get("rows"):
-        figures["histogram"] = distribution(_sizes(diagnosis["rows"]))
+        rows, when = diagnosis["rows"], ("before", "after")
+        errors = [np.array(rows[f"{name}_mm"], dtype=float) for name in when]
+        sizes = [np.linalg.norm(error, axis=1) for error in errors]
+        figures["histogram"] = distribution(dict(zip(when, sizes, strict=True)))
     return render(
         "diagnosis.html.j2",
         f"Diagnosis: {diagnosis['verdict']}",
@@ -77,14 +80,6 @@ def distinct(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]
     for candidate in sorted(candidates, key=lambda c: float(c["p_value"])):
         best.setdefault(name_of(candidate), candidate)
     return list(best.values())
-
-
-def _sizes(rows: Mapping[str, Any]) -> dict[str, Any]:
-    """Take lengths of error vectors before and after."""
-    return {
-        when: np.linalg.norm(np.array(rows[f"{when}_mm"], dtype=float), axis=1)
-        for when in ("before", "after")
-    }
 
 
 def before_after(diagnosis: Mapping[str, Any]) -> Figure:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +39,12 @@ def find_sources(report: Mapping[str, Any], folder: Path) -> dict[str, bytes]:
     named = {str(t["file"]) for t in targets}
     named |= {str(t["literal"]["file"]) for t in targets if t["literal"]}
     names = {Path(name).name for name in named}
-    records = _records(folder, str(report["program"]), names)
+    records = _records(folder, str(report["program"]))
     found = {}
     for name in sorted(names):
-        data = _read_if_there(folder / name)
+        data = None
+        with suppress(OSError):
+            data = (folder / name).read_bytes()
         if data is not None and is_stamped(Source(name, data)):
             data = _restore_bytes(data, records.get(name), name)
         if data is not None:
@@ -49,21 +52,13 @@ def find_sources(report: Mapping[str, Any], folder: Path) -> dict[str, bytes]:
     return found
 
 
-def _records(folder: Path, program: str, names: Iterable[str]) -> dict[str, FileRecord]:
+def _records(folder: Path, program: str) -> dict[str, FileRecord]:
     """Read the record beside the compensated program, where there is one."""
     try:
         record = read_sidecar(sidecar_path(folder / Path(program).name))
     except ProgramError:
         return {}
     return {Path(name).name: file for name, file in record.files.items()}
-
-
-def _read_if_there(path: Path) -> bytes | None:
-    """Read a file that may be missing."""
-    try:
-        return path.read_bytes()
-    except OSError:
-        return None
 
 
 def _restore_bytes(data: bytes, record: FileRecord | None, name: str) -> bytes | None:
