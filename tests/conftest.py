@@ -116,7 +116,7 @@ def make_job(
         for i, (q, side) in enumerate(zip(targets.q, targets.side, strict=True)):
             cells = [*np.degrees(q), *np.sign(side), i % 3]
             out.write(f"{i + 1}," + ",".join(f"{c:.5f}" for c in cells) + "\n")
-    from postproc.cli.simulate import setup_of
+    from postproc.report.simulation import setup_of
 
     if quiet:
         arm = replace(arm, joint_noise=np.zeros(6), tracker_noise=(0.0, 0.0))

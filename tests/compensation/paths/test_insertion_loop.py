@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from postproc.arrays import Floats, Ints
-from postproc.cli.simulate import _read, setup_of, simulate_file
 from postproc.compensation.paths import insertion_loop, prune, split_selection
 from postproc.compensation.paths.arc_splitting import bending
 from postproc.compensation.paths.arcs import is_arc
@@ -23,6 +22,7 @@ from postproc.compensation.paths.insertion_plan import AIM, InsertionPlan
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.model.backlash_width import ahead
 from postproc.model.model import load_model
+from postproc.report.simulation import _read, setup_of, simulate_file
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion

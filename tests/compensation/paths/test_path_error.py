@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of, visits_of
 from postproc.compensation.options import DEFAULT_OPTIONS, Clock, Job, no_progress
 from postproc.compensation.program import plan_visits, prepare_cell, read_program
 from postproc.compensation.timing_comparison import InTime, run_in_time
 from postproc.language.visits import Visits
 from postproc.model.model import load_model
+from postproc.report.simulation import setup_of, visits_of
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM
 from postproc.robot.state import make_states
