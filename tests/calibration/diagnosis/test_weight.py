@@ -36,6 +36,7 @@ def shaped() -> Search:
     return searched(weight_laws.measured(31_003, 5.0, "plain").base)
 
 
+@pytest.mark.slow
 def test_the_law_of_the_weight_stays_where_shapes_took_it(shaped):
     found = weigh_laws(shaped, no_progress)
     assert joints(shaped, "compliance") == {2, 3, 5}
