@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,6 +49,11 @@ points_mm = [[80.0, -40.0, 150.0], [-120.0, 60.0, 180.0], [30.0, 130.0, 320.0]]
 1 = "gun"
 """
 
+
+# The tests start hundreds of processes: where Python is to write no bytecode, each
+# would compile the package again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # Commands that the tests start are to hear signals, also where the tests run in the
 # background of a shell, or behind nohup, which let what they start ignore some.
@@ -109,7 +116,7 @@ def make_job(
         for i, (q, side) in enumerate(zip(targets.q, targets.side, strict=True)):
             cells = [*np.degrees(q), *np.sign(side), i % 3]
             out.write(f"{i + 1}," + ",".join(f"{c:.5f}" for c in cells) + "\n")
-    from postproc.cli.simulate import setup_of
+    from postproc.report.simulation import setup_of
 
     if quiet:
         arm = replace(arm, joint_noise=np.zeros(6), tracker_noise=(0.0, 0.0))

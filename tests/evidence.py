@@ -12,7 +12,6 @@ from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.calibration.fit import fit
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.survey_program import write_survey
-from postproc.cli.simulate import setup_of, simulate_file, visits_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.inverse_model import new_numbers, solve_visits
 from postproc.compensation.outcome import Status
@@ -21,6 +20,7 @@ from postproc.compensation.program import states_of as planned_states
 from postproc.language.visits import Meaning
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import Model
+from postproc.report.simulation import setup_of, simulate_file, visits_of
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.state import States, make_states

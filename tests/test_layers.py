@@ -6,6 +6,7 @@ import ast
 import subprocess
 import sys
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 import postproc
@@ -100,6 +101,7 @@ KNOWING = {
 EVERYWHERE = {"numpy", "scipy"}
 
 
+@cache
 def modules() -> list[tuple[str, Path]]:
     """Return (dotted name below postproc, file) of every module of the package."""
     found = []
@@ -110,9 +112,16 @@ def modules() -> list[tuple[str, Path]]:
     return found
 
 
+@cache
+def syntax(path: Path) -> ast.Module:
+    """Parse a module."""
+    return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+
+
+@cache
 def imported(name: str, path: Path) -> set[str]:
     """Return the dotted names that a module imports, lazy imports included."""
-    tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+    tree = syntax(path)
     package = ["postproc", *name.split(".")] if name else ["postproc"]
     if path.name != "__init__.py":
         package = package[:-1]
@@ -127,6 +136,7 @@ def imported(name: str, path: Path) -> set[str]:
     return found
 
 
+@cache
 def ours(name: str, path: Path) -> set[str]:
     """Return the modules of ours that a module imports, dotted below postproc."""
     names = {known for known, _ in modules()} | {"_native"}
@@ -188,7 +198,7 @@ def test_an_effect_is_known_to_its_own_file_and_to_the_list() -> None:
 def test_no_two_classes_have_one_name() -> None:
     places = defaultdict(list)
     for name, path in modules():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(syntax(path)):
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(name)
     assert not {c: where for c, where in places.items() if len(where) > 1}

@@ -41,6 +41,7 @@ from postproc.robot.backlash_operator import (
 from postproc.robot.inverse import ClosedForm
 from postproc.robot.pose import rotation_from_vector
 from postproc.robot.state import make_states
+from tests.bench import made
 from tests.reference import kinematics, paths, statements
 from tests.reference import play as plain
 
@@ -393,8 +394,7 @@ def test_corners_of_a_program(bench_cell, bench_model, monkeypatch):
 
     compared("_pass_corners", corners)
     compared("_resample", samples)
-    source = (PROGRAMS / "milling.pdl").read_bytes()
-    compensate(source, bench_cell, bench_model)
+    compensate(made.milling(600).source, bench_cell, bench_model)
     assert {"_pass_corners", "_resample"} <= set(seen)
 
 

@@ -26,8 +26,8 @@ from typing import Any
 
 import numpy as np
 
-from postproc.cli.simulate import simulate_file
 from postproc.compensation.program import plan_visits, read_program
+from postproc.report.simulation import simulate_file
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import record_from_pose
 from postproc.simulation.path import PathScores

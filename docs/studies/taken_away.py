@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from data_sets import DataSet, descriptions, read_set
+from numpy.typing import NDArray
 
 from postproc.calibration.diagnosis.diagnose import extend_model
 from postproc.calibration.fit import fit_measurements
@@ -46,11 +47,16 @@ def parts_of(rows: Measurements, seed: int) -> list[Measurements]:
 
 def left(model: Model, data: DataSet, rows: Measurements) -> ErrorStatistics:
     """Return what a model leaves of readings of its own set-up."""
+    return ErrorStatistics.of(residual(model, data, rows))
+
+
+def residual(model: Model, data: DataSet, rows: Measurements) -> NDArray[np.float64]:
+    """Return residuals of readings of the model's own set-up, (n, 3) [m]."""
     arm, placed = data.cell.arm, model.registration
     states = rows.states if placed is None else placed.on_probes(rows.states)
     position = rows.position if placed is None else placed.to_base(rows.position)
     read = model.reading(arm, states)
-    return ErrorStatistics.of(position - ArmStates(arm, states).walk.tcp - read.error)
+    return position - ArmStates(arm, states).walk.tcp - read.error
 
 
 def trial(

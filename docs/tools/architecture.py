@@ -86,7 +86,7 @@ FLOW = (
 )
 LINES = {  # grey: upper chapter, lower chapter, from, to
     ("cli", "report"): ((315, 63), (315, 120)),
-    ("cli", "simulation"): ((795, 63), (795, 225)),
+    ("report", "simulation"): ((450, 172), (690, 225)),
     ("language", "robot"): ((615, 555), (615, 605)),
 }
 

@@ -84,7 +84,7 @@ def simulate(
     report: ReportOption = None,
 ) -> None:
     """Run a program or a survey on the virtual arm, and measure it."""
-    from postproc.cli.simulate import simulate_file
+    from postproc.report.simulation import simulate_file
     from postproc.robot.cell import load_cell
 
     with report_errors():

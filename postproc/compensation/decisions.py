@@ -17,11 +17,13 @@ from postproc.compensation.continuity import (
     path_correction,
 )
 from postproc.compensation.eligibility import STRAYS, Reasons, find_strayed
+from postproc.compensation.flag_borders import joints_written, poses_with_signs
 from postproc.compensation.inverse_model import (
     Commands,
     angles_astray,
     change_mm,
     new_numbers,
+    solve_written,
     turns_in_file,
 )
 from postproc.compensation.options import Job, Options
@@ -602,37 +604,61 @@ class Round:
         return shift
 
     def propose(self) -> Proposal:
-        """Decide what moves, until no arc becomes quite another one by it.
+        """Decide what moves, until no arc and no sign of an axis is another by it.
 
         Every round leaves more points alone.
         """
-        strays = np.zeros(len(self.held), dtype=bool)
-        arcs = self.planned.targets.via.any()
+        count = len(self.held)
+        strays, border = np.zeros(count, bool), np.zeros((count, 6), bool)
         while True:
-            found = self.decide(strays)
-            if not arcs:
+            found = self.decide(strays, border)
+            bent = self._find_bent(found) & ~strays
+            near = self._find_on_borders(found) & ~border
+            if not (bent.any() or near.any()):
                 return found
-            moves = np.where(found.corrected[:, None], self.shift, 0.0)
-            values = found.decisions.corrected
-            visits, planned = self.reading.visits, self.planned
-            more = (
-                find_bent_arcs(visits, planned, self.setting.cell, values, moves)
-                & ~strays
-            )
-            if not more.any():
-                return found
-            strays = strays | more
+            strays, border = strays | bent, border | near
 
-    def decide(self, strays: Bools) -> Proposal:
+    def _find_bent(self, found: Proposal) -> Bools:
+        """Tell which points of a proposal make another arc, (n,)."""
+        if not self.planned.targets.via.any():
+            return np.zeros(len(found.corrected), dtype=bool)
+        moves = np.where(found.corrected[:, None], self.shift, 0.0)
+        values, cell = found.decisions.corrected, self.setting.cell
+        return find_bent_arcs(self.reading.visits, self.planned, cell, values, moves)
+
+    def _find_on_borders(self, found: Proposal) -> Bools:
+        """Tell which axes are on a border of flags with the numbers written, (n, 6).
+
+        Arrivals at one point get the mean of what they need, and points that are
+        passed make up for their corner: both differ from the commands.
+        """
+        visits, out = self.reading.visits, np.zeros((len(found.corrected), 6), bool)
+        rows = np.flatnonzero(found.corrected & poses_with_signs(visits))
+        if len(rows) == 0:
+            return out
+        arm, given, new = (
+            self.setting.cell.arm,
+            visits.values,
+            found.decisions.corrected,
+        )
+        before, q = (
+            solve_written(visits, arm, rows, numbers[rows], near[rows])
+            for numbers, near in ((given, self.planned.plan.q), (new, self.solved.q))
+        )
+        out[rows] = visits.dialect.near_border(given[rows], q, before, rounded=True)
+        return out
+
+    def decide(self, strays: Bools, border: Bools) -> Proposal:
         """Guard every solved visit, and compare the arrivals at every literal.
 
         Args:
             strays: Visits whose correction would make another arc, (n,).
+            border: Axes that would be on a border of flags, (n, 6).
         """
         visits, reasons = self.reading.visits, Reasons(len(self.reading.visits))
         display = mark_display(visits, reasons)
         unchanged = mark_unchanged(visits, reasons, self.setting.options)
-        self._guard(reasons, strays)
+        self._guard(reasons, strays, border)
         usable = reasons.none
         settled = self._settle(usable)
         agreement, stay = settled.agreement, settled.stay
@@ -659,7 +685,7 @@ class Round:
             agreement.literal[np.any([*stay.values()], axis=0)],
         )
 
-    def _guard(self, reasons: Reasons, strays: Bools) -> None:
+    def _guard(self, reasons: Reasons, strays: Bools, border: Bools) -> None:
         """Mark the visits whose corrections are not trusted."""
         solved, limits, q = self.solved, self.setting.cell.limits, self.planned.plan.q
         visits, given = self.reading.visits, ~reasons.none
@@ -671,7 +697,7 @@ class Round:
         guard_turn(reasons, limits, solved.turn)
         guard_size(reasons, limits, self.correction, solved.residual)
         guard_size(reasons, limits, self.shift, solved.residual)
-        self._guard_flags(reasons)
+        self._guard_flags(reasons, border)
         reasons.mark(self.held, HELD)
         reasons.mark(self.swung, SWUNG)
         reasons.mark(strays, STRAYS)
@@ -679,16 +705,16 @@ class Round:
         reasons.mark(astray, ASTRAY)
         keep_whole(reasons, self.path, visits, given, limits.correction_step_mm)
 
-    def _guard_flags(self, reasons: Reasons) -> None:
+    def _guard_flags(self, reasons: Reasons, border: Bools) -> None:
         """Mark corrections that end where flags are not sure."""
-        visits, before = self.reading.visits, self.planned.plan.q
-        near = visits.dialect.near_border(visits.values, self.solved.q, before)
-        if near is None:
-            return
-        rows = visits.config_given & (visits.target == Meaning.POSE)
+        visits, near = self.reading.visits, np.array(border)
+        rows = np.flatnonzero(poses_with_signs(visits))
+        arm, solved = self.setting.cell.arm, self.solved
+        q, before = joints_written(arm, self.planned, rows, solved, self.aside)
+        near[rows] |= visits.dialect.near_border(visits.values[rows], q, before)
         for axis, found in enumerate(near.T, start=1):
             text = visits.dialect.terms.border.format(axis)
-            reasons.mark(rows & found, Reason(Code.CONFIGURATION_BORDER, text))
+            reasons.mark(found, Reason(Code.CONFIGURATION_BORDER, text))
 
     @property
     def _is_trusted(self) -> Bools:

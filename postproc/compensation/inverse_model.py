@@ -159,7 +159,7 @@ def solve(
             command[far, :3, :3] = back @ wanted[far, :3, :3]
             allowed[far] = turned[far]
         own = None if branch is None else branch[far]
-        q[far] = _nearest(arm, times(command[far], from_tcp[far]), q[far], own)
+        q[far] = nearest_joints(arm, times(command[far], from_tcp[far]), q[far], own)
         moved = states[far].with_(q=np.array(q[far]))
         landing[far] = command[far, :3, 3] + model.error(arm, moved)
         if orientation:
@@ -173,7 +173,7 @@ def _distance(a: Floats, b: Floats) -> Floats:
     return lengths(a - b)
 
 
-def _nearest(
+def nearest_joints(
     arm: Arm, flange: Floats, near: Floats, branch: NDArray[np.int64] | None
 ) -> Floats:
     """Solve for the joint angles next to given ones, in closed form or by Newton."""
@@ -298,7 +298,7 @@ def solve_again(
         outside=dict(solved.outside),
     )
     out.q[known], out.command[known] = part.q, part.command
-    out.turn[known] = _turns(part.command, plan.tcp[known])
+    out.turn[known] = turns_between(part.command, plan.tcp[known])
     out.residual[known] = part.residual
     near = with_surveyed_load(model, cell, here)
     std = model.std_on_flanks(cell.arm, near)
@@ -328,7 +328,7 @@ def std_errors(model: Model, cell: Cell, states: States, solved: Commands) -> Fl
     return out
 
 
-def _turns(new: Floats, old: Floats) -> Floats:
+def turns_between(new: Floats, old: Floats) -> Floats:
     """Return the rotation from old poses to new ones (n, 4, 4), (n, 3) [rad]."""
     new, old, out = new[:, :3, :3], old[:, :3, :3], np.zeros((len(new), 3))
     rows = np.unique(np.nonzero(new != old)[0])
@@ -390,8 +390,11 @@ def new_numbers(
     if len(rows):
         by = rotation_from_vector(turns_in_file(visits, solved)[rows])
         numbers[rows] = dialect.rotate(numbers[rows], by)
-    if dialect.reflags:
-        q = _solve_written(visits, arm, poses, numbers[poses], solved.q[poses])
+    if dialect.flag_joints:
+        q = np.array(solved.q[poses])
+        close = np.flatnonzero(dialect.rounding_decides(q))
+        rows = poses[close]
+        q[close] = solve_written(visits, arm, rows, numbers[rows], q[close])
         numbers[poses] = dialect.rewrite_flags(numbers[poses], q, plan.q[poses])
     return numbers
 
@@ -445,7 +448,7 @@ def angles_astray(visits: Visits, plan: Plan, solved: Commands, aside: Floats) -
     return out
 
 
-def _solve_written(
+def solve_written(
     visits: Visits, arm: Arm, rows: Ints, numbers: Floats, near: Floats
 ) -> Floats:
     """Solve the numbers (k, w) of some poses as they will be rounded, (k, 6) [rad].
@@ -459,7 +462,7 @@ def _solve_written(
     found = np.array(near)
     known = np.isfinite(near).all(axis=1) & np.isfinite(flange).all(axis=(1, 2))
     own = arm.branch(near[known])
-    q = _nearest(arm, np.ascontiguousarray(flange[known]), near[known], own)
+    q = nearest_joints(arm, np.ascontiguousarray(flange[known]), near[known], own)
     found[known] = np.where(np.isnan(q), near[known], q)
     return found
 

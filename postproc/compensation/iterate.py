@@ -33,6 +33,7 @@ from postproc.compensation.decisions import (
     limit_violations,
     with_origins,
 )
+from postproc.compensation.flag_borders import turn_from_borders
 from postproc.compensation.inverse_model import (
     Commands,
     solve_again,
@@ -180,9 +181,22 @@ class Iteration:
                 setting.model, setting.cell, self.planned, states,
                 setting.options.orientation,
             )  # fmt: skip
+            solved = self._keep_sides(solved, solved.known, states)
             departed = self.measure_deviation(solved, np.arange(len(self.states)))
         bent = np.zeros_like(self.planned.plan.aside)
         return SolverState(solved, departed, bent, none, none, meant)
+
+    def _keep_sides(self, solved: Commands, rows: Bools, states: States) -> Commands:
+        """Let axes near 0 stay on the side that flags name."""
+        setting, plan = self.setting, self.planned.plan
+        if not self.reading.visits.dialect.sign_flags:
+            return solved
+        wanted = np.nan_to_num(solved.command[:, :3, 3] - plan.tcp[:, :3, 3])
+        return turn_from_borders(
+            solved, rows, self.reading.visits, setting.model, setting.cell,
+            self.planned, states, passing_after(plan, wanted),
+            setting.options.orientation,
+        )  # fmt: skip
 
     def measure_deviation(self, solved: Commands, rows: Ints) -> JointDeviation:
         """Say how far commands lead the arm from where it was, k visits."""
@@ -203,6 +217,7 @@ class Iteration:
                 current.solved, moved, setting.model, setting.cell, self.planned,
                 states, setting.options.orientation,
             )  # fmt: skip
+            solved = self._keep_sides(solved, moved, states)
             rows = np.flatnonzero(moved)
             departed = current.departure.with_rows(
                 rows, self.measure_deviation(solved, rows)

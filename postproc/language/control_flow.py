@@ -77,20 +77,33 @@ def flow_of(
         routine: Its rows.
         handles: Tells with what the handlers at its end begin.
     """
-    rows = range(routine.first + 1, routine.last)
-    outside = (k for k in rows if handles(text.statement(k)))
-    last = next(outside, routine.last)
+    outside = text.where(handles, routine.first + 1, routine.last)
+    last = outside[0] if outside else routine.last
     flow = RoutineFlow(routine.first + 1, last, range(last, routine.last))
     stack: list[list[int]] = []
-    heads = []
-    for row in range(flow.first, last):
-        one = text.statement(row)
-        _take(flow, stack, row, one)
-        loops = isinstance(one, said.Branch) and one.word in LOOPS
-        if loops or isinstance(one, said.ForLoop):
-            heads.append(row)
+    for row in text.where(_divides, flow.first, last):
+        _take(flow, stack, row, text.statement(row))
+    heads = text.where(_is_loop, flow.first, last)
     _find_exits(flow, text, heads)
     return flow
+
+
+def _divides(one: said.SourceStatement) -> bool:
+    """Tell whether a statement begins, divides or ends a block, or is a label."""
+    kinds = said.LabelMark | said.ForLoop | said.Branch | said.BlockWord
+    return isinstance(one, kinds)
+
+
+def _leaves_loop(one: said.SourceStatement) -> bool:
+    """Tell whether a statement leaves a loop."""
+    return isinstance(one, said.Leave) and one.word == EXIT
+
+
+def _is_loop(one: said.SourceStatement) -> bool:
+    """Tell whether a loop begins with a statement."""
+    return isinstance(one, said.ForLoop) or (
+        isinstance(one, said.Branch) and one.word in LOOPS
+    )
 
 
 def _find_exits(
@@ -99,13 +112,11 @@ def _find_exits(
     heads: Sequence[int],
 ) -> None:
     """Find the loop that each word leaves which leaves one, given all their heads."""
-    for row in range(flow.first, flow.last):
-        one = text.statement(row)
-        if isinstance(one, said.Leave) and one.word == EXIT:
-            around = (h for h in reversed(heads) if h < row < flow.end.get(h, -1))
-            head = next(around, -1)
-            if head >= 0:
-                flow.exits[row] = head
+    for row in text.where(_leaves_loop, flow.first, flow.last):
+        around = (h for h in reversed(heads) if h < row < flow.end.get(h, -1))
+        head = next(around, -1)
+        if head >= 0:
+            flow.exits[row] = head
 
 
 def _take(

@@ -7,15 +7,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from typing import Any, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
 
-from postproc.arrays import Ints
+from postproc.arrays import Bools, Floats, Ints, all_in_rows
 from postproc.diagnostics import Code
 from postproc.language import ir as said
+from postproc.language.comment_directives import Comments
 from postproc.language.control_flow import EXIT, HeadedRows, RoutineFlow, flow_of
 from postproc.language.language import Start
+from postproc.language.move_runs import Runs, find_runs, rows_of_lines
 from postproc.language.statement_table import StatementText
 from postproc.language.visits import ELSEWHERE, Diagnostic
 
@@ -60,6 +62,7 @@ class VisitLike(Protocol):
 
     modes: Any
     origins: frozenset[int]
+    count: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +147,7 @@ NOWHERE = frozenset([ELSEWHERE])
 NOT_FOLLOWED = "may move the arm: it is not followed"
 Place = tuple[CallContext, int]
 _PLAIN = (said.SourceStatement, said.LabelMark)
+M = TypeVar("M", bound="TaskMachine")
 
 
 @dataclass
@@ -160,8 +164,10 @@ class TaskMachine(ABC):
         exhausted: It has too many ways to be followed.
         beside: Statements that run in ways that are not followed: file, first row, and
             the row behind the last.
+        at_once: Moves that differ only in where they go are read at once.
     """
 
+    comments: ClassVar[Comments]
     texts: Sequence[StatementText[Any]]
     start: Start
     visits: list[Any] = field(default_factory=list)
@@ -170,6 +176,8 @@ class TaskMachine(ABC):
     reached: set[tuple[int, int]] = field(default_factory=set)
     exhausted: bool = False
     beside: set[tuple[int, int, int]] = field(default_factory=set)
+    at_once: bool = True
+    _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
     _numbers: dict[tuple[CallContext, int], list[int]] = field(default_factory=dict)
     _entered: dict[Place, Arrived] = field(default_factory=dict)
     _left: dict[Place, Arrived] = field(default_factory=dict)
@@ -179,6 +187,10 @@ class TaskMachine(ABC):
     _steps: int = 0
 
     # What a language says.
+
+    @abstractmethod
+    def run(self) -> None:
+        """Follow every way from where the task begins."""
 
     @abstractmethod
     def acts(self, one: said.SourceStatement) -> bool:
@@ -220,6 +232,22 @@ class TaskMachine(ABC):
     @abstractmethod
     def goals_of(self, file: int, row: int) -> Iterable[Any]:
         """Yield where a move goes that is not followed."""
+
+    @abstractmethod
+    def places_of(self, one: Any) -> Sequence[int] | None:
+        """Return the numbers of a line to a written point that say only where it is.
+
+        None for all other statements, and for moves that do more than move.
+        """
+
+    @staticmethod
+    def is_plain(numbers: Floats) -> Bools:
+        """Tell which of such numbers, (m, k), need no word of their own, (m,)."""
+        return all_in_rows(np.isfinite(numbers))
+
+    def apart(self, context: CallContext) -> set[int] | None:
+        """Return rows that are read by themselves, None where all are."""
+        return set()
 
     def bind_arguments(
         self, scope: Scope, routine: HeadedRows, caller: CallContext, row: int
@@ -281,8 +309,10 @@ class TaskMachine(ABC):
         """Go on from a statement until ways part or meet."""
         context, row = place
         text, joins = self.texts[context.scope.file], context.flow.joins
+        runs = self._runs_of(context)
         while row < context.flow.last:
-            self._steps += 1
+            behind = runs.get(row, row + 1)
+            self._steps += behind - row
             self.exhausted |= self._steps > MOST_STEPS
             one = text.statement(row)
             if self.acts(one):
@@ -291,16 +321,38 @@ class TaskMachine(ABC):
                 if after is None or after == known:
                     return
                 self._left[context, row] = here = after
+                self._stand_for(context, row, behind)
             elif type(one) in _PLAIN or self.goes_on(one) or _ends(one):
                 here = self.after_functions(context, row, one, here)
             else:
                 self.part(context, row, one, here)
                 return
-            row += 1
+            row = behind
             if row in joins:
                 self.enter(context, row, here)
                 return
         self._return(context, here)
+
+    def _runs_of(self, context: CallContext) -> Runs:
+        """Find once which moves of a routine are read at once."""
+        key = context.scope.file, context.flow.first
+        apart = self.apart(context) if self.at_once else None
+        if apart is None:
+            return {}
+        if key not in self._runs:
+            text = self.texts[context.scope.file]
+            apart |= rows_of_lines(text, self.comments.list_taught(text.source))
+            self._runs[key] = find_runs(
+                text, context.flow, apart, self.places_of, self.is_plain
+            )
+        return self._runs[key]
+
+    def _stand_for(self, context: CallContext, row: int, behind: int) -> None:
+        """Let the visit of a move stand for all up to a row."""
+        if behind > row + 1:
+            (number,) = self._numbers[context, row]
+            self.visits[number].count = behind - row
+            self.reached |= {(context.scope.file, k) for k in range(row, behind)}
 
     def part(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
@@ -603,6 +655,22 @@ class TaskMachine(ABC):
             if lines:
                 found[text.source.name] = np.array(sorted(lines), dtype=np.int64)
         return found
+
+
+def follow(make: Callable[[], M]) -> M:
+    """Make a machine and run it.
+
+    Where anything runs beside the program another one reads each move by itself: what
+    runs beside may be one of several that were read at once.
+    """
+    machine = make()
+    machine.run()
+    if not machine.beside or all(v.count == 1 for v in machine.visits):
+        return machine
+    machine = make()
+    machine.at_once = False
+    machine.run()
+    return machine
 
 
 def _ends(one: said.SourceStatement) -> bool:

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, all_in_rows
+
+BESIDE = np.deg2rad(0.1)  # of a border of flags [rad]
+STRAIGHT = 0.02  # sine of axis 5
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,10 @@ class Dialect(ABC):
 
     Attributes:
         terms: Its words.
-        reflags: Flags depend on small moves, and are written anew.
+        flag_joints: Joints whose sides of a border flags say, which small moves decide:
+            such flags are written anew.
+        flag_step: From one border to the next [rad]; one of them is 0.
+        sign_flags: Flags name the signs of axes, also of axes near 0.
         flag_columns: Which numbers of a pose are flags.
         heads: What tables head the numbers of a pose with, w words.
         pose_decimals, joint_decimals: Least decimals of every written number, w each.
@@ -76,10 +82,23 @@ class Dialect(ABC):
     runs_alone: bool = False
     terms: Terms
     heads: tuple[str, ...]
-    reflags: bool = False
+    flag_joints: tuple[int, ...] = ()
+    flag_step: float = 2 * np.pi
+    sign_flags: bool = False
     flag_columns: tuple[int, ...] = ()
     pose_decimals: tuple[int, ...]
     joint_decimals: tuple[int, ...]
+
+    def rounding_decides(self, q: Floats) -> Bools:
+        """Tell where the last digits of a target may decide its flags, (k,).
+
+        They move joints (k, 6) [rad] by far less than `BESIDE`, but where the wrist is
+        nearly straight.
+        """
+        own = q[:, list(self.flag_joints)]
+        off = own - self.flag_step * np.round(own / self.flag_step)
+        far = all_in_rows(np.abs(off) > BESIDE)  # false of NaN too
+        return ~(far & (np.abs(np.sin(q[:, 4])) > STRAIGHT))
 
     @property
     def width(self) -> int:
@@ -172,14 +191,25 @@ class Dialect(ABC):
         """
         return None
 
-    def near_border(self, values: Floats, q: Floats, before: Floats) -> Bools | None:
+    def near_border(
+        self, values: Floats, q: Floats, before: Floats, rounded: bool = False
+    ) -> Bools:
         """Tell which joints are too near a border of flags, (k, 6).
 
-        None where flags there do no harm.
+        Only where `sign_flags` says that flags name signs of axes.
 
         Args:
-            values: Numbers of poses as they are written, (k, w).
+            values: Numbers of poses as they are in the source, (k, w).
             q: Joints that the commands reach, (k, 6) [rad].
             before: Joints that the source reaches, (k, 6) [rad].
+            rounded: The commands are those of numbers as they are written.
         """
-        return None
+        return np.zeros(q.shape, dtype=bool)
+
+    def leave_border(self, values: Floats, q: Floats, before: Floats) -> Floats:
+        """Say how far joints must move to leave a border of flags, (k, 6) [rad].
+
+        0 where they need not, or where the side they are on is not known. For the
+        arguments see `near_border`.
+        """
+        return np.zeros(q.shape)

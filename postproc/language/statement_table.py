@@ -52,6 +52,21 @@ class StatementText(Generic[T]):
         """Return what a statement says."""
         return self.said[int(self.shape[row])]
 
+    def where(
+        self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
+    ) -> list[int]:
+        """List statements that pass a test, which is asked once for each shape.
+
+        Args:
+            test: The test.
+            first: The first row to look at.
+            behind: The row behind the last one.
+        """
+        shapes, own = np.unique(self.shape[first:behind], return_inverse=True)
+        passed = np.array([test(self.said[k]) for k in shapes.tolist()], dtype=bool)
+        rows: list[int] = (first + np.flatnonzero(passed[own])).tolist()
+        return rows
+
     def line(self, row: int) -> int:
         """Return the 1-based line that a statement begins on."""
         return self.source.line_of(int(self.begin[row]))

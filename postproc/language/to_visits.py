@@ -15,6 +15,7 @@ from postproc.arrays import Floats, Interned, Ints, slim
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.comment_directives import MEASURE, Comments
 from postproc.language.interpreter import Scope, TaskMachine
+from postproc.language.move_runs import unfold, within
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
 from postproc.language.statement_table import StatementText
@@ -161,6 +162,8 @@ class FoundVisit:
         arc_angle: As in `Visits` [rad].
         block: Tells the curves apart that visits are points of, None for none.
         curved: As in `Visits`.
+        count: How many moves it stands for that follow each other and differ only in
+            where they go: this one is the first.
     """
 
     scope: Scope
@@ -174,6 +177,7 @@ class FoundVisit:
     arc_angle: float = math.nan
     block: Hashable = None
     curved: bool = False
+    count: int = 1
 
 
 @dataclass(frozen=True)
@@ -254,7 +258,7 @@ def visits_of(
     tables = _Tables(Interned(), Interned([NO_REASON]), Interned([""]))
     loads = Interned[tuple[float, ...]]([NO_LOAD])
     other = [*_goals_beside(machine, moves)]
-    literals, literal, follows = _literals(
+    literals, literal, follows, copies = _literals(
         found, machine, dialect.width, comments, other
     )
     reasons = [_reason(c, machine.exhausted) for c in held]
@@ -263,7 +267,9 @@ def visits_of(
     follows[follows == _NO_LITERAL] = -1
     pred_start, pred = _predecessors(machine, order)
     base = tables.frames_of([(c.base, False) for c in held])
-    return Visits(
+    counts = np.array([v.count for v in found], np.int64)
+    ids = _read_measure_ids(found, texts, comments, moves)
+    visits = Visits(
         files=tuple(text.source.name for text in texts),
         file=slim(np.array([v.scope.file for v in found], np.int64)),
         line=np.array([texts[v.scope.file].line(v.row) for v in found], np.int64),
@@ -285,13 +291,45 @@ def visits_of(
         frame_taught=np.array([taught for _, taught in tables.frames], bool),
         pred_start=pred_start,
         pred=pred,
-        measure_id=tuple(_read_measure_ids(found, texts, comments, moves)),
+        measure_id=("",) * n if (counts > 1).any() else tuple(ids),
         literals=literals,
         dialect=dialect,
         **_shifts(found),
         load=slim(np.array(loads.of([c.load or NO_LOAD for c in held]), np.int64)),
         loads=np.array(list(loads), float).reshape(-1, 4),
     )  # fmt: skip
+    if (counts <= 1).all():
+        return visits
+    values, line = _each(found, counts, visits.values, machine)
+    return unfold(visits, counts, copies, values, line, tuple(ids))
+
+
+def _each(
+    found: Sequence[FoundVisit], counts: Ints, values: Floats, machine: TaskMachine
+) -> tuple[Floats, Ints]:
+    """Return the numbers and the line of each move that visits stand for."""
+    owner, inside = within(counts)
+    out, begin = values[owner], np.cumsum(counts) - counts
+    for k in np.flatnonzero(counts > 1).tolist():
+        v, text = found[k], machine.texts[found[k].scope.file]
+        own = np.flatnonzero(np.array(v.goal.slots) >= 0)
+        first = np.array(v.goal.slots, np.int64)[own]
+        places = first + _stride(v, machine) * np.arange(v.count)[:, None]
+        out[begin[k] : begin[k] + v.count, own] = text.value[places]
+    file = np.array([v.scope.file for v in found], np.int64)[owner]
+    row = np.array([v.row for v in found], np.int64)[owner] + inside
+    line = np.zeros(len(owner), np.int64)
+    for number, text in enumerate(machine.texts):
+        mine = file == number
+        starts = text.source.line_starts
+        line[mine] = np.searchsorted(starts, text.begin[row[mine]], side="right")
+    return out, line
+
+
+def _stride(v: FoundVisit, machine: TaskMachine) -> int:
+    """Return how many numbers the statement of a visit has."""
+    first = machine.texts[v.scope.file].first
+    return int(first[v.row + 1] - first[v.row])
 
 
 def _read_measure_ids(
@@ -304,12 +342,17 @@ def _read_measure_ids(
     ids: dict[tuple[int, int], str] = {}
     for file, rows in moves.items():
         text = texts[file]
-        last = [text.source.line_of(text.span(row).end) for row in rows]
+        starts, ends = text.source.line_starts, text.end[np.asarray(rows, np.int64)]
+        last = np.searchsorted(starts, ends, side="right")
         for line, mark in comments.marks(text.source, MEASURE):
-            at = int(np.searchsorted(np.array(last, np.int64), line))
+            at = int(np.searchsorted(last, line))
             if at < len(rows):
                 ids.setdefault((file, rows[at]), mark)
-    return ["" if v.via else ids.get((v.scope.file, v.row), "") for v in found]
+    return [
+        "" if v.via else ids.get((v.scope.file, v.row + k), "")
+        for v in found
+        for k in range(v.count)
+    ]
 
 
 def _reason(held: Conditions, exhausted: bool) -> Reason:
@@ -400,8 +443,10 @@ def _literals(
     width: int,
     comments: Comments,
     other: Sequence[tuple[FoundGoal, str]],
-) -> tuple[Literals, Ints, Ints]:
+) -> tuple[Literals, Ints, Ints, Ints]:
     """Find the distinct literals; also those of visits, and those they follow.
+
+    The last are how many literals each of them stands for, as its visit does.
 
     Args:
         found: The visits.
@@ -424,7 +469,8 @@ def _literals(
     _hold_for_taught(pinned, found, index, machine, comments)
     taught = _find_taught(found, literal, len(rows), machine, comments)
     literals = _places(rows, machine, pinned, taught, width)
-    return literals, literal, _find_followed(found, index)
+    counts = np.array([v.count for v in rows], np.int64)
+    return literals, literal, _find_followed(found, index), counts
 
 
 def _find_followed(
@@ -530,11 +576,14 @@ def _places(
     width: int,
 ) -> Literals:
     """Say where the numbers of literals stand."""
-    m = len(rows)
     held = [v.goal.writes for v in rows]
     shifts = [v.goal.is_rewritten_by_shift for v in rows]
-    file = np.array([at for at, _ in held], np.int64)
-    slots = np.array([own for _, own in held], np.int64).reshape(m, width)
+    owner, inside = within(np.array([v.count for v in rows], np.int64))
+    m, each = len(owner), owner.tolist()
+    file = np.array([at for at, _ in held], np.int64)[owner]
+    slots = np.array([own for _, own in held], np.int64).reshape(-1, width)[owner]
+    stride = np.array([_stride(v, machine) for v in rows], np.int64)[owner]
+    slots = np.where(slots >= 0, slots + (stride * inside)[:, None], -1)
     start, end = np.full((m, width), -1), np.full((m, width), -1)
     line = np.zeros(m, dtype=np.int64)
     for number, one in enumerate(machine.texts):
@@ -544,18 +593,17 @@ def _places(
         end[mine] = np.where(written, np.append(one.stop, -1)[own], -1)
         starts = one.source.line_starts
         line[mine] = np.searchsorted(starts, start[mine, 0], side="right")
+    joints = [v.goal.target == Meaning.JOINTS for v in rows]
+    shared = [v.goal.shared and not own for v, own in zip(rows, shifts, strict=True)]
     return Literals(
         file=file,
         line=line,
         places=NumberPlaces.of(start, end),
-        joints=np.array([v.goal.target == Meaning.JOINTS for v in rows], bool),
-        name=tuple(v.goal.name for v in rows),
-        shared=np.array(
-            [v.goal.shared and not own for v, own in zip(rows, shifts, strict=True)],
-            bool,
-        ),
-        taught=np.array(taught, bool),
-        pinned=tuple(pinned),
+        joints=np.array(joints, bool)[owner],
+        name=tuple(rows[k].goal.name for k in each),
+        shared=np.array(shared, bool)[owner],
+        taught=np.array(taught, bool)[owner],
+        pinned=tuple(pinned[k] for k in each),
     )
 
 

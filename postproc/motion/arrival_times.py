@@ -8,6 +8,8 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 
+MOST_SAMPLES = 10_000  # between two waypoints
+
 
 @dataclass(frozen=True)
 class ArrivalTimes:
@@ -63,14 +65,15 @@ class Trajectory:
         spline would swing on by more than the play of a joint.
 
         Args:
-            step: Time between two samples [s].
+            step: Time between two samples [s]; more where a move lasts long, as no
+                joint turns between waypoints.
 
         Returns:
             Joint angles, (m, 6) [rad], and the move of each sample, (m,).
         """
         i = np.flatnonzero(~self.begins[1:])  # intervals by the waypoint they begin at
         lasts = self.since[i + 1] - self.since[i]
-        count = np.maximum(np.ceil(lasts / step), 1).astype(np.int64)
+        count = np.clip(np.ceil(lasts / step), 1, MOST_SAMPLES).astype(np.int64)
         own = np.repeat(np.arange(len(i)), count)
         nth = np.arange(len(own)) - np.repeat(np.cumsum(count) - count, count) + 1
         t, i = nth / count[own], i[own]

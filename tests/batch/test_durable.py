@@ -43,7 +43,7 @@ def started(plant, *more, **how):
 
 def test_killed_runs_resume_to_the_same_tree(plant):
     build(plant.source, 16)
-    chaos(plant, 2, seed=2)
+    chaos(plant, 1, seed=2)
 
 
 def test_an_interrupted_run_stops_in_order_and_can_go_on(plant):

@@ -21,6 +21,7 @@ from tempfile import TemporaryDirectory
 
 from postproc import _native
 from tests.bench.beside import TARGETS, Beside, side_by_side
+from tests.bench.languages import compared
 from tests.bench.made import KINDS
 from tests.bench.memory import watched
 
@@ -46,6 +47,8 @@ ABOUT_KERNELS = """toppra by itself solves the same joint angles once, a gridpoi
 waypoint, and ruckig moves from stop to stop between them. The pipeline calls them only
 for a model with an effect that depends on the speed, which this one has not. All is of
 the longest program that ran, in one process; growth is from 10,000 targets to that."""
+ABOUT_LANGUAGES = """One milled job in the words of each language: processor time in one
+process, `python -m tests.bench.languages`. Lines of KRL and RAPID are longer."""
 Row = dict[str, float]
 
 
@@ -229,6 +232,10 @@ def main() -> None:
         "\n".join(share_table(rows)),
         "## Side by side",
         "\n".join(beside_lines(beside, rows)),
+        "## Languages",
+        ABOUT_LANGUAGES,
+        "\n".join(compared()),
+        "## From the command line",
         f"`postproc --help`: {helps:.2f} s. `postproc compensate` of 1,000 milling "
         f"targets from the command line, start of Python included: {timed:.2f} s, with "
         f"`--set compensation.timing=false` {plain:.2f} s.",

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from postproc.calibration.design_matrix import DesignMatrix, JointColumns
+from postproc.calibration.diagnosis import diagnose
 from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.model_update import revise
 from postproc.calibration.effect_selection import fit_survey, model_of
@@ -100,6 +104,14 @@ def measurements(states: States, position: np.ndarray, name: str) -> Measurement
     lines = np.arange(n) + 2
     inferred = np.zeros(n, dtype=bool)
     return Measurements(Path(name), states, position, ids, lines, inferred, name)
+
+
+@contextmanager
+def few_parts() -> Iterator[None]:
+    """Hold out two parts of the rows, not five: each repeats the whole search."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(diagnose, "PARTS", 2)
+        yield
 
 
 def base_model(rows: Measurements, arm: Arm = ARM) -> Model:

@@ -1,10 +1,11 @@
 """A small arm with errors of its own, to check the fits against.
 
-Its chain multiplies 4 x 4 matrices in a loop and shares no code with the package.
+Its chain multiplies 4 x 4 matrices and shares no code with the package.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -25,18 +26,27 @@ LOW = np.deg2rad([-90.0, -45, -170, -150, -110, -150])
 HIGH = np.deg2rad([90.0, 60, -40, 150, 110, 150])
 
 
-def rot(axis: int, angle: float) -> np.ndarray:
-    T = np.eye(4)
-    vector = np.zeros(3)
-    vector[axis] = angle
-    T[:3, :3] = Rotation.from_rotvec(vector).as_matrix()
+def rot(axis: int, angle: float | np.ndarray) -> np.ndarray:
+    """Turn about an axis, (4, 4), or by each of n angles, (n, 4, 4)."""
+    vectors = np.multiply.outer(angle, np.eye(3)[axis])
+    T = np.zeros((*vectors.shape[:-1], 4, 4))
+    T[..., :3, :3] = Rotation.from_rotvec(vectors).as_matrix()
+    T[..., 3, 3] = 1.0
     return T
 
 
-def move(x: float, y: float, z: float) -> np.ndarray:
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
+def move(place: Iterable[float] | np.ndarray) -> np.ndarray:
+    """Move by a vector, (4, 4), or by each of n vectors, (n, 4, 4)."""
+    T = np.zeros((*np.shape(place)[:-1], 4, 4))
+    T[..., np.arange(4), np.arange(4)] = 1.0
+    T[..., :3, 3] = place
     return T
+
+
+def apart(six: np.ndarray) -> np.ndarray:
+    """Move by three lengths, then turn by three angles about x, y and z."""
+    a, b, c = six[3:]
+    return move(six[:3]) @ rot(0, a) @ rot(1, b) @ rot(2, c)
 
 
 @dataclass
@@ -63,21 +73,15 @@ class Simulated:
         return out
 
     def pose(self, q: np.ndarray, side: np.ndarray, tool: np.ndarray) -> np.ndarray:
-        """True TCP poses (n, 4, 4), one after the other; the tool is not turned."""
+        """True TCP poses (n, 4, 4); the tool is not turned."""
         dh = self.arm.dh
         actual = q + self.joint_error(q, side)
-        out = np.empty((len(q), 4, 4))
-        for k in range(len(q)):
-            x, y, z, a, b, c = self.base
-            T = move(x, y, z) @ rot(0, a) @ rot(1, b) @ rot(2, c)
-            theta = dh.offset + dh.sense * (dh.mix @ actual[k])
-            for j in range(6):
-                T = T @ rot(2, theta[j] + self.dh_theta[j])
-                T = T @ move(dh.a[j], 0, dh.d[j] + self.dh_d[j])
-                T = T @ rot(0, dh.alpha[j])
-                x, y, z, a, b, c = self.link[j]
-                T = T @ move(x, y, z) @ rot(0, a) @ rot(1, b) @ rot(2, c)
-            out[k] = T @ move(*(tool[k] + self.tool))
+        theta = dh.offset + dh.sense * (actual @ dh.mix.T) + self.dh_theta
+        T = np.broadcast_to(apart(self.base), (len(q), 4, 4))
+        for j in range(6):
+            link = move((dh.a[j], 0.0, dh.d[j] + self.dh_d[j])) @ rot(0, dh.alpha[j])
+            T = T @ rot(2, theta[:, j]) @ (link @ apart(self.link[j]))
+        out: np.ndarray = T @ move(tool + self.tool)
         return out
 
     def measure(

@@ -10,6 +10,7 @@ import pytest
 
 from postproc.files import SCHEMAS
 from postproc.model.model import load_model
+from tests.calibration.planted import few_parts
 from tests.compensation.paths.test_path_error import job
 from tests.conftest import SEED
 from tests.written import cli
@@ -71,7 +72,8 @@ def test_a_path_confirms_the_flanks_and_lacks_nothing(tracked):
 def test_one_run_tells_nothing_of_how_poses_repeat_nor_of_the_rest_of_the_range(
     tracked,
 ):
-    diagnosed(tracked, "plain.csv")
+    with few_parts():
+        diagnosed(tracked, "plain.csv")
     given, better = (load_model(tracked / f"{n}.json") for n in ("model", "better"))
     assert better.noise == given.noise and better.registration == given.registration
     assert better.reading_spread == given.reading_spread

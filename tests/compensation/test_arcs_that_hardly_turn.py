@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.motion.spline_moves import turns_at_unknown_blends, turns_on_arcs
 from postproc.motion.targets import Fly, make_targets
+from postproc.report.simulation import setup_of
 from postproc.robot.arm import load_arm
 from postproc.robot.trajectory import Motion
 from postproc.simulation import land, virtual_arm

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.language.visits import Meaning, Visits
+from postproc.report.simulation import setup_of
 from postproc.robot.trajectory import Motion
 from postproc.simulation import land, virtual_arm
 from tests.compensation.shared_points import SWEEP, Writer

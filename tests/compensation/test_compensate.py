@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.compensation.sidecar import FileRecord, restore
 from postproc.exceptions import CellError, ModelError, ProgramError
 from postproc.report.json import report_text
+from postproc.report.simulation import setup_of
 from postproc.robot.cell import load_cell
 from postproc.simulation import land, virtual_arm
 from tests.conftest import CELL, SEED

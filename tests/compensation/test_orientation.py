@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.inverse_model import turn, turn_std
 from postproc.compensation.options import Options
@@ -16,6 +15,7 @@ from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.exceptions import ModelError
 from postproc.language.visits import Visits
+from postproc.report.simulation import setup_of
 from postproc.robot.pose import MM, angles_near, rotation_from_zyz, rotation_vector
 from postproc.robot.state import make_states
 from postproc.simulation import run_program, virtual_arm

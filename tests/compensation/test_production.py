@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import read_program
 from postproc.model.model import load_model
 from postproc.report.json import report_text
+from postproc.report.simulation import setup_of
 from postproc.robot.cell import load_cell
 from postproc.simulation import land, run_program, virtual_arm
 from tests.conftest import ROOT, SEED, make_job

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.compensation.taught_frames import find_moved_frame, frame_of_points
 from postproc.exceptions import CellError
+from postproc.report.simulation import setup_of
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.simulation import land, make_arrivals, virtual_arm

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import read_program
+from postproc.report.simulation import setup_of
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from postproc.simulation import virtual_arm

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from tests.golden.case import HERE, Case
-from tests.golden.cases import DESK
+from tests.golden.cases import DESK, all_cases
 from tests.golden.record import BINARY, Record, masked
 
 WARM = Case(
@@ -29,6 +29,7 @@ WARM = Case(
     ),
     {**DESK, "job.pdl": "cases/robodk/job.pdl"},
 )  # loads most of the package
+LANGUAGES = ("krl/calls", "rapid/if")  # load what belongs to one language alone
 
 
 class Worker:
@@ -61,7 +62,8 @@ class Worker:
             raise RuntimeError(f"postproc is {hello['file']}, not below {root}")
         self.version = hello["version"]
         self.root = root
-        self.run(WARM, here=True)
+        for case in (WARM, *(c for c in all_cases() if c.name in LANGUAGES)):
+            self.run(case, here=True)
 
     def __enter__(self) -> Worker:
         return self

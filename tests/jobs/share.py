@@ -29,7 +29,6 @@ from postproc.batch.plan import Task, Unit, make_plan
 from postproc.batch.tree import scan
 from postproc.batch.workers import outcomes_of
 from postproc.calibration.fit import fit
-from postproc.cli.simulate import setup_of
 from postproc.compensation.decisions import HOLDS_NONE
 from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome, Status
@@ -38,6 +37,7 @@ from postproc.exceptions import PostprocError
 from postproc.language.languages import languages
 from postproc.language.visits import NOT_FOLLOWED
 from postproc.model.effects import BASE_EFFECTS
+from postproc.report.simulation import setup_of
 from postproc.robot.arm_file import arm_path
 from postproc.robot.cell import Cell, load_cell
 from postproc.simulation import (

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.eligibility import STRANDED
 from postproc.compensation.program import plan_visits, read_program
+from postproc.report.simulation import setup_of
 from postproc.simulation import virtual_arm
 from postproc.simulation.program import land
 from tests.conftest import SEED

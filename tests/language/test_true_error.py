@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.language.visits import Meaning
+from postproc.report.simulation import setup_of
 from postproc.robot.trajectory import Motion
 from postproc.simulation import run_program, virtual_arm
 from tests.conftest import SEED

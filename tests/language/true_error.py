@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.model.model import Model, load_model
+from postproc.report.simulation import setup_of
 from postproc.robot.cell import Cell, load_cell
 from postproc.simulation import land, run_program, virtual_arm
 from tests.any_controller import any_controller

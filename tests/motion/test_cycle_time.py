@@ -12,6 +12,7 @@ import pytest
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.program import prepare_cell, read_program
 from postproc.compensation.targets import targets_from_visits
+from postproc.motion.arrival_times import MOST_SAMPLES
 from postproc.motion.cycle_time import ProgramCycle, run
 from postproc.motion.directions_from_trajectory import disagreements, read_directions
 from postproc.motion.ruckig import JointMoves
@@ -83,6 +84,14 @@ def test_the_trajectory_is_sampled_through_its_waypoints(arm, tool, home) -> Non
     np.testing.assert_allclose(ends, found.path.q[1:], atol=1e-12)
     first = way[visit == 1, 0]
     assert (np.diff(first) > -1e-9).all() and first[-1] == pytest.approx(0.2, abs=1e-3)
+
+
+def test_a_move_that_lasts_for_days_is_sampled_more_coarsely(arm, tool, home) -> None:
+    runs = run(arm, lines(arm, tool, home, 1e-6)).clock.runs
+    assert runs.since.max() > 1e5
+    q, visit = runs.sample(4e-3)
+    waypoints = len(runs.since)
+    assert len(q) <= MOST_SAMPLES * waypoints and set(visit.tolist()) == {1, 2}
 
 
 def test_directions_read_in_time_are_those_of_the_moves(arm: Arm, home) -> None:

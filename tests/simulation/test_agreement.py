@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.targets import targets_from_visits
 from postproc.motion.planner import plan
+from postproc.report.simulation import setup_of
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import load_cell
 from postproc.robot.state import make_states

@@ -27,7 +27,8 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoals
+from postproc.language.krl.moves import KrlGoals, own_numbers
+from postproc.language.krl.pose_encoding import COMMENTS
 from postproc.language.krl.program import whole
 from postproc.language.krl.statements import KrlText
 from postproc.language.krl.symbols import (
@@ -74,6 +75,7 @@ class KrlMachine(TaskMachine):
         goals: Reads destinations.
     """
 
+    comments = COMMENTS
     task: KrlTask = field(kw_only=True)
     goals: KrlGoals = field(kw_only=True)
     _known: dict[tuple[int, int], _Effects] = field(default_factory=dict)
@@ -103,6 +105,17 @@ class KrlMachine(TaskMachine):
             )
 
     # What a statement is.
+
+    def places_of(self, one: said.SourceStatement) -> Sequence[int] | None:
+        """Return X to C of a line to numbers, see `TaskMachine.places_of`."""
+        return own_numbers(one) if isinstance(one, said.KrlMove) else None
+
+    def apart(self, context: CallContext) -> set[int] | None:
+        """Return the points of splines; all where an interrupt may end any move."""
+        if self._has_interrupts:
+            return None
+        blocks = self.task.files[context.scope.file].splines
+        return {row for rows in blocks for row in rows}
 
     def acts(self, one: said.SourceStatement) -> bool:
         """Tell what moves, calls or sets, see `TaskMachine.acts`."""
@@ -413,10 +426,11 @@ class KrlMachine(TaskMachine):
     def _in_routines(
         self,
     ) -> Iterator[tuple[int, HeadedRows, int, said.SourceStatement]]:
-        """Yield all statements of routines: file, routine, row."""
+        """Yield what routines say of interrupts: file, routine, row."""
         for file, text in self._robot_texts():
             for routine in self.task.files[file].routines:
-                for row in range(routine.first + 1, routine.last):
+                rows = text.where(_is_interrupt, routine.first + 1, routine.last)
+                for row in rows:
                     yield file, routine, row, text.statement(row)
 
     def at_return(self, context: CallContext, here: Arrived) -> Arrived:
@@ -529,7 +543,7 @@ class KrlMachine(TaskMachine):
         found = set()
         for file, text in self._robot_texts():
             here = Scope(file, self.task.files[file].name, "")
-            for row in range(len(text)):
+            for row in text.where(_is_interrupt):
                 one = text.statement(row)
                 if isinstance(one, said.InterruptSwitched) and one.word == "on":
                     number = whole(self.task.number(one.number, row, here))
@@ -589,7 +603,7 @@ class KrlMachine(TaskMachine):
         found = set()
         unseen_on = False
         for file, text in self._robot_texts():
-            for row in range(len(text)):
+            for row in text.where(_is_interrupt):
                 if (file, row) in self._met:
                     continue
                 one = text.statement(row)
@@ -681,6 +695,11 @@ def _puts_out(one: said.Instruction) -> bool:
     """Return True if a call of BAS switches outputs, which may stop the arm."""
     command = one.arguments[0].value if one.arguments else None
     return isinstance(command, said.EnumValue) and command.name.startswith("#out_")
+
+
+def _is_interrupt(one: said.SourceStatement) -> bool:
+    """Return True if a statement declares or switches interrupts."""
+    return isinstance(one, said.InterruptDeclared | said.InterruptSwitched)
 
 
 def _is_tracking(operand: said.Operand) -> bool:

@@ -13,6 +13,7 @@ from postproc.files import KRL_PROGRAMS
 from postproc.language.archive import Archive
 from postproc.language.blocks import read_once
 from postproc.language.grammars import line_parser
+from postproc.language.interpreter import follow
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
 from postproc.language.krl.clones import KrlCloner
@@ -75,8 +76,8 @@ class Krl(Language):
             raise ProgramError(sources[0].name, problem, cure)
         _refuse_own_accuracy(files)
         _refuse_doubles(files)
-        machine = KrlMachine.of(KrlTask(files, start.taught), start)
-        machine.run()
+        task = KrlTask(files, start.taught)
+        machine = follow(lambda: KrlMachine.of(task, start))
         visits = visits_of(machine)
         missed = machine.find_unreached({k: file.moves for k, file in enumerate(files)})
         told = never_reached(missed, f"DEF {files[0].routines[0].head.name}", "program")
@@ -143,14 +144,13 @@ def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:
         ProgramError: It does.
     """
     for file in files:
-        for row in range(len(file.text)):
+        for row in file.text.where(lambda one: bool(_switches_on(one))):
             name = _switches_on(file.text.statement(row))
-            if name:
-                problem = f"sets {name.upper()}: the controller "
-                problem += "compensates on its own, this would do it twice"
-                cure = "Switch that off, here and on the controller"
-                line = file.text.line(row)
-                raise ProgramError(file.text.source.name, problem, cure, line=line)
+            problem = f"sets {name.upper()}: the controller "
+            problem += "compensates on its own, this would do it twice"
+            cure = "Switch that off, here and on the controller"
+            line = file.text.line(row)
+            raise ProgramError(file.text.source.name, problem, cure, line=line)
 
 
 POINTS = frozenset("e6pos pos e6axis axis frame".split())

@@ -200,6 +200,24 @@ def motion_of(word: str) -> Motion:
     return Motion.JOINT if stem.startswith("ptp") else Motion.LINEAR
 
 
+def own_numbers(move: said.KrlMove) -> list[int] | None:
+    """Return which numbers of a line to a written point are its X, Y, Z, A, B, C.
+
+    None for moves of another kind, and for those that are more than numbers.
+    """
+    to = move.to
+    alone = move.via is None and move.angle is None and not move.settings
+    if move.word not in ("lin", "slin") or not alone:
+        return None
+    if not isinstance(to, said.KrlAggregate):
+        return None
+    slots = {one.name: one.value.slot for one in to.fields
+             if isinstance(one.value, said.Num)}  # fmt: skip
+    if len(slots) != len(to.fields) or not slots.keys() >= {*PLACE}:
+        return None
+    return [slots[name] for name in PLACE]
+
+
 @dataclass(frozen=True)
 class _Goal:
     """Reads the ends of one move."""

@@ -24,6 +24,7 @@ MEASURED, UNKNOWN_STATUS = 16, 32  # bit 4 of S, and the first value that is non
 # wrong bit turns an axis by 360 deg.
 BORDER = np.deg2rad(0.02)
 SURE = np.deg2rad(0.0005)  # [rad] more than the last digits of a target move an axis by
+LEAVING = 4.0 * SURE  # by which axes are taken away from 0
 
 _FLAGS_SAY = "S or T name another configuration or other turns than the move ends with"
 TERMS = Terms(
@@ -64,7 +65,9 @@ class KrlNumbers(Dialect):
     runs_alone: bool = True
     terms: Terms = TERMS
     heads: tuple[str, ...] = HEADS
-    reflags: bool = True
+    flag_joints: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+    flag_step: float = 1e6  # 0 alone
+    sign_flags: bool = True
     flag_columns: tuple[int, ...] = (STATUS, TURN)
     pose_decimals: tuple[int, ...] = (
         *(MM_DECIMALS,) * 3,
@@ -144,17 +147,25 @@ class KrlNumbers(Dialect):
         """Tell where signs of T are not those of joints (k, 6) [rad], (k,)."""
         return np.asarray(_beyond(turn_bits(values[:, TURN]), q).any(axis=1))
 
-    def near_border(self, values: Floats, q: Floats, before: Floats) -> Bools:
+    def near_border(
+        self, values: Floats, q: Floats, before: Floats, rounded: bool = False
+    ) -> Bools:
         """Tell which joints are so near 0 that T may be wrong, see `Dialect`.
 
         One that the correction takes away from 0, to the side that its bit names, is
         there on the controller, too, if the source is.
         """
-        bits = turn_bits(values[:, TURN])
-        inwards = np.where(bits > 0, -1.0, 1.0)  # to the side of the bit
-        away = (q - before) * inwards >= SURE
+        inwards = _side_of(values)
+        away = (q - before) * inwards >= (0.0 if rounded else SURE)
         away &= before * inwards >= -SURE
         return np.asarray((np.abs(q) <= BORDER) & ~away)
+
+    def leave_border(self, values: Floats, q: Floats, before: Floats) -> Floats:
+        """Say how far joints must move to be on their side of 0, see `Dialect`."""
+        inwards = _side_of(values)
+        moves = np.maximum(before * inwards, 0.0) + LEAVING - q * inwards
+        able = self.near_border(values, q, before) & (before * inwards >= -SURE)
+        return np.where(able & (values[:, TURN] >= 0)[:, None], moves * inwards, 0.0)
 
 
 KRL_DIALECT = KrlNumbers()
@@ -169,6 +180,11 @@ def _whole(values: Floats) -> Ints:
 def turn_bits(values: Floats) -> Ints:
     """Return the six bits of T, (k, 6): axis i + 1 is negative."""
     return np.asarray((_whole(values)[:, None] >> AXES) & 1)
+
+
+def _side_of(values: Floats) -> Floats:
+    """Return 1 for axes that T says to be at 0 or above, -1 for the others, (k, 6)."""
+    return np.where(turn_bits(values[:, TURN]) > 0, -1.0, 1.0)
 
 
 def _beyond(bits: Ints, q: Floats, by: float = BORDER) -> Bools:

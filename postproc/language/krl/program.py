@@ -92,7 +92,7 @@ def read_krl(source: Source) -> KrlFile:
     """
     text = read_krl_statements(source)
     reader = _KrlReader(text, Outline(text, _WORDS))
-    for row in range(len(text)):
+    for row in text.where(lambda one: not isinstance(one, said.KrlMove)):
         reader.take(row, text.statement(row))
     reader.outline.close()
     found = sorted({*reader.outline.diagnostics, *reader.diagnostics})
@@ -101,7 +101,7 @@ def read_krl(source: Source) -> KrlFile:
         base_name(source.name),
         tuple(sorted(reader.outline.of(*_ROUTINES), key=lambda one: one.first)),
         tuple(reader.data),
-        tuple(reader.moves),
+        tuple(text.where(lambda one: isinstance(one, said.KrlMove))),
         tuple(reader.splines),
         tuple(found),
     )
@@ -126,7 +126,6 @@ class _KrlReader:
     text: KrlText
     outline: Outline
     data: list[KrlDatum] = field(default_factory=list)
-    moves: list[int] = field(default_factory=list)
     splines: list[range] = field(default_factory=list)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     _spline: int = -1
@@ -139,8 +138,6 @@ class _KrlReader:
             case said.Assignment(target=target, value=value):
                 if self.outline.name("defdat"):
                     self._initial(row, target, value)
-            case said.KrlMove():
-                self.moves.append(row)
             case said.NotUnderstood():
                 message = f"{self.text.quote(row)} is not understood"
                 self.diagnostics.append(

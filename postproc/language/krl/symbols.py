@@ -235,7 +235,10 @@ class KrlTask:
         found: dict[str, set[int]] = {table: set() for table in TABLES}
         for number, file in enumerate(self.files):
             here = Scope(number, file.name, "")
-            for row in range(len(file.text)):
+            changing = file.text.where(
+                lambda one: bool(list_changes(one, self.routines))
+            )
+            for row in changing:
                 for target in list_changes(file.text.statement(row), self.routines):
                     given = not (file.routines or _is_of_part(target))
                     if target.name in found and not given:

@@ -161,29 +161,27 @@ def _ends(
     statements: Iterable[tuple[int, said.RapidStatement]], read: ReadNumber
 ) -> Iterator[HandlerEnd]:
     """Find how a handler goes on, and with which errors each word is reached."""
-    blocks: list[Numbers] = []
-    tested: list[bool] = []
+    blocks: list[tuple[Numbers, bool]] = []  # each with whether it tests ERRNO
     for row, one in statements:
         match one:
             case said.Branch(word="if", values=(condition, *_)):
-                blocks.append(_find_errors(condition, row, read))
+                blocks.append((_find_errors(condition, row, read), False))
             case said.Branch(word="elseif", values=(condition, *_)) if blocks:
-                blocks[-1] = _find_errors(condition, row, read)
+                blocks[-1] = _find_errors(condition, row, read), False
             case said.Branch(word="test", values=(value, *_)):
-                tested.append(_is_errno(value))
-                blocks.append(NO_NUMBERS)
-            case said.Branch(word="case", values=values) if blocks and tested:
-                blocks[-1] = _read(values, row, read) if tested[-1] else ANY
+                blocks.append((NO_NUMBERS, _is_errno(value)))
+            case said.Branch(word="case", values=values) if blocks:
+                tested = blocks[-1][1]
+                blocks[-1] = _read(values, row, read) if tested else ANY, tested
             case said.Branch(word="default") | said.BlockWord(word="else") if blocks:
-                blocks[-1] = ANY
+                blocks[-1] = ANY, blocks[-1][1]
             case said.Branch() | said.ForLoop():
-                blocks.append(ANY)
+                blocks.append((ANY, False))
             case said.BlockWord(word=word) if word in CLOSING and blocks:
                 blocks.pop()
-                if word == "endtest":
-                    tested.pop()
             case _:
-                yield from _end(one, row, reduce(common, blocks, ANY), read)
+                numbers = reduce(common, (numbers for numbers, _ in blocks), ANY)
+                yield from _end(one, row, numbers, read)
 
 
 def _end(

@@ -45,7 +45,8 @@ from postproc.language.rapid.modal_state import (
     change_modes,
     list_set_modes,
 )
-from postproc.language.rapid.moves import Goals, pose_of
+from postproc.language.rapid.moves import Goals, are_targets, own_numbers, pose_of
+from postproc.language.rapid.pose_encoding import COMMENTS
 from postproc.language.rapid.program import RapidFile
 from postproc.language.rapid.symbols import (
     RapidTask,
@@ -80,6 +81,7 @@ class RapidMachine(TaskMachine):
         restarts: What holds where a cycle ends before that.
     """
 
+    comments = COMMENTS
     task: RapidTask = field(kw_only=True)
     goals: Goals = field(kw_only=True)
     ends: list[Arrived] = field(default_factory=list)
@@ -153,9 +155,13 @@ class RapidMachine(TaskMachine):
             one for routines in self.task.routines.values() for one in routines
         ):
             scope = self.task.scope_of(file, module, routine)
-            for row in range(routine.first + 1, routine.last):
-                one = inside(self.texts[file].statement(row))
-                if isinstance(one, said.Instruction) and one.name in modal:
+            text = self.texts[file]
+            for row in text.where(
+                lambda one: getattr(inside(one), "name", "") in modal,
+                routine.first + 1, routine.last,
+            ):  # fmt: skip
+                one = inside(text.statement(row))
+                if isinstance(one, said.Instruction):
                     given = list_set_modes(partial(self._change_modes, one, row, scope))
                     found |= set() if given >= ANYTHING else given
         return {name for name, value in found if value != getattr(AT_START, name)}
@@ -171,6 +177,18 @@ class RapidMachine(TaskMachine):
     def goes_on(self, one: said.RapidStatement) -> bool:
         """Tell what does nothing, see `TaskMachine.goes_on`."""
         return type(one) in _PLAIN
+
+    def places_of(self, one: said.RapidStatement) -> Sequence[int] | None:
+        """Return place and turn of MoveL to numbers, see `TaskMachine.places_of`."""
+        if not isinstance(one, said.Instruction) or "movel" in self.task.routines:
+            return None
+        return own_numbers(one)
+
+    is_plain = staticmethod(are_targets)
+
+    def apart(self, context: CallContext) -> set[int] | None:
+        """Return all (None) where an error may lead to any statement."""
+        return None if self._exits_of(context) else set()
 
     def number(self, operand: said.Operand | None, row: int, scope: Scope) -> float:
         """Evaluate a number, see `TaskMachine.number`."""

@@ -15,6 +15,7 @@ from postproc.files import MODULES, task_beside
 from postproc.language.archive import Archive
 from postproc.language.blocks import read_once
 from postproc.language.grammars import line_parser
+from postproc.language.interpreter import follow
 from postproc.language.language import (
     Cloner,
     JobReading,
@@ -66,8 +67,7 @@ class Rapid(Language):
         """Read the modules of a task, the one with main first; see `Language.read`."""
         task, beside = _tasks(sources, start, known)
         files = [*task.files, *beside]
-        machine = RapidMachine.of(task, start, beside)
-        machine.run()
+        machine = follow(lambda: RapidMachine.of(task, start, beside))
         visits = visits_of(machine)
         moves = {k: [m.row for m in file.moves] for k, file in enumerate(task.files)}
         missed = machine.find_unreached(moves)

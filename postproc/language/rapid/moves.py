@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 
+from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.interpreter import Scope
 from postproc.language.rapid import syntax as said
@@ -604,6 +605,32 @@ def _motion(name: str, signature: Signature) -> Motion:
 def _is_unit(q: Sequence[float]) -> bool:
     """Tell whether four numbers say a rotation."""
     return sum(c * c for c in q) > SHORTEST**2
+
+
+def are_targets(numbers: Floats) -> Bools:
+    """Tell which x, y, z, q1 to q4, (m, 7), are a place and a rotation, (m,)."""
+    turned: Bools = (numbers[:, 3:] ** 2).sum(axis=1) > SHORTEST**2
+    return turned & all_in_rows(np.isfinite(numbers))
+
+
+def own_numbers(one: said.Instruction) -> list[int] | None:
+    """Return which numbers of ``MoveL [[..], ..], ..`` are its place and rotation.
+
+    None for other instructions, and where anything else is more than a name or number.
+    """
+    if one.name != "movel" or not one.arguments:
+        return None
+    to, *others = (argument.value for argument in one.arguments)
+    simple = (
+        value is None
+        or isinstance(value, said.Num)
+        or (isinstance(value, said.DataObject) and not value.steps)
+        for value in others
+    )
+    if not isinstance(to, said.Composite) or not all(simple):
+        return None
+    slots = _plain_slots(to)
+    return slots[:7] if len(slots) == 17 else None
 
 
 def _plain_slots(operand: said.Composite) -> list[int]:

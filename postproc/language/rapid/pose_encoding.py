@@ -66,7 +66,8 @@ class RapidNumbers(Dialect):
 
     terms: Terms = TERMS
     heads: tuple[str, ...] = HEADS
-    reflags: bool = True
+    flag_joints: tuple[int, ...] = COUNTED
+    flag_step: float = QUARTER
     flag_columns: tuple[int, ...] = (7, 8, 9, 10)
     pose_decimals: tuple[int, ...] = (
         *(MM_DECIMALS,) * 3,

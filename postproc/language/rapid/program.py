@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-
-import numpy as np
 
 from postproc.diagnostics import Code
 from postproc.files import is_named_as_system
@@ -119,10 +116,11 @@ def read_rapid(source: Source) -> RapidFile:
     outline, data = _outline(text)
     routines = outline.of(*_ROUTINES)
     # Without its end, calls may stand behind a record.
-    records = [range(r.first, r.last + 1) for r in outline.of("record") if r.ended]
+    ended = (r for r in outline.of("record") if r.ended)
+    within = {row for r in ended for row in range(r.first, r.last + 1)}
     calls = _Calls(text, {scope.head.name for scope in routines})
-    for row in _rows(text, _is_call):
-        if not any(row in rows for rows in records):
+    for row in text.where(_is_call):
+        if row not in within:
             calls.take(row, text.statement(row))
     found = sorted({*outline.diagnostics, *calls.diagnostics})
     return RapidFile(
@@ -133,12 +131,6 @@ def read_rapid(source: Source) -> RapidFile:
         tuple(calls.moves),
         tuple(found),
     )
-
-
-def _rows(text: RapidText, test: Callable[[RapidStatement], bool]) -> list[int]:
-    """List the statements whose forms pass a test."""
-    rows: list[int] = np.flatnonzero(text.said.which(test)[text.shape]).tolist()
-    return rows
 
 
 def _is_call(said: RapidStatement) -> bool:
@@ -168,7 +160,7 @@ _ROUTINES = ("proc", "func", "trap")
 def _outline(text: RapidText) -> tuple[Outline, list[Datum]]:
     """Find modules, routines, records, blocks and data of a file."""
     outline, data = Outline(text, _WORDS), list[Datum]()
-    for row in _rows(text, _is_outline):
+    for row in text.where(_is_outline):
         match said := text.statement(row):
             case DataDeclaration():
                 module, routine = outline.name("module"), outline.name(*_ROUTINES)
@@ -204,6 +196,9 @@ class _Calls:
     own: set[str]
     moves: list[MotionCall] = field(default_factory=list)
     diagnostics: list[Diagnostic] = field(default_factory=list)
+    _operands: dict[int, tuple[object, tuple[Operand | None, ...]]] = field(
+        default_factory=dict
+    )  # by the id of arguments, which are kept so that nothing else gets it
 
     def take(self, row: int, said: RapidStatement, condition: bool = False) -> None:
         """Take the next statement that may move."""
@@ -223,7 +218,9 @@ class _Calls:
     ) -> None:
         signature = MOTIONS.get(name)
         if signature is not None:
-            to, via = signature.operands(arguments)
+            if id(arguments) not in self._operands:
+                self._operands[id(arguments)] = arguments, signature.operands(arguments)
+            to, via = self._operands[id(arguments)][1]
             self.moves.append(
                 MotionCall(row, name, signature, to, via, arguments, condition)
             )

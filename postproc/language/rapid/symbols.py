@@ -189,8 +189,7 @@ class RapidTask:
         texts = [
             file.text.text(row)
             for file in self.files
-            for row in range(len(file.text))
-            if isinstance(file.text.statement(row), said.NotUnderstood)
+            for row in file.text.where(lambda one: isinstance(one, said.NotUnderstood))
         ]
         return frozenset(w for text in texts for w in _WORD.findall(text.lower()))
 

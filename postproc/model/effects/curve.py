@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, product
 from typing import ClassVar, Self
 
@@ -147,6 +148,11 @@ class Curve(CarriedEffect):
 
     def law_parameters(self) -> tuple[Parameter, ...]:
         """Name the terms by their degrees."""
+        return self._named
+
+    @cached_property
+    def _named(self) -> tuple[Parameter, ...]:
+        """Name them once: a search asks for their number again and again."""
         si, scale = self.own_unit()
         what = f"{self.direction} by {' x '.join(self.source)}"
         what += f" times {self.factor}" if self.factor else ""
@@ -191,6 +197,8 @@ def _terms(u: Floats, degree: int, beyond: float) -> Floats:
     """
     inside = np.clip(u, 0.0, 1.0)
     terms = legvander(2.0 * inside - 1.0, degree)
+    if beyond == 0.0:
+        return np.asarray(terms)
     out = np.clip(u - inside, -beyond, beyond)[:, None]
     ends = legvander(np.array([-1.0, 2.0 * END - 1.0, 1.0 - 2.0 * END, 1.0]), degree)
     slope = np.where(out < 0.0, ends[1] - ends[0], ends[3] - ends[2]) / END

@@ -25,7 +25,7 @@ from postproc.report.diagnosis import history_json, history_text, tell
 from postproc.report.plots import plot_diagnosis
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import pose_from_record
-from tests.calibration.planted import campaign
+from tests.calibration.planted import campaign, few_parts
 
 CELL = """
 [robot]
@@ -80,12 +80,13 @@ def test_files_in_model_and_words_out(job: Path, tmp_path: Path) -> None:
     for name in ("cell.toml", "rows.csv", "model.json"):
         shutil.copy(job / name, tmp_path)
     told: list[float] = []
-    found = diagnose(
-        tmp_path / "rows.csv",
-        cell=tmp_path / "cell.toml",
-        model=tmp_path / "model.json",
-        progress=lambda stage, share: told.append(share),
-    )
+    with few_parts():
+        found = diagnose(
+            tmp_path / "rows.csv",
+            cell=tmp_path / "cell.toml",
+            model=tmp_path / "model.json",
+            progress=lambda stage, share: told.append(share),
+        )
     assert found.to_frame()["effect"].tolist() == ["coupling"]
     assert told == sorted(told)
     assert 0 <= told[0] < told[-1] < 1

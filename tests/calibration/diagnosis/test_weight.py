@@ -36,6 +36,7 @@ def shaped() -> Search:
     return searched(weight_laws.measured(31_003, 5.0, "plain").base)
 
 
+@pytest.mark.slow
 def test_the_law_of_the_weight_stays_where_shapes_took_it(shaped):
     found = weigh_laws(shaped, no_progress)
     assert joints(shaped, "compliance") == {2, 3, 5}
@@ -44,6 +45,7 @@ def test_the_law_of_the_weight_stays_where_shapes_took_it(shaped):
     assert sum(a.together for a in found.additions) >= 1
 
 
+@pytest.mark.slow
 def test_shapes_stay_alone_where_no_joint_yields():
     found = searched(weight_laws.measured(31_001, 1.0, "whole", nothing=True).base)
     assert weigh_laws(found, no_progress) is found

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from postproc.arrays import Floats, Ints
-from postproc.cli.simulate import _read, setup_of, simulate_file
 from postproc.compensation.paths import insertion_loop, prune, split_selection
 from postproc.compensation.paths.arc_splitting import bending
 from postproc.compensation.paths.arcs import is_arc
@@ -23,6 +22,7 @@ from postproc.compensation.paths.insertion_plan import AIM, InsertionPlan
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.model.backlash_width import ahead
 from postproc.model.model import load_model
+from postproc.report.simulation import _read, setup_of, simulate_file
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
@@ -31,12 +31,12 @@ from postproc.simulation.program import land
 from tests.compensation.paths.test_path_error import (
     ARM,
     CELL,
-    DESIGN,
     LINES,
     SEED,
     START,
     done,
     drawn,
+    fitted,
     job,
     pos,
 )
@@ -62,10 +62,7 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An arm surveyed, and a job with points on its ways, with and without stops."""
     folder = tmp_path_factory.mktemp("points")
     (folder / "job.pdl").write_bytes(timed().encode())
-    survey, measured = folder / "survey.pdl", folder / "survey.csv"
-    done("survey", "--cell", CELL, *DESIGN, "-o", survey)
-    done("simulate", survey, "--cell", CELL, *ARM, "-o", measured)
-    done("fit", measured, "--cell", CELL, "-o", folder / "model.json")
+    (folder / "model.json").write_bytes(fitted())
     known(folder, "confirmed")
     asked = ("--path-tolerance", TOLERANCE)
     for name, more in (("plain", ()), ("points", asked),

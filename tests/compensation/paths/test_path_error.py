@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -10,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of, visits_of
 from postproc.compensation.options import DEFAULT_OPTIONS, Clock, Job, no_progress
 from postproc.compensation.program import plan_visits, prepare_cell, read_program
 from postproc.compensation.timing_comparison import InTime, run_in_time
 from postproc.language.visits import Visits
 from postproc.model.model import load_model
+from postproc.report.simulation import setup_of, visits_of
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM
 from postproc.robot.state import make_states
@@ -74,16 +75,26 @@ def done(*arguments: object) -> None:
     assert found.exit_code in (0, 1), found.stderr
 
 
+@cache
+def fitted() -> bytes:
+    """Survey the virtual arm and fit a model, once for all that test with it."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        survey, model = folder / "survey.pdl", folder / "model.json"
+        done("survey", "--cell", CELL, *DESIGN, "-o", survey)
+        measured = folder / "survey.csv"
+        done("simulate", survey, "--cell", CELL, *ARM, "-o", measured)
+        done("fit", measured, "--cell", CELL, "-o", model)
+        return model.read_bytes()
+
+
 @pytest.fixture(scope="module")
 def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An arm surveyed, and a job compensated for it."""
     folder = tmp_path_factory.mktemp("paths")
     (folder / "job.pdl").write_text(job())
-    survey, model = folder / "survey.pdl", folder / "model.json"
-    done("survey", "--cell", CELL, *DESIGN, "-o", survey)
-    measured = folder / "survey.csv"
-    done("simulate", survey, "--cell", CELL, *ARM, "-o", measured)
-    done("fit", measured, "--cell", CELL, "-o", model)
+    model = folder / "model.json"
+    model.write_bytes(fitted())
     done("compensate", folder / "job.pdl", "--cell", CELL, "--model", model,
          "-o", folder / "out.pdl", "--report", folder / "report.json")  # fmt: skip
     for name in ("job", "out"):

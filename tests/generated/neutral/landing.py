@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.findings import SURE
 from postproc.compensation.options import Options
@@ -17,6 +16,7 @@ from postproc.compensation.sidecar import restore
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Blend, Meaning, Visits, ZoneRule
 from postproc.model.model import Model
+from postproc.report.simulation import setup_of
 from postproc.robot.cell import Cell
 from postproc.robot.pose import record_from_pose
 from postproc.robot.trajectory import Motion

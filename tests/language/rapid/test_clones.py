@@ -8,13 +8,13 @@ from pathlib import PurePosixPath
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.compensation.sidecar import restore
 from postproc.files import name_read
+from postproc.report.simulation import setup_of
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
 from tests.fuzz.case import records_of

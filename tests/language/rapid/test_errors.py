@@ -150,3 +150,10 @@ def test_a_cycle_that_ends_early_begins_with_its_modes():
 def test_a_handler_may_end_the_cycle():
     found = behind(["ExitCycle;"], ("PDispOff;", TIMED))
     assert ELSEWHERE in origins(found)[0]
+
+
+def test_a_handler_in_a_block_is_read_to_its_end():
+    """No controller loads it, and no text stops the reader."""
+    handler = ["DEFAULT:", "TRYNEXT;", "ENDTEST"]
+    found = behind(handler, MOVING, head="TEST n\nCASE 1:\nERROR")
+    assert any(reasons(found)) or any(ELSEWHERE in at for at in origins(found)[1:])

@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from postproc.cli.simulate import setup_of, simulate_file
+from postproc.report.simulation import setup_of, simulate_file
 from postproc.robot.cell import load_cell
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
@@ -56,7 +56,7 @@ def test_readings_are_the_landing_with_a_trackers_noise(desk, job_cell):
     out = desk.folder / "m.csv"
     found = simulate_file(source, desk.cell, SEED, reference=source)
     found.write(out)
-    from postproc.cli.simulate import visits_of
+    from postproc.report.simulation import visits_of
 
     landed = land(
         virtual_arm(SEED, tool=job_cell.tool.pose),

@@ -1,0 +1,162 @@
+"""Moves that follow each other and differ only in where they go, read at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints, slim
+from postproc.language.control_flow import RoutineFlow
+from postproc.language.statement_table import StatementText
+from postproc.language.visits import Visits
+
+LEAST = 8  # statements that are worth it
+Runs = dict[int, int]
+"""From the first row that is read for all, to the row behind the last such one."""
+
+# What is no column of visits.
+_NO_COLUMNS = ("frames", "frame_taught", "pred_start", "pred", "loads")
+
+
+def find_runs(
+    text: StatementText[Any],
+    flow: RoutineFlow,
+    apart: Collection[int],
+    places_of: Callable[[Any], Sequence[int] | None],
+    plain: Callable[[Floats], Bools],
+) -> Runs:
+    """Find the moves of a routine that differ only in where they go.
+
+    All numbers else, and all words, are the same in them. The first and the last of
+    such a run are read by themselves: what comes before or behind tells of them.
+
+    Args:
+        text: The statements of its file.
+        flow: The routine.
+        apart: Rows that are read by themselves.
+        places_of: Which numbers of a statement (by their place in it) say nothing but
+            where it goes, None for statements of another kind.
+        plain: Tells which numbers of this kind, (m, k), need no word of their own.
+    """
+    runs: Runs = {}
+    for first, behind in _alike(text, flow, apart):
+        places = places_of(text.statement(first))
+        if places is None:
+            continue
+        numbers = _numbers(text, first, behind)
+        others = np.delete(numbers, places, axis=1)
+        own = plain(numbers[:, places])
+        same = own[1:] & own[:-1] & (others[1:] == others[:-1]).all(axis=1)
+        cuts = [0, *(np.flatnonzero(~same) + 1).tolist(), len(numbers)]
+        for a, b in pairwise(cuts):
+            if b - a >= LEAST:
+                runs[first + a + 1] = first + b - 1
+    return runs
+
+
+def _alike(
+    text: StatementText[Any], flow: RoutineFlow, apart: Collection[int]
+) -> Iterator[tuple[int, int]]:
+    """Yield the rows of statements of one shape on one way: first, and behind."""
+    shape = text.shape[flow.first : flow.last]
+    cut = np.zeros(len(shape) + 1, dtype=bool)
+    cut[1:-1] = shape[1:] != shape[:-1]
+    cut[[0, -1]] = True
+    cut[[row - flow.first for row in flow.joins if flow.first <= row < flow.last]] = (
+        True
+    )
+    for row in apart:
+        if flow.first <= row < flow.last:
+            cut[row - flow.first : row - flow.first + 2] = True
+    at = np.flatnonzero(cut)
+    long = np.flatnonzero(np.diff(at) >= LEAST)
+    for k in long.tolist():
+        yield flow.first + int(at[k]), flow.first + int(at[k + 1])
+
+
+def _numbers(text: StatementText[Any], first: int, behind: int) -> Floats:
+    """Return the numbers of statements of one shape, a row each."""
+    start, end = int(text.first[first]), int(text.first[behind])
+    return text.value[start:end].reshape(behind - first, -1)
+
+
+def rows_of_lines(text: StatementText[Any], lines: Collection[int]) -> set[int]:
+    """Return the statements that stand on some lines."""
+    if not lines:
+        return set()
+    starts = text.source.line_starts
+    begin = np.searchsorted(starts, text.begin, side="right")
+    end = np.searchsorted(starts, np.maximum(text.end - 1, text.begin), side="right")
+    wanted = np.array(sorted(lines))
+    found = np.searchsorted(wanted, begin) < np.searchsorted(wanted, end, side="right")
+    return set(np.flatnonzero(found).tolist())
+
+
+def within(counts: Ints) -> tuple[Ints, Ints]:
+    """Return of each of all that are counted: whose it is, and its place there.
+
+    >>> within(np.array([1, 3]))
+    (array([0, 1, 1, 1]), array([0, 0, 1, 2]))
+    """
+    owner = np.repeat(np.arange(len(counts)), counts)
+    return owner, np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]
+
+
+def unfold(
+    visits: Visits,
+    counts: Ints,
+    literal_counts: Ints,
+    values: Floats,
+    line: Ints,
+    measure_id: tuple[str, ...],
+) -> Visits:
+    """Put a visit for each move in the place of the one that was read for several.
+
+    Args:
+        visits: As they were read; their literals are unfolded already.
+        counts: Of the moves that each stands for, (n,).
+        literal_counts: Likewise of literals.
+        values: Of the unfolded visits, and so on.
+        line: ..
+        measure_id: ..
+    """
+    owner, inside = within(counts)
+    begin = np.cumsum(counts) - counts
+    literal_begin = np.cumsum(literal_counts) - literal_counts
+    columns: dict[str, Any] = {
+        name: slim(column[owner])
+        for name, column in vars(visits).items()
+        if isinstance(column, np.ndarray) and name not in _NO_COLUMNS
+    }
+    for name in ("literal", "follows"):
+        own = getattr(visits, name)[owner].astype(np.int64)
+        moved = np.append(literal_begin, 0)[own]
+        each = inside if name == "literal" else 0
+        columns[name] = slim(np.where(own >= 0, moved + each, -1))
+    block = visits.block[owner].astype(np.int64)
+    columns["block"] = slim(np.where(block >= 0, begin[block], -1))
+    columns |= {"values": values, "line": line}
+    pred_start, pred = _follow_each_other(visits, counts)
+    return replace(
+        visits, pred_start=pred_start, pred=pred, measure_id=measure_id, **columns
+    )
+
+
+def _follow_each_other(visits: Visits, counts: Ints) -> tuple[Ints, Ints]:
+    """Return the predecessors of unfolded visits: in a run each follows the last."""
+    owner, inside = within(counts)
+    behind = np.cumsum(counts)
+    own = np.diff(visits.pred_start)
+    number = np.where(inside == 0, own[owner], 1)
+    start = np.concatenate([[0], np.cumsum(number)]).astype(np.int64)
+    pred = np.repeat(np.arange(len(owner)) - 1, number)
+    old = visits.pred.astype(np.int64)
+    moved = np.where(old >= 0, np.append(behind, 0)[old] - 1, old)
+    heads = start[behind - counts]
+    at = np.repeat(heads, own) + within(own)[1]
+    pred[at] = moved
+    return start, pred

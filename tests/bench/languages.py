@@ -1,0 +1,126 @@
+"""One milled job of 20,000 targets in every language: processor time of every stage.
+
+    python -m tests.bench.languages [--targets 20000] [--rounds 3]
+
+The same moves in the same cell, one process, without cycle times. Languages take
+turns; the fastest round of each counts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from postproc.compensation.compensate import compensate
+from postproc.compensation.options import Options
+from postproc.compensation.outcome import Status
+from postproc.compensation.program import read_program
+from postproc.model.model import Model
+from postproc.robot.cell import Cell
+from postproc.robot.trajectory import Motion
+from tests.language.neutral_job import LANGUAGES, NeutralJob, NeutralMove, drawn
+from tests.language.true_error import fitted
+
+ARM = 56  # seed
+ROW = 200  # targets of a milled row
+NAMES = {"job.pdl": "PDL2", "job.mod": "RAPID", "job.src": "KRL"}
+
+
+def milled(cell: Cell, n: int) -> NeutralJob:
+    """Return a job that goes there and back in rows, targets about 2 mm apart."""
+    job = drawn(cell, 0)
+    first, last = job.moves[0], job.moves[-1]
+    k = np.arange(n)
+    row, along = k // ROW, k % ROW
+    along = np.where(row % 2, ROW - 1 - along, along)
+    turned = np.outer(along - ROW / 2, [0.09, 0.0, 0.0, 0.01, 0.02, 0.03])
+    turned += np.outer(row % 100, [0.0, 0.05, -0.05, 0.0, 0.03, 0.0])
+    places = last.q + np.deg2rad(turned)
+    lines = (NeutralMove(Motion.LINEAR, q, zone_mm=1.0) for q in places)
+    return replace(job, moves=(first, *lines, last))
+
+
+def written(job: NeutralJob) -> dict[str, Mapping[str, bytes]]:
+    """Write a job in every language; a zone that stays is set once, as posts do."""
+    again = re.compile(rb"(?<=\n)[ ]*(\$FLY_DIST := 1|\$APO\.CDIS=1)\r?\n")
+    found: dict[str, Mapping[str, bytes]] = {}
+    for name, write in LANGUAGES.items():
+        texts = dict(write(job))
+        begin = again.search(texts[name])
+        if begin is not None:
+            rest = again.sub(b"", texts[name][begin.end() :])
+            texts[name] = texts[name][: begin.end()] + rest
+        found[name] = texts
+    return found
+
+
+def measure(
+    name: str, texts: Mapping[str, bytes], cell: Cell, model: Model
+) -> dict[str, float]:
+    """Compensate a job once, and return processor seconds of reading and of all."""
+    others = {page: data for page, data in texts.items() if page != name}
+    begin = time.process_time()
+    program = read_program(texts, cell)
+    read = time.process_time() - begin
+    begin = time.process_time()
+    done = compensate(
+        texts[name], cell, model, options=Options(timing=False), name=name,
+        pages=others, processes=1,
+    )  # fmt: skip
+    whole = time.process_time() - begin
+    targets = len(program.visits)
+    corrected = float(np.mean(done.decisions.status == Status.CORRECTED))
+    return {"targets": targets, "read": read, "all": whole, "corrected": corrected}
+
+
+def table(found: Mapping[str, dict[str, float]]) -> list[str]:
+    """Write the table, times for a target."""
+    one = {name: 1e6 / f["targets"] for name, f in found.items()}
+    base = found["job.pdl"]["all"] * one["job.pdl"]
+    rows = [
+        "| language | targets | corrected | read, us a target | all, us a target | "
+        "of PDL2's |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, f in found.items():
+        whole = f["all"] * one[name]
+        rows.append(
+            f"| {NAMES[name]} | {f['targets']:,} | {f['corrected']:.1%} | "
+            f"{f['read'] * one[name]:.1f} | "
+            f"{whole:.1f} | {whole / base:.2f} |"
+        )
+    return rows
+
+
+def compared(targets: int = 20_000, rounds: int = 3) -> list[str]:
+    """Compensate one job in every language in turn, and write the table."""
+    with TemporaryDirectory() as folder:
+        cell, model = fitted(ARM, Path(folder))
+    texts = written(milled(cell, targets))
+    best: dict[str, dict[str, float]] = {}
+    for _ in range(rounds):
+        for name in texts:
+            one = measure(name, texts[name], cell, model)
+            old = best.setdefault(name, one)
+            best[name] = {key: min(old[key], one[key]) for key in one}
+    return table(best)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--targets", type=int, default=20_000)
+    parser.add_argument("--rounds", type=int, default=3)
+    asked = parser.parse_args()
+    print("\n".join(compared(asked.targets, asked.rounds)))
+
+
+if __name__ == "__main__":
+    main()
