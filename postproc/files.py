@@ -249,7 +249,9 @@ class _Temporaries:
 
     def write(self, place: Path, data: Content) -> None:
         """Write and sync a file that has the rights of the one in its place."""
-        mode = place.stat().st_mode & 0o777 if place.exists() else 0o666 & ~_umask()
+        mask = os.umask(0)  # it cannot be read without being set
+        os.umask(mask)
+        mode = place.stat().st_mode & 0o777 if place.exists() else 0o666 & ~mask
         with self.open(place) as out:
             out.writelines([data] if isinstance(data, bytes) else data)
             _sync(out)
@@ -300,13 +302,6 @@ def disk_error(exc: OSError, path: str | Path) -> OutputError:
 def _follow_link(path: Path) -> Path:
     """Return the file that a link leads to, whether it is there yet or not."""
     return Path(os.path.realpath(path)) if path.is_symlink() else path
-
-
-def _umask() -> int:
-    """Read the process's file mode mask."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _reason(exc: OSError) -> str:

@@ -31,6 +31,7 @@ from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import COMPENSATED, READING, WORST_STD, Model, weight_of
+from postproc.model.noise import Noise
 from postproc.model.validity import Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
@@ -402,16 +403,8 @@ def model_of(
     used = fitted.rows.weight > 0
     left = np.linalg.norm(fitted.residual[used], axis=1) / MM
     covariance = fitted.stated * max(widening(fitted), wide**2)
-    told = fitted.combination.where(*COMPENSATED)
-    own = np.where(np.outer(told, told), covariance, 0.0)  # no set-up in predictions
     arm, noise = fitted.batch.arm, expect_noise(fitted).rescale(wide)
-    jacobian = fitted.design.jacobian
-    known = fitted.design.variance(own) + noise.pose_variance(jacobian)
-    if doubt is not None:
-        known = known + wide**2 * doubt.get_settings(told).variance(
-            *_take_compensated(fitted)
-        )
-    known = np.sqrt(known)
+    known = np.sqrt(_prediction_variance(fitted, covariance, noise, wide, doubt))
     statistics = {
         "residual_mean_mm": float(left.mean()),
         "residual_max_mm": float(left.max()),
@@ -443,8 +436,23 @@ def model_of(
     )
 
 
-def _take_compensated(fitted: Fit) -> tuple[Combination, ArmStates]:
-    """Return what predictions have of a fit, and the arm at its values."""
-    c = fitted.combination
-    own = tuple(e for e in c.effects if e.belongs_to() in COMPENSATED)
-    return Combination(own), c.at(fitted.batch, fitted.values)
+def _prediction_variance(
+    fitted: Fit, covariance: Floats, noise: Noise, wide: float, doubt: Doubt | None
+) -> Floats:
+    """Variance of predictions at the rows of a fit, (n, 3) [m^2].
+
+    Args:
+        fitted: The fit.
+        covariance: Of its parameters; predictions have nothing of the set-up.
+        noise: What poses have besides.
+        wide: Factor on standard deviations that a doubt gives.
+        doubt: What may be there besides.
+    """
+    c, told = fitted.combination, fitted.combination.where(*COMPENSATED)
+    own = np.where(np.outer(told, told), covariance, 0.0)
+    variance = fitted.design.variance(own) + noise.pose_variance(fitted.design.jacobian)
+    if doubt is not None:
+        effects = tuple(e for e in c.effects if e.belongs_to() in COMPENSATED)
+        at = Combination(effects), c.at(fitted.batch, fitted.values)
+        variance = variance + wide**2 * doubt.get_settings(told).variance(*at)
+    return variance

@@ -441,7 +441,8 @@ class Model:
                 "Use the model of this arm, or fit one",
                 place="$.arm",
             )
-        apart = _degrees_between(np.array(self.weight), arm.weight)
+        across = np.linalg.norm(np.cross(self.weight, arm.weight))
+        apart = float(np.degrees(np.arctan2(across, np.dot(self.weight, arm.weight))))
         if apart > TILTED:
             raise ModelError(
                 path,
@@ -638,11 +639,6 @@ def weight_of(arm: Arm) -> Direction:
     """Return the direction of an arm's weight, as a model keeps it."""
     x, y, z = arm.weight.tolist()
     return x, y, z
-
-
-def _degrees_between(a: Floats, b: Floats) -> float:
-    """Return the angle between two directions (3,) [deg]."""
-    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
 
 
 def _format(direction: Direction | Floats) -> str:

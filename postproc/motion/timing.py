@@ -373,22 +373,24 @@ def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
     )
     begins = np.append(np.flatnonzero(points.begins), k)
     for i in np.flatnonzero(found.failed[begins[:-1]]).tolist():
-        rows = slice(int(begins[i]), int(begins[i + 1]))
-        found.since[rows], found.velocity[rows] = _estimate(points, rows)
-        found.acceleration[rows] = 0.0
-        found.fastest[rows] = np.inf
-        # A run goes evenly from waypoint to waypoint at first.
-        rate = points.ds[rows][1:] / np.maximum(np.diff(found.since[rows]), SHORTEST)
-        found.rate[rows] = np.append(rate[:1], rate)
+        _estimate(found, points, slice(int(begins[i]), int(begins[i + 1])))
     return found
 
 
-def _estimate(points: Waypoints, rows: slice) -> tuple[Floats, Floats]:
-    """Guess the times of one run from programmed speeds and full joint speed."""
-    dt = np.maximum(points.ds[rows] / points.override[rows], points.least[rows])
+def _estimate(found: _Laws, points: Waypoints, rows: slice) -> None:
+    """Guess the times of one run from programmed speeds and full joint speed.
+
+    The arm goes evenly from waypoint to waypoint.
+    """
+    ds = points.ds[rows]
+    dt = np.maximum(ds / points.override[rows], points.least[rows])
+    found.since[rows] = np.cumsum(dt)
     velocity = np.zeros((len(dt), 6))
     velocity[1:-1] = (np.diff(points.q[rows], axis=0) / dt[1:, None])[:-1]
-    return np.cumsum(dt), velocity
+    found.velocity[rows], found.acceleration[rows] = velocity, 0.0
+    found.fastest[rows] = np.inf
+    rate = ds[1:] / np.maximum(np.diff(found.since[rows]), SHORTEST)
+    found.rate[rows] = np.append(rate[:1], rate)
 
 
 def _speeds(arm: Arm, targets: Targets, traced: Trace, velocity: Floats) -> Floats:

@@ -646,9 +646,12 @@ def round_corner(
     second = progress(ways[1], shares[1] * MOMENTS**2)
     point = ways[0].joints[-1]
     if in_space:
-        added = _add_motion(
-            *(chain.flange(q) @ tool for q in (first, second, point[None]))
-        )
+        first_pose, second_pose = (chain.flange(q) @ tool for q in (first, second))
+        at = chain.flange(point[None]) @ tool
+        back = np.swapaxes(at[:, :3, :3], 1, 2)
+        turn = first_pose[:, :3, :3] @ back @ second_pose[:, :3, :3]
+        place = first_pose[:, :3, 3] + second_pose[:, :3, 3] - at[:, :3, 3]
+        added = pose(turn, place)
         joints = joints_along(chain, added @ undo(tool), first[0])
     else:
         joints = first + second - point
@@ -666,12 +669,6 @@ def progress(way: Way, part: Floats) -> Floats:
     """Return the joints (k, 6) at parts (k,) of a way that is sampled evenly."""
     marks = np.linspace(0.0, 1.0, len(way.joints))
     return np.stack([np.interp(part, marks, q) for q in way.joints.T], axis=1)
-
-
-def _add_motion(first: Floats, second: Floats, point: Floats) -> Floats:
-    """Add the motion from the point to the second poses to the first poses."""
-    turn = first[:, :3, :3] @ np.swapaxes(point[:, :3, :3], 1, 2) @ second[:, :3, :3]
-    return pose(turn, first[:, :3, 3] + second[:, :3, 3] - point[:, :3, 3])
 
 
 def _nearest(joints: Floats, distance: Floats) -> tuple[Floats, int]:

@@ -61,15 +61,13 @@ def _entries(task: KrlTask, table: str) -> Iterator[tuple[int, KrlRecord]]:
     for datum in task.files[0].data:
         if datum.name == table and datum.index:
             value = task.value(datum.value, datum.row, here)
-            if isinstance(value, KrlRecord) and _is_set(value):
+            if not isinstance(value, KrlRecord):
+                continue
+            given = any(abs(value.number(name.lower())) > 0.0 for name in _PLACE)
+            if value.get("m") is not None:
+                given = value.number("m") > 0.0
+            if given:
                 yield datum.index[0], value
-
-
-def _is_set(value: KrlRecord) -> bool:
-    """Return True if a frame is not zero, or a load has a mass."""
-    if value.get("m") is not None:
-        return value.number("m") > 0.0
-    return any(abs(value.number(name.lower())) > 0.0 for name in _PLACE)
 
 
 def _numbers_of_load(value: KrlRecord) -> tuple[float, ...]:

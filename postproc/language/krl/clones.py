@@ -185,9 +185,9 @@ class KrlCloner(Cloner):
         if not shape:
             lines = [head + values[0]]
         last = max(file.text.line(datum.row) for _, datum in data)
-        return insert_after(
-            file.text.source, last, _join_lines(file.text.source, lines)
-        )
+        source = file.text.source
+        text = source.newline.decode("latin-1").join(lines)
+        return insert_after(source, last, text)
 
     def _head(self, point: KrlPoint, file: KrlFile) -> tuple[str, str]:
         """Return the type of a point, and the sizes of an array as they are written."""
@@ -214,11 +214,6 @@ class KrlCloner(Cloner):
         span = self._find_name(self.task.files.index(file), datum.row, name)
         end = file.text.span(datum.row).end
         return file.text.source.text[span.end : end].rstrip()
-
-
-def _join_lines(source: Source, lines: Sequence[str]) -> str:
-    """Join lines by the line ending of a file."""
-    return source.newline.decode("latin-1").join(lines)
 
 
 def _is_of_form(source: Source, line: int) -> bool:

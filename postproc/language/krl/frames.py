@@ -205,19 +205,16 @@ class FrameReader:
         value = self.task.value(operand, self.row, self.here)
         pose = pose_of(value)
         if pose and isinstance(operand, said.DataObject):
-            return KrlFrame(pose, taught=self._is_taught(operand.name))
+            taught, found = False, self.task.datum(operand.name, self.here)
+            if found is not None:
+                taught = self.task.is_taught(operand.name, found[0], found[1].row)
+            return KrlFrame(pose, taught=taught)
         if pose:
-            return KrlFrame(
-                pose, taught=self.task.is_taught("", self.here.file, self.row)
-            )
+            taught = self.task.is_taught("", self.here.file, self.row)
+            return KrlFrame(pose, taught=taught)
         if isinstance(operand, said.DataObject):
             return KrlFrame((), self._unknown(operand.name.upper(), operand.name))
         return no_frame("a frame is not written whole")
-
-    def _is_taught(self, name: str) -> bool:
-        """Tell whether a named frame was taught."""
-        found = self.task.datum(name, self.here)
-        return found is not None and self.task.is_taught(name, found[0], found[1].row)
 
     @staticmethod
     def _product(first: KrlFrame, second: KrlFrame) -> KrlFrame:

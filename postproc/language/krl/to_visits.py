@@ -216,21 +216,17 @@ def _ends(found: Sequence[KrlVisit]) -> Sequence[str]:
 
 def _end(v: KrlVisit, after: Sequence[KrlVisit]) -> str:
     """Tell whether the arm stops at a visit, by those behind it."""
-    stops = [
-        True if one.by_spline_planner != v.by_spline_planner else _find_halt(v, one)
-        for one in after
-    ]
+    stops: list[bool | None] = []
+    for one in after:
+        if one.by_spline_planner != v.by_spline_planner:
+            stops.append(True)
+        elif one.modes.ahead != v.modes.ahead and not one.modes.halted:
+            stops.append(None)  # whether the program waits between them is not known
+        else:
+            stops.append(one.modes.halted)
     if all(stop is True for stop in stops):
         return STOP
     return PASS if all(stop is False for stop in stops) else MAYBE
-
-
-def _find_halt(v: KrlVisit, after: KrlVisit) -> bool | None:
-    """Return whether the program waits between two moves, None if not known."""
-    if after.modes.ahead != v.modes.ahead and not after.modes.halted:
-        return None
-    halted: bool | None = after.modes.halted
-    return halted
 
 
 def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
@@ -238,7 +234,9 @@ def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
     for v in found:
         modes, _ = _effective(machine, v)
         if modes.orientation not in TURNING and v.motion != Motion.JOINT:
-            v.goal = not_reached(v.goal, v.goal.why or _not_turned(modes))
+            lost = modes.tool.why or modes.base.why or _MAY_NOT_TURN
+            why = v.goal.why or _NOT_TURNED.get(modes.orientation, lost)
+            v.goal = not_reached(v.goal, why)
 
 
 def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
@@ -256,12 +254,6 @@ def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
             lost |= own is None or any(_frames(machine, one) != own for one in before)
         if lost:
             v.goal = FoundGoal(Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, why=PARTIAL)
-
-
-def _not_turned(modes: KrlModes) -> Reason:
-    """Say why the tool need not turn to a point; frames that are lost come first."""
-    lost = modes.tool.why or modes.base.why
-    return _NOT_TURNED.get(modes.orientation, lost or _MAY_NOT_TURN)
 
 
 def _frames(machine: KrlMachine, v: KrlVisit) -> tuple[Pose, Pose, str] | None:

@@ -311,8 +311,7 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
     new = statement.value
     if statement.operator != ":=":
         new = ast.Binary(statement.operator[0], statement.target, statement.value)
-    if _assigns_component(here, statement.target):
-        _assign_component(here, statement.target, here.read_number(new))
+    if _assign_component(here, statement.target, new):
         return
     if not statement.target.name.startswith("$") and copy_parts(
         here, new, statement.target
@@ -349,24 +348,22 @@ def _assign_other(here: Execution, statement: ast.Assign, arm: int) -> None:
         invalidate_key(here, key, points_of(arm))
 
 
-def _assigns_component(here: Execution, reference: ast.Reference) -> bool:
-    """Tell whether a reference means one of a position's six numbers."""
+def _assign_component(
+    here: Execution, reference: ast.Reference, value: ast.Expression
+) -> bool:
+    """Replace a number of a position; return False where a reference is none."""
     if reference.name.startswith("$"):
         return False
     target = here.locate(reference)
-    return target.exact and component_index(target) >= 0
-
-
-def _assign_component(
-    here: Execution, reference: ast.Reference, new: SourceNumber
-) -> None:
-    """Replace one of the six numbers of a position."""
-    target = here.locate(reference)
+    if not target.exact or component_index(target) < 0:
+        return False
+    new = here.read_number(value)
     held = here.store.read(target.key)
     if not isinstance(held, Position):
         held = _blank(here, reference.name, held)
     held = held.with_component(component_index(target), new)
     here.store.write(target.key, set_owner(here, reference.name, target.key, held))
+    return True
 
 
 def _setting(here: Execution, reference: ast.Reference, value: Value) -> None:

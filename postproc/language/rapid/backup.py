@@ -92,8 +92,13 @@ def _modules(folder: Path | None) -> tuple[Path, ...]:
     """Return the modules of a folder that can be read."""
     if folder is None or not folder.is_dir():
         return ()
-    files = (p for p in sorted(folder.iterdir()) if is_module(p.name))
-    return tuple(p for p in files if p.is_file() and _is_readable(p))
+    readable = []
+    for path in sorted(folder.iterdir()):
+        if is_module(path.name) and path.is_file():
+            at = path.stat()  # system modules may be encoded
+            if _is_text(path, at.st_mtime_ns, at.st_size):
+                readable.append(path)
+    return tuple(readable)
 
 
 def read_mounted_arms(program: Path) -> tuple[MountedArm, ...]:
@@ -156,12 +161,6 @@ def _entry(folder: Path, name: str) -> Path | None:
         return next(found, None)
     except OSError:
         return None
-
-
-def _is_readable(path: Path) -> bool:
-    """Return True if a module can be read: system modules may be encoded."""
-    at = path.stat()
-    return _is_text(path, at.st_mtime_ns, at.st_size)
 
 
 @lru_cache(maxsize=READ_BEFORE)

@@ -7,6 +7,7 @@ can show, without naming them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import ClassVar, Self
 
 import numpy as np
@@ -88,19 +89,15 @@ class JointSpline(JointEffect):
 
     def _parts(self) -> list[_LengthPart]:
         """List the functions of every joint and length."""
-        return [
-            _LengthPart(j - 1, length, *self._range(j - 1, length))
-            for j in self.joints
-            for length in self.lengths
-        ]
-
-    def _range(self, j: int, length: float) -> tuple[float, float, bool]:
-        """Say from where to where a joint's functions go, and whether all round."""
-        low, high = self.lower[j], self.upper[j]
-        half, middle = (high - low) / 2.0, (low + high) / 2.0
-        if not self.turns or (length < max(self.lengths) and half < WHOLE * np.pi):
-            return low, high, False
-        return middle - np.pi, middle + np.pi, True
+        parts = []
+        for j, length in product(self.joints, self.lengths):
+            low, high = self.lower[j - 1], self.upper[j - 1]
+            half, middle = (high - low) / 2.0, (low + high) / 2.0
+            short = length < max(self.lengths) and half < WHOLE * np.pi
+            if whole := self.turns and not short:  # all round
+                low, high = middle - np.pi, middle + np.pi
+            parts.append(_LengthPart(j - 1, length, low, high, whole))
+        return parts
 
     def _count_angles(self, q: Floats) -> Floats:
         """Take angles (n, 6) as they count."""

@@ -171,13 +171,21 @@ class Orders:
     def of(cls, angle: Floats, ratio: float) -> Orders:
         """Take the orders that poses can tell apart.
 
+        Waves of orders k and k' are alike over the poses as far as the mean of
+        exp(i (k - k') angle) is 1; of k and -k' as far as that of k + k' is: from half
+        the first such difference on, waves look like lower ones.
+
         Args:
             angle: Surveyed angles, (n,) [rad].
             ratio: Turns of the motor per turn, or NaN.
         """
         covered = max(float(np.ptp(angle)), 0.1)
         asked = LAST_FREE if np.isnan(ratio) else 2.0 * ratio + BEYOND
-        return cls(covered, ratio, asked, min(asked, _alias(angle, covered, asked)))
+        some = np.sort(angle)[:: max(len(angle) // LOOKED_AT, 1)]
+        apart = np.arange(2.0 * np.pi / covered, 2.0 * asked, 1.0 / covered)
+        alike = np.abs(np.exp(1j * np.outer(apart, some)).mean(axis=1)) > ALIKE
+        alias = float(apart[np.argmax(alike)] / 2.0) if alike.any() else np.inf
+        return cls(covered, ratio, asked, min(asked, alias))
 
     @property
     def free(self) -> Floats:
@@ -210,15 +218,3 @@ def orders_of(batch: ArmStates, row: tuple[float, ...], ratio: float) -> Orders:
     """Take the orders that may be tried of an angle, row @ q, found once."""
     key = ("orders", row, None if np.isnan(ratio) else ratio)
     return batch.once(key, lambda q: Orders.of(q @ np.array(row), ratio))
-
-
-def _alias(angle: Floats, covered: float, last: float) -> float:
-    """Find the order from which waves look like lower ones, half a sampling rate.
-
-    Waves of orders k and k' are alike over the poses as far as the mean of
-    exp(i (k - k') angle) is 1; of k and -k' as far as that of k + k' is.
-    """
-    some = np.sort(angle)[:: max(len(angle) // LOOKED_AT, 1)]
-    apart = np.arange(2.0 * np.pi / covered, 2.0 * last, 1.0 / covered)
-    alike = np.abs(np.exp(1j * np.outer(apart, some)).mean(axis=1)) > ALIKE
-    return float(apart[np.argmax(alike)] / 2.0) if alike.any() else np.inf

@@ -110,12 +110,9 @@ class Windup(JointEffect):
         if self.form == "elastic":
             wound = -np.cos(np.pi * np.minimum(travel / self.d0, 1.0))
         else:
-            wound = 1.0 - 2.0 * self._remaining_share(batch) * np.exp(-travel / self.d0)
+            share = np.ones((1, len(self.joints)))
+            if self.form == "dahl":  # of the friction, what a reversal had to turn
+                way = np.column_stack([loops(batch, int(j)) for j in joint])
+                share = 1.0 - np.exp(-np.nan_to_num(way, nan=np.inf) / self.d0)
+            wound = 1.0 - 2.0 * share * np.exp(-travel / self.d0)
         return np.asarray(batch.states.direction[:, joint] * wound)
-
-    def _remaining_share(self, batch: ArmStates) -> Floats:
-        """Return the share of the friction that a reversal had to turn, (n, p)."""
-        if self.form != "dahl":
-            return np.ones((1, len(self.joints)))
-        way = np.column_stack([loops(batch, int(j)) for j in self.acts_on()])
-        return np.asarray(1.0 - np.exp(-np.nan_to_num(way, nan=np.inf) / self.d0))
