@@ -44,8 +44,8 @@ class JobSetup:
         Contents count, places do not: a copy of the same cell file is the same cell.
         It is made in the words that logs began with, so that they are resumed.
         """
-        told = self.options.to_dict()
-        options = {FIRST_WORDS.get(name, name): value for name, value in told.items()}
+        values = self.options.to_dict()
+        options = {FIRST_WORDS.get(name, name): value for name, value in values.items()}
         shared = options.pop("shared_points")
         options["clone"] = shared == "clone"  # version 0.1.0 knew mean and clone
         if shared == "leave":

@@ -448,11 +448,11 @@ def _prediction_variance(
         wide: Factor on standard deviations that a doubt gives.
         doubt: What may be there besides.
     """
-    c, told = fitted.combination, fitted.combination.where(*COMPENSATED)
-    own = np.where(np.outer(told, told), covariance, 0.0)
+    c, kept = fitted.combination, fitted.combination.where(*COMPENSATED)
+    own = np.where(np.outer(kept, kept), covariance, 0.0)
     variance = fitted.design.variance(own) + noise.pose_variance(fitted.design.jacobian)
     if doubt is not None:
         effects = tuple(e for e in c.effects if e.belongs_to() in COMPENSATED)
         at = Combination(effects), c.at(fitted.batch, fitted.values)
-        variance = variance + wide**2 * doubt.get_settings(told).variance(*at)
+        variance = variance + wide**2 * doubt.get_settings(kept).variance(*at)
     return variance

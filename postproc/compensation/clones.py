@@ -194,7 +194,7 @@ def _origin(
             behind = start >= begin + moved + len(text)
             moved += len(text) - (end - begin)
             shift[behind] = moved
-        lines[mine] = np.searchsorted(old.line_starts, start - shift, side="right")
+        lines[mine] = old.lines_of(start - shift)
     return [int(line) for line in lines]
 
 

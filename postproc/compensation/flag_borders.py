@@ -2,8 +2,8 @@
 
 The sign of an axis near 0 depends on the last digits of machine data: where flags tell
 it (T in KRL), a wrong one turns the axis by 360 deg. Where the source is on the side of
-its flag, a command that takes the axis farther to that side is there, too, whatever the
-data are. A tiny turn of the tool about its TCP does that.
+its flag, a command that takes the axis farther to that side is there, too, with any
+such data. A tiny turn of the tool about its TCP does that.
 """
 
 from __future__ import annotations

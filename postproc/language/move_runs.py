@@ -88,9 +88,8 @@ def rows_of_lines(text: StatementText[Any], lines: Collection[int]) -> set[int]:
     """Return the statements that stand on some lines."""
     if not lines:
         return set()
-    starts = text.source.line_starts
-    begin = np.searchsorted(starts, text.begin, side="right")
-    end = np.searchsorted(starts, np.maximum(text.end - 1, text.begin), side="right")
+    begin = text.source.lines_of(text.begin)
+    end = text.source.lines_of(np.maximum(text.end - 1, text.begin))
     wanted = np.array(sorted(lines))
     found = np.searchsorted(wanted, begin) < np.searchsorted(wanted, end, side="right")
     return set(np.flatnonzero(found).tolist())

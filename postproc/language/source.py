@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc import _native
-from postproc.arrays import Bytes, Indices, chunks
+from postproc.arrays import Bytes, Indices, Ints, chunks
 from postproc.exceptions import FileError, PostprocError, ProgramError
 
 # What is to be changed in a text: single edits, or a million of them as arrays.
@@ -267,6 +267,10 @@ class Source:
     def line_of(self, offset: int) -> int:
         """Return the 1-based line that holds an offset."""
         return int(np.searchsorted(self.line_starts, offset, side="right"))
+
+    def lines_of(self, offsets: Indices) -> Ints:
+        """Return the 1-based lines that offsets stand on, of any shape."""
+        return np.searchsorted(self.line_starts, offsets, side="right")
 
     def line_text(self, line: int) -> str:
         """Return a 1-based line without its line ending."""

@@ -104,8 +104,7 @@ class StatementText(Generic[T]):
         Args:
             reread: Reads another text of the same language.
         """
-        starts = self.source.line_starts
-        line = np.searchsorted(starts, self.begin, side="right").astype(np.int32)
+        line = self.source.lines_of(self.begin).astype(np.int32)
         return Skeleton(
             self.source,
             self.said.shapes,

@@ -321,8 +321,7 @@ def _each(
     line = np.zeros(len(owner), np.int64)
     for number, text in enumerate(machine.texts):
         mine = file == number
-        starts = text.source.line_starts
-        line[mine] = np.searchsorted(starts, text.begin[row[mine]], side="right")
+        line[mine] = text.source.lines_of(text.begin[row[mine]])
     return out, line
 
 
@@ -342,8 +341,7 @@ def _read_measure_ids(
     ids: dict[tuple[int, int], str] = {}
     for file, rows in moves.items():
         text = texts[file]
-        starts, ends = text.source.line_starts, text.end[np.asarray(rows, np.int64)]
-        last = np.searchsorted(starts, ends, side="right")
+        last = text.source.lines_of(text.end[np.asarray(rows, np.int64)])
         for line, mark in comments.marks(text.source, MEASURE):
             at = int(np.searchsorted(last, line))
             if at < len(rows):
@@ -591,8 +589,7 @@ def _places(
         own, written = slots[mine], slots[mine] >= 0
         start[mine] = np.where(written, np.append(one.start, -1)[own], -1)
         end[mine] = np.where(written, np.append(one.stop, -1)[own], -1)
-        starts = one.source.line_starts
-        line[mine] = np.searchsorted(starts, start[mine, 0], side="right")
+        line[mine] = one.source.lines_of(start[mine, 0])
     joints = [v.goal.target == Meaning.JOINTS for v in rows]
     shared = [v.goal.shared and not own for v, own in zip(rows, shifts, strict=True)]
     return Literals(

@@ -202,8 +202,8 @@ class PathSolver:
         Of these, long runs of a Cartesian path are solved together.
         """
         t, samples = self.targets, self.samples
-        told = (t.kind == TargetKind.POSE) & (t.slot >= 0) & ~t.nearest_turn
-        self.by_string = told & (t.move == Motion.JOINT) & self.placed
+        flagged = (t.kind == TargetKind.POSE) & (t.slot >= 0) & ~t.nearest_turn
+        self.by_string = flagged & (t.move == Motion.JOINT) & self.placed
         single = np.flatnonzero(np.diff(t.pred_start) == 1)
         edge = t.pred_start[single]
         self.single = np.zeros(len(self.q), dtype=bool)

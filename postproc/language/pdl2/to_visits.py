@@ -164,7 +164,7 @@ def _literals(
     for i, source in enumerate(numbering.sources):
         mine = file == i
         first = places.first[mine]
-        line[mine] = np.searchsorted(source.line_starts, first, side="right")
+        line[mine] = source.lines_of(first)
     own, unnamed = columns.name[visit].astype(np.int64), texts_of(len(slots), {})
     return Literals(
         file=slim(file),
