@@ -151,6 +151,8 @@ class KrlMachine(TaskMachine):
         inside = [text.statement(k) for k in rows]
         if any(one.name in self._sets(other) for other in inside):
             return False
+        if one.name in self.task.odd_words:
+            return False
         scope = context.scope
         if self.task.place(one.name, scope) == (scope.module, scope.routine):
             return True
@@ -600,8 +602,8 @@ class KrlMachine(TaskMachine):
         An interrupt that no way declares, or that no way switches on, may be on at any
         time: by a routine that is not followed, or by another program.
         """
-        found = set()
-        unseen_on = False
+        odd = {"interrupt", "trigger"} & self.task.odd_words
+        found, unseen_on = {_INTERRUPT} if odd else set(), False
         for file, text in self._robot_texts():
             for row in text.where(_is_interrupt):
                 if (file, row) in self._met:

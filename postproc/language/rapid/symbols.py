@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,6 +11,7 @@ from functools import cached_property
 from postproc.files import task_beside
 from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import Scope
+from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import (
     ANSWERS,
@@ -186,12 +186,8 @@ class RapidTask:
     @cached_property
     def _odd_words(self) -> frozenset[str]:
         """Words of what is not understood: each may name what is set there."""
-        texts = [
-            file.text.text(row)
-            for file in self.files
-            for row in file.text.where(lambda one: isinstance(one, said.NotUnderstood))
-        ]
-        return frozenset(w for text in texts for w in _WORD.findall(text.lower()))
+        found = (file.text.words(file.text.where(_is_odd)) for file in self.files)
+        return frozenset().union(*found)
 
     def _first_value(self, file: int, datum: Datum) -> Nested | None:
         """Return what data hold at first, without where it is written."""
@@ -237,6 +233,8 @@ class RapidTask:
         for file in self.files:
             for statement in file.text.said:
                 uses.note(statement)
+        uses.written |= self._odd_words
+        uses.read |= self._odd_words
         uses.pass_on()
         return frozenset(uses.written), frozenset(uses.read)
 
@@ -380,7 +378,6 @@ class RapidTask:
 
 
 DEEPEST = 20  # names that stand for names
-_WORD = re.compile(r"[a-z_]\w*")
 
 
 def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
@@ -389,6 +386,11 @@ def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
     for file in files:
         tasks.setdefault(task_beside(file.text.source.name), []).append(file)
     return [RapidTask(own) for own in tasks.values()]
+
+
+def _is_odd(one: said.RapidStatement) -> bool:
+    """Return True if a statement, or what a condition leads to, is odd."""
+    return is_odd(inside(one))
 
 
 def _is_shared(datum: Datum) -> bool:
@@ -510,8 +512,6 @@ class _NamesUsed:
                 self._call(name, arguments)
             case said.LateCall(arguments=arguments):
                 self._arguments(arguments)
-            case said.NotUnderstood():
-                pass  # what it may change is said with it: nothing is known behind it
 
     def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
         pairs = self._fitting(name, arguments)
