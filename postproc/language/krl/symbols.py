@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -124,6 +124,7 @@ class KrlTask:
                 if datum.index in place and place[datum.index][1].value is not None:
                     if datum.value is None:
                         continue
+                    datum = replace(datum, value=None)  # which of the two holds?
                 place[datum.index] = number, datum
                 if not datum.routine and (datum.shared or file.name == CONFIG):
                     self._shared[datum.name].add(file.name)

@@ -61,6 +61,7 @@ class RapidTask:
     others: Sequence[RapidTask] = ()
     _moved: dict[tuple[int, int], bool] = field(default_factory=dict)
     _local: dict[tuple[int, str, str], dict[str, Datum]] = field(default_factory=dict)
+    _twice: set[tuple[int, str, str, str]] = field(default_factory=set)
     _global: dict[str, list[tuple[int, Datum]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -68,7 +69,10 @@ class RapidTask:
         for number, file in enumerate(self.files):
             for datum in file.data:
                 place = number, datum.module, datum.routine
-                self._local.setdefault(place, {})[datum.declared.name] = datum
+                own = self._local.setdefault(place, {})
+                if datum.declared.name in own:
+                    self._twice.add((*place, datum.declared.name))
+                own[datum.declared.name] = datum
                 if not datum.routine and datum.declared.scope != "local":
                     known = self._global.setdefault(datum.declared.name, [])
                     known.append((number, datum))
@@ -120,9 +124,10 @@ class RapidTask:
         if name in here.parameters:
             return None
         for routine in (here.routine, ""):
-            found = self._local.get((here.file, here.module, routine), {}).get(name)
+            place = here.file, here.module, routine
+            found = self._local.get(place, {}).get(name)
             if found is not None:
-                return here.file, found
+                return None if (*place, name) in self._twice else (here.file, found)
         shared = self._global.get(name, [])
         return shared[0] if len(shared) == 1 else None
 
