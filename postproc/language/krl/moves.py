@@ -268,6 +268,8 @@ class _Goal:
             goal = self._axes(found)
         else:
             goal = self._pose(found)
+        if not name and goal.file >= 0:
+            return replace(goal, pins=self._system(goal.file))
         if not name:
             return goal
         if goal.why.code is Code.PARTIAL_TARGET:  # what data lack may be told elsewhere
