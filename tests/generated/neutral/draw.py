@@ -269,6 +269,20 @@ class Draw:
                 return Made("above", self._expr())
         return self._fixed()
 
+    def _value(self) -> Point:
+        """Draw what a variable point is given: another one, numbers, or a shift."""
+        match self.rng.choice(["point", "point", "numbers", "numbers", "shift"]):
+            case "numbers":
+                return Inline(self._literal())
+            case "shift" if self.has("offset"):
+                self.shifts += 1
+                return Shifted(
+                    self._fixed(), self._offset(), mark=SHIFTS + self.shifts
+                )
+            case "point" if self.has("variable"):
+                return Named(self.rng.choice(self.made.variables))
+        return self._fixed()
+
     def _offset(self) -> tuple[Expr, Expr, Expr]:
         rng = self.rng
         z: Expr = rng.randint(-20, 20)
@@ -351,8 +365,7 @@ class Draw:
         kinds = ["number", "number", *["point", "lift"] * self.has("lift")]
         match rng.choice(kinds):
             case "point":
-                value = self._fixed()
-                return SetPoint(rng.choice(self.made.variables), value)
+                return SetPoint(rng.choice(self.made.variables), self._value())
             case "lift":
                 return Lift(rng.choice(self.made.variables), rng.randint(-5, 5))
         return Assign(rng.choice(self._names()), self._expr())
