@@ -296,7 +296,7 @@ class Draw:
             self.made.places.append(Place(MIDDLE - back, True, 1, 1))
             first.append(self._move("axes", Inline(len(self.made.places) - 1), 0))
         frames: list[Statement] = [SetTool(1, 1), SetBase(1, way=1), SetSpeed(200)]
-        given = [SetPoint(name, self._fixed()) for name in self.made.variables]
+        given = [SetPoint(name, self._fixed()) for name in self.made.variables[:2]]
         counts = [Assign("m1", 0)]
         return (*frames, *given, *counts, *first)
 
