@@ -390,7 +390,7 @@ class Goals:
         if found is None:
             code = Code.UNDECLARED_VARIABLE
             text = "is declared in none of the given files, or in several of them"
-        elif found[1].declared.value is None:
+        elif found[1].declared.value is None and name not in self.task.written:
             code, text = Code.NO_VALUE, "has no value in the given files"
         elif self.task.is_changed_beside(*found):
             code = Code.BESIDE_PROGRAM
