@@ -335,7 +335,11 @@ class TaskMachine(ABC):
                 if after is None or after == known:
                     return
                 self._left[context, row] = here = after
-                self._stand_for(context, row, behind)
+                if behind > row + 1:  # its visit stands for all of a run
+                    (number,) = self._numbers[context, row]
+                    self.visits[number].count = behind - row
+                    file = context.scope.file
+                    self.reached |= {(file, k) for k in range(row, behind)}
             elif type(one) in _PLAIN or self.goes_on(one) or _ends(one):
                 here = self.after_functions(context, row, one, here)
             else:
@@ -360,13 +364,6 @@ class TaskMachine(ABC):
                 text, context.flow, apart, self.places_of, self.is_plain
             )
         return self._runs[key]
-
-    def _stand_for(self, context: CallContext, row: int, behind: int) -> None:
-        """Let the visit of a move stand for all up to a row."""
-        if behind > row + 1:
-            (number,) = self._numbers[context, row]
-            self.visits[number].count = behind - row
-            self.reached |= {(context.scope.file, k) for k in range(row, behind)}
 
     def part(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived

@@ -278,7 +278,10 @@ class KrlMachine(TaskMachine):
                 "out if it is not needed"
             )
             return self.unknown(context, row, here, what)
-        here = replace(here, origins=NOWHERE) if _is_tracking(one.value) else here
+        value = one.value
+        if isinstance(value, said.FunctionCall) and value.name in ("eb", "eb_abs"):
+            # The base follows a conveyor, which takes the arm along.
+            here = replace(here, origins=NOWHERE)
         return replace(here, modes=modes)
 
     def _call(
@@ -389,15 +392,12 @@ class KrlMachine(TaskMachine):
             (file, routine.first) for file, routine, own, word in self._switches
             if word == "on" and own in (number, EVERY)
         }  # fmt: skip
-        known = number != EVERY and bool(switching)
-        return known and self._declaring(number).isdisjoint(switching)
-
-    def _declaring(self, number: int) -> set[tuple[int, int]]:
-        """Return the routines that may declare an interrupt: file and first row."""
-        return {
+        declaring = {
             (file, routine.first) for file, routine, own, _ in self._declarations
             if own in (number, EVERY)
         }  # fmt: skip
+        known = number != EVERY and bool(switching)
+        return known and declaring.isdisjoint(switching)
 
     @cached_property
     def _declarations(
@@ -702,11 +702,6 @@ def _puts_out(one: said.Instruction) -> bool:
 def _is_interrupt(one: said.SourceStatement) -> bool:
     """Return True if a statement declares or switches interrupts."""
     return isinstance(one, said.InterruptDeclared | said.InterruptSwitched)
-
-
-def _is_tracking(operand: said.Operand) -> bool:
-    """Return True if a base follows a conveyor, which takes the arm along."""
-    return isinstance(operand, said.FunctionCall) and operand.name in ("eb", "eb_abs")
 
 
 def _is_modal(name: str) -> bool:
