@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
@@ -201,7 +200,8 @@ class Arrived:
 
 
 NOWHERE = frozenset([ELSEWHERE])
-_WORD = re.compile(r"[a-z_$]\w*")
+JUMPS = frozenset("goto return exit exitcycle raise retry trynext".split())
+"""Words with which a statement leads to another place."""
 NOT_FOLLOWED = "may move the arm: it is not followed"
 Place = tuple[CallContext, int]
 _PLAIN = (said.SourceStatement, said.LabelMark)
@@ -324,7 +324,19 @@ class TaskMachine(ABC):
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
     ) -> None:
         """Go on behind a statement that only this language has."""
-        self.enter(context, row + 1, self.unknown(context, row, here))
+        after = self.unknown(context, row, here)
+        self.enter(context, row + 1, after)
+        if said.is_odd(one):
+            self.may_jump(context, row, after)
+
+    def may_jump(self, context: CallContext, row: int, here: Arrived) -> None:
+        """Go wherever a statement that is not understood may lead, by its words."""
+        if JUMPS.isdisjoint(self.texts[context.scope.file].words([row])):
+            return
+        flow = context.flow
+        for to in sorted(flow.joins | {end + 1 for end in flow.head}):
+            self._leap(context, to, here)
+        self._return(context, here)
 
     def counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
         """Return True if nothing but the loop itself changes its variable."""
@@ -354,7 +366,7 @@ class TaskMachine(ABC):
         """Yield the names of data that a statement changes."""
         return [one.target.name] if isinstance(one, said.Assignment) else []
 
-    def unfollowed(self) -> Iterable[tuple[int, int, int]]:
+    def routines_beside(self) -> Iterable[tuple[int, int, int]]:
         """Yield statements that run otherwise than they are followed, as `beside`."""
         return []
 
@@ -398,7 +410,11 @@ class TaskMachine(ABC):
                 if after is None or after == known:
                     return
                 self._left[context, row] = here = after
-                self._stand_for(context, row, behind)
+                if behind > row + 1:  # its visit stands for all of a run
+                    (number,) = self._numbers[context, row]
+                    self.visits[number].count = behind - row
+                    file = context.scope.file
+                    self.reached |= {(file, k) for k in range(row, behind)}
             elif type(one) in _PLAIN or self.goes_on(one) or _ends(one):
                 here = self.after_functions(context, row, one, here)
                 here = self.assign_point(context, row, one, here)
@@ -424,13 +440,6 @@ class TaskMachine(ABC):
                 text, context.flow, apart, self.places_of, self.is_plain
             )
         return self._runs[key]
-
-    def _stand_for(self, context: CallContext, row: int, behind: int) -> None:
-        """Let the visit of a move stand for all up to a row."""
-        if behind > row + 1:
-            (number,) = self._numbers[context, row]
-            self.visits[number].count = behind - row
-            self.reached |= {(context.scope.file, k) for k in range(row, behind)}
 
     def part(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
@@ -701,11 +710,11 @@ class TaskMachine(ABC):
             return here
         held = frozenset[AssignedPoint]()
         if not one.target.steps:
-            held = frozenset([self._assigned(place, one.value, row, context, here)])
+            held = frozenset([self._give(place, one.value, row, context, here)])
         here = here.without(lambda point: point.place == place)
         return replace(here, points=here.points | held)
 
-    def _assigned(
+    def _give(
         self,
         place: tuple[int, str, str, str],
         value: said.Operand,
@@ -727,19 +736,15 @@ class TaskMachine(ABC):
         given = [visit for visit in self.visits if visit.goal.given]
         if not given:
             return
-        rows = self._rows_of({*self.beside, *self.unfollowed()})
-        lost = {name for at, row in rows for name in self._find_changed(at, row)}
+        rows = self._rows_of({*self.beside, *self.routines_beside()})
+        lost = {
+            name for at, row in rows
+            for name in self.changes_of(self.texts[at].statement(row))
+        }  # fmt: skip
         for visit in given:
             known = visit.goal.given <= visit.points
             if not known or any(lost & point.names for point in visit.goal.given):
                 visit.goal = visit.goal.lost
-
-    def _find_changed(self, file: int, row: int) -> Iterable[str]:
-        """Return the names that a statement changes; all words of what is odd."""
-        one = self.texts[file].statement(row)
-        if isinstance(one, said.NotUnderstood):
-            return _WORD.findall(self.texts[file].text(row).lower())
-        return self.changes_of(one)
 
     def unknown(
         self, context: CallContext, row: int, here: Arrived, what: str = NOT_FOLLOWED

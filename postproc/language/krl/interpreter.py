@@ -151,6 +151,8 @@ class KrlMachine(TaskMachine):
         inside = [text.statement(k) for k in rows]
         if any(one.name in self._sets(other) for other in inside):
             return False
+        if one.name in self.task.odd_words:
+            return False
         scope = context.scope
         if self.task.place(one.name, scope) == (scope.module, scope.routine):
             return True
@@ -276,7 +278,10 @@ class KrlMachine(TaskMachine):
                 "out if it is not needed"
             )
             return self.unknown(context, row, here, what)
-        here = replace(here, origins=NOWHERE) if _is_tracking(one.value) else here
+        value = one.value
+        if isinstance(value, said.FunctionCall) and value.name in ("eb", "eb_abs"):
+            # The base follows a conveyor, which takes the arm along.
+            here = replace(here, origins=NOWHERE)
         here = self.assign_point(context, row, one, here)
         return replace(here, modes=modes)
 
@@ -388,15 +393,12 @@ class KrlMachine(TaskMachine):
             (file, routine.first) for file, routine, own, word in self._switches
             if word == "on" and own in (number, EVERY)
         }  # fmt: skip
-        known = number != EVERY and bool(switching)
-        return known and self._declaring(number).isdisjoint(switching)
-
-    def _declaring(self, number: int) -> set[tuple[int, int]]:
-        """Return the routines that may declare an interrupt: file and first row."""
-        return {
+        declaring = {
             (file, routine.first) for file, routine, own, _ in self._declarations
             if own in (number, EVERY)
         }  # fmt: skip
+        known = number != EVERY and bool(switching)
+        return known and declaring.isdisjoint(switching)
 
     @cached_property
     def _declarations(
@@ -593,7 +595,7 @@ class KrlMachine(TaskMachine):
         """Yield the names of data that a statement changes, see `TaskMachine`."""
         yield from (data.name for data in list_changes(one, self.task.routines))
 
-    def unfollowed(self) -> Iterator[tuple[int, int, int]]:
+    def routines_beside(self) -> Iterator[tuple[int, int, int]]:
         """Yield functions, and what interrupts and triggers do, see `TaskMachine`."""
         for file, text in enumerate(self.texts):
             for routine in self.task.files[file].routines:
@@ -627,8 +629,8 @@ class KrlMachine(TaskMachine):
         An interrupt that no way declares, or that no way switches on, may be on at any
         time: by a routine that is not followed, or by another program.
         """
-        found = set()
-        unseen_on = False
+        odd = {"interrupt", "trigger"} & self.task.odd_words
+        found, unseen_on = {_INTERRUPT} if odd else set(), False
         for file, text in self._robot_texts():
             for row in text.where(_is_interrupt):
                 if (file, row) in self._met:
@@ -732,11 +734,6 @@ def _is_interrupt(one: said.SourceStatement) -> bool:
 def _is_beside(one: said.SourceStatement) -> bool:
     """Return True if a statement says what is done at another time."""
     return isinstance(one, said.InterruptDeclared | said.PathTrigger)
-
-
-def _is_tracking(operand: said.Operand) -> bool:
-    """Return True if a base follows a conveyor, which takes the arm along."""
-    return isinstance(operand, said.FunctionCall) and operand.name in ("eb", "eb_abs")
 
 
 def _is_modal(name: str) -> bool:

@@ -142,9 +142,13 @@ class KrlGoals:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
         block, given = self.block(row, here), dict[str, Any]()
+        in_joints = False
         if block is not None:
             move, given = self._in_block(move, row, here, block)
-        in_joints = block is not None and self._is_in_joints(block, here)
+            begin = self.task.files[here.file].text.statement(block.start)
+            in_joints = (
+                isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
+            )
         if kind not in _POINTS[block is not None, in_joints]:
             goal = not_reached(_Goal(self, move, row, here).end(move.to), SPLINE)
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
@@ -172,11 +176,6 @@ class KrlGoals:
         """Return the rows of the spline block that a move stands in."""
         blocks = self.task.files[here.file].splines
         return next((rows for rows in blocks if row in rows), None)
-
-    def _is_in_joints(self, rows: range, here: Scope) -> bool:
-        """Tell whether a spline block is one of joint moves."""
-        begin = self.task.files[here.file].text.statement(rows.start)
-        return isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
 
     def _in_block(
         self, move: said.KrlMove, row: int, here: Scope, rows: range
@@ -249,7 +248,7 @@ class _Goal:
         operands = (
             operand.operands if isinstance(operand, said.Operation) else (operand,)
         )
-        held = (self.task.held_by(one, self.here) for one in operands)
+        held = (self.task.find_held(one, self.here) for one in operands)
         return replace(found, given=frozenset(one for one in held if one is not None))
 
     def _end(self, operand: said.Operand) -> FoundGoal:
@@ -274,9 +273,9 @@ class _Goal:
 
     def _point(self, operand: said.KrlAggregate | said.DataObject) -> FoundGoal:
         """Read a point that is written or named."""
-        held = self.task.held_by(operand, self.here)
+        held = self.task.find_held(operand, self.here)
         if held is not None:
-            return self._held(held)
+            return self._read_held(held)
         name = operand.name if isinstance(operand, said.DataObject) else ""
         found = self.task.value(operand, self.row, self.here)
         if not isinstance(found, KrlRecord) or not found.whole:
@@ -294,7 +293,7 @@ class _Goal:
             return _unknown_goal(PARTIAL, name=name)
         return self._describe_point(goal, operand)
 
-    def _held(self, held: AssignedPoint) -> FoundGoal:
+    def _read_held(self, held: AssignedPoint) -> FoundGoal:
         """Read the destination that an assignment gave to a point."""
         there = replace(self, row=held.row, here=held.scope)
         goal = _unknown_goal(AT_RUN_TIME)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from postproc.diagnostics import Code
 from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import AssignedPoint, Scope
+from postproc.language.ir import is_odd
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import TABLES
 from postproc.language.krl.external_routines import package_routines
@@ -25,7 +25,6 @@ ANY = -1  # an entry of a table whose number is not known
 POSITIONS = ("pos", "e6pos")  # types
 POINTS = (*POSITIONS, "axis", "e6axis")
 DEEPEST = 20  # names that stand for names
-_WORD = re.compile(r"\$?\w+")
 
 
 @dataclass(frozen=True)
@@ -126,6 +125,7 @@ class KrlTask:
                 if datum.index in place and place[datum.index][1].value is not None:
                     if datum.value is None:
                         continue
+                    datum = replace(datum, value=None)  # which of the two holds?
                 place[datum.index] = number, datum
                 if not datum.routine and (datum.shared or file.name == CONFIG):
                     self._shared[datum.name].add(file.name)
@@ -210,7 +210,7 @@ class KrlTask:
             return None
         return found[()][0], *place, name
 
-    def held_by(
+    def find_held(
         self, operand: said.Operand | None, here: Scope
     ) -> AssignedPoint | None:
         """Return what an assignment gave to the point that an operand names."""
@@ -237,7 +237,13 @@ class KrlTask:
         changed = (
             data for one in said_ones for data in list_changes(one, self.routines)
         )
-        return frozenset(data.name for data in changed) | self.beside
+        return frozenset(data.name for data in changed) | self.beside | self.odd_words
+
+    @cached_property
+    def odd_words(self) -> frozenset[str]:
+        """Words of what is not understood: each may name what is set there."""
+        programs = (file.text for file in self.files if not file.is_submit)
+        return frozenset().union(*(one.words(one.where(is_odd)) for one in programs))
 
     @cached_property
     def counted(self) -> Counter[str]:
@@ -265,6 +271,8 @@ class KrlTask:
     def _entries_written(self) -> Mapping[str, frozenset[int]]:
         """Collect the entries of tables that statements may change."""
         found: dict[str, set[int]] = {table: set() for table in TABLES}
+        for table in self.odd_words.intersection(TABLES):
+            found[table].add(ANY)
         for number, file in enumerate(self.files):
             here = Scope(number, file.name, "")
             changing = file.text.where(
@@ -348,7 +356,7 @@ class KrlTask:
                 if _is_of_part(one.target):
                     uses.written.add(one.target.name)
         written, read = self._uses_beside
-        uses.changed |= written
+        uses.changed |= written | self.odd_words
         uses.read |= read | written
         uses.read |= {one for target, one in uses.copies if self._outlives(target)}
         uses.pass_on()
@@ -521,11 +529,8 @@ class _Beside:
     @classmethod
     def _of_rows(cls, file: KrlFile, rows: range, own: frozenset[str]) -> _Beside:
         statements = [file.text.statement(row) for row in rows]
-        odd = [
-            r for r in rows if isinstance(file.text.statement(r), said.NotUnderstood)
-        ]
-        words = (_WORD.findall(file.text.text(row).lower()) for row in odd)
-        return cls(statements, own, frozenset().union(*words))
+        words = file.text.words(file.text.where(is_odd, rows.start, rows.stop))
+        return cls(statements, own, words)
 
     @property
     def find_calls(self) -> frozenset[str]:
@@ -581,7 +586,7 @@ class _Uses:
             case said.Assignment(target=target, value=value):
                 self.written.add(target.name)
                 self._subscripts(target)
-                self._assigned(target, value)
+                self._note_assignment(target, value)
             case said.ForLoop(name=name):
                 self.changed.add(name)
             case said.Instruction(name=name, arguments=arguments):
@@ -600,7 +605,7 @@ class _Uses:
             for operand in operands_of(one):
                 self.take(operand)
 
-    def _assigned(self, target: said.DataObject, value: said.Operand) -> None:
+    def _note_assignment(self, target: said.DataObject, value: said.Operand) -> None:
         """Note what an assignment takes: a point that moves go to by another name."""
         plain = isinstance(value, said.DataObject) and not (value.steps or target.steps)
         if plain and isinstance(value, said.DataObject):

@@ -233,10 +233,10 @@ class Goals:
         found = self.goal(operand, signature, row, scope)
         if not scope.points:
             return found
-        held = self.task.held_by(source_of(operand), scope)
+        held = self.task.find_held(source_of(operand), scope)
         return found if held is None else replace(found, given=frozenset([held]))
 
-    def _held(self, held: AssignedPoint, signature: Signature) -> FoundGoal:
+    def _read_held(self, held: AssignedPoint, signature: Signature) -> FoundGoal:
         """Read the destination that an assignment gave to a point."""
         found = self.goal(held.operand, signature, held.row, held.scope)
         why = [self._explain_pinned(p.name, Scope(*p.place[:3])) for p in held.chain]
@@ -254,9 +254,9 @@ class Goals:
         scope: Scope,
     ) -> FoundGoal:
         """Read a destination; numbers of system modules are to stay."""
-        held = self.task.held_by(operand, scope)
+        held = self.task.find_held(operand, scope)
         if held is not None:
-            return self._held(held, signature)
+            return self._read_held(held, signature)
         found = self._goal(operand, signature, row, scope)
         if found.pins or found.file < 0 or not self.task.files[found.file].is_system:
             return found
@@ -389,7 +389,7 @@ class Goals:
         found, code = self.task.datum(name, scope), Code.RUNTIME_VALUE
         if found is None:
             code = Code.UNDECLARED_VARIABLE
-            text = "is declared in none of the given files, or in several of them"
+            text = "is declared in none of the given files, or more than once"
         elif found[1].declared.value is None and name not in self.task.written:
             code, text = Code.NO_VALUE, "has no value in the given files"
         elif self.task.is_changed_beside(*found):

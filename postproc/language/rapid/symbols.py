@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
@@ -12,6 +11,7 @@ from functools import cached_property
 from postproc.files import task_beside
 from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import AssignedPoint, Scope, source_of
+from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import (
     ANSWERS,
@@ -61,6 +61,7 @@ class RapidTask:
     others: Sequence[RapidTask] = ()
     _moved: dict[tuple[int, int], bool] = field(default_factory=dict)
     _local: dict[tuple[int, str, str], dict[str, Datum]] = field(default_factory=dict)
+    _twice: set[tuple[int, str, str, str]] = field(default_factory=set)
     _global: dict[str, list[tuple[int, Datum]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -68,7 +69,10 @@ class RapidTask:
         for number, file in enumerate(self.files):
             for datum in file.data:
                 place = number, datum.module, datum.routine
-                self._local.setdefault(place, {})[datum.declared.name] = datum
+                own = self._local.setdefault(place, {})
+                if datum.declared.name in own:
+                    self._twice.add((*place, datum.declared.name))
+                own[datum.declared.name] = datum
                 if not datum.routine and datum.declared.scope != "local":
                     known = self._global.setdefault(datum.declared.name, [])
                     known.append((number, datum))
@@ -120,9 +124,10 @@ class RapidTask:
         if name in here.parameters:
             return None
         for routine in (here.routine, ""):
-            found = self._local.get((here.file, here.module, routine), {}).get(name)
+            place = here.file, here.module, routine
+            found = self._local.get(place, {}).get(name)
             if found is not None:
-                return here.file, found
+                return None if (*place, name) in self._twice else (here.file, found)
         shared = self._global.get(name, [])
         return shared[0] if len(shared) == 1 else None
 
@@ -186,12 +191,8 @@ class RapidTask:
     @cached_property
     def _odd_words(self) -> frozenset[str]:
         """Words of what is not understood: each may name what is set there."""
-        texts = [
-            file.text.text(row)
-            for file in self.files
-            for row in file.text.where(lambda one: isinstance(one, said.NotUnderstood))
-        ]
-        return frozenset(w for text in texts for w in _WORD.findall(text.lower()))
+        found = (file.text.words(file.text.where(_is_odd)) for file in self.files)
+        return frozenset().union(*found)
 
     def _first_value(self, file: int, datum: Datum) -> Nested | None:
         """Return what data hold at first, without where it is written."""
@@ -244,7 +245,7 @@ class RapidTask:
             return None
         return file, datum.module, datum.routine, name
 
-    def held_by(
+    def find_held(
         self, operand: said.Operand | None, here: Scope
     ) -> AssignedPoint | None:
         """Return what an assignment gave to the point that an operand names."""
@@ -270,6 +271,8 @@ class RapidTask:
         for file in self.files:
             for statement in file.text.said:
                 uses.note(statement)
+        uses.changed |= self._odd_words
+        uses.read |= self._odd_words
         uses.read |= {one for target, one in uses.copies if self._outlives(target)}
         uses.pass_on()
         return uses
@@ -433,7 +436,6 @@ class RapidTask:
 
 
 DEEPEST = 20  # names that stand for names
-_WORD = re.compile(r"[a-z_]\w*")
 
 
 def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
@@ -442,6 +444,11 @@ def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
     for file in files:
         tasks.setdefault(task_beside(file.text.source.name), []).append(file)
     return [RapidTask(own) for own in tasks.values()]
+
+
+def _is_odd(one: said.RapidStatement) -> bool:
+    """Return True if a statement, or what a condition leads to, is odd."""
+    return is_odd(inside(one))
 
 
 def _is_shared(datum: Datum) -> bool:
@@ -551,7 +558,7 @@ class _NamesUsed:
                     self._operand(operand)
             case said.Assignment(target=target, value=value):
                 self.written.add(target.name)
-                self._assigned(target, value)
+                self._note_assignment(target, value)
             case said.Branch(values=values):
                 for operand in values:
                     self._operand(operand)
@@ -570,10 +577,8 @@ class _NamesUsed:
                 self._call(name, arguments)
             case said.LateCall(arguments=arguments):
                 self._arguments(arguments)
-            case said.NotUnderstood():
-                pass  # what it may change is said with it: nothing is known behind it
 
-    def _assigned(self, target: said.DataObject, value: said.Operand) -> None:
+    def _note_assignment(self, target: said.DataObject, value: said.Operand) -> None:
         """Note what an assignment takes: a point that moves go to by another name."""
         source = source_of(value)
         if source is None or target.steps or source.steps:

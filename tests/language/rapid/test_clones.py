@@ -116,7 +116,7 @@ TRAPS = {
          "IF diSide=1 MoveAbsJ [[25,-20,-100,20,40,10],[9E9,9E9,9E9,9E9,9E9,9E9]],"
          "vWork,fine,tWork;", TWICE[1].format("pShared", ""), TWICE[2],
          "ENDFOR"], P, ""),
-    "shifted, and read": ([*twice(), "MoveL Offs(pShared,0,0,9),vWork,fine,tWork"
+    "shifted, and read": ([*twice(), "MoveL Offs(pShared,0,0,3*3),vWork,fine,tWork"
                            "\\WObj:=wPart;", "TPWrite NumToStr(pShared.trans.x,2);"],
                           P, ""),
     "points that change": ([*twice(), "pShared.trans.x:=pShared.trans.x+1;"],
