@@ -26,7 +26,7 @@ CLONE = Options(shared_points="clone")
 def shared(cell, seed):
     """Return a job that goes to its named points twice, from different sides."""
     job = drawn(cell, seed, 16)
-    moves = [replace(m, name=f"P{k}") if not m.in_joints and m.via is None else m
+    moves = [replace(m, name=f"Shared{k}") if not m.in_joints and m.via is None else m
              for k, m in enumerate(job.moves)]  # fmt: skip
     again = [m for m in reversed(moves) if m.name]
     return rapid(replace(job, moves=(*moves, *again)))
