@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -45,16 +45,6 @@ class Scope:
     parameters: frozenset[str] = frozenset()
     loops: tuple[tuple[str, float], ...] = ()
     given: tuple[tuple[str, said.Operand, int, Scope], ...] = ()
-
-
-class ModesLike(Protocol):
-    """What moves are carried out with until something changes it."""
-
-    def join(self, other: Any) -> Self:
-        """Keep what is the same on another way here."""
-
-    def forget(self) -> Self:
-        """Forget what may have changed."""
 
 
 class VisitLike(Protocol):

@@ -46,7 +46,6 @@ NOTHING = (np.nan,) * WIDTH
 NO_SLOTS = (-1,) * WIDTH
 _ZONE = re.compile(r"z(\d+)$")
 _SPEED = re.compile(r"v(\d+)$")
-USUAL_TURN = np.deg2rad(500.0)  # [rad/s] of the speeds that the controller knows
 _STEM = re.compile(
     r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search|calib|nut)"
 )
