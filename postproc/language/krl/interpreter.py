@@ -390,7 +390,7 @@ class KrlMachine(TaskMachine):
             (file, routine.first) for file, routine, own, word in self._switches
             if word == "on" and own in (number, EVERY)
         }  # fmt: skip
-        declaring = {
+        declaring = {  # file and first row of routines that may declare it
             (file, routine.first) for file, routine, own, _ in self._declarations
             if own in (number, EVERY)
         }  # fmt: skip

@@ -110,7 +110,8 @@ def calibration_report(
         model=model,
         fit=told,
         parameters=parameters,
-        unseen=told.get("unseen") or at_prior(parameters),
+        unseen=told.get("unseen")
+        or [str(p["name"]) for p in parameters if p["determined"] < UNSEEN],
         pairs=pairs[:MOST_PAIRS],
         more_pairs=max(0, len(pairs) - MOST_PAIRS),
         iso=iso,
@@ -198,11 +199,6 @@ def parameter_table(parameters: Sequence[Mapping[str, Any]]) -> list[dict[str, A
             }
         )
     return out
-
-
-def at_prior(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Name the parameters that the rows say next to nothing about."""
-    return [str(p["name"]) for p in parameters if p["determined"] < UNSEEN]
 
 
 def list_correlated(model: Mapping[str, Any]) -> list[tuple[str, str, float]]:

@@ -519,11 +519,6 @@ def _place(columns: PageColumns, i: int) -> tuple[int, str, int, str]:
     )
 
 
-def tell_counts(columns: PageColumns) -> dict[str, int]:
-    """Count the visits of every status."""
-    return {s.name.lower(): int((columns.status == s).sum()) for s in Status}
-
-
 def histogram(columns: PageColumns) -> dict[str, Any]:
     """Count the lengths of the corrections that were made."""
     size = columns.size_mm[columns.status == Status.CORRECTED]
@@ -660,7 +655,7 @@ def _page(program: ProgramPage) -> str:
         payload,
         SCRIPTS,
         program=program,
-        counts=tell_counts(columns),
+        counts={s.name.lower(): int((columns.status == s).sum()) for s in Status},
         corrected=int((columns.status == Status.CORRECTED).sum()),
         groups=group_uncorrected(columns),
         predicted=finite(program.predicted),
