@@ -196,7 +196,6 @@ def _guesses(states: States, position: Floats) -> Iterator[Guess]:
 
 
 def _guess_units(states: States, position: Floats) -> Iterator[Guess]:
-    """Guess units of positions and angles."""
     yield Guess(
         "The positions look like metres: write millimetres (of points: "
         "--set measurements.unit=m)",

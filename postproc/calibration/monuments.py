@@ -105,7 +105,6 @@ def split_references(table: TextTable) -> tuple[TextTable, ReferenceRows | None]
 
 
 def _rows(table: TextTable, which: Bools) -> TextTable:
-    """Take some rows of a table."""
     return replace(table, cells=table.cells[which], line=table.line[which])
 
 

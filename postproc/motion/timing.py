@@ -354,7 +354,6 @@ class _Laws:
 
 
 def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
-    """Find the time laws of all runs."""
     k = len(points.ds)
     if k == 0:
         none, joints = np.zeros(0), np.zeros((0, 6))

@@ -288,7 +288,6 @@ class KrlMachine(TaskMachine):
     def _call(
         self, context: CallContext, row: int, one: said.Instruction, here: Arrived
     ) -> Arrived | None:
-        """Call a routine."""
         name = one.name
         found = self.task.routine(name, context.scope)
         if found is not None:
@@ -491,7 +490,6 @@ class KrlMachine(TaskMachine):
     def _switch(
         self, context: CallContext, row: int, one: said.InterruptSwitched, here: Arrived
     ) -> Arrived:
-        """Switch interrupts on or off."""
         self._met.add((context.scope.file, row))
         modes, number = here.modes, self._number_of(context, row, one.number)
         if one.word == "on":

@@ -268,7 +268,6 @@ class Goals:
         row: int,
         scope: Scope,
     ) -> FoundGoal:
-        """Read a destination."""
         written, names = operand, {g[0] for g in self.task.find_given(operand, scope)}
         operand, row, scope = self.task.behind(operand, row, scope)
         match operand:

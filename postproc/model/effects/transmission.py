@@ -126,7 +126,6 @@ class Transmission(JointEffect):
 
 
 def _joints(numbers: list[int]) -> str:
-    """Name joints."""
     some = ", ".join(map(str, numbers))
     return f"joint {some}" if len(numbers) == 1 else f"joints {some}"
 

@@ -55,7 +55,6 @@ def steps(history: Sequence[Mapping[str, Any]] | None) -> list[dict[str, Any]]:
 
 
 def _step(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Take one step."""
     added = entry.get("added") or ([entry] if "effect" in entry else [])
     means = {
         when: (entry.get(when) or {}).get("mean_mm") for when in ("before", "after")
@@ -121,7 +120,6 @@ def calibration_report(
 
 
 def _rows(rows: Mapping[str, Sequence[Any]] | None) -> dict[str, Floats]:
-    """Take the rows as arrays."""
     if not rows:
         return {}
     return {k: np.array(v, dtype=float) for k, v in rows.items() if k != "id"}

@@ -322,7 +322,6 @@ def choose(columns: PageColumns, most: int = MOST) -> Ints:
 
 
 def _evenly(rows: Ints, most: int) -> Ints:
-    """Take at most so many rows, evenly."""
     if len(rows) <= most:
         return rows
     return rows[np.arange(most) * len(rows) // most]
