@@ -702,7 +702,7 @@ class Round:
         shifts, lost = own_shifts(visits), np.zeros(len(points.literal), dtype=bool)
         absorbing = shifts & points.usable[points.group] if shifts.any() else shifts
         while True:
-            stay = self._pinned_targets(points, change, absorbing)
+            stay = self._find_pinned(points, change, absorbing)
             found = Settled(points, stay, both)
             if not shifts.any():
                 return found
@@ -718,7 +718,7 @@ class Round:
             lost[points.group[failed]] = True
             absorbing = absorbing & ~failed
 
-    def _pinned_targets(
+    def _find_pinned(
         self, agreement: Agreement, change: Floats, absorbing: Bools
     ) -> dict[Reason, Bools]:
         """Find literals that must keep their values for what else depends on them.

@@ -29,7 +29,7 @@ from postproc.report.html.figure import (
     thin,
 )
 from postproc.report.html.page import render
-from postproc.report.html.program import finite
+from postproc.report.json import finite
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 
