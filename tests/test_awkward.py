@@ -67,4 +67,4 @@ def test_points_on_a_line_register_without_a_warning() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         found = register(NJ, states, line, Combination(()), np.zeros(0))
-    assert np.isfinite(found.base_from_tracker).all()
+    assert np.isfinite(found.transforms[0]).all()

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -91,16 +91,6 @@ def source_of(operand: said.Operand | None) -> said.DataObject | None:
     while isinstance(operand, said.FunctionCall) and operand.arguments:
         operand = operand.arguments[0].value
     return operand if isinstance(operand, said.DataObject) else None
-
-
-class ModesLike(Protocol):
-    """What moves are carried out with until something changes it."""
-
-    def join(self, other: Any) -> Self:
-        """Keep what is the same on another way here."""
-
-    def forget(self) -> Self:
-        """Forget what may have changed."""
 
 
 class VisitLike(Protocol):

@@ -288,7 +288,6 @@ class KrlMachine(TaskMachine):
     def _call(
         self, context: CallContext, row: int, one: said.Instruction, here: Arrived
     ) -> Arrived | None:
-        """Call a routine."""
         name = one.name
         found = self.task.routine(name, context.scope)
         if found is not None:
@@ -393,7 +392,7 @@ class KrlMachine(TaskMachine):
             (file, routine.first) for file, routine, own, word in self._switches
             if word == "on" and own in (number, EVERY)
         }  # fmt: skip
-        declaring = {
+        declaring = {  # file and first row of routines that may declare it
             (file, routine.first) for file, routine, own, _ in self._declarations
             if own in (number, EVERY)
         }  # fmt: skip
@@ -491,7 +490,6 @@ class KrlMachine(TaskMachine):
     def _switch(
         self, context: CallContext, row: int, one: said.InterruptSwitched, here: Arrived
     ) -> Arrived:
-        """Switch interrupts on or off."""
         self._met.add((context.scope.file, row))
         modes, number = here.modes, self._number_of(context, row, one.number)
         if one.word == "on":

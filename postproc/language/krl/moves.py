@@ -42,7 +42,6 @@ from postproc.robot.trajectory import Motion
 
 NOTHING = (math.nan,) * WIDTH
 NO_SLOTS = (-1,) * WIDTH
-NO_AXES = (math.nan,) * 6
 AXES = ("a1", "a2", "a3", "a4", "a5", "a6")
 OUTSIDE = ("e1", "e2", "e3", "e4", "e5", "e6")
 PLACE = COMPONENTS[:6]

@@ -647,22 +647,14 @@ class _Uses:
             case said.DataObject():
                 self._subscripts(operand)
             case said.Operation(operator=":", operands=(first, second)):
-                point, shift = point_and_shift(first, second, self.points)
+                behind = (
+                    isinstance(first, said.DataObject) and first.name in self.points
+                )
+                point, shift = (first, second) if behind else (second, first)
                 self._destination(point)
                 self.take(shift)
             case _:
                 self.take(operand)
-
-
-def point_and_shift(
-    first: said.Operand, second: said.Operand, points: Collection[str]
-) -> tuple[said.Operand, said.Operand]:
-    """Tell which operand of ``first : second`` is the point that is shifted.
-
-    It is the first where that is a position, else the second.
-    """
-    behind = isinstance(first, said.DataObject) and first.name in points
-    return (first, second) if behind else (second, first)
 
 
 def list_changes(

@@ -46,7 +46,6 @@ NOTHING = (np.nan,) * WIDTH
 NO_SLOTS = (-1,) * WIDTH
 _ZONE = re.compile(r"z(\d+)$")
 _SPEED = re.compile(r"v(\d+)$")
-USUAL_TURN = np.deg2rad(500.0)  # [rad/s] of the speeds that the controller knows
 _STEM = re.compile(
     r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search|calib|nut)"
 )
@@ -269,7 +268,6 @@ class Goals:
         row: int,
         scope: Scope,
     ) -> FoundGoal:
-        """Read a destination."""
         written, names = operand, {g[0] for g in self.task.find_given(operand, scope)}
         operand, row, scope = self.task.behind(operand, row, scope)
         match operand:
