@@ -14,6 +14,7 @@ from tests.generated.found import KNOWN, LOADED, UNSURE, Found, within
 from tests.generated.neutral import landing
 from tests.generated.neutral.draw import FEATURES, Draw
 from tests.generated.neutral.follow import follow
+from tests.generated.neutral.in_rapid import counters
 from tests.generated.neutral.landing import case, compensated, given_back, lands
 from tests.generated.neutral.run import Run
 from tests.generated.neutral.text import NUMBER
@@ -94,6 +95,19 @@ def test_every_construct_is_drawn(told_cell, language):
         name for seed in range(60) for name in Draw(seed, language).features
     )
     assert set(drawn) == set(FEATURES)
+
+
+@pytest.mark.parametrize("seed", [0, 100, 5801, 5984])
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_label_and_a_counter_are_those_of_one_loop(told_cell, language, seed):
+    one = case(seed, language, told_cell)
+    for text in one.text.files.values():
+        labels = re.findall(r"(?m)^\s*(\w+):\s*$", text.decode("latin-1"))
+        own = [name for name in labels if name != "DEFAULT"]
+        assert len(own) == len(set(own))
+    for routine in one.made.routines:
+        found = counters(routine.body)
+        assert len(found) == len(set(found))
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

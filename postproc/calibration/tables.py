@@ -185,7 +185,10 @@ def read_table(
     if len(rows) < 1 + headed:
         raise MeasurementError(path, "has no measurements", EMPTY_CURE)
     body = rows[1:] if headed else rows
-    names = _strip_end(rows[0][1]) if headed else _number_columns(body)
+    names = _strip_end(rows[0][1])
+    if not headed:
+        width = int(np.median([len(_strip_end(cells)) for _, cells in body]))
+        names = [str(k + 1) for k in range(max(width, len(names)))]
     cells, names = _block(path, names, body, rows[0][0], headed)
     line = np.array([i for i, _ in body], dtype=np.int64)
     sign = decimal or _decimal(cells, split)
@@ -368,12 +371,6 @@ def _decimal(cells: NDArray[np.object_], split: str) -> str:
         return "."
     comma = sum(bool(DECIMAL_COMMA.match(str(v))) for v in cells[:20].reshape(-1))
     return "," if comma else "."
-
-
-def _number_columns(rows: list[Row]) -> list[str]:
-    """Name columns by their number, from 1: as many as the first rows have cells."""
-    width = int(np.median([len(_strip_end(cells)) for _, cells in rows]))
-    return [str(k + 1) for k in range(max(width, len(_strip_end(rows[0][1]))))]
 
 
 # Single columns of a measurement file: ids, directions, probe points.

@@ -364,8 +364,10 @@ def _places(
     away = target == Meaning.AWAY
     kind[away], tcp[away] = TargetKind.TOOL_STEP, _along_approach(-values[away, 0])
     partial = target == Meaning.PARTIAL_POSE
-    kind[partial] = TargetKind.PARTIAL_POSE
-    tcp[partial] = _along_axes(user[partial], values[partial])
+    kind[partial], axes = TargetKind.PARTIAL_POSE, user[partial]
+    origin = np.einsum("nji,nj->ni", axes[:, :3, :3], axes[:, :3, 3])
+    tcp[partial] = axes
+    tcp[partial, :3, 3] = origin + values[partial, :3] * MM
     steps = np.isin(target, (*STEPS_IN, Meaning.ABOUT))
     for v in np.flatnonzero(steps).tolist():
         kind[v], tcp[v] = _step(target[v], values[v], user[v])
@@ -376,14 +378,6 @@ def _along_approach(distance_mm: Floats) -> Floats:
     """Shifts (m, 4, 4) [m] along the tool's z axis."""
     T = np.tile(np.eye(4), (len(distance_mm), 1, 1))
     T[:, 2, 3] = distance_mm * MM
-    return T
-
-
-def _along_axes(user: Floats, values: Floats) -> Floats:
-    """Axes of user frames, and places along them [m], (m, 4, 4), NaN: not written."""
-    T = np.array(user)
-    origin = np.einsum("nji,nj->ni", user[:, :3, :3], user[:, :3, 3])
-    T[:, :3, 3] = origin + values[:, :3] * MM
     return T
 
 

@@ -144,6 +144,8 @@ class Arrived:
 
 
 NOWHERE = frozenset([ELSEWHERE])
+JUMPS = frozenset("goto return exit exitcycle raise retry trynext".split())
+"""Words with which a statement leads to another place."""
 NOT_FOLLOWED = "may move the arm: it is not followed"
 Place = tuple[CallContext, int]
 _PLAIN = (said.SourceStatement, said.LabelMark)
@@ -266,7 +268,19 @@ class TaskMachine(ABC):
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
     ) -> None:
         """Go on behind a statement that only this language has."""
-        self.enter(context, row + 1, self.unknown(context, row, here))
+        after = self.unknown(context, row, here)
+        self.enter(context, row + 1, after)
+        if said.is_odd(one):
+            self.may_jump(context, row, after)
+
+    def may_jump(self, context: CallContext, row: int, here: Arrived) -> None:
+        """Go wherever a statement that is not understood may lead, by its words."""
+        if JUMPS.isdisjoint(self.texts[context.scope.file].words([row])):
+            return
+        flow = context.flow
+        for to in sorted(flow.joins | {end + 1 for end in flow.head}):
+            self._leap(context, to, here)
+        self._return(context, here)
 
     def counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
         """Return True if nothing but the loop itself changes its variable."""
@@ -321,7 +335,11 @@ class TaskMachine(ABC):
                 if after is None or after == known:
                     return
                 self._left[context, row] = here = after
-                self._stand_for(context, row, behind)
+                if behind > row + 1:  # its visit stands for all of a run
+                    (number,) = self._numbers[context, row]
+                    self.visits[number].count = behind - row
+                    file = context.scope.file
+                    self.reached |= {(file, k) for k in range(row, behind)}
             elif type(one) in _PLAIN or self.goes_on(one) or _ends(one):
                 here = self.after_functions(context, row, one, here)
             else:
@@ -346,13 +364,6 @@ class TaskMachine(ABC):
                 text, context.flow, apart, self.places_of, self.is_plain
             )
         return self._runs[key]
-
-    def _stand_for(self, context: CallContext, row: int, behind: int) -> None:
-        """Let the visit of a move stand for all up to a row."""
-        if behind > row + 1:
-            (number,) = self._numbers[context, row]
-            self.visits[number].count = behind - row
-            self.reached |= {(context.scope.file, k) for k in range(row, behind)}
 
     def part(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived

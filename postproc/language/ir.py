@@ -95,6 +95,11 @@ class NotUnderstood(SourceStatement):
     """Text that the grammar has no rule for."""
 
 
+def is_odd(one: SourceStatement) -> bool:
+    """Return True if a statement is not understood."""
+    return isinstance(one, NotUnderstood)
+
+
 @dataclass(frozen=True, slots=True)
 class BlockWord(SourceStatement):
     """A word that is a statement: else, endif, .."""

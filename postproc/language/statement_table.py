@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -16,6 +17,7 @@ from postproc.language.source import NumberSpans, Source, Span
 from postproc.language.templates import ParsedShapes, find_shapes, parse_shapes
 from postproc.language.visits import Diagnostic
 
+_WORD = re.compile(r"[A-Za-z_$]\w*")
 SHOWN = 60  # characters of a statement in a message
 T = TypeVar("T")
 
@@ -88,6 +90,11 @@ class StatementText(Generic[T]):
         """Return a statement as it is written."""
         start, end = self.span(row)
         return self.source.text[start:end]
+
+    def words(self, rows: Iterable[int]) -> frozenset[str]:
+        """Return the words of some statements, in lower case."""
+        found = (_WORD.findall(self.text(row).lower()) for row in rows)
+        return frozenset().union(*found)
 
     def quote(self, row: int) -> str:
         """Quote the beginning of a statement, on one line."""

@@ -151,6 +151,8 @@ class KrlMachine(TaskMachine):
         inside = [text.statement(k) for k in rows]
         if any(one.name in self._sets(other) for other in inside):
             return False
+        if one.name in self.task.odd_words:
+            return False
         scope = context.scope
         if self.task.place(one.name, scope) == (scope.module, scope.routine):
             return True
@@ -276,7 +278,10 @@ class KrlMachine(TaskMachine):
                 "out if it is not needed"
             )
             return self.unknown(context, row, here, what)
-        here = replace(here, origins=NOWHERE) if _is_tracking(one.value) else here
+        value = one.value
+        if isinstance(value, said.FunctionCall) and value.name in ("eb", "eb_abs"):
+            # The base follows a conveyor, which takes the arm along.
+            here = replace(here, origins=NOWHERE)
         return replace(here, modes=modes)
 
     def _call(
@@ -387,15 +392,12 @@ class KrlMachine(TaskMachine):
             (file, routine.first) for file, routine, own, word in self._switches
             if word == "on" and own in (number, EVERY)
         }  # fmt: skip
-        known = number != EVERY and bool(switching)
-        return known and self._declaring(number).isdisjoint(switching)
-
-    def _declaring(self, number: int) -> set[tuple[int, int]]:
-        """Return the routines that may declare an interrupt: file and first row."""
-        return {
+        declaring = {
             (file, routine.first) for file, routine, own, _ in self._declarations
             if own in (number, EVERY)
         }  # fmt: skip
+        known = number != EVERY and bool(switching)
+        return known and declaring.isdisjoint(switching)
 
     @cached_property
     def _declarations(
@@ -600,8 +602,8 @@ class KrlMachine(TaskMachine):
         An interrupt that no way declares, or that no way switches on, may be on at any
         time: by a routine that is not followed, or by another program.
         """
-        found = set()
-        unseen_on = False
+        odd = {"interrupt", "trigger"} & self.task.odd_words
+        found, unseen_on = {_INTERRUPT} if odd else set(), False
         for file, text in self._robot_texts():
             for row in text.where(_is_interrupt):
                 if (file, row) in self._met:
@@ -700,11 +702,6 @@ def _puts_out(one: said.Instruction) -> bool:
 def _is_interrupt(one: said.SourceStatement) -> bool:
     """Return True if a statement declares or switches interrupts."""
     return isinstance(one, said.InterruptDeclared | said.InterruptSwitched)
-
-
-def _is_tracking(operand: said.Operand) -> bool:
-    """Return True if a base follows a conveyor, which takes the arm along."""
-    return isinstance(operand, said.FunctionCall) and operand.name in ("eb", "eb_abs")
 
 
 def _is_modal(name: str) -> bool:

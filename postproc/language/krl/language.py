@@ -153,11 +153,11 @@ def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:
             raise ProgramError(file.text.source.name, problem, cure, line=line)
 
 
-POINTS = frozenset("e6pos pos e6axis axis frame".split())
+_OF_MOVES = frozenset("e6pos pos e6axis axis frame fdat ldat pdat load".split())
 
 
 def _refuse_doubles(files: Sequence[KrlFile]) -> None:
-    """Refuse a data list that declares a point twice, or gives it two values.
+    """Refuse a data list that gives a point, frames or a load of moves two values.
 
     Raises:
         ProgramError: One does: which of the values holds is not known.
@@ -166,7 +166,7 @@ def _refuse_doubles(files: Sequence[KrlFile]) -> None:
         types = {datum.name: datum.type for datum in file.data if datum.type}
         first: dict[tuple[str, tuple[int, ...]], int] = {}
         for datum in file.data:
-            if datum.value is None or types.get(datum.name) not in POINTS:
+            if datum.value is None or types.get(datum.name) not in _OF_MOVES:
                 continue
             row = first.setdefault((datum.name, datum.index), datum.row)
             if row != datum.row:

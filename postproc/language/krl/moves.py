@@ -137,9 +137,13 @@ class KrlGoals:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
         block, given = self.block(row, here), dict[str, Any]()
+        in_joints = False
         if block is not None:
             move, given = self._in_block(move, row, here, block)
-        in_joints = block is not None and self._is_in_joints(block, here)
+            begin = self.task.files[here.file].text.statement(block.start)
+            in_joints = (
+                isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
+            )
         if kind not in _POINTS[block is not None, in_joints]:
             goal = not_reached(_Goal(self, move, row, here).end(move.to), SPLINE)
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
@@ -166,11 +170,6 @@ class KrlGoals:
         """Return the rows of the spline block that a move stands in."""
         blocks = self.task.files[here.file].splines
         return next((rows for rows in blocks if row in rows), None)
-
-    def _is_in_joints(self, rows: range, here: Scope) -> bool:
-        """Tell whether a spline block is one of joint moves."""
-        begin = self.task.files[here.file].text.statement(rows.start)
-        return isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
 
     def _in_block(
         self, move: said.KrlMove, row: int, here: Scope, rows: range

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from postproc.diagnostics import Code
 from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import Scope
+from postproc.language.ir import is_odd
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import TABLES
 from postproc.language.krl.external_routines import package_routines
@@ -24,7 +24,6 @@ CONFIG = "$config"
 ANY = -1  # an entry of a table whose number is not known
 POSITIONS = ("pos", "e6pos")  # types
 DEEPEST = 20  # names that stand for names
-_WORD = re.compile(r"\$?\w+")
 
 
 @dataclass(frozen=True)
@@ -125,6 +124,7 @@ class KrlTask:
                 if datum.index in place and place[datum.index][1].value is not None:
                     if datum.value is None:
                         continue
+                    datum = replace(datum, value=None)  # which of the two holds?
                 place[datum.index] = number, datum
                 if not datum.routine and (datum.shared or file.name == CONFIG):
                     self._shared[datum.name].add(file.name)
@@ -205,7 +205,13 @@ class KrlTask:
         changed = (
             data for one in said_ones for data in list_changes(one, self.routines)
         )
-        return frozenset(data.name for data in changed) | self.beside
+        return frozenset(data.name for data in changed) | self.beside | self.odd_words
+
+    @cached_property
+    def odd_words(self) -> frozenset[str]:
+        """Words of what is not understood: each may name what is set there."""
+        programs = (file.text for file in self.files if not file.is_submit)
+        return frozenset().union(*(one.words(one.where(is_odd)) for one in programs))
 
     @cached_property
     def counted(self) -> Counter[str]:
@@ -233,6 +239,8 @@ class KrlTask:
     def _entries_written(self) -> Mapping[str, frozenset[int]]:
         """Collect the entries of tables that statements may change."""
         found: dict[str, set[int]] = {table: set() for table in TABLES}
+        for table in self.odd_words.intersection(TABLES):
+            found[table].add(ANY)
         for number, file in enumerate(self.files):
             here = Scope(number, file.name, "")
             changing = file.text.where(
@@ -316,6 +324,7 @@ class KrlTask:
                 if _is_of_part(one.target):
                     uses.written.add(one.target.name)
         written, read = self._uses_beside
+        written |= self.odd_words
         return written | uses.written, read | written | uses.read
 
     @cached_property
@@ -473,11 +482,8 @@ class _Beside:
     @classmethod
     def _of_rows(cls, file: KrlFile, rows: range, own: frozenset[str]) -> _Beside:
         statements = [file.text.statement(row) for row in rows]
-        odd = [
-            r for r in rows if isinstance(file.text.statement(r), said.NotUnderstood)
-        ]
-        words = (_WORD.findall(file.text.text(row).lower()) for row in odd)
-        return cls(statements, own, frozenset().union(*words))
+        words = file.text.words(file.text.where(is_odd, rows.start, rows.stop))
+        return cls(statements, own, words)
 
     @property
     def find_calls(self) -> frozenset[str]:

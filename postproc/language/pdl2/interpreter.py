@@ -196,6 +196,7 @@ def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
     if isinstance(statement, _OTHERS_RUN) or text:
         let_others_run(here)
     if text and not isinstance(statement, ast.Unknown):
+        invalidate_names(here, words_in(text), _why_unknown(here))
         if not _is_harmless(here, text):
             _forget_by_text(here, _why_unknown(here))
     if not isinstance(statement, ast.Label | ast.Else | ast.When):

@@ -102,7 +102,10 @@ def goal_of(here: Execution, statement: ast.Move, motion: Motion) -> Goal:
         case "TO":
             return absolute(here, where[0])
         case "RELATIVE":
-            return _relative(here, where[0], statement.frame)
+            vector, frame = here.value(where[0]), _FRAME.get(statement.frame)
+            if isinstance(vector, Vector) and frame is not None:
+                numbers = (*vector.numbers, None, None, None)
+                return _no_target(frame, numbers, "RELATIVE")
         case "AWAY":
             distance = here.real(where[0])
             return _no_target(Meaning.AWAY, (distance, *(None,) * 5), "AWAY")
@@ -136,13 +139,6 @@ def _no_target(target: Meaning, numbers: tuple[float | None, ...], word: str) ->
     if None in numbers[:needed]:
         return Goal(Meaning.UNKNOWN, reason=_why(word))
     return Goal(target, numbers, reason=_why(word))
-
-
-def _relative(here: Execution, vector: ast.Expression, frame: str) -> Goal:
-    value = here.value(vector)
-    if not isinstance(value, Vector) or frame not in _FRAME:
-        return Goal(Meaning.UNKNOWN, reason=_why("RELATIVE"))
-    return _no_target(_FRAME[frame], (*value.numbers, None, None, None), "RELATIVE")
 
 
 def _about(here: Execution, where: tuple[ast.Expression, ...], frame: str) -> Goal:

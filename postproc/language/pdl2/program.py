@@ -42,6 +42,12 @@ _UNKNOWN_OPENERS: tuple[tuple[str, ast.Statement], ...] = (
     (r"CASE\b", ast.Case(())),
     (r"CONDITION\b(?!.*\bENDCONDITION\b)", ast.Condition()),
 )
+_STRING = re.compile(r"'[^']*'")
+_JUMP = re.compile(r"\b(?:GOTO|RETURN|EXIT)\b", re.I)
+_LEADS = (
+    "where this line leads is not known: write its statements on lines of their own, "
+    "in words that are understood"
+)
 
 
 @dataclass(frozen=True)
@@ -106,7 +112,10 @@ class _BlockReader:
 
     def take(self, row: int) -> None:
         """Read the next row."""
-        statement = recover_block(self._statements[int(self._lines.shape[row])])
+        written = self._statements[int(self._lines.shape[row])]
+        if _may_jump(written):
+            self._problems.append((row, _LEADS))
+        statement = recover_block(written)
         if isinstance(statement, ast.Label):
             self._labels[statement.name] = row
             statement = statement.then or ast.Statement()
@@ -204,6 +213,13 @@ class _BlockReader:
             tuple(sorted(handlers)),
             min((int(self._lines.line[row]) for row, _ in self.problems), default=0),
         )
+
+
+def _may_jump(statement: ast.Statement) -> bool:
+    """Return True if a line that is not understood may lead to another place."""
+    odd = ast.action(statement)
+    text = odd.text if isinstance(odd, ast.Unknown) else ""
+    return _JUMP.search(_STRING.sub("", text)) is not None
 
 
 def _behind(statement: ast.Statement) -> ast.Statement:

@@ -54,7 +54,12 @@ _HARMLESS = re.compile(
     r"\$?\w+(?:\[[^\]]*\]|\.\$?\w+)*\s*:=)",
     re.I,
 )
-_MOVING = re.compile(r"\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b|\$ARM_DATA\b", re.I)
+_MOVING = re.compile(
+    r"\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY|CANCEL|EXIT|GOTO|RETURN|CALL)\b|\$ARM_DATA\b",
+    re.I,
+)
+_STRING = re.compile(r"'[^']*'")
+_NEXT = re.compile(r";|\b(?:THEN|ELSE|DO|REPEAT)\b|\bCASE\s*\([^)]*\)\s*:", re.I)
 _NO_CALLS = frozenset(
     "if select case for while until wait write read encode decode open and or not div "
     "mod then do of to downto step xor condition event".split()
@@ -70,14 +75,19 @@ def is_harmless(text: str) -> bool:
     """Tell whether a statement that is not understood does nothing to the arm.
 
     It must begin like one that cannot move the arm or set frames (an assignment sets
-    what it names), and call nothing but built-in functions.
+    what it names), and call nothing but built-in functions. So must each further
+    statement of its line.
 
     >>> is_harmless("WAIT FOR $DIN[1] ?? 3"), is_harmless("WAIT FOR f(1) ?? 3")
     (True, False)
     >>> is_harmless("n := abs(3 3)"), is_harmless("FROBNICATE p WITH 3")
     (True, False)
+    >>> is_harmless("IF $DIN[1] THEN grip ENDIF"), is_harmless("n := 1 ?? CANCEL ALL")
+    (False, False)
     """
-    if not _HARMLESS.match(text) or _MOVING.search(text):
+    text = _STRING.sub("", text)
+    parts = filter(None, map(str.strip, _NEXT.split(text)))
+    if not all(map(_HARMLESS.match, parts)) or _MOVING.search(text):
         return False
     called = {name.lower() for name in _CALL.findall(text)}
     return called <= PURE | CHANGING | _NO_CALLS

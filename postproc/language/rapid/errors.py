@@ -195,7 +195,7 @@ def _end(
         yield HandlerEnd(one.word, numbers)
     elif isinstance(one, said.Instruction) and one.name == EXIT_CYCLE:
         yield HandlerEnd(EXIT_CYCLE, numbers)
-    elif isinstance(one, said.JumpTo):  # what the label is reached with is not followed
+    elif isinstance(one, said.JumpTo | said.NotUnderstood):  # that is not followed
         yield from (HandlerEnd(word, ANY) for word in LEAVES)
 
 

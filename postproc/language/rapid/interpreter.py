@@ -350,6 +350,12 @@ class RapidMachine(TaskMachine):
             self._bind_late(one)
             super().part_otherwise(context, row, one, here)
 
+    def may_jump(self, context: CallContext, row: int, here: Arrived) -> None:
+        """Begin a cycle as well, see `TaskMachine.may_jump`."""
+        super().may_jump(context, row, here)
+        if EXIT_CYCLE in self.texts[context.scope.file].words([row]):
+            self.restarts.append(here)
+
     def _bind_late(self, one: said.RapidStatement) -> None:
         """Note the procedures that ``%name%`` may call."""
         if not isinstance(one, said.LateCall):
@@ -445,7 +451,7 @@ class RapidMachine(TaskMachine):
             self.part(context, row, inside, here)
         elif type(inside) not in _PASSED:
             self._bind_late(inside)
-            self.enter(context, row + 1, self.unknown(context, row, here))
+            super().part_otherwise(context, row, inside, here)
 
     # What instructions do.
 

@@ -358,7 +358,7 @@ class Goals:
         found, code = self.task.datum(name, scope), Code.RUNTIME_VALUE
         if found is None:
             code = Code.UNDECLARED_VARIABLE
-            text = "is declared in none of the given files, or in several of them"
+            text = "is declared in none of the given files, or more than once"
         elif found[1].declared.value is None:
             code, text = Code.NO_VALUE, "has no value in the given files"
         elif self.task.is_changed_beside(*found):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,6 +11,7 @@ from functools import cached_property
 from postproc.files import task_beside
 from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import Scope
+from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import (
     ANSWERS,
@@ -61,6 +61,7 @@ class RapidTask:
     others: Sequence[RapidTask] = ()
     _moved: dict[tuple[int, int], bool] = field(default_factory=dict)
     _local: dict[tuple[int, str, str], dict[str, Datum]] = field(default_factory=dict)
+    _twice: set[tuple[int, str, str, str]] = field(default_factory=set)
     _global: dict[str, list[tuple[int, Datum]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -68,7 +69,10 @@ class RapidTask:
         for number, file in enumerate(self.files):
             for datum in file.data:
                 place = number, datum.module, datum.routine
-                self._local.setdefault(place, {})[datum.declared.name] = datum
+                own = self._local.setdefault(place, {})
+                if datum.declared.name in own:
+                    self._twice.add((*place, datum.declared.name))
+                own[datum.declared.name] = datum
                 if not datum.routine and datum.declared.scope != "local":
                     known = self._global.setdefault(datum.declared.name, [])
                     known.append((number, datum))
@@ -120,9 +124,10 @@ class RapidTask:
         if name in here.parameters:
             return None
         for routine in (here.routine, ""):
-            found = self._local.get((here.file, here.module, routine), {}).get(name)
+            place = here.file, here.module, routine
+            found = self._local.get(place, {}).get(name)
             if found is not None:
-                return here.file, found
+                return None if (*place, name) in self._twice else (here.file, found)
         shared = self._global.get(name, [])
         return shared[0] if len(shared) == 1 else None
 
@@ -186,12 +191,8 @@ class RapidTask:
     @cached_property
     def _odd_words(self) -> frozenset[str]:
         """Words of what is not understood: each may name what is set there."""
-        texts = [
-            file.text.text(row)
-            for file in self.files
-            for row in file.text.where(lambda one: isinstance(one, said.NotUnderstood))
-        ]
-        return frozenset(w for text in texts for w in _WORD.findall(text.lower()))
+        found = (file.text.words(file.text.where(_is_odd)) for file in self.files)
+        return frozenset().union(*found)
 
     def _first_value(self, file: int, datum: Datum) -> Nested | None:
         """Return what data hold at first, without where it is written."""
@@ -237,6 +238,8 @@ class RapidTask:
         for file in self.files:
             for statement in file.text.said:
                 uses.note(statement)
+        uses.written |= self._odd_words
+        uses.read |= self._odd_words
         uses.pass_on()
         return frozenset(uses.written), frozenset(uses.read)
 
@@ -380,7 +383,6 @@ class RapidTask:
 
 
 DEEPEST = 20  # names that stand for names
-_WORD = re.compile(r"[a-z_]\w*")
 
 
 def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
@@ -389,6 +391,11 @@ def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
     for file in files:
         tasks.setdefault(task_beside(file.text.source.name), []).append(file)
     return [RapidTask(own) for own in tasks.values()]
+
+
+def _is_odd(one: said.RapidStatement) -> bool:
+    """Return True if a statement, or what a condition leads to, is odd."""
+    return is_odd(inside(one))
 
 
 def _is_shared(datum: Datum) -> bool:
@@ -510,8 +517,6 @@ class _NamesUsed:
                 self._call(name, arguments)
             case said.LateCall(arguments=arguments):
                 self._arguments(arguments)
-            case said.NotUnderstood():
-                pass  # what it may change is said with it: nothing is known behind it
 
     def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
         pairs = self._fitting(name, arguments)

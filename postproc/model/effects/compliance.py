@@ -161,13 +161,9 @@ class Compliance(WeightEffect, JointEffect):
     """
 
     name: ClassVar[str] = "compliance"
+    cells: ClassVar[Cells] = own_cells("torque {j}", "linear")
 
     along: tuple[float, float, float] | None = None
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return own_cells("torque {j}", "linear")
 
     @classmethod
     def along_axes(cls, batch: ArmStates) -> tuple[Self, Self, Self]:

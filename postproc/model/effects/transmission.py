@@ -45,15 +45,11 @@ class Transmission(JointEffect):
     name: ClassVar[str] = "transmission"
     search_policy: ClassVar[SearchPolicy] = SearchPolicy.ALONE
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
+    cells: ClassVar[Cells] = own_cells("joint {j}", "harmonic")
 
     waves: tuple[tuple[int, float], ...] = tuple(
         (j, float(k)) for j in range(1, 7) for k in (1, 2)
     )
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return own_cells("joint {j}", "harmonic")
 
     @classmethod
     def candidates(cls, batch: ArmStates) -> list[Candidate]:

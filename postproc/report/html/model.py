@@ -98,6 +98,10 @@ def calibration_report(
     figures |= residuals(rows) if rows else {}
     parameters = told.get("parameters") or parameter_table(model["parameters"])
     pairs = told.get("correlated") or list_correlated(model)
+    iso: dict[str, PoseFigures] = {}
+    if rows:
+        q, side = rows["q_deg"], rows["lambda"].astype(int)
+        iso = {when: pose_figures(q, side, rows[f"{when}_mm"]) for when in WHEN}
     return render(
         "calibration.html.j2",
         f"Model {model['id']}",
@@ -109,7 +113,7 @@ def calibration_report(
         unseen=told.get("unseen") or at_prior(parameters),
         pairs=pairs[:MOST_PAIRS],
         more_pairs=max(0, len(pairs) - MOST_PAIRS),
-        iso=_iso(rows),
+        iso=iso,
         has_rows=bool(rows),
         history=steps(model.get("history")),
     )
@@ -120,14 +124,6 @@ def _rows(rows: Mapping[str, Sequence[Any]] | None) -> dict[str, Floats]:
     if not rows:
         return {}
     return {k: np.array(v, dtype=float) for k, v in rows.items() if k != "id"}
-
-
-def _iso(rows: Mapping[str, Floats]) -> dict[str, PoseFigures]:
-    """Work out the figures of ISO 9283 before and after."""
-    if not rows:
-        return {}
-    q, side = rows["q_deg"], rows["lambda"].astype(int)
-    return {when: pose_figures(q, side, rows[f"{when}_mm"]) for when in WHEN}
 
 
 WHEN = ("before", "after")

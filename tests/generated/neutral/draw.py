@@ -424,8 +424,9 @@ class Draw:
             return Poll(rng.randint(1, 3), self._inner(depth))
         if kind == "loop":
             self.marks += 1
+            name = f"m{self.marks}"  # before loops in it are drawn
             inner = self._inner(depth), self._cond(), self._inner(depth)
-            return Loop(f"m{self.marks}", *inner)
+            return Loop(name, *inner)
         if kind == "skip":
             self.marks += 1
             return Skip(self.marks, self._cond(), self._inner(depth))

@@ -322,3 +322,42 @@ def test_an_interrupt_of_a_routine_comes_in_moves_before_the_call():
 def test_a_track_that_need_not_go_where_targets_say(use, lines, left):
     found = job(*FRAMES, *lines, "LIN XP1", start=Start(aux={1: use}))
     assert ("$EX_AX_IGNORE" in reasons(found)[0]) == left
+
+
+# Statements that are not understood.
+
+AS_BEFORE = [*FRAMES, "$IPO_MODE=#BASE", "$ORI_TYPE=#VAR", "$APO.CDIS=5", "PTP XP1"]
+NAMING = {
+    "point": "XP2.Z=1 ?? 2",
+    "entry": "BASE_DATA[2]= ?? 3",
+    "switch": "IF $IN[1] THEN M_BAS_COR_ON=TRUE ENDIF",
+    "interrupt": "?? INTERRUPT ON 5",
+}
+
+
+@pytest.mark.parametrize("kind", NAMING)
+def test_a_statement_that_is_not_understood_may_change_what_it_names(kind):
+    more = "DEF never( )\n" + NAMING[kind] + "\nEND\n"
+    assert reasons(job(NAMING[kind], *AS_BEFORE, "LIN XP2"))[-1]
+    assert reasons(job(*AS_BEFORE, "LIN XP2", more=more))[-1]
+
+
+def test_a_statement_that_is_not_understood_may_change_the_variable_of_a_loop():
+    lines = ["FOR N2=1 TO 3", "LIN XS[N2]", "?? N2", "ENDFOR"]
+    assert "xs[2]" not in names(job(*FRAMES, *lines))
+
+
+JUMPING = {
+    "label": ([THIRD, "IF $IN[1] THEN GOTO out ENDIF", *AS_BEFORE, "out:"], ""),
+    "routine": (["sub( )"], "\n".join(["DEF sub( )", THIRD, "?? RETURN", *AS_BEFORE,
+                                       "END\n"])),
+    "loop": (["LOOP", THIRD, "IF $IN[1] THEN EXIT ENDIF", *AS_BEFORE,
+              "IF $IN[2] THEN", "EXIT", "ENDIF", "ENDLOOP"], ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", JUMPING)
+def test_a_statement_that_is_not_understood_may_lead_elsewhere(kind):
+    lines, more = JUMPING[kind]
+    found = job(*AS_BEFORE, *lines, "LIN XP2", more=more)
+    assert ELSEWHERE in origins(found)[-1] and "not known" in reasons(found)[-1]

@@ -619,12 +619,18 @@ def test_the_controllers_own_accuracy_is_refused():
 @pytest.mark.parametrize(
     "more",
     ["DECL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 180,S 2,T 35}", "XS[2]={X 5}",
-     "DECL E6AXIS XA={A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}", "XP1={X 1}"],
+     "DECL E6AXIS XA={A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}", "XP1={X 1}",
+     "DECL FDAT FP1={TOOL_NO 1,BASE_NO 3}", "DECL LDAT LCPDAT1={VEL 1}"],
 )  # fmt: skip
 def test_a_point_with_two_values_in_a_list_is_refused(more):
-    with pytest.raises(ProgramError, match=r"m\.dat:\d+: gives X.* a second value"):
+    with pytest.raises(ProgramError, match=r"m\.dat:\d+: gives \w+ a second value"):
         job("LIN XP1", data=f"{DATA}{more}\n")
     assert reasons(job("LIN XP1", data=f"{DATA}INT N=4\nDECL E6POS XNEW\n")) == [""]
+
+
+def test_a_number_with_two_values_in_a_list_is_not_known():
+    assert reasons(job("LIN XS[N]")) == [""]
+    assert reasons(job("LIN XS[N]", data=f"{DATA}INT n=2\n")) != [""]
 
 
 def test_a_data_list_alone_is_refused():

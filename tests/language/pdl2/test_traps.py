@@ -67,3 +67,45 @@ def test_a_cycle_begins_where_and_with_what_it_ends():
 def test_a_routine_that_calls_itself_is_left():
     again = routine("r", MOVE, SHIFT, "IF $DIN[1] THEN", "r", "ENDIF")
     assert "calls itself" in read(again, ["r"])[1][0]
+
+
+# Lines that are not understood.
+
+
+@pytest.mark.parametrize("line", [
+    "IF $DIN[1] THEN CANCEL ALL ENDIF", "IF $DIN[1] THEN; CANCEL ALL; ENDIF",
+    "WHILE $DIN[1] DO CANCEL ALL ENDWHILE", "REPEAT CANCEL ALL UNTIL $DIN[1]",
+    "SELECT i OF CASE (1): CANCEL ALL ENDSELECT", "i := 1 ; CANCEL ALL",
+    "i := 1 CANCEL ALL", "DELAY 100 ; CANCEL ALL", "IF $DIN[1] THEN grip ENDIF",
+    "IF i = 1 THEN\nELSE CANCEL ALL ?? 1\nENDIF",
+])  # fmt: skip
+def test_a_line_that_is_not_understood_may_hold_a_second_statement(line):
+    _, why = read(POINTS, [MOVE, f"{MOVE} ADVANCE", *line.split("\n"), MOVE])
+    assert why[:2] == ["", ""] and "not understood" in why[-1]
+
+
+@pytest.mark.parametrize("line", [
+    "IF $DIN[1] THEN i := 2 ENDIF", "WRITE ('CANCEL ALL; x' ?? 3)", "WAIT FOR ?? 3",
+])  # fmt: skip
+def test_a_line_that_is_not_understood_may_be_harmless(line):
+    assert read(POINTS, [MOVE, line, MOVE])[1] == ["", ""]
+
+
+def test_a_head_that_is_not_understood_may_set_what_it_names():
+    lines = [f"WHILE $DIN[1] DO {SHIFT}", "ENDWHILE", MOVE]
+    assert "$UFRAME" in read(POINTS, [MOVE, *lines])[1][-1]
+
+
+JUMPING = {
+    "label": ([SHIFT, "IF $DIN[1] THEN GOTO out ENDIF", "$UFRAME := POS(0)", "out::"],
+              []),
+    "routine": (["sub"], routine("sub", SHIFT, "IF $DIN[1] THEN RETURN ENDIF",
+                                 "$UFRAME := POS(0)")),
+    "cycle": (["CYCLE", "IF $DIN[1] THEN EXIT CYCLE ENDIF"], []),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", JUMPING)
+def test_a_line_that_is_not_understood_may_lead_elsewhere(kind):
+    lines, more = JUMPING[kind]
+    assert "block structure" in read([*POINTS, *more], [*lines, MOVE])[1][-1]

@@ -126,6 +126,12 @@ CHECKS = {
     "`SetDataVal`, `SetAllDataVal`": lambda: (
         "run" in reasons(task(L.format("list{1}"), 'SetDataVal "list",n;',
                               more=MORE))[0]),
+    "a statement that is not understood": lambda: (
+        anywhere("?? n;") and "run" in reasons(task(
+            L.format("list{1}"), "?? list;", more=MORE))[0]),
+    ".. with `GOTO`, `RETURN`, `ExitCycle`, `RAISE`": lambda: (
+        anywhere("?? GOTO out;", "PDispOff;", "out:") and anywhere(
+            "x;", more="PROC x()\n?? RETURN;\nPDispOff;\nENDPROC")),
 }  # fmt: skip
 
 

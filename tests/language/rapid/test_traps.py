@@ -310,3 +310,48 @@ def test_a_main_that_sets_its_modes_first_knows_them():
     v = found.visits
     assert v.orientation_law.tolist() == [OrientationLaw.ONE_AXIS]
     assert (v.care == Switch.OFF).all()
+
+
+# Statements that are not understood.
+
+AS_BEFORE = [
+    "PDispOff;", "GripLoad load0;", r"ConfL\On;", r"ConfJ\On;", r"SingArea\Off;",
+    r"CirPathMode\PathFrame;",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "line", ["p9.trans.z:=1 ?? 2;", "?? t;", "?? w;", "IF n ?? d;"]
+)
+def test_a_statement_that_is_not_understood_may_change_what_it_names(line):
+    more = MORE + f"VAR robtarget p9:=[[4,5,6],[0,1,0,0],{END};\n"
+    found = once(line, *AS_BEFORE, SET, L.format("p9"), more=more)
+    assert reasons(found)[-1]
+
+
+JUMPING = {
+    "label": ([SET, "IF n=1 ?? GOTO out;", *AS_BEFORE, "out:", P2], ""),
+    "routine": (["sub;", P2], routine("sub", SET, "?? RETURN;", *AS_BEFORE)),
+    "cycle": ([P2, *AS_BEFORE, SET, "?? ExitCycle;", *AS_BEFORE], ""),
+    "condition": ([SET, "IF n=1 GOTO out ?? 2;", *AS_BEFORE, "out:", P2], ""),
+}
+
+
+@pytest.mark.parametrize("kind", JUMPING)
+def test_a_statement_that_is_not_understood_may_lead_elsewhere(kind):
+    lines, more = JUMPING[kind]
+    found = task(P1, *lines, more=MORE + more)
+    last = names(found).index("p1" if kind == "cycle" else "p2")
+    assert ELSEWHERE in origins(found)[last]
+    assert "displacement" in reasons(found)[last]
+
+
+def test_a_statement_that_is_not_understood_leads_nowhere_without_such_a_word():
+    found = once(P1, "?? n;", *AS_BEFORE, "VelSet 100,500;", "out:", P2, more=MORE)
+    assert reasons(found) == ["", ""]
+
+
+def test_a_handler_that_is_not_understood_may_go_on():
+    lines = ["sub;", P2, "EXIT;", "ERROR", "?? TRYNEXT;"]
+    found = task(*lines, more=MORE + routine("sub", SET, "WaitDI d1,1;", *AS_BEFORE))
+    assert reasons(found)[-1]

@@ -120,6 +120,18 @@ def test_what_is_not_known_is_left(lines, why):
     assert why in reasons(found)[-1]
 
 
+@pytest.mark.parametrize("name", ["p1", "P1", "t", "w"])
+def test_data_that_are_declared_twice_are_not_known(name):
+    of_type = {"t": "PERS tooldata", "w": "PERS wobjdata"}.get(name, "CONST robtarget")
+    line = next(x for x in DATA.split("\n") if f"{of_type} {name.lower()}:=" in x)
+    again = line.replace(f" {name.lower()}:=", f" {name}:=")
+    assert reasons(once(L.format("p1")))[0] == ""
+    assert reasons(once(L.format("p1"), more=again))[0]
+    own = [again.replace("TASK PERS", "VAR").replace("CONST", "VAR")]
+    assert reasons(once(*own, L.format("p1")))[0] == ""
+    assert reasons(once(*own, *own, L.format("p1")))[0]
+
+
 @pytest.mark.parametrize("zone", ["odd", "fine\\Z:=5", "z10\\Z:=n"])
 def test_a_zone_that_is_not_known(zone):
     found = once(f"MoveL p1,v200,{zone},t\\WObj:=w;", L.format("p2"))
