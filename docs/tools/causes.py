@@ -58,7 +58,7 @@ def column_of(driver: str) -> str:
 def entries() -> Iterator[tuple[str, str, str]]:
     """List row, column and name of every effect."""
     for kind in EFFECTS:
-        for place, driver, _ in kind.cells():
+        for place, driver, _ in kind.cells:
             yield row_of(place), column_of(driver), kind.name
         for row, column in kind.acts:
             yield row, column, kind.name

@@ -230,15 +230,10 @@ def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
         flanks=tell_widths(model.flank_widths),
         pose_mm=float(np.sqrt(model.noise.pose_variance(jacobian).mean()) / MM),
         split=_split(fit),
-        repeated=_describe_repeatability(fit),
+        repeated="estimated"
+        if count_repeats(fit.batch.states) >= ENOUGH_REPEATS
+        else "estimated, at most the data sheet's: no approach was repeated",
     )
-
-
-def _describe_repeatability(fit: Fit) -> str:
-    """Say where the repeatability of a fit comes from."""
-    if count_repeats(fit.batch.states) >= ENOUGH_REPEATS:
-        return "estimated"
-    return "estimated, at most the data sheet's: no approach was repeated"
 
 
 def _split(fit: Fit) -> str:
@@ -364,7 +359,6 @@ def _shares(fit: Fit) -> Floats:
 
 
 def _table(fit: Fit, shares: Floats) -> tuple[ParameterRow, ...]:
-    """Make the parameter table."""
     rows, std = [], np.sqrt(np.diag(fit.stated))
     for k, (name, p) in enumerate(
         zip(fit.combination.names, fit.combination.parameters, strict=True)

@@ -185,7 +185,10 @@ def read_table(
     if len(rows) < 1 + headed:
         raise MeasurementError(path, "has no measurements", EMPTY_CURE)
     body = rows[1:] if headed else rows
-    names = _strip_end(rows[0][1]) if headed else _number_columns(body)
+    names = _strip_end(rows[0][1])
+    if not headed:
+        width = int(np.median([len(_strip_end(cells)) for _, cells in body]))
+        names = [str(k + 1) for k in range(max(width, len(names)))]
     cells, names = _block(path, names, body, rows[0][0], headed)
     line = np.array([i for i, _ in body], dtype=np.int64)
     sign = decimal or _decimal(cells, split)
@@ -368,12 +371,6 @@ def _decimal(cells: NDArray[np.object_], split: str) -> str:
         return "."
     comma = sum(bool(DECIMAL_COMMA.match(str(v))) for v in cells[:20].reshape(-1))
     return "," if comma else "."
-
-
-def _number_columns(rows: list[Row]) -> list[str]:
-    """Name columns by their number, from 1: as many as the first rows have cells."""
-    width = int(np.median([len(_strip_end(cells)) for _, cells in rows]))
-    return [str(k + 1) for k in range(max(width, len(_strip_end(rows[0][1]))))]
 
 
 # Single columns of a measurement file: ids, directions, probe points.
@@ -600,7 +597,12 @@ def read_tools(table: TextTable, tools: Nests) -> tuple[Floats, NDArray[np.int64
             two of them.
     """
     named = isinstance(tools, Mapping) and any(isinstance(k, str) for k in tools)
-    column = _nest_column(table)
+    found = [name for name in ("nest", "tool_id") if table.has(name)]
+    if len(found) > 1:
+        cure = "Remove one of them: both name the probe point"
+        problem = "has columns nest and tool_id"
+        raise MeasurementError(table.path, problem, cure, line=1)
+    column = found[0] if found else ""
     if column and table.has(*TOOL) and _all_numbers(table, column):
         named = named and set(table.text(column)) <= set(map(str, tools))
     if column and (named or not _all_numbers(table, column)):
@@ -627,20 +629,6 @@ def read_tools(table: TextTable, tools: Nests) -> tuple[Floats, NDArray[np.int64
                 line=int(table.line[i]),
             )
     return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
-
-
-def _nest_column(table: TextTable) -> str:
-    """Name the column of probe points, "" without one.
-
-    Raises:
-        MeasurementError: There are two.
-    """
-    found = [name for name in ("nest", "tool_id") if table.has(name)]
-    if len(found) > 1:
-        cure = "Remove one of them: both name the probe point"
-        problem = "has columns nest and tool_id"
-        raise MeasurementError(table.path, problem, cure, line=1)
-    return found[0] if found else ""
 
 
 def _all_numbers(table: TextTable, column: str) -> bool:

@@ -98,7 +98,9 @@ class Destination:
         files: dict[Path, Content] = {}
         for page in reversed(self.given.page_paths):
             if page.name in outcome.outputs:
-                place = _page_place(page, _file_of(target, page))
+                output = _file_of(target, page)
+                beside = output.parent.resolve() == page.parent.resolve()
+                place = default_output(page) if beside else output.with_name(page.name)
                 files |= outcome.name_files({page.name: place}, place)
         own = self._own_places(outcome, target, values)
         variables = self.given.variables
@@ -148,13 +150,6 @@ def _file_of(target: Path | None, part: Path) -> Path:
             f"Give {how}the program a file with -o",
         )
     return target
-
-
-def _page_place(page: Path, target: Path) -> Path:
-    """Name the output of a page: beside that of its program."""
-    if target.parent.resolve() == page.parent.resolve():
-        return default_output(page)
-    return target.with_name(page.name)
 
 
 def default_output(program: Path) -> Path:

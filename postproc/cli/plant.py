@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -238,20 +238,14 @@ def _second_opinion(
         return None
     from postproc.batch.plan import make_plan
     from postproc.batch.second_opinion import judge_tree
+    from postproc.batch.tree import scan
 
     own = (None, None) if cell is None and plan is not None else (cell, model)
     made = make_plan(plan, *own, DEFAULT_OPTIONS, changes)
     judged = judge_tree(folder, made)
-    return replace(judged, skipped=(*judged.skipped, *_without_rule(folder, made)))
-
-
-def _without_rule(folder: Path, plan: BatchPlan) -> Iterator[tuple[str, str]]:
-    """Yield programs of a tree that the plan leaves out, and why."""
-    from postproc.batch.tree import scan
-
-    for place, why in sorted(scan(folder, plan).refused.items()):
-        if is_program(place):
-            yield place, why
+    refused = sorted(scan(folder, made).refused.items())
+    outside = [(place, why) for place, why in refused if is_program(place)]
+    return replace(judged, skipped=(*judged.skipped, *outside))
 
 
 def _print_opinion(judged: TreeOpinion) -> None:

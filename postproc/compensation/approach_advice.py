@@ -53,19 +53,15 @@ def advise(arm: Arm, cycle: ProgramCycle, rows: Ints) -> dict[int, str]:
         turned = (arm.coupling @ np.diff(way, axis=0)[0]) if len(way) > 1 else None
         if turned is None:
             continue
-        missing = _missing(arm, cycle.arrived.side[v], turned)
+        side = cycle.arrived.side[v]
+        on = np.where(np.abs(turned) < LOST, 0.0, np.sign(turned))
+        lacks = np.maximum((SURE - side * on) * half_width(arm), 0.0)
+        missing = np.where(np.abs(side) < SURE, lacks, 0.0)  # of the drives [rad]
         if not missing.any():
             continue  # as it is compensated now, the sides are known
         cartesian = bool(cycle.targets.move[v] != Motion.JOINT)
         told[v] = _advise_joints(missing, turned, length, cartesian)
     return told
-
-
-def _missing(arm: Arm, side: Floats, turned: Floats) -> Floats:
-    """Travel that the drives lack, (6,) [rad]: 0 where the side is known."""
-    on = np.where(np.abs(turned) < LOST, 0.0, np.sign(turned))
-    lacks = (SURE - side * on) * half_width(arm)
-    return np.where(np.abs(side) < SURE, np.maximum(lacks, 0.0), 0.0)
 
 
 def _advise_joints(

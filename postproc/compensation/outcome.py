@@ -348,6 +348,9 @@ class LineOutcomes:
         sides = (_places(told["direction"], SIGNS) - 1).reshape(len(line), 6)
         size = np.array(told["correction_mm"], dtype=np.float64)
         why = np.array(_read_reason_index(told), dtype=np.int64)
+        texts = [str(text) for text in told["reasons"]]
+        # The reasons of version 0.1.0 are texts without codes.
+        codes = [str(code) for code in told.get("codes", [""] * len(texts))]
         rank = np.argsort(URGENCY)[status]
         order = np.lexsort((rank, line))
         first = np.flatnonzero(np.diff(line[order], prepend=-1))
@@ -360,7 +363,7 @@ class LineOutcomes:
             line=line[lead],
             status=status[lead],
             why=why[lead],
-            reasons=_read_reasons(told),
+            reasons=tuple(map(Reason.named, codes, texts)),
             direction=np.where(least == most, least, BOTH),
             correction_mm=np.maximum.reduceat(size[order], first)
             if len(line)
@@ -374,13 +377,6 @@ def _read_reason_index(told: Mapping[str, Any]) -> Sequence[int]:
     """Take the index of the reason of every visit; `why` in records of 0.1.0."""
     found: Sequence[int] = told.get("reason", told.get("why", ()))
     return found
-
-
-def _read_reasons(told: Mapping[str, Any]) -> tuple[Reason, ...]:
-    """Take the reasons of a record; those of version 0.1.0 are texts without codes."""
-    texts = [str(text) for text in told["reasons"]]
-    codes = [str(code) for code in told.get("codes", [""] * len(texts))]
-    return tuple(map(Reason.named, codes, texts))
 
 
 def _count_mixed(status: Ints, first: Ints) -> dict[int, dict[str, int]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -84,7 +84,11 @@ def flow_of(
     for row in text.where(_divides, flow.first, last):
         _take(flow, stack, row, text.statement(row))
     heads = text.where(_is_loop, flow.first, last)
-    _find_exits(flow, text, heads)
+    for row in text.where(_leaves_loop, flow.first, last):
+        around = (h for h in reversed(heads) if h < row < flow.end.get(h, -1))
+        head = next(around, -1)
+        if head >= 0:
+            flow.exits[row] = head
     return flow
 
 
@@ -95,28 +99,13 @@ def _divides(one: said.SourceStatement) -> bool:
 
 
 def _leaves_loop(one: said.SourceStatement) -> bool:
-    """Tell whether a statement leaves a loop."""
     return isinstance(one, said.Leave) and one.word == EXIT
 
 
 def _is_loop(one: said.SourceStatement) -> bool:
-    """Tell whether a loop begins with a statement."""
     return isinstance(one, said.ForLoop) or (
         isinstance(one, said.Branch) and one.word in LOOPS
     )
-
-
-def _find_exits(
-    flow: RoutineFlow,
-    text: StatementText[said.SourceStatement],
-    heads: Sequence[int],
-) -> None:
-    """Find the loop that each word leaves which leaves one, given all their heads."""
-    for row in text.where(_leaves_loop, flow.first, flow.last):
-        around = (h for h in reversed(heads) if h < row < flow.end.get(h, -1))
-        head = next(around, -1)
-        if head >= 0:
-            flow.exits[row] = head
 
 
 def _take(

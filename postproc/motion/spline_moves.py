@@ -201,24 +201,19 @@ def turns_on_arcs(arm: Arm, targets: Targets, q: Floats, side: Floats) -> Bools:
     tools = targets.tool[via]
     poses = [arm.flange(q[at]) @ tools for at in (start, via, via + 1)]
     rates = _tangents(*(pose[:, :3, 3] for pose in poses))
+    axes = np.eye(6)[3:]
     for k, (begin, at) in enumerate(((start, via), (via, via + 1))):
         turn = OFF * lengths(_turn(poses[0], poses[k + 1]))
         jacobian = arm.jacobian(q[at], tools[:, :3, 3])
-        made_up = _compute_drive_turns(arm, jacobian, turn)
+        by_axis = [_solve_rates(jacobian, np.tile(a, (len(turn), 1))) for a in axes]
+        each = np.linalg.norm(np.stack(by_axis) @ arm.coupling.T, axis=0)
+        made_up = each * turn[:, None]  # by the drives, about whatever axis
         sign = np.sign(side[at])
         way = (q[at] - q[begin]) @ arm.coupling.T * sign
         last = _solve_rates(jacobian, rates[k]) @ arm.coupling.T * sign * LAST
         steady = (way > FARTHER * made_up) & (last > made_up + arm.play)
         out[at] = ~(steady | (turn <= OFF * NO_TURN)[:, None])
     return out
-
-
-def _compute_drive_turns(arm: Arm, jacobian: Floats, turn: Floats) -> Floats:
-    """Return how far drives turn for turns of the tool about any axis, (k, 6) [rad]."""
-    axes = np.eye(6)[3:]
-    by_axis = [_solve_rates(jacobian, np.tile(axis, (len(turn), 1))) for axis in axes]
-    found = np.linalg.norm(np.stack(by_axis) @ arm.coupling.T, axis=0)
-    return np.asarray(found * turn[:, None])
 
 
 def _tangents(start: Floats, via: Floats, end: Floats) -> list[Floats]:

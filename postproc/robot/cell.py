@@ -598,9 +598,9 @@ def _beside(folder: Path, section: MeasurementSection) -> MeasurementSection:
 
 
 def _cell_of(path: Path, file: CellFile) -> Cell:
-    """Make a cell of what its file says."""
     arm = load_arm(file.robot.arm, beside=path.parent).mount(_weight(file))
-    payload, tracker = file.payload, file.tracker
+    payload, tracker, survey = file.payload, file.tracker, file.survey
+    turn = None if survey is None else survey.euler_zyz_deg
     return Cell(
         path=path,
         file=file,
@@ -616,8 +616,8 @@ def _cell_of(path: Path, file: CellFile) -> Cell:
         temperature=file.environment.temperature_c if file.environment else np.nan,
         tracker=None if tracker is None else np.array(tracker.xyz_mm) * MM,
         probes=_probes(path, file),
-        probe_names=() if file.survey is None else tuple(file.survey.points),
-        mounting=_mounting(file),
+        probe_names=() if survey is None else tuple(survey.points),
+        mounting=None if turn is None else rotation_from_zyz(np.array(turn)),
         aux=_aux(file, path),
         limits=file.limits,
         compensation=file.compensation,
@@ -631,8 +631,16 @@ def _cell_of(path: Path, file: CellFile) -> Cell:
         constant=_patterns(file.variables.constant),
         frame_tables={k.lower(): v for k, v in file.frames.routines.items()},
         taught=frozenset(name.lower() for name in file.taught),
-        taught_frames=_collect_taught_frames(file),
-        taught_sides=_collect_taught_sides(file),
+        taught_frames={
+            frame.record(): np.deg2rad(frame.taught_deg) if frame.taught_deg else None
+            for frame in _frames_of(file)
+            if frame.source == "taught"
+        },
+        taught_sides={
+            frame.record(): np.array(frame.taught_direction, dtype=float)
+            for frame in _frames_of(file)
+            if frame.taught_direction is not None
+        },
     )
 
 
@@ -649,24 +657,6 @@ def _weight(file: CellFile) -> Floats:
 def _patterns(said: object) -> tuple[str, ...]:
     """Return the patterns of a list, none of anything else."""
     return tuple(map(str.lower, said)) if isinstance(said, list) else ()
-
-
-def _collect_taught_frames(file: CellFile) -> dict[tuple[float, ...], Floats | None]:
-    """Collect the taught frames of the cell and of its tables."""
-    return {
-        frame.record(): np.deg2rad(frame.taught_deg) if frame.taught_deg else None
-        for frame in _frames_of(file)
-        if frame.source == "taught"
-    }
-
-
-def _collect_taught_sides(file: CellFile) -> dict[tuple[float, ...], Floats]:
-    """Collect from which sides the joints arrived at the points of taught frames."""
-    return {
-        frame.record(): np.array(frame.taught_direction, dtype=float)
-        for frame in _frames_of(file)
-        if frame.taught_direction is not None
-    }
 
 
 def _frames_of(file: CellFile) -> list[FrameSection]:
@@ -713,13 +703,6 @@ def _probes(path: Path, file: CellFile) -> Floats:
         )
         raise CellError(path, problem, cure, place="$.survey")
     return np.array(numbered or named) * MM
-
-
-def _mounting(file: CellFile) -> Floats | None:
-    """Convert the orientation of a 6D probe."""
-    if file.survey is None or file.survey.euler_zyz_deg is None:
-        return None
-    return rotation_from_zyz(np.array(file.survey.euler_zyz_deg))
 
 
 def _aux(file: CellFile, path: Path) -> dict[int, str]:

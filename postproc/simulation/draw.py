@@ -91,7 +91,8 @@ def virtual_arm(
     laws = {item: planter.law(item) for item in planted if item.name not in AS_BUILT}
     gaps = [law for law in laws.values() if law.effect == "backlash"]
     gap = gaps[0] if gaps else planter.law(Planted("backlash"))
-    rng = stream(seed, "arm")
+    rng, at = stream(seed, "arm"), planter.reference
+    torque = total_torque(body, at.q, at.payload, at.payload_com)
     return replace(
         perfect,
         seed=seed,
@@ -105,7 +106,7 @@ def virtual_arm(
             wave=_wave(gap),
             kind=GearKind(gears),
             body=body,
-            friction=_friction(body, planter.reference),
+            friction=np.maximum(HELD * np.abs(torque).max(axis=0), LEAST_HELD),
             runs_on=RUNS_ON * chain.speed,
         ),
         joint_noise=planter.joint_noise(rng),
@@ -126,12 +127,6 @@ def _perfect(chain: Chain, coupling: Floats | None) -> VirtualArm:
         tracker_noise=(0.0, 0.0),
         warming=(0.0, 1.0),
     )
-
-
-def _friction(body: LinkMasses, reference: VirtualArrivals) -> Floats:
-    """Return the torques that friction holds (6,) [N m]: a part of the largest ones."""
-    torque = total_torque(body, reference.q, reference.payload, reference.payload_com)
-    return np.asarray(np.maximum(HELD * np.abs(torque).max(axis=0), LEAST_HELD))
 
 
 def _half_gap(law: Law) -> Floats:

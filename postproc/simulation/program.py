@@ -184,7 +184,6 @@ def run_moves(
 
 
 def _start(arm: VirtualArm, setup: VirtualCell) -> _ProgramPlace:
-    """Return the arm before the program starts."""
     joints = UPRIGHT if setup.home is None else setup.home
     side = stream(arm.seed, "start").choice([-1.0, 1.0], 6)
     return _ProgramPlace(joints, at_start(arm.gears, joints, side))
@@ -250,8 +249,13 @@ def _collect(
     visit = np.array(reached, dtype=np.int64)
     kept = [places[i] for i in reached]
     time = np.cumsum([p.lasted for p in places])[visit] if reached else np.zeros(0)
-    number = _tool_numbers(setup, visits.tool[visit].tolist(), poses)
-    tool_id = np.array([number[t] for t in visits.tool[visit].tolist()], dtype=np.int64)
+    tools = visits.tool[visit].tolist()
+    frames = list(dict.fromkeys(tools))
+    probes = [setup.number_of(poses[frame]) for frame in frames]
+    if min(probes, default=-1) < 0:
+        probes = list(range(len(frames)))
+    number = dict(zip(frames, probes, strict=True))
+    tool_id = np.array([number[tool] for tool in tools], dtype=np.int64)
     arrivals = make_arrivals(
         np.array([p.joints for p in kept]).reshape(-1, 6),
         np.array([p.gears.side for p in kept]).reshape(-1, 6),
@@ -267,15 +271,6 @@ def _collect(
     )
     why = tuple(p.why for p in places)
     return ProgramRun(visit, arrivals, tool_id, why, left)
-
-
-def _tool_numbers(setup: VirtualCell, used: list[int], poses: Floats) -> dict[int, int]:
-    """Number the frames that serve as tools."""
-    frames = list(dict.fromkeys(used))
-    probes = [setup.number_of(poses[frame]) for frame in frames]
-    if min(probes, default=-1) < 0:
-        probes = list(range(len(frames)))
-    return dict(zip(frames, probes, strict=True))
 
 
 # Where the tool really lands when a program runs, against what was wanted.

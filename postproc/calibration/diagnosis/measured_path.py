@@ -164,7 +164,9 @@ def _diagnose_track(
     found = align(read, ways, visits.fly)
     _check(found, track, frame)
     joints = in_motion(measure_steps(ways, found.on_the_way, read.scatter))
-    lag = _lag(found, ways, visits, cycle, own)
+    visit = ways.visit[_move(np.arange(len(ways.q)), ways)]
+    nominal = own.arm.tcp(ways.q, cycle.targets.tool[visit, :3, 3])
+    lag = servo_lag(ways, nominal, found.on_the_way, visits.fly & ~visits.via)
     rows = _rows(found, ways, visits, cycle, cell)
     survey = Measurements(
         track, rows.states, rows.position, rows.ids, np.zeros(len(rows.ids), np.int64),
@@ -187,15 +189,6 @@ def _diagnose_track(
         track.name, len(read.time), 1.0 / read.period, read.scatter, stops,
         len(moves), size, joints, extension, rows.moving, lag,
     )  # fmt: skip
-
-
-def _lag(
-    found: Aligned, ways: PredictedWays, visits: Visits, cycle: ProgramCycle, cell: Cell
-) -> ServoLag:
-    """Fit the servos' lag to a track."""
-    visit = ways.visit[_move(np.arange(len(ways.q)), ways)]
-    nominal = cell.arm.tcp(ways.q, cycle.targets.tool[visit, :3, 3])
-    return servo_lag(ways, nominal, found.on_the_way, visits.fly & ~visits.via)
 
 
 def read_track(path: Path, reading: TableFormat = DETECT) -> tuple[Track, str]:

@@ -339,7 +339,9 @@ def _maps(
     q = at.states.q
     place = (q - q.min(axis=0)) / np.maximum(np.ptp(q, axis=0), 1e-9)
     whitened = projection.fit.whiten(at.jacobian).reshape(len(q), 3, 6)
-    keep, square = _thin_rows(len(q), rng), np.einsum("rd,rd->d", rows, rows)
+    keep, square = np.ones(len(q)), np.einsum("rd,rd->d", rows, rows)
+    if len(q) > MAPPED_ROWS:
+        keep[rng.permutation(len(q))[MAPPED_ROWS:]] = 0.0
     out = []
     for k in range(MAPS):
         a, b = rng.choice(6, 2, replace=False)
@@ -356,14 +358,6 @@ def _maps(
         what = f"joint {j + 1} errs alike where joints {min(a, b) + 1} and "
         out.append((what + f"{max(a, b) + 1} are alike", share))
     return out
-
-
-def _thin_rows(n: int, rng: np.random.Generator) -> Floats:
-    """Mark the rows that the maps use, (n,)."""
-    keep = np.ones(n)
-    if n > MAPPED_ROWS:
-        keep[rng.permutation(n)[MAPPED_ROWS:]] = 0.0
-    return keep
 
 
 def _serial(projection: Projection, rows: Floats) -> list[tuple[str, Floats]]:

@@ -659,7 +659,10 @@ def stand(found: Search, number: int) -> JudgedAddition:
     names = {_name(own.family)}
     for s in scores:
         name = _name(s.family)
-        within = _within(own, s.best)
+        # A law of two covariates is one of many that are alike: the free form of the
+        # same two is named with it unless the law is clearly ahead.
+        alike = own.source == s.best.source and " x " in own.source
+        within = CLEARLY[0] if alike and s.best.family.tier == FREE else NEAR
         if _same_load((own.source, s.best.source), projection.at):
             within = max(within, SAME_LOAD * here.evidence)
         if s.evidence >= here.evidence - within and name not in names:
@@ -692,7 +695,7 @@ def apart(own: Candidate, rivals: Sequence[Score], at: ArmStates) -> list[Score]
 def _cells_of(name: Candidate) -> list[tuple[str, str]]:
     """List carrier and driver of the cells that a name is, at its joint."""
     own = str(name.family.joint)
-    every = type(name.effect).cells()
+    every = type(name.effect).cells
     return [(c, driver) for c, driver, _ in every if own in f"{c} {driver}"]
 
 
@@ -744,13 +747,3 @@ def _name(family: Family) -> tuple[str | int | None, ...]:
     if family.effect == PART_MOTION:
         return family.joint, family.along, family.driver
     return family.effect, family.joint
-
-
-def _within(own: Candidate, other: Candidate) -> float:
-    """Return by how many nats another may be behind that is told with a candidate.
-
-    A law of two covariates is one of many that are alike: the free form of the same two
-    is told with it unless the law is clearly ahead.
-    """
-    alike = own.source == other.source and " x " in own.source
-    return CLEARLY[0] if alike and other.family.tier == FREE else NEAR

@@ -256,7 +256,7 @@ class Table:
             laws[factor] = MotionLaws.of(batch, other, factor)
         named: dict[str, set[tuple[str, str]]] = defaultdict(set)
         for kind in EFFECTS:
-            for carrier, *cell in kind.cells():
+            for carrier, *cell in kind.cells:
                 named[carrier].add((cell[0], cell[1]))
         return cls(
             revises(fit), laws, {k: frozenset(cells) for k, cells in named.items()}

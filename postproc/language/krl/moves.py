@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.interpreter import Scope
+from postproc.language.interpreter import NO_POINTS, AssignedPoint, Scope
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame
 from postproc.language.krl.pose_encoding import (
@@ -42,7 +42,6 @@ from postproc.robot.trajectory import Motion
 
 NOTHING = (math.nan,) * WIDTH
 NO_SLOTS = (-1,) * WIDTH
-NO_AXES = (math.nan,) * 6
 AXES = ("a1", "a2", "a3", "a4", "a5", "a6")
 OUTSIDE = ("e1", "e2", "e3", "e4", "e5", "e6")
 PLACE = COMPONENTS[:6]
@@ -132,19 +131,29 @@ class KrlGoals:
     aux: Collection[int] = ()
 
     def visits(
-        self, move: said.KrlMove, row: int, here: Scope, modes: object
+        self,
+        move: said.KrlMove,
+        row: int,
+        here: Scope,
+        modes: object,
+        points: frozenset[AssignedPoint] = NO_POINTS,
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
         block, given = self.block(row, here), dict[str, Any]()
+        in_joints = False
         if block is not None:
             move, given = self._in_block(move, row, here, block)
-        in_joints = block is not None and self._is_in_joints(block, here)
+            begin = self.task.files[here.file].text.statement(block.start)
+            in_joints = (
+                isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
+            )
         if kind not in _POINTS[block is not None, in_joints]:
             goal = not_reached(_Goal(self, move, row, here).end(move.to), SPLINE)
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
-        reader = _Goal(self, move, row, here)
+        there = replace(here, points=points) if points else here
+        reader = _Goal(self, move, row, there)
         angle = self._angle(move, row, here)
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
@@ -166,11 +175,6 @@ class KrlGoals:
         """Return the rows of the spline block that a move stands in."""
         blocks = self.task.files[here.file].splines
         return next((rows for rows in blocks if row in rows), None)
-
-    def _is_in_joints(self, rows: range, here: Scope) -> bool:
-        """Tell whether a spline block is one of joint moves."""
-        begin = self.task.files[here.file].text.statement(rows.start)
-        return isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
 
     def _in_block(
         self, move: said.KrlMove, row: int, here: Scope, rows: range
@@ -236,6 +240,17 @@ class _Goal:
         return motion_of(self.move.word) == Motion.JOINT
 
     def end(self, operand: said.Operand) -> FoundGoal:
+        """Read a destination, and note the assigned points that it names."""
+        found = self._end(operand)
+        if not self.here.points:
+            return found
+        operands = (
+            operand.operands if isinstance(operand, said.Operation) else (operand,)
+        )
+        held = (self.task.find_held(one, self.here) for one in operands)
+        return replace(found, given=frozenset(one for one in held if one is not None))
+
+    def _end(self, operand: said.Operand) -> FoundGoal:
         """Read a destination."""
         if self.move.word.endswith("_rel"):
             return self._step(operand)
@@ -257,6 +272,9 @@ class _Goal:
 
     def _point(self, operand: said.KrlAggregate | said.DataObject) -> FoundGoal:
         """Read a point that is written or named."""
+        held = self.task.find_held(operand, self.here)
+        if held is not None:
+            return self._read_held(held)
         name = operand.name if isinstance(operand, said.DataObject) else ""
         found = self.task.value(operand, self.row, self.here)
         if not isinstance(found, KrlRecord) or not found.whole:
@@ -275,6 +293,23 @@ class _Goal:
         if goal.why.code is Code.PARTIAL_TARGET:  # what data lack may be told elsewhere
             return _unknown_goal(PARTIAL, name=name)
         return self._describe_point(goal, operand)
+
+    def _read_held(self, held: AssignedPoint) -> FoundGoal:
+        """Read the destination that an assignment gave to a point."""
+        there = replace(self, row=held.row, here=held.scope)
+        goal = _unknown_goal(AT_RUN_TIME)
+        if isinstance(held.operand, said.KrlAggregate | said.DataObject):
+            goal = there._point(held.operand)
+        if goal.why.code is Code.PARTIAL_TARGET:  # the others are what they were before
+            goal = _unknown_goal(PARTIAL)
+        why = [self._explain_pinned(point.name, goal) for point in held.chain]
+        why += [
+            f"{point.name} stands in a data list: it outlives the run"
+            for point in held.chain
+            if not point.place[2]
+        ]
+        pins = next(filter(None, (goal.pins, *why)), "")
+        return replace(goal, name=held.name, pins=pins)
 
     def _explain_unknown(self, name: str) -> Reason:
         """Say why a name stands for no known point."""

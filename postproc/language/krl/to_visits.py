@@ -129,7 +129,10 @@ def _conditions(
     given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
     if v.goal.target != Meaning.JOINTS:
         given += (modes.base.why, NO_REASON if modes.interpolation else _IPO)
-        given += (_explain_swapped(modes),)
+        # Frames that were set for a fixed tool hold for no other move.
+        remote = modes.tool.remote or modes.base.remote
+        swapped = remote and modes.interpolation != "#tcp"
+        given += (_SWAPPED if swapped else NO_REASON,)
     given += (_STATUS if odd else NO_REASON,)
     given += (NO_LOAD if modes.load == LOST_LOAD else NO_REASON,)
     return Conditions(
@@ -157,12 +160,6 @@ def _load(modes: KrlModes) -> tuple[float, ...]:
     """Return what the program states that the arm carries, see `Conditions.load`."""
     unknown = not modes.load or modes.load == LOST_LOAD
     return () if unknown else (*modes.load, *(math.nan,) * 3)[:4]
-
-
-def _explain_swapped(modes: KrlModes) -> Reason:
-    """Return why frames that were set for a fixed tool hold for no other move."""
-    remote = modes.tool.remote or modes.base.remote
-    return _SWAPPED if remote and modes.interpolation != "#tcp" else NO_REASON
 
 
 def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:

@@ -229,7 +229,11 @@ def opaque_call(
             _unknown_frames(here, f"{name} sets it; give its table under "
                             f"[frames.routines.{name}] in the cell file")  # fmt: skip
         case RoutineEffect.TRACKS:
-            _track(here, name, arguments)
+            on = here.value(arguments[0]) if arguments else Nothing("")
+            here.store.set(**{TRACKING: on})
+            here.store.last = frozenset({ELSEWHERE})
+            _say(here, Code.POSITION_UNKNOWN, name, "lets a sensor guide the arm, or "
+                 "ends that: the next move starts at an unknown place")  # fmt: skip
         case RoutineEffect.KNOWN:
             _say(here, Code.ROUTINE_ASSUMED_MOTIONLESS, name,
                  "is not in the given files. It is assumed to neither move the arm "
@@ -245,17 +249,6 @@ def opaque_call(
 
 def _say(here: Execution, code: Code, name: str, text: str) -> None:
     here.world.report_once(here.place.program, here.row, code, name, f"{name} {text}")
-
-
-def _track(
-    here: Execution, name: str, arguments: tuple[ast.Expression | None, ...]
-) -> None:
-    """Let a sensor lead the arm, or no longer: only an absolute move ends it."""
-    on = here.value(arguments[0]) if arguments else Nothing("")
-    here.store.set(**{TRACKING: on})
-    here.store.last = frozenset({ELSEWHERE})
-    _say(here, Code.POSITION_UNKNOWN, name, "lets a sensor guide the arm, or ends "
-         "that: the next move starts at an unknown place")  # fmt: skip
 
 
 def _unknown_frames(here: Execution, why: str) -> None:
@@ -306,7 +299,9 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
     """Let an assignment have its effect; `taught` marks the literal in it."""
     other = here.world.other_arm(here.place, statement.target.name)
     if other:
-        _assign_other(here, statement, other)
+        here.world.pin(here.value(statement.value), f"arm {other} goes to it too")
+        for key in here.locate(statement.target).keys:
+            invalidate_key(here, key, points_of(other))
         return
     new = statement.value
     if statement.operator != ":=":
@@ -339,13 +334,6 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
         here.store.forget(target.key, Nothing(held.why, code=held.code))
     else:
         here.store.write(target.key, held)
-
-
-def _assign_other(here: Execution, statement: ast.Assign, arm: int) -> None:
-    """Forget a point of another arm: what it is given goes to that arm too."""
-    here.world.pin(here.value(statement.value), f"arm {arm} goes to it too")
-    for key in here.locate(statement.target).keys:
-        invalidate_key(here, key, points_of(arm))
 
 
 def _assign_component(

@@ -166,7 +166,10 @@ class ProgramPoint:
             case ast.Unary(sign, operand):
                 return unary(sign, self.value(operand))
             case ast.Binary(sign, left, right):
-                return self._binary(sign, self.value(left), self.value(right))
+                values = self.value(left), self.value(right)
+                for frame in values if sign == ":" else ():
+                    self.world.pin(frame, "the program composes it with a frame (`:`)")
+                return binary(sign, *values)
             case ast.Aggregate(items):
                 return self._joints(items)
             case ast.Invoke(name, arguments):
@@ -242,12 +245,6 @@ class ProgramPoint:
                 ours = setting in _DEFAULT_ARM or not self.other_default()
                 return setting if ours else None
         return None
-
-    def _binary(self, sign: str, left: Value, right: Value) -> Value:
-        if sign == ":":
-            for frame in (left, right):
-                self.world.pin(frame, "the program composes it with a frame (`:`)")
-        return binary(sign, left, right)
 
     def _joints(self, items: tuple[ast.Expression, ...]) -> Value:
         if len(items) < 6:

@@ -102,7 +102,10 @@ def goal_of(here: Execution, statement: ast.Move, motion: Motion) -> Goal:
         case "TO":
             return absolute(here, where[0])
         case "RELATIVE":
-            return _relative(here, where[0], statement.frame)
+            vector, frame = here.value(where[0]), _FRAME.get(statement.frame)
+            if isinstance(vector, Vector) and frame is not None:
+                numbers = (*vector.numbers, None, None, None)
+                return _no_target(frame, numbers, "RELATIVE")
         case "AWAY":
             distance = here.real(where[0])
             return _no_target(Meaning.AWAY, (distance, *(None,) * 5), "AWAY")
@@ -136,13 +139,6 @@ def _no_target(target: Meaning, numbers: tuple[float | None, ...], word: str) ->
     if None in numbers[:needed]:
         return Goal(Meaning.UNKNOWN, reason=_why(word))
     return Goal(target, numbers, reason=_why(word))
-
-
-def _relative(here: Execution, vector: ast.Expression, frame: str) -> Goal:
-    value = here.value(vector)
-    if not isinstance(value, Vector) or frame not in _FRAME:
-        return Goal(Meaning.UNKNOWN, reason=_why("RELATIVE"))
-    return _no_target(_FRAME[frame], (*value.numbers, None, None, None), "RELATIVE")
 
 
 def _about(here: Execution, where: tuple[ast.Expression, ...], frame: str) -> Goal:
@@ -326,20 +322,16 @@ def _beside(machine: Machine, here: Execution, statement: ast.Move) -> None:
 def _keep(here: Execution, statement: ast.Move) -> None:
     """Keep the numbers of what another arm goes to, and list its target."""
     if goes_to_target(statement):
-        _list_other(here, statement)
+        arm = here.integer(statement.arm) if statement.arm is not None else None
+        whose = f"arm {arm}'s" if arm is not None else "not our arm's"
+        number = f" with arm_number = {arm} under [robot]" if arm is not None else ""
+        text = (
+            f"this move is {whose}, and the cell is of arm {here.world.arm}: it is not "
+            f"corrected. Compensate it with a cell of its arm{number}, and its model"
+        )
+        here.world.report(here.place.program, here.row, Code.OTHER_ARM, text)
     names = frozenset(r.name for r in references((statement.where, statement.via)))
     escape_names(here, names, "another arm goes to it too")
-
-
-def _list_other(here: Execution, statement: ast.Move) -> None:
-    arm = here.integer(statement.arm) if statement.arm is not None else None
-    whose = f"arm {arm}'s" if arm is not None else "not our arm's"
-    number = f" with arm_number = {arm} under [robot]" if arm is not None else ""
-    text = (
-        f"this move is {whose}, and the cell is of arm {here.world.arm}: it is not "
-        f"corrected. Compensate it with a cell of its arm{number}, and its model"
-    )
-    here.world.report(here.place.program, here.row, Code.OTHER_ARM, text)
 
 
 def _with(here: Execution, statement: ast.Move) -> Settings:

@@ -29,13 +29,9 @@ class Backlash(JointEffect):
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "lambda"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.ALWAYS
+    cells: ClassVar[Cells] = own_cells("lambda {j}", "linear")
 
     joints: tuple[int, ...] = JOINTS
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return own_cells("lambda {j}", "linear")
 
     @classmethod
     def candidates(cls, batch: ArmStates) -> list[Candidate]:

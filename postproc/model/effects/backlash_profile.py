@@ -46,17 +46,13 @@ class BacklashProfile(JointEffect):
     driven_by: ClassVar[str] = "lambda"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.ALWAYS
     variation_of: ClassVar[str | None] = "backlash"
+    cells: ClassVar[Cells] = own_cells("lambda {j} x joint {j}", *ANY)
 
     joints: tuple[int, ...] = JOINTS
     orders: tuple[int, ...] = (1, 2, 3)
     constant: bool = False
     lower: tuple[float, ...] = (-FAR,) * 6
     upper: tuple[float, ...] = (FAR,) * 6
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return own_cells("lambda {j} x joint {j}", *ANY)
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:

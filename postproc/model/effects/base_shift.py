@@ -47,11 +47,7 @@ class BaseShift(CampaignStep):
 
     name: ClassVar[str] = "base_shift"
     search_policy: ClassVar[SearchPolicy] = SearchPolicy.RIVAL
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return cells_in_time("base", "step")
+    cells: ClassVar[Cells] = cells_in_time("base", "step")
 
     @classmethod
     def candidates(cls, batch: ArmStates) -> list[Candidate]:

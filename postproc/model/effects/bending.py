@@ -45,19 +45,15 @@ class Bending(WeightEffect):
     """
 
     name: ClassVar[str] = "bending"
+    cells: ClassVar[Cells] = tuple(
+        (f"link {j} turn {a}", f"moment {j}{a}", "linear")
+        for j in BENDING
+        for a in ACROSS
+    )
 
     joints: tuple[int, ...] = BENDING
     moments: tuple[tuple[tuple[int, float], ...], ...] = ((),) * 5
     softness: tuple[float, ...] = (1e-7,) * 5
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return tuple(
-            (f"link {j} turn {a}", f"moment {j}{a}", "linear")
-            for j in BENDING
-            for a in ACROSS
-        )
 
     @classmethod
     def on(cls, batch: ArmStates) -> Self:

@@ -33,13 +33,11 @@ class Coupling(JointEffect):
 
     name: ClassVar[str] = "coupling"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
+    cells: ClassVar[Cells] = tuple(
+        (f"joint {j}", f"joint {k}", "linear") for j, k in TRIED
+    )
 
     pairs: tuple[tuple[int, int], ...] = HOLLOW_WRIST
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return tuple((f"joint {j}", f"joint {k}", "linear") for j, k in TRIED)
 
     @classmethod
     def candidates(cls, batch: ArmStates) -> list[Candidate]:

@@ -69,6 +69,7 @@ class Effect(ABC):
         search_policy: Whether a fit searches for it in its residual.
         naming_policy: What a report says where `diagnose` adds it.
         variation_of: Name of the plainer effect that a search takes first.
+        cells: The cells of the table of causes that it is: carrier, driver and law.
         acts: What it moves and what drives that, in the words of the table of causes,
             where it is more than `cells`, several of them at once say.
         at_one_row: True for what happens once, or at one place of what drives it.
@@ -90,6 +91,7 @@ class Effect(ABC):
     free: ClassVar[bool] = False
     everywhere: ClassVar[bool] = False
     published: ClassVar[bool] = False
+    cells: ClassVar[Cells] = ()
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
@@ -134,11 +136,6 @@ class Effect(ABC):
             batch: The surveyed states, for ranges and for what was recorded.
         """
         return []
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """List the cells of the table of causes that it is: carrier, driver and law."""
-        return ()
 
     @classmethod
     def propose_sighted(

@@ -49,14 +49,10 @@ class JointMap(JointEffect):
     name: ClassVar[str] = "joint_map"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.LAST
     free: ClassVar[bool] = True
+    cells: ClassVar[Cells] = own_cells("joint {j}", "curve", "step", "saturating")
 
     bumps: tuple[tuple[int, float], ...] = ()
     width: float = 0.1
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return own_cells("joint {j}", "curve", "step", "saturating")
 
     @classmethod
     def over(cls, joint: int, low: float, high: float, knots: int) -> Self:

@@ -37,13 +37,9 @@ class JointStep(CampaignStep, JointEffect):
 
     name: ClassVar[str] = "joint_step"
     search_policy: ClassVar[SearchPolicy] = SearchPolicy.ALWAYS
+    cells: ClassVar[Cells] = (*own_cells("order", "step"), *own_cells("time", "step"))
 
     joints: tuple[int, ...] = JOINTS
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return (*own_cells("order", "step"), *own_cells("time", "step"))
 
     @classmethod
     def candidates(cls, batch: ArmStates) -> list[Candidate]:

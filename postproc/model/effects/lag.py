@@ -35,13 +35,9 @@ class Lag(JointEffect):
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "speed"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
+    cells: ClassVar[Cells] = own_cells("lambda {j} x speed", "linear")
 
     joints: tuple[int, ...] = JOINTS
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return own_cells("lambda {j} x speed", "linear")
 
     @classmethod
     def candidates(cls, batch: ArmStates) -> list[Candidate]:

@@ -51,15 +51,11 @@ class LoadBacklash(JointEffect):
     driven_by: ClassVar[str] = "torque"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
     variation_of: ClassVar[str | None] = "backlash"
+    cells: ClassVar[Cells] = own_cells("lambda {j} x torque {j}", *ANY)
 
     joints: tuple[int, ...] = (2, 3, 5)
     form: Literal["load", "signed", "gravity_side"] = "load"
     t0: float = 1000.0
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return own_cells("lambda {j} x torque {j}", *ANY)
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:

@@ -31,13 +31,9 @@ class Scale(JointEffect):
 
     name: ClassVar[str] = "scale"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
+    cells: ClassVar[Cells] = own_cells("joint {j}", "linear")
 
     joints: tuple[int, ...] = JOINTS
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return own_cells("joint {j}", "linear")
 
     @classmethod
     def candidates(cls, batch: ArmStates) -> list[Candidate]:

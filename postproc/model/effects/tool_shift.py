@@ -33,13 +33,9 @@ class ToolShift(CampaignStep):
 
     name: ClassVar[str] = "tool_shift"
     search_policy: ClassVar[SearchPolicy] = SearchPolicy.RIVAL
+    cells: ClassVar[Cells] = cells_in_time("tool", "step")
 
     turns: bool = False
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return cells_in_time("tool", "step")
 
     @classmethod
     def candidates(cls, batch: ArmStates) -> list[Candidate]:

@@ -48,15 +48,11 @@ class TrackerDrift(Effect):
     search_policy: ClassVar[SearchPolicy] = SearchPolicy.ALWAYS
     driven_by: ClassVar[str] = "time"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
+    cells: ClassVar[Cells] = cells_in_time("base", "linear", "curve")
 
     start: float = 0.0
     duration: float = 1.0
     clock: Clock = "time"
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return cells_in_time("base", "linear", "curve")
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:

@@ -50,15 +50,11 @@ class Windup(JointEffect):
     driven_by: ClassVar[str] = "travel"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
     variation_of: ClassVar[str | None] = "backlash"
+    cells: ClassVar[Cells] = own_cells("lambda {j} x way {j}", *ANY)
 
     joints: tuple[int, ...] = JOINTS
     d0: float = 0.05
     form: Literal["friction", "dahl", "elastic"] = "friction"
-
-    @classmethod
-    def cells(cls) -> Cells:
-        """Name the cells of the table of causes that it is."""
-        return own_cells("lambda {j} x way {j}", *ANY)
 
     @classmethod
     def candidates(cls, batch: ArmStates) -> list[Candidate]:
