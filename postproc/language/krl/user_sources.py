@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from postproc.exceptions import ProgramError
-from postproc.files import find_shared_list, is_system_source, read_input
+from postproc.files import ARCHIVE_DEPTH, is_system_source, read_input
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.symbols import KrlTask
@@ -36,10 +36,10 @@ def acting_sources(program: Path) -> tuple[Path, ...]:
 
 def _places(program: Path) -> Iterator[Path]:
     """Yield where such sources stand, the nearest last."""
-    shared = find_shared_list(program)
-    if shared is not None and shared.parent.name.lower() == "system":
-        for folder in FOLDERS:
-            yield from _spelt_in(shared.parent.parent / folder)
+    above = [*program.parents][: 1 + ARCHIVE_DEPTH]
+    roots = [folder for folder in above if (folder / "System").is_dir()][:1]
+    for place in (root / name for root in roots for name in FOLDERS):
+        yield from _spelt_in(place)
     yield from _spelt_in(program.parent)
 
 
