@@ -567,11 +567,7 @@ def build_arm(file: ArmFile) -> Arm:
 
 
 def _check_inverse(arm: Arm, path: Path) -> None:
-    """Refuse an arm file whose two kinematics disagree.
-
-    Raises:
-        ArmError: The closed-form inverse does not lead back to the pose.
-    """
+    """Refuse an arm file whose two kinematics disagree."""
     q = np.deg2rad(np.array([[20.0, 10, -100, 40, 50, -60], [0, 0, -90, 0, 30, 0]]))
     wanted = arm.flange(q)
     solved = arm.inverse(wanted).q.reshape(-1, 6)

@@ -373,11 +373,7 @@ def _list(values: Sequence[float] | Floats) -> str:
 
 
 def _verify(path: Path, shape: KukaShape, text: str) -> None:
-    """Refuse a text that does not say what the machine data do.
-
-    Raises:
-        ArmError: It places the flange elsewhere.
-    """
+    """Refuse a text that does not say what the machine data do."""
     arm = arm_of_text(path, text)
     q = np.linspace(-2.0, 2.0, 60).reshape(10, 6) * [1.0, -0.7, 0.5, -0.9, 0.6, 0.8]
     wanted = np.array([shape.place(angles) for angles in q])

@@ -442,11 +442,7 @@ Q = np.linspace(-3.0, 3.0, 90).reshape(15, 6) * [1.0, -0.7, 0.5, -0.9, 0.6, 0.8]
 
 
 def _verify(chain: UrdfChain, arm: Arm) -> None:
-    """Refuse an arm that is not what the URDF says.
-
-    Raises:
-        ArmError: It places the flange elsewhere.
-    """
+    """Refuse an arm that is not what the URDF says."""
     wanted = chain.flange(Q)
     gap = float(np.abs(arm.flange(Q) - wanted).max())
     back = arm.flange(arm.nearest(wanted, Q))
