@@ -45,10 +45,31 @@ def rounding_of(visits: Visits) -> tuple[Ints, Floats, Floats]:
     within = visits.zone_rule == ZoneRule.WITHIN
     rounding = np.where(cartesian, np.where(within, Fly.WITHIN, Fly.FROM), Fly.OVERLAP)
     rounding[passing | (visits.zone_mm < 0)] = Fly.EXACT
-    rounding[visits.zone_rule == ZoneRule.UNKNOWN] = Fly.UNKNOWN
+    rounding[find_open_corners(visits)] = Fly.UNKNOWN
     distance = np.nan_to_num(visits.zone_mm, nan=USUAL_DISTANCE) * MM
     overlap = np.nan_to_num(visits.overlap_percent, nan=USUAL_OVERLAP) / 100.0
     return rounding, np.maximum(distance, 0.0), np.clip(overlap, 0.0, 1.0)
+
+
+def find_open_corners(visits: Visits) -> Bools:
+    """Return fly points whose corner is not known, (n,).
+
+    Of some the program does not show whether the arm stops there. Of others it does not
+    show from where the arm comes or where it goes: they have several ways in or out, or
+    one that leads nowhere known.
+    """
+    n, pred = len(visits), visits.pred.astype(np.int64)
+    into = np.diff(visits.pred_start)
+    to, known = np.repeat(np.arange(n), into), pred >= 0
+    out = np.bincount(pred[known], minlength=n)
+    framed = ~np.isin(visits.target, (*JOINTS, Meaning.BY, Meaning.PARTIAL_JOINTS))
+    nowhere = framed & ((visits.tool < 0) | (visits.uframe < 0))
+    nowhere |= visits.target == Meaning.UNKNOWN
+    leads = np.bincount(pred[known & nowhere[to]], minlength=n) > 0
+    rounded = visits.fly & ~visits.via & (visits.zone_rule != ZoneRule.PASS)
+    rounded &= ~(visits.zone_mm < 0)
+    open_ = rounded & ((into > 1) & (out > 0) | (out > 1) | leads)
+    return np.asarray(open_ | (visits.zone_rule == ZoneRule.UNKNOWN))
 
 
 def report_rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
@@ -81,13 +102,14 @@ def unknown_blends(visits: Visits, corrected: Bools) -> list[Diagnostic]:
         visits: Every arrival.
         corrected: Those that are corrected, (n,).
     """
-    found = np.flatnonzero(corrected & (visits.zone_rule == ZoneRule.UNKNOWN))
+    found = np.flatnonzero(corrected & find_open_corners(visits))
     if len(found) == 0:
         return []
     text = (
-        f"the program does not show whether the arm stops at {len(found)} points, or "
-        "how early it leaves them. They are corrected for both cases; joints that turn "
-        "back there are corrected for the middle of their play"
+        f"the program does not show whether the arm stops at {len(found)} points, how "
+        "early it leaves them, or which of several ways it takes there. They are "
+        "corrected for all cases; joints that turn back there are corrected for the "
+        "middle of their play"
     )
     return [_note(visits, int(found[0]), Code.FLY_UNKNOWN, text)]
 

@@ -10,6 +10,7 @@ import pytest
 
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
+from postproc.compensation.targets import find_open_corners
 from postproc.language.visits import ZoneRule
 from postproc.motion.spline_moves import turns_at_unknown_blends
 from postproc.motion.targets import Fly
@@ -171,3 +172,35 @@ def test_a_line_that_begins_backwards():
                 unknown = turns_at_unknown_blends(arm, targets, both, sides)
                 found.append(bool(unknown[0, 1]))
     assert len(found) > 5 and all(found)
+
+
+FLY = "  MOVEFLY LINEAR TO POS(100, 200, 150, 0, 175, 0, '') ADVANCE"
+ON = "  MOVE LINEAR TO POS(200, 100, 50, 0, 175, 0, '')"
+BACK = "  MOVE LINEAR TO POS(0, 200, 150, 0, 175, 0, '')"
+FIRST = "  MOVE JOINT TO {5, 10, -95, 20, 50, 30}"
+CORNERS = {  # what stands round a fly point, and whether its corner is not known
+    "one way": ([FIRST, FLY, ON], False),
+    "two ways on": ([FIRST, FLY, "IF $DIN[1] THEN", ON, "ENDIF", BACK], True),
+    "two ways in": ([FIRST, "IF $DIN[1] THEN", BACK, "ENDIF", FLY, ON], True),
+    "to a place that is not known": ([FIRST, FLY, "  MOVE LINEAR TO p", ON], True),
+    "in a frame that is not known": ([FIRST, FLY, "$UFRAME := f", ON], True),
+    "to joints in such a frame": ([FIRST, FLY, "$UFRAME := f", FIRST], False),
+    "at the end": ([FIRST, "IF $DIN[1] THEN", ON, "ENDIF", FLY], False),
+}
+
+
+@pytest.mark.parametrize("title", CORNERS)
+def test_which_corners_are_not_known(bench_cell, title):
+    lines, wanted = CORNERS[title]
+    head = ["PROGRAM job", "VAR p, f : POSITION", "BEGIN"]
+    text = "\n".join([*head, *lines, "END job", ""]).encode()
+    visits = read_program({"job.pdl": text}, bench_cell).visits
+    assert find_open_corners(visits)[visits.fly].tolist() == [wanted]
+
+
+def test_a_stop_before_two_ways_is_no_corner(bench_cell):
+    stop = FLY.replace("MOVEFLY", "MOVE").replace(" ADVANCE", "")
+    lines = [FIRST, stop, "IF $DIN[1] THEN", ON, "ENDIF", BACK]
+    text = "\n".join(["PROGRAM job", "BEGIN", *lines, "END job", ""]).encode()
+    visits = read_program({"job.pdl": text}, bench_cell).visits
+    assert not find_open_corners(visits).any()
