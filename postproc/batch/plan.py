@@ -242,11 +242,7 @@ def _open_rules(
 
 
 def _check_number(rule: Rule, cell: Cell) -> None:
-    """Refuse a rule for one arm with the cell of another.
-
-    Raises:
-        CellError: They differ.
-    """
+    """Refuse a rule for one arm with the cell of another."""
     if rule.arm not in (None, cell.arm_number):
         raise CellError(
             rule.cell,

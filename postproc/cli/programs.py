@@ -156,11 +156,7 @@ def _why_nothing(outcome: Outcome) -> str:
 
 
 def _check_values(place: Path, files: ProgramFiles) -> None:
-    """Refuse a place for a variable file that is none, or where there is no such file.
-
-    Raises:
-        PostprocError: It is.
-    """
+    """Refuse a place that is none, or one for a variable file that is not there."""
     if place == Path(STREAM):
         raise PostprocError("--variables-out -: stdout holds the program. Name a file")
     if files.variables is None:

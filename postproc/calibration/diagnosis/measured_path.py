@@ -338,13 +338,7 @@ def _move(sample: Ints, ways: PredictedWays) -> Ints:
 def _as_surveyed(
     found: Extension, model: Model, joints: tuple[JointInMotion, ...]
 ) -> Extension:
-    """Leave what one run tells nothing of: how poses repeat, where the tracker stood.
-
-    Args:
-        found: What a track says.
-        model: The given model.
-        joints: What its joints do in motion, for its history.
-    """
+    """Leave what one run tells nothing of: how poses repeat, where a tracker stood."""
     *earlier, record = found.model.history
     record = {**record, "in_motion": {str(j.joint): j.verdict for j in joints}}
     told = {k: v for k, v in model.statistics.items() if k == READING}

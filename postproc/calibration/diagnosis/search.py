@@ -286,12 +286,7 @@ def plainest(best: Score, scores: list[Score]) -> Score:
 
 
 def _law(free: Score, names: list[Score]) -> Score | None:
-    """Find the law that the torque drives as it does a free form, if rows speak for it.
-
-    Args:
-        free: The free form.
-        names: Scores of names, best first.
-    """
+    """Find the law by the torque that drives a free form, if rows speak for it."""
     source = free.best.source
     for s in names if source.startswith("torque") else ():
         same = s.family.joint == free.family.joint and s.best.source == source

@@ -144,11 +144,7 @@ def skeleton_of(text: KrlText) -> Skeleton:
 
 
 def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:
-    """Refuse a program that switches the controller's own accuracy model on.
-
-    Raises:
-        ProgramError: It does.
-    """
+    """Refuse a program that switches the controller's own accuracy model on."""
     for file in files:
         for row in file.text.where(lambda one: bool(_switches_on(one))):
             name = _switches_on(file.text.statement(row))
