@@ -144,7 +144,7 @@ class Arrived:
 
 
 NOWHERE = frozenset([ELSEWHERE])
-NOT_FOLLOWED = "may move the arm: it is not followed"
+NOT_FOLLOWED = "is not followed, and may move the arm"
 Place = tuple[CallContext, int]
 _PLAIN = (said.SourceStatement, said.LabelMark)
 M = TypeVar("M", bound="TaskMachine")
