@@ -204,7 +204,10 @@ def make_plan(
             Rule(r.pattern, r.arm, here / r.cell, here / r.model) for r in file.rule
         ]
     if (cell is None) != (model is None) or (cell is None and plan is None):
-        raise PostprocError("Give --cell and --model, or --plan, or all three")
+        raise PostprocError(
+            "neither --cell and --model nor --plan are given. Name one cell and one "
+            "model, or a plan with several; with both, the plan comes first"
+        )
     if cell is not None and model is not None:
         rules.append(Rule("**", None, cell, model))
     return _open_rules(rules, options, changes)

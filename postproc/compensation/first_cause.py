@@ -51,9 +51,10 @@ def first_cause(
         return ()
     first, total = causes[0], max(map(_count_targets, (free, reading.visits)))
     text = (
-        f"what happens here is not known, and with what follows it leaves {freed} of "
-        f"{total} targets. Say under [routines] of the cell what the routines do that "
-        'no file holds (name = "motionless" or "moves"), or give their files'
+        f"{freed} of {total} targets are not corrected because it is not known what "
+        "this statement, and others after it, do. Declare under [routines] of the cell "
+        'the routines that no file holds (name = "motionless" or "moves"), or give '
+        "their files"
     )
     return (Diagnostic(first.file, first.line, Code.FIRST_CAUSE, text),)
 

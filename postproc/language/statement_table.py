@@ -105,7 +105,7 @@ class StatementText(Generic[T]):
     def quote(self, row: int) -> str:
         """Quote the beginning of a statement, on one line."""
         words = " ".join(self.text(row).split())
-        return words if len(words) <= SHOWN else f"{words[:SHOWN]} .."
+        return repr(words if len(words) <= SHOWN else f"{words[:SHOWN]} ..")
 
     def diagnostic(self, row: int, code: Code, message: str) -> Diagnostic:
         """Say something of a statement."""

@@ -65,7 +65,7 @@ def test_a_job_knows_what_runs_beside_it(archive, job_folder):
     job = archive / "KRC/R1/Program/weld/job.src"
     run = cli("compensate", job, "--cell", archive / "cell.toml", "--model",
               job_folder / "model.json", "-o", archive / "job.src")  # fmt: skip
-    assert "sps.sub is read, and not rewritten" in run.output
+    assert "sps.sub is read, but not written" in run.output
     alone = cli("compensate", sub, "--cell", archive / "cell.toml", "--model",
                 job_folder / "model.json")  # fmt: skip
     assert alone.exit_code == 2 and "is a submit program" in alone.output
