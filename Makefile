@@ -51,10 +51,10 @@ demo: $(STAMP)
 	@PATH="$(abspath $(VENV))/bin:$$PATH" bash programs/demo.sh
 
 test: $(STAMP)
-	@$(PYTHON_BIN) -m pytest -n 2
+	@$(PYTHON_BIN) -m pytest -n 2 --dist loadfile
 
 slow: $(STAMP)
-	@$(PYTHON_BIN) -m pytest -n 2 -m slow
+	@$(PYTHON_BIN) -m pytest -n 2 --dist loadfile -m slow
 
 lint: $(STAMP)
 	@$(VENV)/bin/ruff check .

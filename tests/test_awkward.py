@@ -28,7 +28,7 @@ def test_a_campaign_is_fitted_or_refused_in_words(seed: int) -> None:
     assert re.match(r"fitted|refused: .*\S\. \S", end), end
 
 
-@pytest.mark.parametrize("seed", [40, 31])
+@pytest.mark.parametrize("seed", [31, *slow([40])])
 def test_a_campaign_is_diagnosed(seed: int) -> None:
     assert re.match("fitted, (noise|effect|unexplained)", run(seed))
 
@@ -67,4 +67,4 @@ def test_points_on_a_line_register_without_a_warning() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         found = register(NJ, states, line, Combination(()), np.zeros(0))
-    assert np.isfinite(found.base_from_tracker).all()
+    assert np.isfinite(found.transforms[0]).all()

@@ -8,7 +8,11 @@ from pathlib import Path
 
 from typer.testing import CliRunner, Result
 
+from postproc.arrays import Floats, Ints
 from postproc.cli.commands import app
+from postproc.compensation.program import ParsedProgram
+from postproc.compensation.rewrite import Output, write_edits
+from postproc.language.number_edits import edits as number_edits
 
 FIRST = "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 50.0, 30.0}"
 POSE = "MOVE LINEAR TO POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')"
@@ -74,3 +78,12 @@ class Desk:
     def names(self) -> set[str]:
         """List the folder."""
         return {path.name for path in self.folder.iterdir()}
+
+
+def write_numbers(
+    reading: ParsedProgram, literals: Ints, values: Floats, model: str
+) -> Output:
+    """Write new numbers (m, w), in the file's units, for literals (m,) of a program."""
+    v = reading.visits
+    found = number_edits(v.literals, reading.sources, literals, values, v.dialect)
+    return write_edits(reading, found, model)

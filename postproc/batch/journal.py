@@ -55,24 +55,6 @@ _BEFORE = {
 }  # words of version 0.1.0
 
 
-def entry_from(data: Mapping[str, Any]) -> JournalEntry:
-    """Take a line of the log apart.
-
-    Raises:
-        KeyError, TypeError, ValueError, AttributeError: It is no such line.
-    """
-    outputs = {str(k): str(v) for k, v in data.get("outputs", {}).items()}
-    facts = {_BEFORE.get(k, k): v for k, v in data.items() if k not in _OWN}
-    return JournalEntry(
-        str(data["file"]),
-        _BEFORE.get(data["status"], str(data["status"])),
-        int(data["exit"]),
-        str(data.get("digest", "")),
-        outputs,
-        facts,
-    )
-
-
 def read_entries(path: Path) -> dict[str, JournalEntry]:
     """Read the last entry of every file; a torn or foreign line does not count."""
     entries: dict[str, JournalEntry] = {}
@@ -82,7 +64,17 @@ def read_entries(path: Path) -> dict[str, JournalEntry]:
         return entries
     for line in lines:
         try:
-            entry = entry_from(json.loads(line))
+            data = json.loads(line)
+            outputs = {str(k): str(v) for k, v in data.get("outputs", {}).items()}
+            facts = {_BEFORE.get(k, k): v for k, v in data.items() if k not in _OWN}
+            entry = JournalEntry(
+                str(data["file"]),
+                _BEFORE.get(data["status"], str(data["status"])),
+                int(data["exit"]),
+                str(data.get("digest", "")),
+                outputs,
+                facts,
+            )
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
             continue
         entries[entry.place] = entry

@@ -422,5 +422,4 @@ def _follow_parent() -> None:
 
 
 def _run(chunk: Chunk) -> list[Result]:
-    """Do a chunk in a worker."""
     return run_tasks(chunk, _setups[chunk[0].unit.setup], __version__)

@@ -247,7 +247,7 @@ def fit_measurements(
     """
     rows = _prepare(survey, cell, frame)
     if method != "full":
-        return _dated(_fit_published(rows, cell, frame, method, seed))
+        return _with_provenance(_fit_published(rows, cell, frame, method, seed))
     task = FitTask(
         rows.survey, cell.arm, effects, rows.tracker, rows.setup, rows.mounted
     )
@@ -257,10 +257,10 @@ def fit_measurements(
         progress("predict poses that are held out")
         found = validate_fit(task, fitted)
     progress("report")
-    return _dated(_conclude(rows, found, cell, frame, task.doubt(found.fit)))
+    return _with_provenance(_conclude(rows, found, cell, frame, task.doubt(found.fit)))
 
 
-def _dated(found: Calibration) -> Calibration:
+def _with_provenance(found: Calibration) -> Calibration:
     """Return a calibration whose model tells where it comes from."""
     model = replace(found.model, provenance=Provenance.today(found.cell))
     return replace(found, model=model)
@@ -359,7 +359,7 @@ def _conclude(
         *drifts(fitted),
         *wrong_nests(fitted, rows.points),
         *_rounding(model, fitted),
-        *_left_open(doubt, fitted),
+        *_explain_doubt(doubt, fitted),
         *found.notes,
         *direction,
         *file_steps(fitted, survey),
@@ -409,7 +409,7 @@ def _rounding(model: Model, fitted: Fit) -> tuple[str, ...]:
     )
 
 
-def _left_open(doubt: Doubt | None, fitted: Fit) -> tuple[str, ...]:
+def _explain_doubt(doubt: Doubt | None, fitted: Fit) -> tuple[str, ...]:
     """Name what may be there, where stated errors are notably larger for it."""
     if doubt is None:
         return ()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats
 from postproc.calibration.measurements import Measurements
-from postproc.calibration.registration import register, typical_gap
+from postproc.calibration.registration import register, robust_weights, typical_gap
 from postproc.model.effect_sum import Combination
 from postproc.model.effects.base_shift import rigid_motions
 from postproc.model.effects.placement import Placement
@@ -196,7 +196,6 @@ def _guesses(states: States, position: Floats) -> Iterator[Guess]:
 
 
 def _guess_units(states: States, position: Floats) -> Iterator[Guess]:
-    """Guess units of positions and angles."""
     yield Guess(
         "The positions look like metres: write millimetres (of points: "
         "--set measurements.unit=m)",
@@ -351,7 +350,7 @@ def find_cause_in_tracker_frame(survey: Measurements, arm: Arm) -> Cause | None:
         if used.sum() < ENOUGH_ROWS or good <= most:
             continue
         states = placed.on_probes(survey.states)
-        cause = find_cause(survey.with_states(states), arm, _none, placed)
+        cause = find_cause(survey.with_states(states), arm, no_error, placed)
         if cause is not None:
             found, most = cause, good
             if good > len(survey) / 2:
@@ -388,7 +387,7 @@ def _gap(survey: Measurements, arm: Arm, placed: Registration) -> Floats:
     return np.asarray(np.linalg.norm(placed.to_base(survey.position) - tcp, axis=1))
 
 
-def _none(states: States) -> Floats:
+def no_error(states: States) -> Floats:
     """Return no error, (n, 3) [m]."""
     return np.zeros((len(states), 3))
 
@@ -438,7 +437,7 @@ def _all_together(columns: Floats, y: Floats) -> bool:
         columns: What a wrong direction of each joint does, (n, 3, 6) [m].
         y: What is left of the readings, (n, 3) [m].
     """
-    root = np.sqrt(_robust(y - columns.sum(axis=2)))[:, None]
+    root = np.sqrt(robust_weights(y - columns.sum(axis=2)))[:, None]
     rows, target = (columns * root[:, :, None]).reshape(-1, 6), (y * root).reshape(-1)
     share = np.linalg.lstsq(rows, target)[0]
     rest = target - rows @ share
@@ -468,10 +467,3 @@ def _beside_setup(error: Floats, arm: Arm, states: States) -> Floats:
     rigid = rigid_motions(ArmStates(arm, states).walk.tcp).reshape(-1, 6)
     flat = error.reshape(-1)
     return np.asarray(flat - rigid @ np.linalg.lstsq(rigid, flat)[0]).reshape(-1, 3)
-
-
-def _robust(gap: Floats) -> Floats:
-    """Weigh rows by their distance over the typical one, (n,)."""
-    size = np.linalg.norm(gap, axis=1)
-    ratio = size / max(3.0 * float(np.median(size)), 1e-12)
-    return np.asarray(1.0 / np.maximum(ratio, 1.0) ** 2)

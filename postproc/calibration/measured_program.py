@@ -93,7 +93,6 @@ def _places(measured: tuple[str, ...], names: list[str]) -> dict[str, list[int]]
 
 
 def _visit_of(places: dict[str, list[int]], key: str, path: Path, line: int) -> int:
-    """Find the visit of an id."""
     found = places.get(key.lower(), [])
     if len(found) == 1:
         return found[0]

@@ -81,7 +81,15 @@ def split_references(table: TextTable) -> tuple[TextTable, ReferenceRows | None]
         raise MeasurementError(table.path, "has rows on monuments only", cure)
     some, arm = _rows(table, fixed), _rows(table, ~fixed)
     some.require(*POSITION)
-    _require_positions(some)
+    for column in POSITION:
+        empty = np.isnan(some.numbers(column, empty=True))
+        if empty.any():
+            raise MeasurementError(
+                some.path,
+                f"a row on a monument has no {column}",
+                "Fill it in or remove the row",
+                line=int(some.line[np.argmax(empty)]),
+            )
     names = [t.lower() for t in some.text(REFERENCE)]
     unknown = np.full(len(some), np.nan)
     time = some.numbers("time_s", empty=True) if some.has("time_s") else unknown
@@ -97,25 +105,7 @@ def split_references(table: TextTable) -> tuple[TextTable, ReferenceRows | None]
 
 
 def _rows(table: TextTable, which: Bools) -> TextTable:
-    """Take some rows of a table."""
     return replace(table, cells=table.cells[which], line=table.line[which])
-
-
-def _require_positions(table: TextTable) -> None:
-    """Refuse a reading of a fixed point that holds no place, or a lost beam.
-
-    Raises:
-        MeasurementError: Naming its line.
-    """
-    for column in POSITION:
-        empty = np.isnan(table.numbers(column, empty=True))
-        if empty.any():
-            raise MeasurementError(
-                table.path,
-                f"a row on a monument has no {column}",
-                "Fill it in or remove the row",
-                line=int(table.line[np.argmax(empty)]),
-            )
 
 
 def join_references(

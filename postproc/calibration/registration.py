@@ -73,7 +73,7 @@ def register(
         placed = Registration(T, found, ids, stations)
         measured = placed.to_base(position, states.station)
         gap = measured - tcp
-        weight = _robust(gap)
+        weight = robust_weights(gap)
         step = _step(columns, measured, gap, weight, own, (stated - found) / near, near)
         found = found + step
         if np.abs(step).max() < SETTLED:
@@ -192,7 +192,7 @@ def station_of(
     )
 
 
-def _robust(gap: Floats) -> Floats:
+def robust_weights(gap: Floats) -> Floats:
     """Weigh rows by their distance over the typical one, (n,)."""
     size = np.linalg.norm(gap, axis=1)
     ratio = size / max(ROBUST * float(np.median(size)), 1e-12)

@@ -359,7 +359,6 @@ def _shares(fit: Fit) -> Floats:
 
 
 def _table(fit: Fit, shares: Floats) -> tuple[ParameterRow, ...]:
-    """Make the parameter table."""
     rows, std = [], np.sqrt(np.diag(fit.stated))
     for k, (name, p) in enumerate(
         zip(fit.combination.names, fit.combination.parameters, strict=True)

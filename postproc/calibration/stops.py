@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Floats, Ints
 from postproc.calibration.measurements import DroppedRow, Measurements
 from postproc.calibration.orientations import means
 from postproc.model.noise import SAME_POSE, poses_of
@@ -39,7 +39,13 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
     """
     if len(states) == 0:
         return np.zeros(0, dtype=np.int64)
-    begins = _find_new_commands(states)
+    step = np.abs(np.diff(states.q, axis=0))
+    moved = (step > max(SAME_POSE, restless(step))).any(axis=1)
+    turned = (np.diff(states.direction, axis=0) != 0).any(axis=1)
+    loaded = np.diff(np.nan_to_num(states.payload)) != 0
+    seen = np.diff(states.station) != 0
+    moving = ~np.isnan(states.heading[1:, 0])
+    begins = np.asarray(moved | turned | loaded | seen | moving)
     gap = np.diff(states.time)
     usual = gap[begins & np.isfinite(gap)]
     if len(usual):  # the arm can have left a pose and returned in long gaps
@@ -53,17 +59,6 @@ def stops_of(states: States, visit: Ints | None = None) -> Ints:
     key = np.column_stack([*parts, states.direction])
     _, label = np.unique(key, axis=0, return_inverse=True)
     return _in_order(label.reshape(-1))
-
-
-def _find_new_commands(states: States) -> Bools:
-    """Find the rows that another pose, direction or payload precedes, (n - 1,)."""
-    step = np.abs(np.diff(states.q, axis=0))
-    moved = (step > max(SAME_POSE, restless(step))).any(axis=1)
-    turned = (np.diff(states.direction, axis=0) != 0).any(axis=1)
-    loaded = np.diff(np.nan_to_num(states.payload)) != 0
-    seen = np.diff(states.station) != 0
-    moving = ~np.isnan(states.heading[1:, 0])
-    return np.asarray(moved | turned | loaded | seen | moving)
 
 
 def restless(step: Floats) -> float:

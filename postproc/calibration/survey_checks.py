@@ -14,6 +14,7 @@ from postproc.calibration.likely_causes import (
     cause_in_any_frame,
     find_cause,
     find_cause_in_tracker_frame,
+    no_error,
     wrong_directions,
 )
 from postproc.calibration.measurements import Measurements
@@ -59,7 +60,7 @@ def check_survey(survey: Measurements, arm: Arm) -> None:
     check_rows(survey, arm)
     check_places(survey, arm)
     gap = survey.position - ArmStates(arm, survey.states).walk.tcp
-    _check_cause(survey, find_cause(survey, arm, _no_error))
+    _check_cause(survey, find_cause(survey, arm, no_error))
     _check_frame(survey, arm, gap, "nominal")
     check_tools(survey, arm)
     _check_kinds(survey, gap)
@@ -90,11 +91,6 @@ def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
         )
         raise MeasurementError(survey.path, wrong, cure)
     _check_arm(survey, arm, error(survey.states))
-
-
-def _no_error(states: States) -> Floats:
-    """Return no error, (n, 3) [m]."""
-    return np.zeros((len(states), 3))
 
 
 def _check_cause(survey: Measurements, cause: Cause | None) -> None:

@@ -76,7 +76,6 @@ def _reversal(cell: Cell, q: Floats, side: Floats, pose: int, drive: int) -> lis
 
 
 def _write_measured_move(name: str, q: Floats) -> list[str]:
-    """Write a move to a place that is measured."""
     return [
         f"  -- MEASURE {name}",
         f"  MOVE JOINT TO {_joints(q)}",

@@ -597,7 +597,12 @@ def read_tools(table: TextTable, tools: Nests) -> tuple[Floats, NDArray[np.int64
             two of them.
     """
     named = isinstance(tools, Mapping) and any(isinstance(k, str) for k in tools)
-    column = _nest_column(table)
+    found = [name for name in ("nest", "tool_id") if table.has(name)]
+    if len(found) > 1:
+        cure = "Remove one of them: both name the probe point"
+        problem = "has columns nest and tool_id"
+        raise MeasurementError(table.path, problem, cure, line=1)
+    column = found[0] if found else ""
     if column and table.has(*TOOL) and _all_numbers(table, column):
         named = named and set(table.text(column)) <= set(map(str, tools))
     if column and (named or not _all_numbers(table, column)):
@@ -624,20 +629,6 @@ def read_tools(table: TextTable, tools: Nests) -> tuple[Floats, NDArray[np.int64
                 line=int(table.line[i]),
             )
     return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
-
-
-def _nest_column(table: TextTable) -> str:
-    """Name the column of probe points, "" without one.
-
-    Raises:
-        MeasurementError: There are two.
-    """
-    found = [name for name in ("nest", "tool_id") if table.has(name)]
-    if len(found) > 1:
-        cure = "Remove one of them: both name the probe point"
-        problem = "has columns nest and tool_id"
-        raise MeasurementError(table.path, problem, cure, line=1)
-    return found[0] if found else ""
 
 
 def _all_numbers(table: TextTable, column: str) -> bool:

@@ -317,7 +317,9 @@ class _CloneWork:
         members = list(self._members(literals, named, agree_mm))
         stays = not literals.isdisjoint(self.proposal.fixed.tolist())
         original, *others = group_arrivals(members, stays, agree_mm)
-        followed = not literals.isdisjoint(self.reading.visits.follows.tolist())
+        visits = self.reading.visits
+        moving = visits.follows[visits.literal < 0]  # others have numbers of their own
+        followed = not literals.isdisjoint(moving.tolist())
         if followed and not original.stops:
             place = members[0].stop
             self._note(place.file, place.line, Code.NOT_CLONED, FOLLOWED)

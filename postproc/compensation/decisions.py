@@ -123,41 +123,6 @@ def move_dependants(
 # Why targets stay where they are, whatever the model says of them.
 
 
-def pinned_targets(
-    visits: Visits,
-    agreement: Agreement,
-    change: Floats,
-    trusted: Bools,
-    cell: Cell,
-    absorbing: Bools,
-) -> dict[Reason, Bools]:
-    """Find literals that must keep their values for what else depends on them.
-
-    Args are those of `would_worsen`.
-
-    Returns:
-        The reasons, and which of the m literals of the agreement have each, (m,).
-    """
-    limit = cell.limits.conflict_mm
-    hurt = would_worsen(visits, agreement, change, trusted, limit, absorbing)
-    cloning = visits.dialect.terms.cloning
-    found = {Reason(Code.NUMBERS_USED_ELSEWHERE,
-                    f"{why}: give the move a point of its own ({cloning})"): rows
-             for why, pins in visits.literals.pins.items()
-             if (rows := np.isin(agreement.literal, pins)).any()}  # fmt: skip
-    text = f"a target computed from it would land farther off ({cloning})"
-    return found | {Reason(Code.DEPENDANT_WORSE, text): hurt}
-
-
-def mark_display(visits: Visits, reasons: Reasons) -> Bools:
-    """Mark targets whose value is known only at run time, (n,)."""
-    holds = ~without_target(visits)
-    display = holds & ((visits.reason > 0) | (visits.literal < 0))
-    reasons.adopt(visits.reason, visits.reasons)
-    reasons.mark(display, NOT_WRITTEN)
-    return display
-
-
 def without_target(visits: Visits) -> Bools:
     """Tell which moves go where no target of theirs says, (n,): $HOME, RELATIVE, .."""
     none = np.array([one.code is Code.NO_TARGET for one in visits.reasons])
@@ -656,7 +621,10 @@ class Round:
             border: Axes that would be on a border of flags, (n, 6).
         """
         visits, reasons = self.reading.visits, Reasons(len(self.reading.visits))
-        display = mark_display(visits, reasons)
+        holds = ~without_target(visits)
+        display = holds & ((visits.reason > 0) | (visits.literal < 0))
+        reasons.adopt(visits.reason, visits.reasons)
+        reasons.mark(display, NOT_WRITTEN)
         unchanged = mark_unchanged(visits, reasons, self.setting.options)
         self._guard(reasons, strays, border)
         usable = reasons.none
@@ -734,7 +702,7 @@ class Round:
         shifts, lost = own_shifts(visits), np.zeros(len(points.literal), dtype=bool)
         absorbing = shifts & points.usable[points.group] if shifts.any() else shifts
         while True:
-            stay = self._must_stay(points, change, absorbing)
+            stay = self._find_pinned(points, change, absorbing)
             found = Settled(points, stay, both)
             if not shifts.any():
                 return found
@@ -750,14 +718,24 @@ class Round:
             lost[points.group[failed]] = True
             absorbing = absorbing & ~failed
 
-    def _must_stay(
+    def _find_pinned(
         self, agreement: Agreement, change: Floats, absorbing: Bools
     ) -> dict[Reason, Bools]:
-        """Find literals that must keep their values, see `pinned_targets`."""
+        """Find literals that must keep their values for what else depends on them.
+
+        Returns:
+            The reasons, and which of the m literals of the agreement have each, (m,).
+        """
         visits, cell = self.reading.visits, self.setting.cell
-        stay = pinned_targets(
-            visits, agreement, change, self._is_trusted, cell, absorbing
-        )
+        limit, trusted = cell.limits.conflict_mm, self._is_trusted
+        hurt = would_worsen(visits, agreement, change, trusted, limit, absorbing)
+        cloning = visits.dialect.terms.cloning
+        stay = {Reason(Code.NUMBERS_USED_ELSEWHERE,
+                       f"{why}: give the move a point of its own ({cloning})"): rows
+                for why, pins in visits.literals.pins.items()
+                if (rows := np.isin(agreement.literal, pins)).any()}  # fmt: skip
+        text = f"a target computed from it would land farther off ({cloning})"
+        stay[Reason(Code.DEPENDANT_WORSE, text)] = hurt
         options = self.setting.options
         if options.shared_points == "leave":
             count = len(agreement.literal)

@@ -420,7 +420,7 @@ def mark_arcs(targets: Targets, plan: Plan, reasons: Reasons) -> None:
     arcs = arcs_of(targets, plan.tcp, plan.aside)
     near = arcs.too_near
     for rows, reason in ((near, TOO_NEAR), (arcs.on_a_line & ~near, LINE)):
-        reasons.mark(_among(arcs.visit[rows], len(targets)), reason)
+        reasons.mark(_mark_rows(len(targets), arcs.visit[rows]), reason)
 
 
 def find_strayed(targets: Targets, plan: Plan, shift: Floats, step: float) -> Bools:
@@ -442,11 +442,4 @@ def find_strayed(targets: Targets, plan: Plan, shift: Floats, step: float) -> Bo
     size = np.linalg.norm(own, axis=2).max(axis=1)
     with np.errstate(invalid="ignore"):
         far = (size > 0.0) & (arcs.strays(own) > np.maximum(size, step))
-    return _among(arcs.visit[far], len(targets))
-
-
-def _among(visits: Ints, n: int) -> Bools:
-    """Tell which of n visits are among some, (n,)."""
-    found = np.zeros(n, dtype=bool)
-    found[visits] = True
-    return found
+    return _mark_rows(len(targets), arcs.visit[far])

@@ -64,11 +64,6 @@ def turn_std(model: Model, arm: Arm, states: States) -> Floats:
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def is_turn_uncertain(model: Model, arm: Arm, states: States) -> Bools:
-    """Tell where the rotation is not known well enough to be corrected, (n,)."""
-    return np.asarray(np.linalg.norm(turn_std(model, arm, states), axis=1) > UNSURE_RAD)
-
-
 def refuse_unknown_rotations(model: Model) -> None:
     """Refuse a model that tells where one point of the tool lands, not how it turns.
 
@@ -305,7 +300,8 @@ def solve_again(
     out.std_error[known] = np.hypot(std, load_error(model, cell, here))
     _mark(out.outside, UNSURE, known, model.unsure(std), len(rows))
     if orientation:
-        unsure = is_turn_uncertain(model, cell.arm, here)
+        spread = turn_std(model, cell.arm, here)
+        unsure = np.asarray(np.linalg.norm(spread, axis=1) > UNSURE_RAD)
         _mark(out.outside, UNSURE_TURN, known, unsure, len(rows))
     return out
 

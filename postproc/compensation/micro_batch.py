@@ -145,7 +145,6 @@ def correct_batch(
 def _split(
     kept: WindowResult, readings: Sequence[ParsedProgram]
 ) -> Iterator[WindowResult]:
-    """Give every program what is its own."""
     moved = np.append(0, np.cumsum(kept.corrected))
     visits = offsets([len(reading.visits) for reading in readings])
     literals = offsets([len(reading.visits.literals) for reading in readings])

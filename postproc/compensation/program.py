@@ -133,7 +133,6 @@ def start_of(cell: Cell) -> Start:
         motionless=cell.motionless,
         constant=cell.constant,
         assume_motion=cell.compensation.assume_motion,
-        payload_kg=cell.payload_mass,
         frame_tables=tables,
         aux=dict(cell.aux),
         taught=cell.taught,

@@ -18,7 +18,6 @@ from postproc.compensation.workers import in_background
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
 from postproc.language.number_edits import difference
-from postproc.language.number_edits import edits as number_edits
 from postproc.language.source import (
     UTF8_MARK,
     Edit,
@@ -86,29 +85,19 @@ class Output:
         return Sidecar(__version__, model, records, options)
 
 
-def write_numbers(
-    reading: ParsedProgram, literals: Ints, values: Floats, model: str
+def write_edits(
+    reading: ParsedProgram, edits: tuple[Replacements, ...], model: str
 ) -> Output:
-    """Write new numbers into a program's files.
+    """Make edits of numbers, file by file.
 
     A file is stamped when it changes; the program also when nothing changes at all, so
     that it shows that it was looked at.
 
     Args:
         reading: The program.
-        literals: Literals that get new numbers, (m,).
-        values: Their numbers, (m, w) in the file's units.
+        edits: What to write, of every file.
         model: Id of the model, for the stamp.
     """
-    v = reading.visits
-    found = number_edits(v.literals, reading.sources, literals, values, v.dialect)
-    return write_edits(reading, found, model)
-
-
-def write_edits(
-    reading: ParsedProgram, edits: tuple[Replacements, ...], model: str
-) -> Output:
-    """Make edits of numbers, file by file; as `write_numbers`."""
     nothing = not any(edits) and not any(reading.cloned)
     files, stamps = {}, {}
     comment = language_of(reading.sources[0].name).comment

@@ -231,7 +231,6 @@ def _without_edits(text: bytes) -> bytes:
 
 
 def _record(path: Path, text: bytes) -> Sidecar:
-    """Take the text of a record."""
     try:
         data = json.loads(text)
         files = {name: FileRecord.read(told) for name, told in data["files"].items()}

@@ -309,7 +309,6 @@ def _turn_again(targets: Targets, visits: Visits, rows: Ints) -> Targets:
 
 
 def _frames(visits: Visits) -> Frames:
-    """Look up the frames of visits."""
     return Frames(few_frames(visits)[visits.tool], _user_frames(visits, ALL))
 
 

@@ -73,7 +73,6 @@ def offsets(sizes: Iterable[int]) -> list[int]:
 
 
 def _join_column(name: str, programs: Sequence[Visits]) -> Any:
-    """Join a column, or a table."""
     parts = [getattr(program, name) for program in programs]
     if isinstance(parts[0], Sequence):
         return tuple(chain.from_iterable(parts))

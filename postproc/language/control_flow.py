@@ -99,12 +99,10 @@ def _divides(one: said.SourceStatement) -> bool:
 
 
 def _leaves_loop(one: said.SourceStatement) -> bool:
-    """Tell whether a statement leaves a loop."""
     return isinstance(one, said.Leave) and one.word == EXIT
 
 
 def _is_loop(one: said.SourceStatement) -> bool:
-    """Tell whether a loop begins with a statement."""
     return isinstance(one, said.ForLoop) or (
         isinstance(one, said.Branch) and one.word in LOOPS
     )

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -37,6 +37,7 @@ class Scope:
         loops: Values of loop variables that are known.
         given: What the routine is called with, by parameter: the operand, its row and
             where that stands. Parameters without an entry are not known.
+        points: What points hold that assignments have changed, where a move is read.
     """
 
     file: int
@@ -45,16 +46,51 @@ class Scope:
     parameters: frozenset[str] = frozenset()
     loops: tuple[tuple[str, float], ...] = ()
     given: tuple[tuple[str, said.Operand, int, Scope], ...] = ()
+    points: frozenset[AssignedPoint] = frozenset()
 
 
-class ModesLike(Protocol):
-    """What moves are carried out with until something changes it."""
+@dataclass(frozen=True)
+class AssignedPoint:
+    """What an assignment gives to a point.
 
-    def join(self, other: Any) -> Self:
-        """Keep what is the same on another way here."""
+    Attributes:
+        place: File, module and routine that declare the point, and its name.
+        operand, row, scope: What is assigned, and where that stands.
+        copied: What another point holds that it is a copy of.
+    """
 
-    def forget(self) -> Self:
-        """Forget what may have changed."""
+    place: tuple[int, str, str, str]
+    operand: said.Operand
+    row: int
+    scope: Scope
+    copied: AssignedPoint | None = None
+
+    @property
+    def name(self) -> str:
+        """The name of the point."""
+        return self.place[-1]
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Its name, and those of the points that it was copied or shifted from."""
+        named = source_of(self.operand)
+        own = set() if named is None else {named.name}
+        return frozenset(own.union(point.name for point in self.chain))
+
+    @property
+    def chain(self) -> list[AssignedPoint]:
+        """It, and what it is a copy of."""
+        return [self, *(self.copied.chain if self.copied else ())]
+
+
+NO_POINTS: frozenset[AssignedPoint] = frozenset()
+
+
+def source_of(operand: said.Operand | None) -> said.DataObject | None:
+    """Return the point that an operand names, or shifts, None where it does neither."""
+    while isinstance(operand, said.FunctionCall) and operand.arguments:
+        operand = operand.arguments[0].value
+    return operand if isinstance(operand, said.DataObject) else None
 
 
 class VisitLike(Protocol):
@@ -63,6 +99,8 @@ class VisitLike(Protocol):
     modes: Any
     origins: frozenset[int]
     count: int
+    goal: Any
+    points: frozenset[AssignedPoint] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +162,12 @@ class Arrived:
     Attributes:
         origins: Visits, START or ELSEWHERE.
         modes: What moves are carried out with.
+        points: What points hold that assignments have changed, as far as it is known.
     """
 
     origins: frozenset[int]
     modes: Any
+    points: frozenset[AssignedPoint] = NO_POINTS
 
     def join(self, other: Arrived) -> Arrived:
         """Allow for another way here."""
@@ -136,11 +176,17 @@ class Arrived:
         modes = self.modes
         if modes != other.modes:
             modes = modes.join(other.modes)
-        return Arrived(self.origins | other.origins, modes)
+        points = self.points & other.points
+        return Arrived(self.origins | other.origins, modes, points)
 
     def forget(self) -> Arrived:
-        """Forget where the arm is, and what moves are carried out with."""
+        """Forget where the arm is, what moves are carried out with, and points."""
         return Arrived(NOWHERE, self.modes.forget())
+
+    def without(self, lost: Callable[[AssignedPoint], bool]) -> Arrived:
+        """Forget what some points hold."""
+        kept = frozenset(point for point in self.points if not lost(point))
+        return self if len(kept) == len(self.points) else replace(self, points=kept)
 
 
 NOWHERE = frozenset([ELSEWHERE])
@@ -297,6 +343,25 @@ class TaskMachine(ABC):
         """Tell whether the handlers of a routine begin with a statement."""
         return False
 
+    def place_of_point(
+        self, target: said.DataObject, scope: Scope
+    ) -> tuple[int, str, str, str] | None:
+        """Return the place of a point that assignments change, None for all else."""
+        return None
+
+    @property
+    def copies(self) -> Set[tuple[str, str]]:
+        """Names of points that are assigned, and of those that they are made from."""
+        return frozenset()
+
+    def changes_of(self, one: said.SourceStatement) -> Iterable[str]:
+        """Yield the names of data that a statement changes."""
+        return [one.target.name] if isinstance(one, said.Assignment) else []
+
+    def routines_beside(self) -> Iterable[tuple[int, int, int]]:
+        """Yield statements that run otherwise than they are followed, as `beside`."""
+        return []
+
     def at_call(self, context: CallContext, here: Arrived) -> Arrived:
         """Allow for what may happen in a routine as long as it runs."""
         return here
@@ -344,6 +409,7 @@ class TaskMachine(ABC):
                     self.reached |= {(file, k) for k in range(row, behind)}
             elif type(one) in _PLAIN or self.goes_on(one) or _ends(one):
                 here = self.after_functions(context, row, one, here)
+                here = self.assign_point(context, row, one, here)
             else:
                 self.part(context, row, one, here)
                 return
@@ -586,6 +652,8 @@ class TaskMachine(ABC):
             flow = self._flows[place]
             self._contexts[key] = CallContext(scope, routine, flow, depth, caller, back)
         context = self._contexts[key]
+        own = file, module, context.scope.routine
+        here = here.without(lambda point: point.place[:3] == own)  # declared anew
         here = self.at_call(context, here)
         self.enter(context, context.flow.first, here)
 
@@ -618,8 +686,57 @@ class TaskMachine(ABC):
             visit = self.visits[number]
             if visit.modes != here.modes:
                 visit.modes = visit.modes.join(here.modes)
+            held = here.points if visit.points is None else visit.points
+            visit.points = held & here.points
         self.visits[known[0]].origins |= here.origins
-        return Arrived(frozenset([known[-1]]), here.modes)
+        return replace(here, origins=frozenset([known[-1]]))
+
+    def assign_point(
+        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+    ) -> Arrived:
+        """Note what an assignment gives to a point; a component leaves it unknown."""
+        if not isinstance(one, said.Assignment):
+            return here
+        place = self.place_of_point(one.target, context.scope)
+        if place is None:
+            return here
+        held = frozenset[AssignedPoint]()
+        if not one.target.steps:
+            held = frozenset([self._give(place, one.value, row, context, here)])
+        here = here.without(lambda point: point.place == place)
+        return replace(here, points=here.points | held)
+
+    def _give(
+        self,
+        place: tuple[int, str, str, str],
+        value: said.Operand,
+        row: int,
+        context: CallContext,
+        here: Arrived,
+    ) -> AssignedPoint:
+        """Return what a point is given: what another one holds, or what is written."""
+        other = None
+        if isinstance(value, said.DataObject):
+            other = self.place_of_point(value, context.scope)
+        known = next((point for point in here.points if point.place == other), None)
+        if known is not None and isinstance(value, said.DataObject) and not value.steps:
+            return replace(known, place=place, copied=known)
+        return AssignedPoint(place, value, row, context.scope)
+
+    def settle_points(self) -> None:
+        """Forget where moves go whose points hold other values on other ways."""
+        given = [visit for visit in self.visits if visit.goal.given]
+        if not given:
+            return
+        rows = self._rows_of({*self.beside, *self.routines_beside()})
+        lost = {
+            name for at, row in rows
+            for name in self.changes_of(self.texts[at].statement(row))
+        }  # fmt: skip
+        for visit in given:
+            known = visit.goal.given <= visit.points
+            if not known or any(lost & point.names for point in visit.goal.given):
+                visit.goal = visit.goal.lost
 
     def pause(self, here: Arrived) -> None:
         """Note that the arm may stop where it stands, although a zone is written."""
@@ -648,7 +765,11 @@ class TaskMachine(ABC):
 
     def rows_beside(self) -> Iterator[tuple[int, int]]:
         """Yield statements that run in ways that are not followed: file and row."""
-        waiting, seen = sorted(self.beside), set(self.beside)
+        return self._rows_of(self.beside)
+
+    def _rows_of(self, parts: set[tuple[int, int, int]]) -> Iterator[tuple[int, int]]:
+        """Yield statements, and those of the routines that they call."""
+        waiting, seen = sorted(parts), set(parts)
         while waiting:
             file, first, behind = waiting.pop()
             for row in range(first, behind):
@@ -682,11 +803,11 @@ def follow(make: Callable[[], M]) -> M:
     """
     machine = make()
     machine.run()
-    if not machine.beside or all(v.count == 1 for v in machine.visits):
-        return machine
-    machine = make()
-    machine.at_once = False
-    machine.run()
+    if machine.beside and any(v.count > 1 for v in machine.visits):
+        machine = make()
+        machine.at_once = False
+        machine.run()
+    machine.settle_points()
     return machine
 
 

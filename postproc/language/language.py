@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -30,7 +29,6 @@ class Start:
             neither move the arm nor set frames.
         constant: Patterns of exported variables, ``name`` or ``program.name``, that no
             other program changes.
-        payload_kg: What the arm carries, NaN where that is not known.
         assume_motion: The shipped list of such routines does not count.
         frame_tables: Outside routine to arguments (``"1,2"``) to the records of the
             frames (``tool``, ``base``, ``uframe``) that it sets.
@@ -47,7 +45,6 @@ class Start:
     motionless: tuple[str, ...] = ()
     assume_motion: bool = False
     constant: tuple[str, ...] = ()
-    payload_kg: float = math.nan
     frame_tables: Mapping[str, Mapping[str, Mapping[str, Record]]] = field(
         default_factory=dict
     )

@@ -177,7 +177,12 @@ def edits(
         written = start >= 0
         order = np.argsort(start[written], kind="stable")
         start, end = start[written][order], end[written][order]
-        _check_lengths(source, start, end)
+        long = np.flatnonzero(end - start > MOST_DIGITS)
+        if len(long):
+            line = source.line_of(int(start[long[0]]))
+            problem = f"a number of the target has more than {MOST_DIGITS:,} digits"
+            cure = "Write it with 15 digits at most: a controller reads no more"
+            raise ProgramError(source.name, problem, cure, line=line)
         values, least = new_values[mine][written][order], least[written][order]
         changed, new = _native.rewrite_numbers(
             source.data, start.astype(np.int64), end.astype(np.int64),
@@ -185,13 +190,3 @@ def edits(
         )  # fmt: skip
         found.append(Replacements(start[changed], end[changed], as_texts(new)))
     return tuple(found)
-
-
-def _check_lengths(source: Source, start: Ints, end: Ints) -> None:
-    """Check that the numbers of targets can be written with as many decimals again."""
-    long = np.flatnonzero(end - start > MOST_DIGITS)
-    if len(long):
-        line = source.line_of(int(start[long[0]]))
-        problem = f"a number of the target has more than {MOST_DIGITS:,} digits"
-        cure = "Write it with 15 digits at most: a controller reads no more"
-        raise ProgramError(source.name, problem, cure, line=line)

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, NamedTuple, overload
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from postproc import _native
 from postproc.arrays import Bytes, Indices, Ints, chunks
-from postproc.exceptions import FileError, PostprocError, ProgramError
+from postproc.exceptions import PostprocError, ProgramError
 
 # What is to be changed in a text: single edits, or a million of them as arrays.
 
@@ -305,21 +304,6 @@ def source_from_bytes(name: str, data: bytes) -> Source:
             line=line,
         )
     return Source(name, data)
-
-
-def read_source(path: str | Path) -> Source:
-    """Read a program or variable file.
-
-    Raises:
-        FileError: The file cannot be read.
-        ProgramError: The file is empty or binary.
-    """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as problem:
-        why = problem.strerror or str(problem)
-        raise FileError(path, f"cannot be read: {why}", "Check the name.") from None
-    return source_from_bytes(str(path), data)
 
 
 def apply(data: bytes, edits: Iterable[Edit]) -> bytes:

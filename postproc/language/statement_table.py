@@ -140,7 +140,14 @@ def read_text(
     forms, by_statement, numbers, names, unterminated = scan(source.data)
     form, begin, end, first, name_first = by_statement
     if unterminated:
-        raise _open_end_error(source, unterminated[0])
+        at = unterminated[0]
+        header = source.data[at : at + 1] == b"%"
+        raise ProgramError(
+            source.name,
+            "the header does not end" if header else "a string is not terminated",
+            "Close it with %%%." if header else "Close it with a quote on its line.",
+            line=source.line_of(at),
+        )
     at_names = np.asarray(name_first[:-1])
     shapes, shape = find_shapes(forms, form, at_names, names[1], names[0])
     said = parse_shapes(shapes, parse)
@@ -148,15 +155,4 @@ def read_text(
     value = np.where(np.isfinite(value), value, np.nan)
     return StatementText(
         source, said, shape.astype(np.int32), begin, end, first, start, stop, value
-    )
-
-
-def _open_end_error(source: Source, at: int) -> ProgramError:
-    """Say what does not end at an offset."""
-    header = source.data[at : at + 1] == b"%"
-    return ProgramError(
-        source.name,
-        "the header does not end" if header else "a string is not terminated",
-        "Close it with %%%." if header else "Close it with a quote on its line.",
-        line=source.line_of(at),
     )

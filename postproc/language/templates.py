@@ -244,16 +244,6 @@ def name_index(text: str) -> int:
     return int(found[2]) if found else -1
 
 
-def fill_names(part: object, names: Sequence[str]) -> object:
-    """Fill names into a part of what a form says.
-
-    >>> fill_names(("move", open_name(0).lower()), ["Weld_1"])
-    ('move', 'weld_1')
-    """
-    fill = filler(part)
-    return fill(names) if fill is not None else part
-
-
 def filler(part: object) -> Filler | None:
     """Return what fills names into a part, None where none is open in it."""
     if isinstance(part, str):

@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Hashable,
+    Iterator,
+    Mapping,
+    Sequence,
+    Set,
+)
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +22,12 @@ import numpy as np
 from postproc.arrays import Floats, Interned, Ints, slim
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.comment_directives import MEASURE, Comments
-from postproc.language.interpreter import Scope, TaskMachine
+from postproc.language.interpreter import (
+    NO_POINTS,
+    AssignedPoint,
+    Scope,
+    TaskMachine,
+)
 from postproc.language.move_runs import unfold, within
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
@@ -96,6 +109,7 @@ class FoundGoal:
         shared: Other programs may read it too.
         shift: How it is shifted from a point, None where it is not, or not known.
         holds: File and first number of a shift that keeps its numbers for this move.
+        given: What assignments gave to the points that the move names.
     """
 
     target: Meaning
@@ -110,6 +124,16 @@ class FoundGoal:
     shared: bool = False
     shift: FoundShift | None = None
     holds: tuple[int, int] = (-1, -1)
+    given: frozenset[AssignedPoint] = NO_POINTS
+
+    @property
+    def lost(self) -> FoundGoal:
+        """The goal where its point holds different values on the ways here."""
+        text = f"{self.name} is given different values on the ways here, or beside them"
+        return FoundGoal(
+            Meaning.UNKNOWN, tuple(math.nan for _ in self.values), name=self.name,
+            aux=self.aux, why=Reason(Code.RUNTIME_VALUE, text),
+        )  # fmt: skip
 
     @property
     def writes(self) -> tuple[int, tuple[int, ...]]:
@@ -164,6 +188,7 @@ class FoundVisit:
         curved: As in `Visits`.
         count: How many moves it stands for that follow each other and differ only in
             where they go: this one is the first.
+        points: What assigned points hold on every way here, None before any is known.
     """
 
     scope: Scope
@@ -178,6 +203,7 @@ class FoundVisit:
     block: Hashable = None
     curved: bool = False
     count: int = 1
+    points: frozenset[AssignedPoint] | None = None
 
 
 @dataclass(frozen=True)
@@ -430,6 +456,7 @@ MOST_NUMBERS = 17  # of a target
 UNKNOWN_POINT = "its move shifts a point, too, whose numbers are not known or computed"
 TAUGHT_SHIFT = "a target that is computed from it is marked as taught"
 ANY_ELEMENT = "a move goes to an element of {} that only the run tells"
+ANY_VALUE = "a move goes to {} where only the run tells what it holds"
 BESIDE = (
     "the move in line {} of {} goes there too: how it is reached there is not followed"
 )
@@ -463,7 +490,7 @@ def _literals(
                 index[file, slots[0]] = len(rows)
                 rows.append(v)
             literal[k] = index[file, slots[0]]
-    pinned = _find_pinned(found, rows, index, other)
+    pinned = _find_pinned(found, rows, index, other, machine.copies)
     _hold_for_taught(pinned, found, index, machine, comments)
     taught = _find_taught(found, literal, len(rows), machine, comments)
     literals = _places(rows, machine, pinned, taught, width)
@@ -492,6 +519,7 @@ def _find_pinned(
     rows: Sequence[FoundVisit],
     index: Mapping[tuple[int, int], int],
     other: Sequence[tuple[FoundGoal, str]],
+    copies: Set[tuple[str, str]],
 ) -> list[str]:
     """Say why literals must stay, "" where they need not; args as of `_literals`."""
     goals = [(v.goal, ANY_ELEMENT.format(v.goal.name)) for v in found]
@@ -507,7 +535,14 @@ def _find_pinned(
         by = v.goal.shift if v.goal.is_rewritten_by_shift else None
         own = elements.get(_array_of(v.goal.name), "") if by is None else by.pins
         pinned.append(stays.get((file, slots[0]), "") or own)
+    uncertain = _find_uncertain({*elements}, copies)
     for v in found:
+        given = frozenset[str]().union(*(point.names for point in v.goal.given))
+        unknown = given & uncertain | {v.goal.name} & (uncertain - elements.keys())
+        place = v.goal.writes[0], v.goal.writes[1][0]
+        for at in {index.get(v.goal.point, -1), index.get(place, -1)} - {-1}:
+            text = ANY_VALUE.format(min(unknown)) if unknown else ""
+            pinned[at] = pinned[at] or text
         at = index.get(v.goal.point, -1)
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
@@ -515,6 +550,19 @@ def _find_pinned(
         if shift >= 0:
             pinned[shift] = pinned[shift] or UNKNOWN_POINT
     return pinned
+
+
+def _find_uncertain(names: set[str], copies: Set[tuple[str, str]]) -> set[str]:
+    """Add what points are made from that moves go to where they are not known.
+
+    >>> sorted(_find_uncertain({"q"}, {("q", "p1"), ("p1", "p0"), ("r", "p2")}))
+    ['p0', 'p1', 'q']
+    """
+    found = set[str]()
+    while names - found:
+        found |= names
+        names = {source for target, source in copies if target in found}
+    return found
 
 
 def _hold_for_taught(

@@ -405,7 +405,6 @@ class Model:
         return PredictedReading(np.concatenate(error), np.concatenate(std))
 
     def _read(self, arm: Arm, states: States) -> PredictedReading:
-        """Predict some readings."""
         batch = ArmStates(arm, states)
         at = self.effects.at(batch, self.values)
         known = self.unmodelled_variance(self.effects, at, self.values)

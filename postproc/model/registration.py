@@ -30,11 +30,6 @@ class Registration:
     stations: tuple[str, ...] = ("",)
 
     @property
-    def base_from_tracker(self) -> Floats:
-        """Transform of the first station's coordinates into the base frame, (4, 4)."""
-        return np.asarray(self.transforms[0])
-
-    @property
     def tracker(self) -> Floats:
         """Position of the tracker at the first station, base frame, (3,) [m]."""
         return np.asarray(self.transforms[0, :3, 3])
@@ -63,21 +58,6 @@ class Registration:
         T = self._of(position, station)
         converted: Floats = np.einsum("nij,nj->ni", T[:, :3, :3], position)
         return converted + T[:, :3, 3]
-
-    def to_tracker(
-        self, position: Floats, station: NDArray[np.int64] | None = None
-    ) -> Floats:
-        """Convert positions (n, 3) [m] from the base to the tracker's frame.
-
-        Args:
-            position: In the base frame.
-            station: Of every position, (n,); None: the first.
-        """
-        T = self._of(position, station)
-        converted: Floats = np.einsum(
-            "nji,nj->ni", T[:, :3, :3], position - T[:, :3, 3]
-        )
-        return converted
 
     def rotations(self, station: NDArray[np.int64]) -> Floats:
         """Return the rotation into the base frame for stations (n,), (n, 3, 3)."""

@@ -507,7 +507,12 @@ def trace_stretches(work: PathSolver, smooth: Bools, most: int) -> Bools:
         most: Targets of a stretch that are followed.
     """
     settled = np.zeros(len(smooth), dtype=bool)
-    some = _stretches(work, smooth, most)
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], smooth, [0]])))
+    first, count = ends[::2], np.minimum(ends[1::2] - ends[::2], most)
+    known = ~np.isnan(work.q[first - 1, 0])
+    first, count = first[known], count[known]
+    edge, start = work.targets.pred_start[first], work.samples.start
+    some = _Stretches(first, count, start[edge], start[edge + count] - start[edge])
     if len(some.first) == 0:
         return settled
     flange = work.flange_at(some.samples)
@@ -525,16 +530,6 @@ def trace_stretches(work: PathSolver, smooth: Bools, most: int) -> Bools:
     _settle(work, some[good], q[np.repeat(good, some.size)], slot[good])
     settled[some[good].targets] = True
     return settled
-
-
-def _stretches(work: PathSolver, smooth: Bools, most: int) -> _Stretches:
-    """Find the stretches."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], smooth, [0]])))
-    first, count = ends[::2], np.minimum(ends[1::2] - ends[::2], most)
-    known = ~np.isnan(work.q[first - 1, 0])
-    first, count = first[known], count[known]
-    edge, start = work.targets.pred_start[first], work.samples.start
-    return _Stretches(first, count, start[edge], start[edge + count] - start[edge])
 
 
 def _steps(q: Floats, near: Floats, head: Ints) -> Floats:
@@ -745,7 +740,12 @@ def _one(work: PathSolver, v: int) -> list[int]:
         _record(work, edge, arrival)
     if not arrivals:
         arrivals = [_without_past(work, v)]
-    _merge(work, v, arrivals)
+    first = arrivals[0]
+    reason = next((a.reason for a in arrivals if a.reason), 0)
+    work.q[v], work.flange[v], work.slot[v] = first.q, first.flange, first.slot
+    if any(np.abs(a.q - first.q).max() > AGREE for a in arrivals[1:]):
+        work.q[v], reason = np.nan, CODE[AMBIGUOUS]
+    work.reason[v] = reason
     return later
 
 
@@ -766,16 +766,6 @@ def _record(work: PathSolver, edge: int, arrival: EdgeEnd) -> None:
         work.path[work.span(edge)] = arrival.path
     else:
         work.source[edge] = -1
-
-
-def _merge(work: PathSolver, v: int, arrivals: list[EdgeEnd]) -> None:
-    """Keep what all arrivals agree on."""
-    first = arrivals[0]
-    reason = next((a.reason for a in arrivals if a.reason), 0)
-    work.q[v], work.flange[v], work.slot[v] = first.q, first.flange, first.slot
-    if any(np.abs(a.q - first.q).max() > AGREE for a in arrivals[1:]):
-        work.q[v], reason = np.nan, CODE[AMBIGUOUS]
-    work.reason[v] = reason
 
 
 def _check_late(work: PathSolver, edge: int) -> None:

@@ -354,7 +354,6 @@ class _Laws:
 
 
 def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
-    """Find the time laws of all runs."""
     k = len(points.ds)
     if k == 0:
         none, joints = np.zeros(0), np.zeros((0, 6))
@@ -373,24 +372,18 @@ def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
     )
     begins = np.append(np.flatnonzero(points.begins), k)
     for i in np.flatnonzero(found.failed[begins[:-1]]).tolist():
-        _estimate(found, points, slice(int(begins[i]), int(begins[i + 1])))
+        # Guessed by programmed speeds and full joint speed, evenly between waypoints.
+        rows = slice(int(begins[i]), int(begins[i + 1]))
+        ds = points.ds[rows]
+        dt = np.maximum(ds / points.override[rows], points.least[rows])
+        found.since[rows] = np.cumsum(dt)
+        velocity = np.zeros((len(dt), 6))
+        velocity[1:-1] = (np.diff(points.q[rows], axis=0) / dt[1:, None])[:-1]
+        found.velocity[rows], found.acceleration[rows] = velocity, 0.0
+        found.fastest[rows] = np.inf
+        rate = ds[1:] / np.maximum(np.diff(found.since[rows]), SHORTEST)
+        found.rate[rows] = np.append(rate[:1], rate)
     return found
-
-
-def _estimate(found: _Laws, points: Waypoints, rows: slice) -> None:
-    """Guess the times of one run from programmed speeds and full joint speed.
-
-    The arm goes evenly from waypoint to waypoint.
-    """
-    ds = points.ds[rows]
-    dt = np.maximum(ds / points.override[rows], points.least[rows])
-    found.since[rows] = np.cumsum(dt)
-    velocity = np.zeros((len(dt), 6))
-    velocity[1:-1] = (np.diff(points.q[rows], axis=0) / dt[1:, None])[:-1]
-    found.velocity[rows], found.acceleration[rows] = velocity, 0.0
-    found.fastest[rows] = np.inf
-    rate = ds[1:] / np.maximum(np.diff(found.since[rows]), SHORTEST)
-    found.rate[rows] = np.append(rate[:1], rate)
 
 
 def _speeds(arm: Arm, targets: Targets, traced: Trace, velocity: Floats) -> Floats:

@@ -229,7 +229,6 @@ def describe_changes(
 
 
 def _pairs(rows: Ints, lines: Ints) -> Iterator[tuple[int, int]]:
-    """Return some rows with the line of each."""
     return zip(rows.tolist(), lines[rows].tolist(), strict=True)
 
 

@@ -118,7 +118,6 @@ def _objects(rows: DiffRows, some: slice, single: Sequence[int]) -> bytes:
 
 
 def _write_record_columns(rows: DiffRows, some: slice) -> dict[str, Cells]:
-    """Write what a record says of some rows."""
     told = rows.told
     none = {key: b'""' for key in ("status", "code", "reason")}
     none |= {"direction": b"[]", "correction_mm": b"null"}
@@ -144,7 +143,6 @@ LIST = (b"[\n    ", b",\n    ", b"\n   ]")  # an item a line
 
 
 def _number_list(rows: DiffRows, values: Floats, some: slice) -> Cells:
-    """Write the numbers of some rows as lists."""
     first = rows.first[some.start : some.stop + 1]
     cells = shortest(values[first[0] : first[-1]]).within(*LIST)
     return cells.group_rows(first - first[0]).unless(np.diff(first) == 0, b"[]")
@@ -201,7 +199,6 @@ class _Writer:
     def _block(
         self, rows: DiffRows, some: slice, single: Sequence[int], shown: Sequence[int]
     ) -> Block:
-        """Write some rows."""
         cells = [*_place(rows, some), *_number_changes(rows, some)]
         cells += [self._size(rows, some), *self._write_outcome_columns(rows, some)]
         texts = {row - some.start: self._texts(rows.row(row)) for row in single}
@@ -262,7 +259,6 @@ def _describe_outcome(
 
 
 def _place(rows: DiffRows, some: slice) -> list[Cells]:
-    """Say where rows stand."""
     line = rows.line[some]
     names = format_texts(rows.targets, rows.target[some], str)
     file = Cells(rows.file.encode(errors="replace"))
@@ -270,7 +266,6 @@ def _place(rows: DiffRows, some: slice) -> list[Cells]:
 
 
 def _number_changes(rows: DiffRows, some: slice) -> list[Cells]:
-    """Write the numbers that changed."""
     first = rows.first[some.start : some.stop + 1]
     mine = slice(*first[[0, -1]].tolist())
     old, new = rows.original[mine], rows.compensated[mine]

@@ -24,15 +24,23 @@ POINTS = 40  # of a curve
 
 def describe_timing(told: InTime, visits: Visits) -> dict[str, object]:
     """Describe how a program runs, and how it keeps to its paths."""
+    paths, corners = told.paths, told.corners(visits)
+    worst = set(np.argsort(-paths.after.sizes, kind="stable")[:CURVES].tolist())
     return {
         "timing": _timing(told, visits),
         "path_accuracy": {
             "before": asdict(ErrorStatistics.of_sizes(told.paths.before.sizes)),
             "after": asdict(ErrorStatistics.of_sizes(told.paths.after.sizes)),
-            "unknown": told.paths.unknown,
-            **_round_off(told.corners(visits)),
+            "unknown": paths.unknown,
+            **_round_off(corners),
         },
-        "path": paths_of(told.paths, visits, told.inserted, told.corners(visits)),
+        "path": [
+            _path(paths, k, visits)
+            | _points(paths, k, told.inserted)
+            | _corner(k, corners)
+            | ({"curve": _curve(paths, k)} if k in worst else {})
+            for k in range(len(paths))
+        ],
     }
 
 
@@ -67,23 +75,6 @@ def _uses(shares: Floats, rows: Ints, visits: Visits) -> list[dict[str, object]]
     return [
         {"share": round(share, 4), "line": int(visits.line[row]) if row >= 0 else None}
         for share, row in zip(shares.tolist(), rows.tolist(), strict=True)
-    ]
-
-
-def paths_of(
-    paths: PathAccuracy,
-    visits: Visits,
-    inserted: Insertions | None = None,
-    corners: RoundOff | None = None,
-) -> list[dict[str, object]]:
-    """Describe how every move keeps to its path; of some the curve as well."""
-    worst = set(np.argsort(-paths.after.sizes, kind="stable")[:CURVES].tolist())
-    return [
-        _path(paths, k, visits)
-        | _points(paths, k, inserted)
-        | _corner(k, corners)
-        | ({"curve": _curve(paths, k)} if k in worst else {})
-        for k in range(len(paths))
     ]
 
 

@@ -206,9 +206,9 @@ def _as_written(visits: Visits, values: Floats, rows: Ints) -> Cells:
     return shortest(values, 9).bracket_rows().unless(none, b"[]")
 
 
-def finite(value: object) -> object:
-    """Replace NaN, which JSON does not have, by null."""
-    if isinstance(value, dict):
+def finite(value: Any) -> Any:
+    """Replace NaN, which JSON does not have, by null, all the way down."""
+    if isinstance(value, Mapping):
         return {k: finite(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [finite(v) for v in value]

@@ -37,7 +37,11 @@ def opinion_table(opinion: Opinion | None) -> OpinionTable | None:
     if opinion is None:
         return None
     rows = tuple((cells(row), row.beyond > 0) for row in opinion.rows)
-    lost = tuple(not_compared(opinion))
+    lost = tuple(
+        f"not compared, {row.what}: {count} ({why})"
+        for row in opinion.rows
+        for why, count in row.skipped.items()
+    )
     return OpinionTable(verdict_of(opinion), opinion.agrees, TITLES, rows, lost)
 
 
@@ -75,12 +79,3 @@ def cells(row: OpinionRow) -> tuple[str, ...]:
     if row.unit == COUNTED or not row.compared:
         largest = ""
     return row.what, str(row.compared), largest, bound, row.where if large else ""
-
-
-def not_compared(opinion: Opinion) -> list[str]:
-    """Say what was not compared, and why."""
-    return [
-        f"not compared, {row.what}: {count} ({why})"
-        for row in opinion.rows
-        for why, count in row.skipped.items()
-    ]

@@ -229,16 +229,6 @@ class Arm:
         """
         return _native.landmarks(self.dh.pack(), floats(q), floats(tool))
 
-    def joint_axes(self, q: Floats) -> tuple[Floats, Floats]:
-        """Give every joint's rotation axis and a point on it.
-
-        Returns:
-            Unit axes of positive controller rotation (n, 6, 3), points (n, 6, 3) [m].
-        """
-        screws = np.swapaxes(self.jacobian(q, np.zeros(3)), 1, 2)
-        axes, origin = screws[..., 3:], self.flange(q)[:, None, :3, 3]
-        return axes, np.cross(axes, screws[..., :3] - np.cross(axes, origin))
-
     def jacobian(self, q: Floats, tool: Floats) -> Floats:
         """Differentiate the TCP: (n, 6, 6), rows 0-2 linear [m/rad], 3-5 angular.
 

@@ -124,7 +124,6 @@ def _explain(
 
 
 def _section(schema: type[Strict], place: tuple[int | str, ...]) -> type[Strict]:
-    """Return the section of a schema at a place."""
     here = schema
     for key in place:
         field = here.model_fields.get(str(key))

@@ -598,7 +598,6 @@ def _beside(folder: Path, section: MeasurementSection) -> MeasurementSection:
 
 
 def _cell_of(path: Path, file: CellFile) -> Cell:
-    """Make a cell of what its file says."""
     arm = load_arm(file.robot.arm, beside=path.parent).mount(_weight(file))
     payload, tracker, survey = file.payload, file.tracker, file.survey
     turn = None if survey is None else survey.euler_zyz_deg

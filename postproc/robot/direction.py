@@ -34,7 +34,6 @@ from postproc.robot.backlash_operator import (
 
 WIDTH_IN_PLAYS = 4.0
 SIDE_DIGITS = 9  # of a side: what is less is rounding of the way up to there
-ON_FLANK = 0.999  # of half the width: as good as resting on the flank
 
 
 @dataclass(frozen=True)
@@ -132,11 +131,6 @@ def arrivals_of_rows(arm: Arm, q: Floats) -> Arrivals:
     """
     first, source = in_row_order(len(q))
     return arrivals(arm, q, Edges(first, source, q, first))
-
-
-def directions_of_rows(arm: Arm, q: Floats) -> Floats:
-    """Return the directions of `arrivals_of_rows`, (n, 6)."""
-    return arrivals_of_rows(arm, q).direction
 
 
 def arrivals(arm: Arm, q: Floats, edges: Edges, lead: Arrivals = UNLED) -> Arrivals:

@@ -19,11 +19,7 @@ from postproc.simulation.kinematics import LinkMasses, bending_moment, total_tor
 from postproc.simulation.state import VirtualArrivals
 
 MOTIONS = {"shift": 0, "rotation": 3}  # where their three numbers stand in a twist
-LAWS = (
-    "constant", "linear", "sign", "step", "harmonic", "saturating", "spline",
-)  # fmt: skip
 DRIVERS = "payload", "temperature", "time", "order", "speed"
-JOINT_DRIVERS = "joint", "lambda", "travel", "torque"
 KNOTS = 6  # of a spline law
 SHARP = 0.3  # of half a driver's range, over which a saturating law bends
 HARDLY = 1e-6  # a range of a driver that is rounding

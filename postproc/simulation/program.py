@@ -184,7 +184,6 @@ def run_moves(
 
 
 def _start(arm: VirtualArm, setup: VirtualCell) -> _ProgramPlace:
-    """Return the arm before the program starts."""
     joints = UPRIGHT if setup.home is None else setup.home
     side = stream(arm.seed, "start").choice([-1.0, 1.0], 6)
     return _ProgramPlace(joints, at_start(arm.gears, joints, side))

@@ -124,18 +124,12 @@ def judge_positions(
         lost = {NO_LINKS: len(claim)}
         rows.append(worst_of(what, "N m", TORQUE, claim, [], lost))
     else:
-        off = torque_misses(claim, arms, late)
+        off = np.full(len(claim), np.nan)
+        for i in np.flatnonzero(~np.isnan(claim.q).any(axis=1) & ~late).tolist():
+            arm = arms[tuple(claim.payload[i].tolist())]
+            off[i] = np.abs(arm.torque(claim.q[i]) - claim.torque[i]).max()
         rows.append(compare(what, "N m", TORQUE, claim, off, late))
     return rows
-
-
-def torque_misses(claim: Claim, arms: LoadedArms, late: Bools) -> Floats:
-    """Return how far claimed gravity torques are from Pinocchio's, (n,) [N m]."""
-    out = np.full(len(claim), np.nan)
-    for i in np.flatnonzero(~np.isnan(claim.q).any(axis=1) & ~late).tolist():
-        arm = arms[tuple(claim.payload[i].tolist())]
-        out[i] = np.abs(arm.torque(claim.q[i]) - claim.torque[i]).max()
-    return out
 
 
 def judge_branches(claim: Claim, file: ArmFile, at: Posture) -> list[OpinionRow]:

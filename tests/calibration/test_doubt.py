@@ -20,6 +20,7 @@ from postproc.robot.state import States
 from tests.calibration.simulator import NJ, random_arm
 from tests.campaign_files import FLOOR, Setup, write_cell
 from tests.campaign_rows import Habit, as_mounted, measure, unseen
+from tests.slow import slow
 
 WALL, CEILING = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 SOFT, STIFF = (8e-8, 3e-7, 2e-6), (0.0, 0.0, 0.0)
@@ -69,7 +70,7 @@ def test_intervals_hold_what_coarse_angles_hide() -> None:
     assert min(after) > 0.85
 
 
-@pytest.mark.parametrize("weight", [WALL, CEILING])
+@pytest.mark.parametrize("weight", [WALL, *slow([(CEILING,)])])
 def test_intervals_hold_weight_whose_direction_is_not_stated(
     weight: tuple[float, float, float],
 ) -> None:

@@ -25,6 +25,7 @@ from tests.calibration.simulator import (
     random_states,
     survey_of,
 )
+from tests.slow import slow
 
 N = 60
 Spoil = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -114,7 +115,7 @@ def checks(name: str) -> Callable[[Measurements], object]:
     return tracker
 
 
-@pytest.mark.parametrize("check", ["fit", "model", "tracker"])
+@pytest.mark.parametrize("check", ["fit", "model", *slow(["tracker"])])
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_of_some_rows_is_named_with_the_first(
@@ -139,7 +140,7 @@ def test_a_mistake_of_all_rows_is_named(mistake: str, check: str) -> None:
 
 @pytest.mark.parametrize("check", ["fit", "model", "tracker"])
 @pytest.mark.parametrize("far", [0.004, 0.03, 0.5])
-@pytest.mark.parametrize("count", [0, 1, 2])
+@pytest.mark.parametrize("count", [0, 2, *slow([1])])
 def test_single_bad_rows_are_left_to_the_fit(
     count: int, far: float, check: str
 ) -> None:
@@ -149,7 +150,7 @@ def test_single_bad_rows_are_left_to_the_fit(
     checks(check)(replace(survey, position=xyz))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *slow([1, 2, 3])])
 def test_an_arm_that_is_far_off_is_no_mistake(seed: int) -> None:
     rng = np.random.default_rng(seed)
     arm = random_arm(rng)
@@ -175,7 +176,7 @@ SIDES: dict[str, tuple[Callable[[np.ndarray], np.ndarray], str]] = {
 }
 
 
-@pytest.mark.parametrize("n", [20, 60, 200])
+@pytest.mark.parametrize("n", [20, 200, *slow([60])])
 @pytest.mark.parametrize("name", SIDES)
 def test_directions_that_are_wrong_in_all_rows_are_asked_about(
     name: str, n: int
@@ -206,7 +207,7 @@ def test_an_arm_that_changed_is_left_to_the_search(name: str, n: int) -> None:
     check_against(measured(8, n, CHANGED[name](our_arm())), NJ, our_model())
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [0, 1, *slow([2, 3, 4])])
 def test_rows_of_another_arm_are_refused(seed: int) -> None:
     other = random_arm(np.random.default_rng(100 + seed))
     with pytest.raises(MeasurementError, match="does not fit these rows"):

@@ -27,6 +27,7 @@ from postproc.report.diagnosis import tell
 from postproc.robot.state import make_states
 from postproc.simulation import stream
 from tests.calibration.planted import ARM, TRACKER, Campaign, campaign
+from tests.slow import slow
 
 ONE = np.array([[1.5, 1.0, 0.5]])
 THREE = np.array([[1.5, 1.0, 0.5], [-1.5, 1.5, 0.2], [1.0, -2.0, 1.5]])
@@ -76,7 +77,7 @@ def in_time(effects: tuple[Effect, ...]) -> set[str]:
     return {e.name for e in effects} & {"thermal", "tracker_drift"}
 
 
-@pytest.mark.parametrize("seed", [305, 321])
+@pytest.mark.parametrize("seed", [305, *slow([321])])
 @pytest.mark.parametrize("places", [ONE, THREE], ids=["one", "three"])
 def test_a_warm_up_beside_a_tracker_that_stands_is_the_arms(
     places: np.ndarray, seed: int, tmp_path: Path
@@ -100,7 +101,7 @@ def test_a_warm_up_beside_a_tracker_that_stands_is_the_arms(
     assert np.linalg.norm(cold - again.error(ARM, at)) > 3e-5
 
 
-@pytest.mark.parametrize("seed", [308, 333])
+@pytest.mark.parametrize("seed", [308, *slow([333])])
 @pytest.mark.parametrize("places", [None, ONE, THREE], ids=["none", "one", "three"])
 def test_a_drift_of_the_tracker_is_never_compensated(
     places: np.ndarray | None, seed: int

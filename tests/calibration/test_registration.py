@@ -32,7 +32,7 @@ def test_tracker_and_probe_are_found_exactly_on_a_perfect_arm() -> None:
     position = (ArmStates(NJ, states).walk.tcp - t) @ R  # tracker = R^T (base - t)
     blind = states.with_(tool=np.zeros((60, 3)))
     found = register(NJ, blind, position, Combination(()), np.zeros(0))
-    np.testing.assert_allclose(found.base_from_tracker[:3, :3], R, atol=1e-7)
+    np.testing.assert_allclose(found.transforms[0][:3, :3], R, atol=1e-7)
     np.testing.assert_allclose(found.tracker, t, atol=1e-7)
     np.testing.assert_allclose(found.probes, PLATE, atol=1e-7)
 

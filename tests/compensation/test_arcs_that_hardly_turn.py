@@ -12,13 +12,14 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.motion.spline_moves import turns_at_unknown_blends, turns_on_arcs
-from postproc.motion.targets import Fly, make_targets
+from postproc.motion.targets import Fly
 from postproc.report.simulation import setup_of
 from postproc.robot.arm import load_arm
 from postproc.robot.trajectory import Motion
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
 from tests.language.neutral_job import NeutralMove, drawn, rapid
+from tests.made_targets import make_targets
 
 ARM = load_arm("nj220-2.7")
 STEPS = 200

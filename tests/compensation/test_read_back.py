@@ -9,9 +9,10 @@ import pytest
 
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.program import ParsedProgram, read_program
-from postproc.compensation.rewrite import read_back, write_numbers
+from postproc.compensation.rewrite import read_back
 from postproc.robot.cell import Cell
 from tests.language.pdl2.reachable import reachable
+from tests.written import write_numbers
 
 
 def changed(reading: ParsedProgram, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -12,9 +12,10 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.options import IN_TIME, Options
 from postproc.compensation.timing_comparison import InTime
 from postproc.motion.cycle_time import run
-from postproc.motion.targets import TargetKind, make_targets
+from postproc.motion.targets import TargetKind
 from postproc.report.json import report_text
 from tests.bench.made import milling
+from tests.made_targets import make_targets
 
 TIMED = Options(timing=True)
 JOB = b"\n".join(

@@ -13,13 +13,14 @@ from postproc.compensation.program import read_program
 from postproc.compensation.targets import find_open_corners
 from postproc.language.visits import ZoneRule
 from postproc.motion.spline_moves import turns_at_unknown_blends
-from postproc.motion.targets import Fly, make_targets
+from postproc.motion.targets import Fly
 from postproc.report.simulation import setup_of
 from postproc.robot.arm import load_arm
 from postproc.robot.trajectory import Motion
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
 from tests.language.neutral_job import compensated, drawn, krl
+from tests.made_targets import make_targets
 
 SIZE = re.compile(rb"\$APO\.CDIS=[^\r\n]+")
 

@@ -15,10 +15,9 @@ from postproc.compensation.rewrite import (
     VerificationError,
     check_output,
     read_back,
-    write_numbers,
 )
 from postproc.robot.cell import Cell
-from tests.written import FIRST, POSE, program
+from tests.written import FIRST, POSE, program, write_numbers
 
 
 @pytest.fixture(params=[1, 50_000], autouse=True)

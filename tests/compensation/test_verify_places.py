@@ -10,13 +10,13 @@ from postproc.compensation.rewrite import (
     VerificationError,
     check_output,
     read_back,
-    write_numbers,
 )
 from postproc.language.number_edits import Skeleton, difference
 from postproc.language.source import NumberSpans, Replacements, Source, apply
 from postproc.robot.cell import load_cell
 from tests.bench.__main__ import CELL
 from tests.bench.made import spot
+from tests.written import write_numbers
 
 POSES = b"""PROGRAM a
 VAR p : POSITION := POS(7, 8, 9, 0, 0, 0, '') -- x

@@ -20,6 +20,7 @@ from postproc.compensation.program import read_program
 from postproc.model.model import Model
 from postproc.report.json import report_text
 from tests.bench import made
+from tests.slow import slow
 
 LEAST, HALO, BAND, RUN_UP = 90, 80, 24, 200
 FLY = "  MOVEFLY LINEAR TO POS({}, 'W T1:0 T2:0 T3:0') ADVANCE"
@@ -132,10 +133,10 @@ def by_joints(nth: int, line: str) -> str:
     return line.replace("LINEAR", "JOINT") if nth % 29 < 2 else line
 
 
-HOSTILE = [dwelling, reversing, in_arcs, changing, leaving, shared, by_joints]
+MORE = [dwelling, in_arcs, changing, shared, by_joints]
 
 
-@pytest.mark.parametrize("change", [None, *HOSTILE])
+@pytest.mark.parametrize("change", [None, reversing, leaving, *slow(MORE)])
 def test_inside_runs_windows_change_no_byte(job, joined, change) -> None:
     program = run_of(900, change)
     if change is shared:
@@ -153,7 +154,7 @@ def test_inside_runs_windows_change_no_byte(job, joined, change) -> None:
         assert min(joined) > 2
 
 
-@pytest.mark.parametrize("kind", ["spot", "drilling", "handling", "milling"])
+@pytest.mark.parametrize("kind", ["spot", "milling", *slow(["drilling", "handling"])])
 def test_between_stops_windows_change_no_byte(job, joined, monkeypatch, kind) -> None:
     monkeypatch.setattr(made, "ROWS", 3)
     program = made.KINDS[kind](600)

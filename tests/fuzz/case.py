@@ -13,12 +13,13 @@ import numpy as np
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.program import read_program
-from postproc.compensation.rewrite import check_output, read_back, write_numbers
+from postproc.compensation.rewrite import check_output, read_back
 from postproc.compensation.sidecar import FileRecord, Sidecar, restore
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Visits
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
+from tests.written import write_numbers
 
 LIMIT = 2.0  # [s] of processor time, for files of up to
 SIZE = 100_000  # bytes

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.exceptions import FileError, ProgramError
+from postproc.exceptions import ProgramError
 from postproc.language.source import (
     Edit,
     NumberSpans,
@@ -14,7 +14,6 @@ from postproc.language.source import (
     Span,
     apply,
     compose,
-    read_source,
     source_from_bytes,
 )
 
@@ -79,11 +78,6 @@ def test_a_text_whose_places_cannot_be_told_is_refused(monkeypatch) -> None:
 def test_binary_files_are_refused_with_the_line() -> None:
     with pytest.raises(ProgramError, match=r"x\.cod:2: .*binary.*\.pdl"):
         source_from_bytes("x.cod", b"PROGRAM x\r\n\x00\x01")
-
-
-def test_missing_file() -> None:
-    with pytest.raises(FileError, match="cannot be read"):
-        read_source("/nowhere/at/all.pdl")
 
 
 def test_newline_is_that_of_the_first_line() -> None:

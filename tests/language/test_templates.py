@@ -1,13 +1,23 @@
 """Lines that differ in numbered names share a form, and say what they would alone."""
 
+from typing import cast
+
 import pytest
 
 from postproc.language.lexer import form_of
 from postproc.language.logical_lines import read_lines
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.parser import parse_line, parse_value_form
+from postproc.language.pdl2.parser import parse_form, parse_value_form
 from postproc.language.source import source_from_bytes
-from postproc.language.templates import parse_shapes
+from postproc.language.templates import filler, parse_shapes
+
+
+def parse_line(mask: str) -> ast.Statement:
+    """Parse the mask of one logical line of PDL2."""
+    form, names = form_of(mask)
+    said = parse_form(form)
+    fill = filler(said)
+    return said if fill is None else cast(ast.Statement, fill(names))
 
 
 @pytest.mark.parametrize(

@@ -27,11 +27,12 @@ from tests.language.neutral_job import (
 )
 from tests.language.true_error import ARMS, MAX_MM, MEAN_MM, differing, driven, fitted
 from tests.language.true_error import landed as landed_on
+from tests.slow import slow
 
 MEANS_MM = {61: 0.025}  # more than is asked for, in every language alike
 
 
-@pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.parametrize("arm", [*ARMS[:2], *slow(ARMS[2:])])
 def test_an_arm_lands_at_corrected_stops(arm, tmp_path):
     cell, model = fitted(arm, tmp_path)
     for number, job in itertools.islice(driven(arm, cell), 2):

@@ -7,9 +7,10 @@ import numpy as np
 from postproc.motion.joint_path import trace
 from postproc.motion.path import arc_per_start
 from postproc.motion.replan import replan_all
-from postproc.motion.targets import ARC_END, CODE, TargetKind, Targets, make_targets
+from postproc.motion.targets import ARC_END, CODE, TargetKind, Targets
 from postproc.robot.arm import Arm
 from postproc.robot.trajectory import Motion
+from tests.made_targets import make_targets
 
 MOVE = np.array([Motion.JOINT, Motion.JOINT, Motion.CIRCULAR, Motion.CIRCULAR])
 VIA = np.array([False, False, True, False])

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from postproc.motion.path import Arcs, arcs, arcs_of
-from postproc.motion.targets import TargetKind, make_targets
+from postproc.motion.targets import TargetKind
 from postproc.robot.pose import pose_from_record
+from tests.made_targets import make_targets
 
 
 def of(*points: tuple[float, float, float]) -> Arcs:

@@ -3,9 +3,10 @@
 import numpy as np
 
 from postproc.motion.planner import plan
-from postproc.motion.targets import CODE, NO_START, NO_TARGET, TargetKind, make_targets
+from postproc.motion.targets import CODE, NO_START, NO_TARGET, TargetKind
 from postproc.robot.arm import Arm
 from postproc.robot.trajectory import Motion
+from tests.made_targets import make_targets
 
 
 def test_a_part_of_the_way_ends_on_the_line_and_turns_in_proportion(

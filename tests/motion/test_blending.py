@@ -12,10 +12,11 @@ from postproc.motion.blending import blend, corners
 from postproc.motion.joint_path import trace
 from postproc.motion.planner import plan
 from postproc.motion.replan import replan_all
-from postproc.motion.targets import Fly, TargetKind, Targets, make_targets
+from postproc.motion.targets import Fly, TargetKind, Targets
 from postproc.robot.arm import Arm
 from postproc.robot.direction import arrivals
 from postproc.robot.trajectory import Motion
+from tests.made_targets import make_targets
 from tests.reference.paths import on_corner
 
 MM = 1e-3

@@ -16,9 +16,10 @@ from postproc.motion.arrival_times import MOST_SAMPLES
 from postproc.motion.cycle_time import ProgramCycle, run
 from postproc.motion.directions_from_trajectory import disagreements, read_directions
 from postproc.motion.ruckig import JointMoves
-from postproc.motion.targets import TargetKind, make_targets
+from postproc.motion.targets import TargetKind
 from postproc.robot.arm import Arm
 from tests.fuzz.originals import generated
+from tests.made_targets import make_targets
 
 ROOT = Path(__file__).parents[2]
 

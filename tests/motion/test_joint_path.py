@@ -23,10 +23,10 @@ from postproc.motion.targets import (
     REASONS,
     TargetKind,
     Targets,
-    make_targets,
 )
 from postproc.robot.arm import Arm
 from postproc.robot.trajectory import Motion
+from tests.made_targets import make_targets
 
 
 def shifted(T: np.ndarray, xyz: tuple[float, float, float]) -> np.ndarray:

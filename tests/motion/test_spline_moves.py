@@ -6,8 +6,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from postproc.motion.spline_moves import turns_unsure
-from postproc.motion.targets import Targets, make_targets
+from postproc.motion.targets import Targets
 from postproc.robot.arm import load_arm
+from tests.made_targets import make_targets
 
 ARM = load_arm("kr210-r2700-extra")
 COUNT = 12

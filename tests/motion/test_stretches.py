@@ -9,13 +9,14 @@ from postproc.compensation.program import read_program
 from postproc.compensation.targets import targets_from_visits
 from postproc.motion import joint_path as module
 from postproc.motion.joint_path import Trace, trace
-from postproc.motion.targets import TargetKind, Targets, make_targets
+from postproc.motion.targets import TargetKind, Targets
 from postproc.robot.arm import Arm
 from postproc.robot.cell import load_cell
 from postproc.robot.trajectory import Motion
 from tests.bench.made import drilling, handling, milling
 from tests.conftest import ROOT
 from tests.language.pdl2.reachable import reachable
+from tests.made_targets import make_targets
 
 SINGULAR = 4  # of the paths below, the one through the wrist singularity
 

@@ -5,8 +5,9 @@ import pytest
 
 from postproc.motion.planner import Plan, plan
 from postproc.motion.ruckig import JointMoves
-from postproc.motion.targets import Fly, TargetKind, make_targets
+from postproc.motion.targets import Fly, TargetKind
 from postproc.robot.arm import Arm
+from tests.made_targets import make_targets
 
 WRIST = np.deg2rad(3.0)
 

@@ -23,7 +23,6 @@ from postproc.robot.direction import (
     FlankState,
     arrivals,
     arrivals_of_rows,
-    directions_of_rows,
     half_width,
     in_row_order,
     passages,
@@ -118,8 +117,8 @@ def test_the_drive_decides_where_wrist_gears_are_coupled(arm: Arm) -> None:
     coupled = replace(arm, coupling=coupling)
     q = np.zeros((3, 6))
     q[:, 4], q[:, 5] = [0.0, 0.1, 0.4], [0.0, -0.1, 0.1]
-    assert directions_of_rows(arm, q)[2, 5] == 1
-    assert directions_of_rows(coupled, q)[2, 5] == -1
+    assert arrivals_of_rows(arm, q).direction[2, 5] == 1
+    assert arrivals_of_rows(coupled, q).direction[2, 5] == -1
 
 
 def test_a_turn_between_the_last_two_samples_is_not_missed(arm: Arm) -> None:

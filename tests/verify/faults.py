@@ -23,7 +23,7 @@ from postproc.model.model import Model, load_model
 from postproc.motion.planner import plan
 from postproc.robot.arm import Arm, build_arm
 from postproc.robot.cell import Cell, load_cell
-from postproc.robot.direction import directions_of_rows
+from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.trajectory import Motion
 from postproc.verify.judge import judge
 from postproc.verify.opinion import Claim, Opinion
@@ -129,7 +129,7 @@ def wrong_lambda(one: Case, rng: np.random.Generator) -> Wrong:
 
 def reversal_left_out(one: Case, rng: np.random.Generator) -> Wrong:
     """Where joints turn back inside of a move is not seen."""
-    told = directions_of_rows(one.job.cell.arm, one.output.q)
+    told = arrivals_of_rows(one.job.cell.arm, one.output.q).direction
     return "every move", *_only_where_told(one, told)
 
 

@@ -23,7 +23,7 @@ from postproc.language.visits import Meaning, Visits
 from postproc.model.model import Model, load_model
 from postproc.robot.arm import build_arm
 from postproc.robot.cell import Cell, load_cell
-from postproc.robot.direction import directions_of_rows
+from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.trajectory import Motion
 from postproc.verify.cycle import LINE_PERCENT, MOVE_S, SHORTEST_S
 from postproc.verify.opinion import Claim
@@ -349,7 +349,7 @@ def lambda_one_late(one: Case, rng: np.random.Generator) -> Claims:
 
 def lambda_of_the_step(one: Case, rng: np.random.Generator) -> Claims:
     """The direction is that from target to target, whatever is between."""
-    told = directions_of_rows(one.job.cell.arm, one.output.q)
+    told = arrivals_of_rows(one.job.cell.arm, one.output.q).direction
     return one.with_directions(np.where(one.output.direction != 0, told, 0))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.robot.arm import load_arm
-from postproc.robot.direction import directions_of_rows
+from postproc.robot.direction import arrivals_of_rows
 from postproc.verify.play_memory import PlayMemory
 
 PLAY = np.full(6, 0.01)
@@ -42,7 +42,7 @@ def test_where_both_are_sure_they_agree() -> None:
     for _ in range(200):
         size = arm.play * 10 ** rng.uniform(-1, 2)
         q = np.cumsum(rng.normal(size=(40, 6)) * size, axis=0)
-        told = directions_of_rows(arm, q)
+        told = arrivals_of_rows(arm, q).direction
         memory = PlayMemory.at(q[0])
         for row in range(1, 40):
             memory = memory.pass_angles(q[row : row + 1], arm.play)

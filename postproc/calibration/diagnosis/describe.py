@@ -36,7 +36,6 @@ def _describe(
     standing: JudgedAddition,
     share: float,
 ) -> Finding:
-    """Describe one addition."""
     fit, family = found.fit, addition.candidate.family
     effect = fit.combination.effects[found.place(number)]
     part = fit.combination.slices[found.place(number)]

@@ -99,7 +99,10 @@ def waves_of(whole: Projection, joint: int, least: float) -> list[Score]:
         least: Evidence that each must have [nats].
     """
     known = fine_parameters(whole.fit, joint)
-    orders = orders_of_waves(whole.at.states.q[:, joint - 1])
+    angle = whole.at.states.q[:, joint - 1]
+    told = Orders.of(angle, FASTEST)
+    step = FINER * 2.0 * np.pi / told.covered
+    orders = np.arange(FIRST_FREE, told.told, step)
     if len(known) == 0 or len(orders) < 2:
         return []
     pursuit, out = MatchingPursuit.of(whole, joint, known, orders), list[Score]()
@@ -113,17 +116,6 @@ def waves_of(whole: Projection, joint: int, least: float) -> list[Score]:
             out.append(best)
         pursuit = pursuit.without(order, seen)
     return out
-
-
-def orders_of_waves(angle: Floats) -> Floats:
-    """List the orders that are tried, finer than what the range resolves.
-
-    Args:
-        angle: Of the joint, (n,) [rad].
-    """
-    told = Orders.of(angle, FASTEST)
-    step = FINER * 2.0 * np.pi / told.covered
-    return np.arange(FIRST_FREE, told.told, step)
 
 
 def fine_parameters(fit: Fit, joint: int) -> Ints:
@@ -303,7 +295,13 @@ class MatchingPursuit:
         gram, none = B.T @ (size[:, None] * left), np.zeros((len(target), 0))
         rest = B.T @ told - seen.T @ moment
         tried = along.sums(orders)
-        held = _orders_in(fit, joint)
+        waves = [
+            wave
+            for effect in fit.combination.effects
+            if isinstance(effect, Transmission)
+            for wave in effect.waves
+        ]
+        held = tuple({order for j, order in waves if j == joint})
         return cls(
             whole, joint, axis, along, square, gram, rest, tried, none, held
         )  # fmt: skip
@@ -443,17 +441,6 @@ class MatchingPursuit:
             tried=self.tried.without(curves, others, rest), basis=basis,
             taken=(*self.taken, order),
         )  # fmt: skip
-
-
-def _orders_in(fit: Fit, joint: int) -> tuple[float, ...]:
-    """List the orders of the waves of a joint that a fit has."""
-    waves = [
-        wave
-        for effect in fit.combination.effects
-        if isinstance(effect, Transmission)
-        for wave in effect.waves
-    ]
-    return tuple({order for j, order in waves if j == joint})
 
 
 def _apart(whole: Projection, known: Ints) -> tuple[Floats, Floats]:

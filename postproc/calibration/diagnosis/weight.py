@@ -100,7 +100,6 @@ def _further(found: Search) -> Search | None:
 
 
 def _of_weight(score: Score) -> bool:
-    """Tell whether a score is of a law of the weight."""
     return isinstance(score.best.effect, WeightEffect)
 
 
@@ -132,7 +131,6 @@ def _with_laws(found: Search) -> Search:
 
 
 def _score_law(found: Search, fit: Fit, place: int, law: Candidate) -> Addition:
-    """Score a law that a fit has."""
     seen = Projection.of(fit, without=place)
     score = rank_some(seen, [law])[0]
     gain = compare_held_out(fit, place, law)

@@ -341,7 +341,6 @@ def renumber_literals(before: Visits, after: Visits) -> Visits:
 
 
 def _take_literals(literals: Literals, rows: Ints) -> Literals:
-    """Take some literals."""
     own = {f.name: _some(getattr(literals, f.name), rows) for f in fields(Literals)}
     return Literals(**own)
 

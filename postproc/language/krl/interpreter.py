@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -257,7 +257,7 @@ class KrlMachine(TaskMachine):
         scope = context.scope
         after = self.arrive(
             context, row, here,
-            lambda: [*self.goals.visits(one, row, scope, here.modes)],
+            lambda: [*self.goals.visits(one, row, scope, here.modes, here.points)],
         )  # fmt: skip
         return replace(after, modes=replace(after.modes, halted=False, goes_on=False))
 
@@ -282,12 +282,12 @@ class KrlMachine(TaskMachine):
         if isinstance(value, said.FunctionCall) and value.name in ("eb", "eb_abs"):
             # The base follows a conveyor, which takes the arm along.
             here = replace(here, origins=NOWHERE)
+        here = self.assign_point(context, row, one, here)
         return replace(here, modes=modes)
 
     def _call(
         self, context: CallContext, row: int, one: said.Instruction, here: Arrived
     ) -> Arrived | None:
-        """Call a routine."""
         name = one.name
         found = self.task.routine(name, context.scope)
         if found is not None:
@@ -392,7 +392,7 @@ class KrlMachine(TaskMachine):
             (file, routine.first) for file, routine, own, word in self._switches
             if word == "on" and own in (number, EVERY)
         }  # fmt: skip
-        declaring = {
+        declaring = {  # file and first row of routines that may declare it
             (file, routine.first) for file, routine, own, _ in self._declarations
             if own in (number, EVERY)
         }  # fmt: skip
@@ -443,7 +443,7 @@ class KrlMachine(TaskMachine):
         active = bool(ending & here.modes.active)
         if not ending or not (active or self._may_switch(*at, numbers)):
             return here
-        ended = replace(here, origins=NOWHERE, modes=here.modes.forget())
+        ended = here.forget()
         on = {own for own in ending if own[0] in self._still_enabled}
         left = (ended.modes.active - ending) | on
         return here.join(replace(ended, modes=ended.modes.with_(active=left)))
@@ -490,7 +490,6 @@ class KrlMachine(TaskMachine):
     def _switch(
         self, context: CallContext, row: int, one: said.InterruptSwitched, here: Arrived
     ) -> Arrived:
-        """Switch interrupts on or off."""
         self._met.add((context.scope.file, row))
         modes, number = here.modes, self._number_of(context, row, one.number)
         if one.word == "on":
@@ -578,6 +577,32 @@ class KrlMachine(TaskMachine):
         called = list[tuple[int, HeadedRows]]()
         self._own(file, one, called)
         return called
+
+    def place_of_point(
+        self, target: said.DataObject, scope: Scope
+    ) -> tuple[int, str, str, str] | None:
+        """Return the place of a point, see `TaskMachine.place_of_point`."""
+        return self.task.place_of_point(target.name, scope)
+
+    @property
+    def copies(self) -> Set[tuple[str, str]]:
+        """Names of points and of what they are made from, see `TaskMachine.copies`."""
+        return self.task.copies
+
+    def changes_of(self, one: said.SourceStatement) -> Iterator[str]:
+        """Yield the names of data that a statement changes, see `TaskMachine`."""
+        yield from (data.name for data in list_changes(one, self.task.routines))
+
+    def routines_beside(self) -> Iterator[tuple[int, int, int]]:
+        """Yield functions, and what interrupts and triggers do, see `TaskMachine`."""
+        for file, text in enumerate(self.texts):
+            for routine in self.task.files[file].routines:
+                if getattr(routine.head, "kind", "") == "deffct":
+                    yield file, routine.first, routine.last
+            for row in text.where(_is_beside):
+                yield file, row, row + 1
+                for at, routine in self.calls_of(file, text.statement(row).action):
+                    yield at, routine.first, routine.last
 
     def goals_of(self, file: int, row: int) -> Iterator[FoundGoal]:
         """Yield where a move goes, see `TaskMachine`."""
@@ -702,6 +727,11 @@ def _puts_out(one: said.Instruction) -> bool:
 def _is_interrupt(one: said.SourceStatement) -> bool:
     """Return True if a statement declares or switches interrupts."""
     return isinstance(one, said.InterruptDeclared | said.InterruptSwitched)
+
+
+def _is_beside(one: said.SourceStatement) -> bool:
+    """Return True if a statement says what is done at another time."""
+    return isinstance(one, said.InterruptDeclared | said.PathTrigger)
 
 
 def _is_modal(name: str) -> bool:

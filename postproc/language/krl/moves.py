@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.interpreter import Scope
+from postproc.language.interpreter import NO_POINTS, AssignedPoint, Scope
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame
 from postproc.language.krl.pose_encoding import (
@@ -42,7 +42,6 @@ from postproc.robot.trajectory import Motion
 
 NOTHING = (math.nan,) * WIDTH
 NO_SLOTS = (-1,) * WIDTH
-NO_AXES = (math.nan,) * 6
 AXES = ("a1", "a2", "a3", "a4", "a5", "a6")
 OUTSIDE = ("e1", "e2", "e3", "e4", "e5", "e6")
 PLACE = COMPONENTS[:6]
@@ -132,7 +131,12 @@ class KrlGoals:
     aux: Collection[int] = ()
 
     def visits(
-        self, move: said.KrlMove, row: int, here: Scope, modes: object
+        self,
+        move: said.KrlMove,
+        row: int,
+        here: Scope,
+        modes: object,
+        points: frozenset[AssignedPoint] = NO_POINTS,
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
@@ -148,7 +152,8 @@ class KrlGoals:
             goal = not_reached(_Goal(self, move, row, here).end(move.to), SPLINE)
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
-        reader = _Goal(self, move, row, here)
+        there = replace(here, points=points) if points else here
+        reader = _Goal(self, move, row, there)
         angle = self._angle(move, row, here)
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
@@ -235,6 +240,17 @@ class _Goal:
         return motion_of(self.move.word) == Motion.JOINT
 
     def end(self, operand: said.Operand) -> FoundGoal:
+        """Read a destination, and note the assigned points that it names."""
+        found = self._end(operand)
+        if not self.here.points:
+            return found
+        operands = (
+            operand.operands if isinstance(operand, said.Operation) else (operand,)
+        )
+        held = (self.task.find_held(one, self.here) for one in operands)
+        return replace(found, given=frozenset(one for one in held if one is not None))
+
+    def _end(self, operand: said.Operand) -> FoundGoal:
         """Read a destination."""
         if self.move.word.endswith("_rel"):
             return self._step(operand)
@@ -256,6 +272,9 @@ class _Goal:
 
     def _point(self, operand: said.KrlAggregate | said.DataObject) -> FoundGoal:
         """Read a point that is written or named."""
+        held = self.task.find_held(operand, self.here)
+        if held is not None:
+            return self._read_held(held)
         name = operand.name if isinstance(operand, said.DataObject) else ""
         found = self.task.value(operand, self.row, self.here)
         if not isinstance(found, KrlRecord) or not found.whole:
@@ -272,6 +291,23 @@ class _Goal:
         if goal.why.code is Code.PARTIAL_TARGET:  # what data lack may be told elsewhere
             return _unknown_goal(PARTIAL, name=name)
         return self._describe_point(goal, operand)
+
+    def _read_held(self, held: AssignedPoint) -> FoundGoal:
+        """Read the destination that an assignment gave to a point."""
+        there = replace(self, row=held.row, here=held.scope)
+        goal = _unknown_goal(AT_RUN_TIME)
+        if isinstance(held.operand, said.KrlAggregate | said.DataObject):
+            goal = there._point(held.operand)
+        if goal.why.code is Code.PARTIAL_TARGET:  # the others are what they were before
+            goal = _unknown_goal(PARTIAL)
+        why = [self._explain_pinned(point.name, goal) for point in held.chain]
+        why += [
+            f"{point.name} stands in a data list: it outlives the run"
+            for point in held.chain
+            if not point.place[2]
+        ]
+        pins = next(filter(None, (goal.pins, *why)), "")
+        return replace(goal, name=held.name, pins=pins)
 
     def _explain_unknown(self, name: str) -> Reason:
         """Say why a name stands for no known point."""

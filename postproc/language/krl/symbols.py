@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from postproc.diagnostics import Code
 from postproc.language.control_flow import HeadedRows
-from postproc.language.interpreter import Scope
+from postproc.language.interpreter import AssignedPoint, Scope
 from postproc.language.ir import is_odd
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import TABLES
@@ -23,6 +23,7 @@ from postproc.language.krl.program import KrlDatum, KrlFile, whole
 CONFIG = "$config"
 ANY = -1  # an entry of a table whose number is not known
 POSITIONS = ("pos", "e6pos")  # types
+POINTS = (*POSITIONS, "axis", "e6axis")
 DEEPEST = 20  # names that stand for names
 
 
@@ -195,7 +196,38 @@ class KrlTask:
     @cached_property
     def written(self) -> frozenset[str]:
         """Names of data that something may change."""
-        return self._uses[0]
+        return frozenset(self._uses.written | self._uses.changed)
+
+    def place_of_point(
+        self, name: str, here: Scope
+    ) -> tuple[int, str, str, str] | None:
+        """Return the place of a point that only assignments change, None for others."""
+        place = self.place(name, here)
+        if place is None or name in self.changed or name.startswith("$"):
+            return None
+        found = self._own[(*place, name)]
+        if found.keys() != {()} or found[()][1].type not in POINTS:
+            return None
+        return found[()][0], *place, name
+
+    def find_held(
+        self, operand: said.Operand | None, here: Scope
+    ) -> AssignedPoint | None:
+        """Return what an assignment gave to the point that an operand names."""
+        if not (here.points and isinstance(operand, said.DataObject)) or operand.steps:
+            return None
+        place = self.place_of_point(operand.name, here)
+        return next((point for point in here.points if point.place == place), None)
+
+    @cached_property
+    def changed(self) -> frozenset[str]:
+        """Names of data that something but an assignment by name may change."""
+        return frozenset(self._uses.changed)
+
+    @property
+    def copies(self) -> Set[tuple[str, str]]:
+        """Points that are assigned, and those that they are made from."""
+        return self._uses.copies
 
     @cached_property
     def assigned(self) -> frozenset[str]:
@@ -274,7 +306,7 @@ class KrlTask:
     @cached_property
     def read(self) -> frozenset[str]:
         """Names of data that something but the destination of a move takes."""
-        return self._uses[1]
+        return frozenset(self._uses.read)
 
     @cached_property
     def beside(self) -> frozenset[str]:
@@ -307,12 +339,12 @@ class KrlTask:
             uses = _Uses(self.routines, self._points)
             for one in part.said:
                 uses.note(one)
-            written |= (uses.written | part.words) - part.own
+            written |= (uses.written | uses.changed | part.words) - part.own
             read |= uses.read - part.own
         return frozenset(written), frozenset(read)
 
     @cached_property
-    def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
+    def _uses(self) -> _Uses:
         uses = _Uses(self.routines, self._points)
         for file in (f for f in self.files if not f.is_submit):
             lists = file.routines == ()
@@ -324,8 +356,23 @@ class KrlTask:
                 if _is_of_part(one.target):
                     uses.written.add(one.target.name)
         written, read = self._uses_beside
-        written |= self.odd_words
-        return written | uses.written, read | written | uses.read
+        uses.changed |= written | self.odd_words
+        uses.read |= read | written
+        uses.read |= {one for target, one in uses.copies if self._outlives(target)}
+        uses.pass_on()
+        return uses
+
+    def _outlives(self, name: str) -> bool:
+        """Return True if data may hold what they are given beyond a routine, or a run.
+
+        Parameters may stand for any data.
+        """
+        routines = {
+            one.routine for f in self.files for one in f.data if one.name == name
+        }
+        heads = [scope.head for own in self.routines.values() for _, scope, _ in own]
+        given = any(name in getattr(head, "parameters", ()) for head in heads)
+        return given or not routines or "" in routines
 
     @cached_property
     def _points(self) -> frozenset[str]:
@@ -514,12 +561,24 @@ class _Uses:
     Attributes:
         own: Names of the routines of the job.
         points: Names of positions.
+        written, changed: Names that assignments change, and those that may be changed
+            otherwise.
+        copies: Points that are assigned, and those that they are made from.
     """
 
     own: Collection[str]
     points: Collection[str]
     written: set[str] = field(default_factory=set)
+    changed: set[str] = field(default_factory=set)
     read: set[str] = field(default_factory=set)
+    copies: set[tuple[str, str]] = field(default_factory=set)
+
+    def pass_on(self) -> None:
+        """Note of points what is noted of those that are made from them."""
+        before = -1
+        while before != len(self.read):
+            before = len(self.read)
+            self.read |= {one for target, one in self.copies if target in self.read}
 
     def note(self, one: said.SourceStatement) -> None:
         """Note what a statement takes and changes."""
@@ -527,14 +586,15 @@ class _Uses:
             case said.Assignment(target=target, value=value):
                 self.written.add(target.name)
                 self._subscripts(target)
-                self.take(value)
+                self._note_assignment(target, value)
             case said.ForLoop(name=name):
-                self.written.add(name)
+                self.changed.add(name)
             case said.Instruction(name=name, arguments=arguments):
                 self._call(name, arguments)
-            case said.KrlMove(to=to, via=via, settings=settings):
+            case said.KrlMove(word=word, to=to, via=via, settings=settings):
+                note = self.take if word.endswith("_rel") else self._destination
                 for end in (to, via):
-                    self._destination(end)
+                    note(end)
                 for setting in settings:
                     self.take(setting.value)
             case (
@@ -544,6 +604,14 @@ class _Uses:
         if not isinstance(one, said.Assignment | said.KrlMove | said.Instruction):
             for operand in operands_of(one):
                 self.take(operand)
+
+    def _note_assignment(self, target: said.DataObject, value: said.Operand) -> None:
+        """Note what an assignment takes: a point that moves go to by another name."""
+        plain = isinstance(value, said.DataObject) and not (value.steps or target.steps)
+        if plain and isinstance(value, said.DataObject):
+            self.copies.add((target.name, value.name))
+        else:
+            self.take(value)
 
     def take(self, operand: said.Operand | None) -> None:
         """Note what an operand takes, and what its functions may change."""
@@ -569,7 +637,7 @@ class _Uses:
     def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
         """Note arguments: a routine may change them, unless it is known not to."""
         changed = _list_changed_arguments(name, arguments, self.own)
-        self.written |= {one.name for one in changed}
+        self.changed |= {one.name for one in changed}
         for argument in arguments:
             self.take(argument.value)
 
@@ -579,22 +647,14 @@ class _Uses:
             case said.DataObject():
                 self._subscripts(operand)
             case said.Operation(operator=":", operands=(first, second)):
-                point, shift = point_and_shift(first, second, self.points)
+                behind = (
+                    isinstance(first, said.DataObject) and first.name in self.points
+                )
+                point, shift = (first, second) if behind else (second, first)
                 self._destination(point)
                 self.take(shift)
             case _:
                 self.take(operand)
-
-
-def point_and_shift(
-    first: said.Operand, second: said.Operand, points: Collection[str]
-) -> tuple[said.Operand, said.Operand]:
-    """Tell which operand of ``first : second`` is the point that is shifted.
-
-    It is the first where that is a position, else the second.
-    """
-    behind = isinstance(first, said.DataObject) and first.name in points
-    return (first, second) if behind else (second, first)
 
 
 def list_changes(

@@ -459,7 +459,6 @@ class Collector:
             moves.last[some[mine]] = self.reasons[self.aux_problem(layout.axes)]
 
     def _fill_evaluated(self, moves: ProgramMoves) -> None:
-        """Fill moves whose goals were evaluated."""
         c, found = self.columns, [*moves.list_evaluated()]
         if not found:
             return

@@ -417,6 +417,10 @@ def read_records(
         for some, axes in _by_axes(lines, records.first, mine, parts):
             read = _Read.of(kind_of(head.type)[0], parts, axes)
             c.fill(lines, some, records.first[some], read, head.shared)
+    most = max((values.shape[1] for _, values in c.aux), default=0)
+    stacked = np.full((k, most), np.nan)
+    for rows, values in c.aux:
+        stacked[rows, : values.shape[1]] = values
     return Entries(
         Rows(NameColumn(), np.empty(0, dtype=np.int32)),
         _names(lines, said, records),
@@ -425,7 +429,7 @@ def read_records(
         tuple(c.layouts),
         c.numbers,
         c.slots,
-        _stack(c.aux, k),
+        stacked,
         slim(c.arm),
     )
 
@@ -479,14 +483,6 @@ def _whole(values: Floats) -> Ints:
     """Cut numbers down to whole ones, 0 where not known or beyond all bounds."""
     sound = np.abs(values) < MOST  # NaN is not
     return np.trunc(np.where(sound, values, 0.0)).astype(np.int64)
-
-
-def _stack(parts: Sequence[tuple[Ints, Floats]], k: int) -> Floats:
-    most = max((values.shape[1] for _, values in parts), default=0)
-    stacked = np.full((k, most), np.nan)
-    for rows, values in parts:
-        stacked[rows, : values.shape[1]] = values
-    return stacked
 
 
 def _names(

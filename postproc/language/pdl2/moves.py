@@ -322,20 +322,16 @@ def _beside(machine: Machine, here: Execution, statement: ast.Move) -> None:
 def _keep(here: Execution, statement: ast.Move) -> None:
     """Keep the numbers of what another arm goes to, and list its target."""
     if goes_to_target(statement):
-        _list_other(here, statement)
+        arm = here.integer(statement.arm) if statement.arm is not None else None
+        whose = f"arm {arm}'s" if arm is not None else "not our arm's"
+        number = f" with arm_number = {arm} under [robot]" if arm is not None else ""
+        text = (
+            f"this move is {whose}, and the cell is of arm {here.world.arm}: it is not "
+            f"corrected. Compensate it with a cell of its arm{number}, and its model"
+        )
+        here.world.report(here.place.program, here.row, Code.OTHER_ARM, text)
     names = frozenset(r.name for r in references((statement.where, statement.via)))
     escape_names(here, names, "another arm goes to it too")
-
-
-def _list_other(here: Execution, statement: ast.Move) -> None:
-    arm = here.integer(statement.arm) if statement.arm is not None else None
-    whose = f"arm {arm}'s" if arm is not None else "not our arm's"
-    number = f" with arm_number = {arm} under [robot]" if arm is not None else ""
-    text = (
-        f"this move is {whose}, and the cell is of arm {here.world.arm}: it is not "
-        f"corrected. Compensate it with a cell of its arm{number}, and its model"
-    )
-    here.world.report(here.place.program, here.row, Code.OTHER_ARM, text)
 
 
 def _with(here: Execution, statement: ast.Move) -> Settings:

@@ -7,15 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import count, zip_longest
-from typing import Any, cast
+from typing import Any
 
 import lark
 
 from postproc.language.grammars import line_parser
-from postproc.language.lexer import NAME_MARK, UNREADABLE, form_of
+from postproc.language.lexer import NAME_MARK, UNREADABLE
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.syntax import Number
-from postproc.language.templates import fill_names, open_name
+from postproc.language.templates import open_name
 
 # Parts of a line on their way from tree to statement, told apart by type.
 
@@ -469,17 +469,6 @@ def parse_value_form(form: str) -> EntryPart | None:
     """Parse the form of a line of a variable file, None where the grammar cannot."""
     found = _parse("lsv", form, VALUE_RULES)
     return found if isinstance(found, EntryPart) else None
-
-
-def parse_line(mask: str) -> ast.Statement:
-    """Parse the mask of one logical line of PDL2.
-
-    Returns:
-        Its statement, or `Unknown` where the grammar knows none.
-    """
-    form, names = form_of(mask)
-    said = parse_form(form)
-    return cast(ast.Statement, fill_names(said, names)) if names else said
 
 
 def _parse(name: str, form: str, rules: Mapping[str, Rule]) -> object:

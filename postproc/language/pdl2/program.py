@@ -621,7 +621,13 @@ def parse(source: Source) -> Program:
     for row in rows.tolist():
         statement = statements.once(int(lines.shape[row]))
         if isinstance(statement, ast.Unknown):
-            _report_unknown(reader, row)
+            line = int(reader.lines.line[row])
+            text = reader.lines.source.line_text(line).strip()
+            reader.report(
+                row,
+                Code.UNKNOWN_STATEMENT,
+                f"this statement is not understood and is kept as it is: {text[:60]!r}",
+            )
         reader.take(row, statement)
     _close_open(reader)
     return Program(
@@ -663,16 +669,6 @@ def _structural(statements: ParsedShapes[ast.Statement], lines: Lines) -> Ints:
     """List the rows of other statements than plain ones, ascending."""
     structural = statements.which(lambda said: not isinstance(said, _PLAIN))
     return np.flatnonzero(structural[lines.shape])
-
-
-def _report_unknown(reader: _Reader, row: int) -> None:
-    line = int(reader.lines.line[row])
-    text = reader.lines.source.line_text(line).strip()
-    reader.report(
-        row,
-        Code.UNKNOWN_STATEMENT,
-        f"this statement is not understood and is kept as it is: {text[:60]!r}",
-    )
 
 
 def _close_open(reader: _Reader) -> None:

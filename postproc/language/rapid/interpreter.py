@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeGuard
@@ -391,6 +391,34 @@ class RapidMachine(TaskMachine):
         found = [one for name in names for one in self.task.routines.get(name, [])]
         return [(at, routine) for at, _, routine in found]
 
+    def place_of_point(
+        self, target: said.DataObject, scope: Scope
+    ) -> tuple[int, str, str, str] | None:
+        """Return the place of a point, see `TaskMachine.place_of_point`."""
+        return self.task.place_of_point(target.name, scope)
+
+    @property
+    def copies(self) -> Set[tuple[str, str]]:
+        """Names of points and of what they are made from, see `TaskMachine.copies`."""
+        return self.task.copies
+
+    def changes_of(self, one: said.RapidStatement) -> Iterator[str]:
+        """Yield the names of data that a statement changes, see `TaskMachine`."""
+        yield from super().changes_of(inside(one))
+
+    def routines_beside(self) -> Iterator[tuple[int, int, int]]:
+        """Yield traps, functions, handlers and what moves call, see `TaskMachine`."""
+        for file, places in self._by_file.items():
+            text = self.texts[file]
+            for _, _, routine in places:
+                rows = range(routine.first + 1, routine.last)
+                if _kind(routine) != "proc":
+                    yield file, rows.start, rows.stop
+                heads = text.where(self.handles, rows.start, rows.stop)
+                yield from ((file, row, rows.stop) for row in heads[:1])
+            for row in text.where(_is_synchronous):
+                yield file, row, row + 1
+
     def goals_of(self, file: int, row: int) -> Iterator[FoundGoal]:
         """Yield where a move goes, see `TaskMachine`."""
         one = inside(self.texts[file].statement(row))
@@ -450,6 +478,8 @@ class RapidMachine(TaskMachine):
                 self.enter(context, row + 1, after)
         elif isinstance(inside, said.JumpTo | said.Leave | said.CompactIf):
             self.part(context, row, inside, here)
+        elif isinstance(inside, said.Assignment):
+            self.enter(context, row + 1, self.assign_point(context, row, inside, here))
         elif type(inside) not in _PASSED:
             self._bind_late(inside)
             super().part_otherwise(context, row, inside, here)
@@ -511,7 +541,11 @@ class RapidMachine(TaskMachine):
         self._interrupt(context, row, one, here)
         after = self.arrive(
             context, row, here,
-            lambda: [*self.goals.visits(one, signature, row, scope, here.modes)],
+            lambda: [
+                *self.goals.visits(
+                    one, signature, row, scope, here.modes, here.points
+                )
+            ],
         )  # fmt: skip
         (last,) = after.origins
         if math.isnan(self.visits[last].zone_mm):
@@ -670,6 +704,11 @@ _HANDLER = Reason(
     Code.BESIDE_PROGRAM,
     "the error handler of its routine may move the arm, or change its settings",
 )
+
+
+def _is_synchronous(one: said.RapidStatement) -> bool:
+    """Return True if a move calls a procedure on its way."""
+    return getattr(inside(one), "name", "") in SYNCHRONOUS
 
 
 def _is_text(operand: said.Operand | None) -> TypeGuard[said.StringLiteral]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.interpreter import Scope
+from postproc.language.interpreter import NO_POINTS, AssignedPoint, Scope, source_of
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import POINT, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
@@ -46,7 +46,6 @@ NOTHING = (np.nan,) * WIDTH
 NO_SLOTS = (-1,) * WIDTH
 _ZONE = re.compile(r"z(\d+)$")
 _SPEED = re.compile(r"v(\d+)$")
-USUAL_TURN = np.deg2rad(500.0)  # [rad/s] of the speeds that the controller knows
 _STEM = re.compile(
     r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search|calib|nut)"
 )
@@ -142,8 +141,10 @@ class Goals:
         row: int,
         scope: Scope,
         modes: Modes,
+        points: frozenset[AssignedPoint] = NO_POINTS,
     ) -> Iterator[RapidVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
+        there = replace(scope, points=points) if points else scope
         ends = signature.operands(one.arguments)
         tool, wobj, zone, speed = self._conditions(one, ends, row, scope)
         motion = _motion(one.name, signature)
@@ -153,12 +154,12 @@ class Goals:
         total, untold = self._total(one, row, scope)
         why = why or untold
         if signature.via >= 0:
-            goal = self.goal(ends[1], signature, row, scope)
+            goal = self._end(ends[1], signature, row, there)
             yield RapidVisit(
                 scope, row, motion, True, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
             )  # fmt: skip
-        goal = self.goal(ends[0], signature, row, scope)
+        goal = self._end(ends[0], signature, row, there)
         if not signature.reaches:
             goal = not_reached(goal, why)
         yield RapidVisit(
@@ -220,6 +221,30 @@ class Goals:
             self._known[key] = one, found  # it keeps its id from being used again
         return found
 
+    def _end(
+        self,
+        operand: said.Operand | None,
+        signature: Signature,
+        row: int,
+        scope: Scope,
+    ) -> FoundGoal:
+        """Read a destination, and note the assigned points that it names."""
+        found = self.goal(operand, signature, row, scope)
+        if not scope.points:
+            return found
+        held = self.task.find_held(source_of(operand), scope)
+        return found if held is None else replace(found, given=frozenset([held]))
+
+    def _read_held(self, held: AssignedPoint, signature: Signature) -> FoundGoal:
+        """Read the destination that an assignment gave to a point."""
+        found = self.goal(held.operand, signature, held.row, held.scope)
+        why = [self._explain_pinned(p.name, Scope(*p.place[:3])) for p in held.chain]
+        pins = next(filter(None, (found.pins, *why)), "")
+        shift = found.shift
+        if shift is not None:
+            shift = replace(shift, pins=shift.pins or pins)
+        return replace(found, name=held.name, pins=pins, shift=shift)
+
     def goal(
         self,
         operand: said.Operand | None,
@@ -228,6 +253,9 @@ class Goals:
         scope: Scope,
     ) -> FoundGoal:
         """Read a destination; numbers of system modules are to stay."""
+        held = self.task.find_held(operand, scope)
+        if held is not None:
+            return self._read_held(held, signature)
         found = self._goal(operand, signature, row, scope)
         if found.pins or found.file < 0 or not self.task.files[found.file].is_system:
             return found
@@ -240,12 +268,13 @@ class Goals:
         row: int,
         scope: Scope,
     ) -> FoundGoal:
-        """Read a destination."""
-        written = operand
+        written, names = operand, {g[0] for g in self.task.find_given(operand, scope)}
         operand, row, scope = self.task.behind(operand, row, scope)
         match operand:
             case said.Composite() | said.DataObject():
-                return self._point(operand, signature.joints, row, scope)
+                found = self._point(operand, signature.joints, row, scope)
+                why = [self._explain_pinned(one, scope) for one in sorted(names)]
+                return replace(found, pins=next(filter(None, why), found.pins))
             case said.FunctionCall(name=name, arguments=arguments) if (
                 name in SHIFTS
                 and name not in self.task.routines
@@ -359,7 +388,7 @@ class Goals:
         if found is None:
             code = Code.UNDECLARED_VARIABLE
             text = "is declared in none of the given files, or more than once"
-        elif found[1].declared.value is None:
+        elif found[1].declared.value is None and name not in self.task.written:
             code, text = Code.NO_VALUE, "has no value in the given files"
         elif self.task.is_changed_beside(*found):
             code = Code.BESIDE_PROGRAM
@@ -385,6 +414,9 @@ class Goals:
             return f"{name} is data of another task too, which has its numbers as well"
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
+        found = self.task.datum(name, scope)
+        if found and found[1].declared.kind == "pers" and name in self.task.written:
+            return f"{name} is persistent: it keeps what it is given beyond this run"
         return ""
 
     def _read_shifted(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from postproc.files import task_beside
 from postproc.language.control_flow import HeadedRows
-from postproc.language.interpreter import Scope
+from postproc.language.interpreter import AssignedPoint, Scope, source_of
 from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import (
@@ -214,12 +214,45 @@ class RapidTask:
     @cached_property
     def written(self) -> frozenset[str]:
         """Names of data that something may change."""
-        return self._uses[0]
+        return frozenset(self._uses.written | self._uses.changed)
 
     @cached_property
     def read(self) -> frozenset[str]:
         """Names of data that something but the destination of a move takes."""
-        return self._uses[1]
+        return frozenset(self._uses.read)
+
+    @cached_property
+    def changed(self) -> frozenset[str]:
+        """Names of data that something but an assignment by name may change."""
+        return frozenset(self._uses.changed)
+
+    @property
+    def copies(self) -> Set[tuple[str, str]]:
+        """Points that are assigned, and those that they are made from."""
+        return self._uses.copies
+
+    def place_of_point(
+        self, name: str, here: Scope
+    ) -> tuple[int, str, str, str] | None:
+        """Return the place of a point that only assignments change, None for others."""
+        found = self.datum(name, here)
+        if found is None or name in self.changed or BY_STRING & self.find_calls:
+            return None
+        file, datum = found
+        declared = datum.declared
+        plain = declared.type in TARGETS and not declared.dimensions
+        if not plain or declared.kind == "const" or self.is_used_beside(name, here):
+            return None
+        return file, datum.module, datum.routine, name
+
+    def find_held(
+        self, operand: said.Operand | None, here: Scope
+    ) -> AssignedPoint | None:
+        """Return what an assignment gave to the point that an operand names."""
+        if not (here.points and isinstance(operand, said.DataObject)) or operand.steps:
+            return None
+        place = self.place_of_point(operand.name, here)
+        return next((point for point in here.points if point.place == place), None)
 
     @cached_property
     def declared(self) -> frozenset[str]:
@@ -233,15 +266,27 @@ class RapidTask:
         return frozenset(pairs | {f"o_{name}" for name in pairs})
 
     @cached_property
-    def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
+    def _uses(self) -> _NamesUsed:
         uses = _NamesUsed(self.routines)
         for file in self.files:
             for statement in file.text.said:
                 uses.note(statement)
-        uses.written |= self._odd_words
+        uses.changed |= self._odd_words
         uses.read |= self._odd_words
+        uses.read |= {one for target, one in uses.copies if self._outlives(target)}
         uses.pass_on()
-        return frozenset(uses.written), frozenset(uses.read)
+        return uses
+
+    def _outlives(self, name: str) -> bool:
+        """Return True if data may hold what they are given beyond a routine, or a run.
+
+        Parameters may stand for any data.
+        """
+        data = [one for file in self.files for one in file.data]
+        kinds = {one.declared.kind for one in data if one.declared.name == name}
+        heads = (parameters_of(r) for own in self.routines.values() for *_, r in own)
+        given = any(one.name == name for parameters in heads for one in parameters)
+        return given or not kinds or "pers" in kinds
 
     def scope_of(self, number: int, module: str, routine: HeadedRows) -> Scope:
         """Return where the statements of a routine stand."""
@@ -279,15 +324,23 @@ class RapidTask:
         self, operand: said.Operand | None, row: int, here: Scope
     ) -> tuple[said.Operand | None, int, Scope]:
         """Return what stands behind a parameter, where that is known, and its place."""
+        for _, given, at, there in self.find_given(operand, here):
+            operand, row, here = given, at, there
+        return operand, row, here
+
+    def find_given(
+        self, operand: said.Operand | None, here: Scope
+    ) -> Iterator[tuple[str, said.Operand, int, Scope]]:
+        """Yield the parameters that an operand stands for, as in `Scope.given`."""
         while isinstance(operand, said.DataObject) and not operand.steps:
             if operand.name in dict(here.loops):
-                break
+                return
             found = (one for one in here.given if one[0] == operand.name)
             given = next(found, None)
             if given is None:
-                break
-            _, operand, row, here = given
-        return operand, row, here
+                return
+            yield given
+            _, operand, _, here = given
 
     # Values.
 
@@ -464,6 +517,9 @@ class _NamesUsed:
 
     Attributes:
         own: Routines of the task by name: what else has their names is hidden.
+        written: Names that assignments change; those that take a value are not `read`.
+        changed: Names that may be changed otherwise.
+        copies: Points that are assigned, and those that they are made from.
         passed: Data and the parameter that they are given to, and whether the routine
             may change them through it.
         parts: Names of which moves go to elements or components.
@@ -471,7 +527,9 @@ class _NamesUsed:
 
     own: Mapping[str, Sequence[tuple[int, str, HeadedRows]]]
     written: set[str] = field(default_factory=set)
+    changed: set[str] = field(default_factory=set)
     read: set[str] = field(default_factory=set)
+    copies: set[tuple[str, str]] = field(default_factory=set)
     passed: set[tuple[str, str, bool]] = field(default_factory=set)
     parts: set[str] = field(default_factory=set)
 
@@ -482,13 +540,15 @@ class _NamesUsed:
         """
         self.read |= self.parts & {parameter for _, parameter, _ in self.passed}
         before = -1
-        while before != len(self.written) + len(self.read):
-            before = len(self.written) + len(self.read)
+        while before != len(self.changed) + len(self.read):
+            before = len(self.changed) + len(self.read)
             for name, parameter, by_reference in self.passed:
-                if parameter in self.read | self.written:
+                written = parameter in self.written | self.changed
+                if written or parameter in self.read:
                     self.read.add(name)
-                if parameter in self.written and by_reference:
-                    self.written.add(name)
+                if written and by_reference:
+                    self.changed.add(name)
+            self.read |= {one for target, one in self.copies if target in self.read}
 
     def note(self, one: said.RapidStatement) -> None:
         """Note the names that a statement may change, and those that it takes."""
@@ -498,7 +558,7 @@ class _NamesUsed:
                     self._operand(operand)
             case said.Assignment(target=target, value=value):
                 self.written.add(target.name)
-                self._operand(value)
+                self._note_assignment(target, value)
             case said.Branch(values=values):
                 for operand in values:
                     self._operand(operand)
@@ -506,17 +566,38 @@ class _NamesUsed:
                 self._operand(condition)
                 self.note(inside)
             case said.ForLoop(name=name, first=first, last=last, step=step):
-                self.written.add(name)
+                self.changed.add(name)
                 for operand in (first, last, step):
                     self._operand(operand)
             case said.Leave(value=value):
                 self._operand(value)
             case said.ConnectTrap(interrupt=interrupt):
-                self.written.add(interrupt.name)
+                self.changed.add(interrupt.name)
             case said.Instruction(name=name, arguments=arguments):
                 self._call(name, arguments)
             case said.LateCall(arguments=arguments):
                 self._arguments(arguments)
+
+    def _note_assignment(self, target: said.DataObject, value: said.Operand) -> None:
+        """Note what an assignment takes: a point that moves go to by another name."""
+        source = source_of(value)
+        if source is None or target.steps or source.steps:
+            self._operand(value)
+        elif value is source:
+            self.copies.add((target.name, source.name))
+        elif isinstance(value, said.FunctionCall) and self._shifts(value):
+            self.copies.add((target.name, source.name))
+            self._destination(value)
+        else:
+            self._operand(value)
+
+    def _shifts(self, value: said.Operand | None) -> bool:
+        """Return True if a value is a point, or one that functions only shift."""
+        while isinstance(value, said.FunctionCall):
+            if value.name not in SHIFTS or value.name in self.own:
+                return False
+            value = value.arguments[0].value if value.arguments else None
+        return isinstance(value, said.DataObject)
 
     def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
         pairs = self._fitting(name, arguments)
@@ -601,7 +682,7 @@ class _NamesUsed:
         """Note arguments that a routine may change."""
         for argument in arguments:
             if isinstance(argument.value, said.DataObject):
-                self.written.add(argument.value.name)
+                self.changed.add(argument.value.name)
             self._operand(argument.value)
 
     def _operand(self, operand: said.Operand | None) -> None:

@@ -80,11 +80,6 @@ def loads(batch: ArmStates, torque: Floats, unit: Floats) -> Floats:
     return np.sqrt(variance)
 
 
-def softness_of(load: float) -> float:
-    """Return the usual softness of a joint whose load varies by so much [rad/(N m)]."""
-    return max(SCALE, YIELDS / max(load, 1e-3))
-
-
 @dataclass(frozen=True)
 class WeightEffect(Effect):
     """What joints yield by under weight, each kept or dropped by itself.
@@ -122,7 +117,7 @@ class WeightEffect(Effect):
             joints,
             tuple(moments(batch.arm, j) for j in joints),
             bool(np.nan_to_num(batch.states.payload).any()),
-            tuple(softness_of(float(load[j - 1])) for j in joints),
+            tuple(max(SCALE, YIELDS / max(float(load[j - 1]), 1e-3)) for j in joints),
         )
 
     @classmethod

@@ -148,10 +148,10 @@ class Curve(CarriedEffect):
 
     def law_parameters(self) -> tuple[Parameter, ...]:
         """Name the terms by their degrees."""
-        return self._named
+        return self._parameters
 
     @cached_property
-    def _named(self) -> tuple[Parameter, ...]:
+    def _parameters(self) -> tuple[Parameter, ...]:
         """Name them once: a search asks for their number again and again."""
         si, scale = self.own_unit()
         what = f"{self.direction} by {' x '.join(self.source)}"

@@ -80,7 +80,10 @@ class Transmission(JointEffect):
     def orders(cls, batch: ArmStates, joint: int) -> Orders:
         """Take the orders of a joint, from 1, that may be tried."""
         own = tuple(float(j == joint) for j in JOINTS)
-        return orders_of(batch, own, motor_ratio(batch.arm, joint))
+        ratio = float("nan")  # a motor that follows other joints too: see `drive`
+        if turns_alone(batch.arm, joint):
+            ratio = float(abs(batch.arm.gear_ratio[joint - 1]))
+        return orders_of(batch, own, ratio)
 
     def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Change the order of one wave; those of eccentricity are what they are."""
@@ -123,7 +126,6 @@ class Transmission(JointEffect):
 
 
 def _joints(numbers: list[int]) -> str:
-    """Name joints."""
     some = ", ".join(map(str, numbers))
     return f"joint {some}" if len(numbers) == 1 else f"joints {some}"
 
@@ -131,15 +133,6 @@ def _joints(numbers: list[int]) -> str:
 def whole(waves: tuple[tuple[int, float], ...]) -> tuple[tuple[int, float], ...]:
     """Round the orders of waves."""
     return tuple((j, float(round(k))) for j, k in waves)
-
-
-def motor_ratio(arm: Arm, joint: int) -> float:
-    """Say how often a motor turns while the joint does once; NaN where not known.
-
-    The motor of a coupled joint follows other joints too: its turns are a drive's.
-    """
-    ratio = float(abs(arm.gear_ratio[joint - 1]))
-    return ratio if turns_alone(arm, joint) else float("nan")
 
 
 def turns_alone(arm: Arm, joint: int) -> bool:

@@ -29,7 +29,7 @@ from postproc.report.html.figure import (
     thin,
 )
 from postproc.report.html.page import render
-from postproc.report.html.program import finite
+from postproc.report.json import finite
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 
@@ -55,7 +55,6 @@ def steps(history: Sequence[Mapping[str, Any]] | None) -> list[dict[str, Any]]:
 
 
 def _step(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Take one step."""
     added = entry.get("added") or ([entry] if "effect" in entry else [])
     means = {
         when: (entry.get(when) or {}).get("mean_mm") for when in ("before", "after")
@@ -110,7 +109,8 @@ def calibration_report(
         model=model,
         fit=told,
         parameters=parameters,
-        unseen=told.get("unseen") or at_prior(parameters),
+        unseen=told.get("unseen")
+        or [str(p["name"]) for p in parameters if p["determined"] < UNSEEN],
         pairs=pairs[:MOST_PAIRS],
         more_pairs=max(0, len(pairs) - MOST_PAIRS),
         iso=iso,
@@ -120,7 +120,6 @@ def calibration_report(
 
 
 def _rows(rows: Mapping[str, Sequence[Any]] | None) -> dict[str, Floats]:
-    """Take the rows as arrays."""
     if not rows:
         return {}
     return {k: np.array(v, dtype=float) for k, v in rows.items() if k != "id"}
@@ -198,11 +197,6 @@ def parameter_table(parameters: Sequence[Mapping[str, Any]]) -> list[dict[str, A
             }
         )
     return out
-
-
-def at_prior(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Name the parameters that the rows say next to nothing about."""
-    return [str(p["name"]) for p in parameters if p["determined"] < UNSEEN]
 
 
 def list_correlated(model: Mapping[str, Any]) -> list[tuple[str, str, float]]:

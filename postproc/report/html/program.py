@@ -15,7 +15,7 @@ from postproc.language.languages import language_of
 from postproc.language.source import Source
 from postproc.language.visits import Meaning
 from postproc.report.html.page import render, short, visible
-from postproc.report.json import JOINTS, in_time_of
+from postproc.report.json import JOINTS, finite, in_time_of
 from postproc.report.second_opinion import opinion_table
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
@@ -322,7 +322,6 @@ def choose(columns: PageColumns, most: int = MOST) -> Ints:
 
 
 def _evenly(rows: Ints, most: int) -> Ints:
-    """Take at most so many rows, evenly."""
     if len(rows) <= most:
         return rows
     return rows[np.arange(most) * len(rows) // most]
@@ -519,11 +518,6 @@ def _place(columns: PageColumns, i: int) -> tuple[int, str, int, str]:
     )
 
 
-def tell_counts(columns: PageColumns) -> dict[str, int]:
-    """Count the visits of every status."""
-    return {s.name.lower(): int((columns.status == s).sum()) for s in Status}
-
-
 def histogram(columns: PageColumns) -> dict[str, Any]:
     """Count the lengths of the corrections that were made."""
     size = columns.size_mm[columns.status == Status.CORRECTED]
@@ -549,17 +543,6 @@ def seconds(stages: Mapping[str, float]) -> tuple[Stage, ...]:
     """List stages in their order, with shares."""
     total = sum(stages.values()) or 1.0
     return tuple(Stage(name, s, s / total) for name, s in stages.items())
-
-
-def finite(value: Any) -> Any:
-    """Replace NaN, which JSON does not have, by None, all the way down."""
-    if isinstance(value, Mapping):
-        return {k: finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(v) for v in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
 
 
 # The page of a compensated program: what moved, by how much, and what did not.
@@ -660,7 +643,7 @@ def _page(program: ProgramPage) -> str:
         payload,
         SCRIPTS,
         program=program,
-        counts=tell_counts(columns),
+        counts={s.name.lower(): int((columns.status == s).sum()) for s in Status},
         corrected=int((columns.status == Status.CORRECTED).sum()),
         groups=group_uncorrected(columns),
         predicted=finite(program.predicted),

@@ -10,6 +10,7 @@ import pytest
 from postproc.compensation.paths.path_error import PredictedWays
 from postproc.compensation.paths.servo_lag import CORNER, REACH, ServoLag, servo_lag
 from postproc.compensation.paths.track_alignment import OnTheWay
+from tests.slow import slow
 
 MOVES, COUNT, RATE, SPEED, RADIUS = 8, 301, 500.0, 0.2, 0.1
 SHARP = np.zeros(2 * MOVES + 2, dtype=bool)
@@ -65,7 +66,7 @@ def laid(
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("lag", [5e-3, 15e-3])
+@pytest.mark.parametrize("lag", [5e-3, *slow([15e-3])])
 def test_a_lag_is_told_by_how_arcs_are_cut(lag: float) -> None:
     ways = arcs()
     found = servo_lag(ways, ways.place, read(ways, lag), SHARP)

@@ -198,7 +198,7 @@ class Draw:
         match rng.choice([*kinds, *["displace"] * self.rapid]):
             case "point":
                 value = Named(f"p{rng.randint(1, 3)}")
-                return SetPoint(rng.choice(self.made.variables), value)
+                return SetPoint(rng.choice(self.made.variables[:2]), value)
             case "load":
                 return SetLoad(rng.randint(0, LOADS))
             case "base":
@@ -262,11 +262,23 @@ class Draw:
                 self.made.points[name] = (self._literal(), self.file)
                 return Named(name)
             case "variable":
-                return Named(rng.choice(self.made.variables))
+                return Named(rng.choice(self.made.variables[:2]))
             case "given" if self.given:
                 return Named(self.given[0])
             case "made":
                 return Made("above", self._expr())
+        return self._fixed()
+
+    def _value(self) -> Point:
+        """Draw what a variable point is given: another one, numbers, or a shift."""
+        match self.rng.choice(["point", "point", "numbers", "numbers", "shift"]):
+            case "numbers":
+                return Inline(self._literal())
+            case "shift" if self.has("offset"):
+                self.shifts += 1
+                return Shifted(self._fixed(), self._offset(), mark=SHIFTS + self.shifts)
+            case "point" if self.has("variable"):
+                return Named(self.rng.choice(self.made.variables[:2]))
         return self._fixed()
 
     def _offset(self) -> tuple[Expr, Expr, Expr]:
@@ -284,12 +296,29 @@ class Draw:
             self.made.places.append(Place(MIDDLE - back, True, 1, 1))
             first.append(self._move("axes", Inline(len(self.made.places) - 1), 0))
         frames: list[Statement] = [SetTool(1, 1), SetBase(1, way=1), SetSpeed(200)]
-        given = [SetPoint(name, self._fixed()) for name in self.made.variables]
+        given = [SetPoint(name, self._fixed()) for name in self.made.variables[:2]]
         counts = [Assign("m1", 0)]
         return (*frames, *given, *counts, *first)
 
     def _body(self, count: int, depth: int) -> Body:
-        return tuple(self._statement(depth) for _ in range(count))
+        found: list[Statement] = []
+        for _ in range(count):
+            found.append(one := self._statement(depth))
+            if isinstance(one, SetPoint) and self.rng.random() < 0.7:
+                found.append(self._move("line", Named(one.name), 0))
+            elif self.has("variable") and self.rng.random() < 0.1:
+                found += self._own_variable()
+        return tuple(found)
+
+    def _own_variable(self) -> Body:
+        """Give a variable that nothing else uses a value, or two, and go there."""
+        name = f"w{len(self.made.variables)}"
+        self.made.variables.append(name)
+        found: list[Statement] = []
+        for _ in range(self.rng.randint(1, 2)):
+            value = Inline(self._literal())
+            found += [SetPoint(name, value), self._move("line", Named(name), 0)]
+        return tuple(found)
 
     def _statement(self, depth: int) -> Statement:
         kinds: dict[str, int] = {"motion": 12, "assign": 2, "frames": 2, "other": 2}
@@ -348,13 +377,13 @@ class Draw:
 
     def _assignment(self) -> Statement:
         rng = self.rng
-        kinds = ["number", "number", *["point", "lift"] * self.has("lift")]
+        kinds = ["number", "number", *["point"] * 3 * self.has("variable")]
+        kinds += ["lift"] * self.has("lift")
         match rng.choice(kinds):
             case "point":
-                value = self._fixed()
-                return SetPoint(rng.choice(self.made.variables), value)
+                return SetPoint(rng.choice(self.made.variables[:2]), self._value())
             case "lift":
-                return Lift(rng.choice(self.made.variables), rng.randint(-5, 5))
+                return Lift(rng.choice(self.made.variables[:2]), rng.randint(-5, 5))
         return Assign(rng.choice(self._names()), self._expr())
 
     def _frames(self) -> Statement:

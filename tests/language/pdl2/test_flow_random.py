@@ -13,8 +13,9 @@ from tests.language.pdl2.executed import PAGE, Executed, Generated
 from tests.language.pdl2.interpreter import Interpreter
 from tests.language.pdl2.poses import matrix
 from tests.language.pdl2.whole_jobs import Job
+from tests.slow import slow
 
-PROGRAMS = 150
+SOME, PROGRAMS = 50, 150
 
 
 POSES = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)
@@ -94,14 +95,14 @@ def follow(visits: Visits, trace: list[Executed], made: Generated) -> list[set[i
     return found
 
 
-@pytest.mark.parametrize("seed", range(PROGRAMS))
+@pytest.mark.parametrize("seed", [*range(SOME), *slow(range(SOME, PROGRAMS))])
 def test_predecessors_contain_what_is_run(seed: int) -> None:
     made, visits = generate(seed, exact=False)
     for run in range(6):
         follow(visits, Interpreter(made, run).run(), made)
 
 
-@pytest.mark.parametrize("seed", range(PROGRAMS))
+@pytest.mark.parametrize("seed", [*range(SOME), *slow(range(SOME, PROGRAMS))])
 def test_constant_programs_are_followed_exactly(seed: int) -> None:
     made, visits = generate(1000 + seed, exact=True)
     trace = Interpreter(made, 0, most=100_000).run()

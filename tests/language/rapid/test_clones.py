@@ -26,7 +26,7 @@ CLONE = Options(shared_points="clone")
 def shared(cell, seed):
     """Return a job that goes to its named points twice, from different sides."""
     job = drawn(cell, seed, 16)
-    moves = [replace(m, name=f"P{k}") if not m.in_joints and m.via is None else m
+    moves = [replace(m, name=f"Shared{k}") if not m.in_joints and m.via is None else m
              for k, m in enumerate(job.moves)]  # fmt: skip
     again = [m for m in reversed(moves) if m.name]
     return rapid(replace(job, moves=(*moves, *again)))
@@ -116,7 +116,7 @@ TRAPS = {
          "IF diSide=1 MoveAbsJ [[25,-20,-100,20,40,10],[9E9,9E9,9E9,9E9,9E9,9E9]],"
          "vWork,fine,tWork;", TWICE[1].format("pShared", ""), TWICE[2],
          "ENDFOR"], P, ""),
-    "shifted, and read": ([*twice(), "MoveL Offs(pShared,0,0,9),vWork,fine,tWork"
+    "shifted, and read": ([*twice(), "MoveL Offs(pShared,0,0,3*3),vWork,fine,tWork"
                            "\\WObj:=wPart;", "TPWrite NumToStr(pShared.trans.x,2);"],
                           P, ""),
     "points that change": ([*twice(), "pShared.trans.x:=pShared.trans.x+1;"],
