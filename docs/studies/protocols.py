@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from postproc.calibration.baselines import MethodRow, compare_on
+from postproc.calibration.baselines import MethodRow, Trial, compare_in
 from postproc.calibration.measurements import Measurements
 from postproc.model.effects import elm
 from postproc.model.effects.elm import HiddenLayer
@@ -143,6 +143,5 @@ def experiment(
         sha256="",
     )
     train, test = np.arange(300), np.arange(300, 450)
-    return compare_on(
-        rows[train], rows[test], nominal, tracker, seed, truth=truth[test]
-    )
+    trial = Trial(rows[train], rows[test], tracker, truth[test])
+    return compare_in([trial], nominal, seed)

@@ -204,7 +204,10 @@ def make_plan(
             Rule(r.pattern, r.arm, here / r.cell, here / r.model) for r in file.rule
         ]
     if (cell is None) != (model is None) or (cell is None and plan is None):
-        raise PostprocError("Give --cell and --model, or --plan, or all three")
+        raise PostprocError(
+            "neither --cell and --model nor --plan are given. Name one cell and one "
+            "model, or a plan with several; with both, the plan comes first"
+        )
     if cell is not None and model is not None:
         rules.append(Rule("**", None, cell, model))
     return _open_rules(rules, options, changes)
@@ -242,11 +245,7 @@ def _open_rules(
 
 
 def _check_number(rule: Rule, cell: Cell) -> None:
-    """Refuse a rule for one arm with the cell of another.
-
-    Raises:
-        CellError: They differ.
-    """
+    """Refuse a rule for one arm with the cell of another."""
     if rule.arm not in (None, cell.arm_number):
         raise CellError(
             rule.cell,

@@ -247,11 +247,13 @@ class Trial:
     Attributes:
         train, test: The rows.
         tracker: Tracker position in the base frame, (3,) [m], or None.
+        truth: True positions of the test rows, (n, 3) [m]; None: as they were measured.
     """
 
     train: Measurements
     test: Measurements
     tracker: Floats | None = None
+    truth: Floats | None = None
 
 
 def blocks_of(n: int, blocks: int) -> list[tuple[Rows, Rows]]:
@@ -301,34 +303,10 @@ def compare_in(trials: Sequence[Trial], arm: Arm, seed: int) -> tuple[MethodRow,
     )
 
 
-def compare_on(
-    train: Measurements,
-    test: Measurements,
-    arm: Arm,
-    tracker: Floats | None,
-    seed: int,
-    truth: Floats | None = None,
-) -> tuple[MethodRow, ...]:
-    """Fit every method to one survey and test it on another.
-
-    Args:
-        train: Rows to fit.
-        test: Rows to test on.
-        arm: The arm.
-        tracker: Tracker position in the base frame, or None.
-        seed: Of the random layers.
-        truth: True positions of the test rows where they are known, (n, 3) [m].
-    """
-    left = errors_in(Trial(train, test, tracker), arm, seed, truth)
-    return tuple(_row(method, error) for method, error in left.items())
-
-
-def errors_in(
-    trial: Trial, arm: Arm, seed: int, truth: Floats | None = None
-) -> dict[str, Floats]:
+def errors_in(trial: Trial, arm: Arm, seed: int) -> dict[str, Floats]:
     """Return what every method leaves on the test rows, (n, 3) [m], by its name."""
     train, test = trial.train, trial.test
-    position = test.position if truth is None else truth
+    position = test.position if trial.truth is None else trial.truth
     error = position - ArmStates(arm, test.states).walk.tcp
     left = {"no compensation": error}
     for method in ORDER:

@@ -117,9 +117,9 @@ class HeldOutError:
         """Say it in a line."""
         how = "effects chosen again" if self.chosen else "effects as in this fit"
         return (
-            f"expected on new poses {self.error.mean_mm:.4f} mm, without the tracker's "
-            f"own scatter {self.arm_mm:.4f} mm, in held-out regions "
-            f"{self.regions_mm:.4f} mm; intervals cover {self.covered:.0%} "
+            f"error expected on new poses {self.error.mean_mm:.4f} mm (without scatter "
+            f"of the tracker {self.arm_mm:.4f} mm), in regions without rows "
+            f"{self.regions_mm:.4f} mm; 95 % intervals cover {self.covered:.0%} "
             f"({self.error.n} held-out rows, {how})"
         )
 

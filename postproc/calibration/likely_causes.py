@@ -34,7 +34,8 @@ MOST_PLACING = 200  # rows that place a tracker well enough to find a mistake
 LEAST_OFFSET = np.deg2rad(0.3)  # a smaller one is left to the fit
 NOTHING = Combination(())
 UNKNOWN = (
-    "Check units, joint order and signs, the tool and the frame (measurements.frame)"
+    "Check the arm of the cell, units, joint order and signs, the tool and the frame "
+    "(measurements.frame)"
 )
 
 ErrorOf = Callable[[States], Floats]

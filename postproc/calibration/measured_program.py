@@ -100,6 +100,6 @@ def _visit_of(places: dict[str, list[int]], key: str, path: Path, line: int) -> 
     raise MeasurementError(
         path,
         f"id {key} {problem} in the program",
-        "Mark the move with a comment -- MEASURE <id>",
+        "Mark the move with a comment MEASURE <id>, such as -- MEASURE P12 in PDL2",
         line=line,
     )

@@ -313,8 +313,8 @@ def check_rows(survey: Measurements, arm: Arm) -> None:
         rows = int(survey.states.readings.sum())
         raise MeasurementError(
             survey.path,
-            f"{rows} rows at {poses} poses determine {seen} of {possible} "
-            "directions of the geometry",
+            f"the poses are too few or too alike: {rows} rows, {poses} poses, which "
+            f"determine {seen} of {possible} independent geometric parameters",
             "Measure more poses, spread over the workspace, all joints moving",
         )
 

@@ -116,7 +116,8 @@ class TextTable:
             raise MeasurementError(
                 self.path,
                 f"column {', '.join(missing)} is missing",
-                f"The header has: {', '.join(self.columns)}",
+                f"The header has: {', '.join(self.columns)}. Rename one of these, or "
+                "map it (measurements.columns)",
                 line=1,
             )
 
@@ -723,8 +724,8 @@ def check_axes(table: TextTable) -> None:
         )
     else:
         cure = (
-            "Write the axes that the arm lacks as columns of 0, with D-H rows of their "
-            "own in the arm file"
+            "Add the missing column. If the arm has fewer axes, write the axes that it "
+            "lacks as columns of 0, with D-H rows of their own in the arm file"
         )
     raise MeasurementError(
         table.path,

@@ -217,9 +217,9 @@ def _choose(
     if rung == asked:
         return rung, rows, ()
     note = (
-        f"written with {rung.name}: {DEFAULT} predict new poses no better "
-        f"({mean_error_mm(tried[-1]):.4f} mm, {mean_error_mm(rows):.4f} mm with "
-        f"{rung.name})"
+        f"the model holds {rung.name} alone ({mean_error_mm(rows):.4f} mm on new "
+        f"poses): {DEFAULT} predict new poses no better "
+        f"({mean_error_mm(tried[-1]):.4f} mm)"
     )
     return rung, rows, (note,)
 

@@ -89,10 +89,6 @@ def level_warning(placed: Registration, weight: Floats) -> tuple[str, ...]:
 def _gains(fitted: Fit, others: tuple[Effect, ...]) -> list[float]:
     """Compute by how much every direction is better than the stated one [nats].
 
-    Args:
-        fitted: A fit under the stated direction.
-        others: The effects beside `compliance`.
-
     Returns:
         For each, less than that where it is hardly better than no weight at all.
     """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import typer
 from typer.core import TyperCommand, TyperGroup
 
 GROUPS = {
@@ -89,7 +90,11 @@ class Command(TyperCommand):
                         ctx.fail(f"{word} is called {new}")
                     if instead := ENDED.get(name):
                         ctx.fail(f"{word} is no option any more: {instead}")
-        return super().parse_args(ctx, args)
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as exc:
+            exc.message = exc.message.removeprefix("Value error, ")  # of pydantic
+            raise
 
 
 class Groups(TyperGroup):

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from enum import StrEnum
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, ParamSpec, TextIO, TypeVar
+from typing import Annotated, Any, ParamSpec, TextIO, TypeVar
 
 import typer
 
@@ -35,7 +35,8 @@ CellOption = Annotated[Path, typer.Option("--cell", help="Cell file (TOML).")]
 ModelOption = Annotated[Path, typer.Option("--model", help="Model file (JSON).")]
 
 VariablesOption = Annotated[
-    Path | None, typer.Option("--variables", help="Variable file, default PROGRAM.lsv.")
+    Path | None,
+    typer.Option("--variables", help="Variable file (PDL2). Default: PROGRAM.lsv."),
 ]
 
 
@@ -51,17 +52,21 @@ SharedPointsOption = Annotated[
     SharedPoints | None,
     typer.Option(
         "--shared-points",
-        help="Points of several moves: mean correction, clone or none.",
+        help="Points that moves share: mean correction, a clone for a move, or none.",
     ),
 ]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="SECTION.KEY=VALUE",
-        help="Set a key of the cell for this run, such as measurements.unit=m.",
-    ),
-]
+
+
+def _set_option(example: str) -> Any:
+    """Return --set with an example of what the command follows."""
+    text = f"Set a key of the cell for this run, such as {example}."
+    return typer.Option("--set", metavar="SECTION.KEY=VALUE", help=text)
+
+
+SetOption = Annotated[list[str] | None, _set_option("compensation.reapproach=true")]
+SetMeasured = Annotated[list[str] | None, _set_option("measurements.unit=m")]
+SetSurvey = Annotated[list[str] | None, _set_option("survey.seed=7")]
+SetSimulated = Annotated[list[str] | None, _set_option("simulation.seed=2")]
 OrientationOption = Annotated[
     bool,
     typer.Option("--orientation", help="Correct orientations too, not only places."),

@@ -10,7 +10,7 @@ import typer
 from postproc.cli.common import (
     CellOption,
     ModelOption,
-    SetOption,
+    SetMeasured,
     app,
     changes_of,
     report_errors,
@@ -39,13 +39,18 @@ def diagnose(
     report: PlotOption = None,
     program: Annotated[
         Path | None,
-        typer.Option("--program", help="The program whose points were measured."),
+        typer.Option(
+            "--program",
+            help="Program whose points were measured, or that ran with --path.",
+        ),
     ] = None,
     path: Annotated[
         Path | None,
-        typer.Option("--path", help="Tracker readings while --program ran (CSV)."),
+        typer.Option(
+            "--path", help="Readings of a tracker that followed the tool (CSV)."
+        ),
     ] = None,
-    changes: SetOption = None,
+    changes: SetMeasured = None,
 ) -> None:
     """Find the effects that a model lacks, and add them to the model."""
     from postproc.calibration.diagnosis.diagnose import dump_json, evidence_of

@@ -11,7 +11,9 @@ import typer
 from postproc.cli.common import (
     CellOption,
     ModelOption,
-    SetOption,
+    SetMeasured,
+    SetSimulated,
+    SetSurvey,
     app,
     busy,
     changes_of,
@@ -29,7 +31,8 @@ from postproc.cli.reports import (
     ReportOption,
     Reports,
 )
-from postproc.files import check_places
+from postproc.exceptions import PostprocError
+from postproc.files import check_places, is_program
 
 
 class Method(StrEnum):
@@ -46,15 +49,21 @@ class Method(StrEnum):
 @app.command()
 def survey(
     cell: CellOption,
-    output: Annotated[Path, typer.Option("-o", "--output", help="SURVEY.pdl")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="SURVEY.pdl (PDL2)")],
     poses: Annotated[int, typer.Option("--poses", help="Number of poses.")] = 300,
-    changes: SetOption = None,
+    changes: SetSurvey = None,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
     from postproc.calibration.survey_program import write_survey
     from postproc.robot.cell import load_cell
 
     with report_errors():
+        if is_program(output.name) and output.suffix.lower() != ".pdl":
+            raise PostprocError(
+                f"{output}: survey programs are PDL2. Write SURVEY.pdl; for another "
+                "controller move its joint moves into a program of its language, with "
+                "the ids in comments (! MEASURE 1a in RAPID, ; MEASURE 1a in KRL)"
+            )
         check_places([output], [cell])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
@@ -64,7 +73,9 @@ def survey(
 
 @app.command()
 def simulate(
-    program: Annotated[Path, typer.Argument(help="PROGRAM.pdl or SURVEY.csv")],
+    program: Annotated[
+        Path, typer.Argument(help="Program, survey program or SURVEY.csv")
+    ],
     cell: CellOption,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="MEASURED.csv")
@@ -80,7 +91,7 @@ def simulate(
         Path | None,
         typer.Option("--track", help="Tracker readings while the arm moves (CSV)."),
     ] = None,
-    changes: SetOption = None,
+    changes: SetSimulated = None,
     report: ReportOption = None,
 ) -> None:
     """Run a program or a survey on the virtual arm, and measure it."""
@@ -114,13 +125,16 @@ def fit(
     method: Annotated[Method, typer.Option("--method")] = Method.FULL,
     effects: Annotated[
         str | None,
-        typer.Option("--effects", help="Effects of the full method, comma separated."),
+        typer.Option(
+            "--effects",
+            help="Effects to fit, comma separated. Default: those with evidence.",
+        ),
     ] = None,
     program: Annotated[
         Path | None,
         typer.Option("--program", help="Survey program, for files of id, x, y, z."),
     ] = None,
-    changes: SetOption = None,
+    changes: SetMeasured = None,
     report: PageOption = None,
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
@@ -157,8 +171,11 @@ def predict(
     states: Annotated[Path, typer.Argument(help="STATES.csv")],
     cell: CellOption,
     model: ModelOption,
-    output: Annotated[Path | None, typer.Option("-o", "--output")] = None,
-    changes: SetOption = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="ERRORS.csv. Default: stdout."),
+    ] = None,
+    changes: SetMeasured = None,
 ) -> None:
     """Add the predicted error, and with positions the residual, to every row."""
     from postproc.calibration import predict as prediction
@@ -185,7 +202,7 @@ def compare(
     blocks: Annotated[
         int, typer.Option("--cv-blocks", min=0, help="Test on so many blocks in turn.")
     ] = 0,
-    changes: SetOption = None,
+    changes: SetMeasured = None,
 ) -> None:
     """Fit all methods to the same rows, and test them on held-out rows."""
     from postproc.calibration.comparison import Held, compare_files

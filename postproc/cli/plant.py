@@ -29,13 +29,20 @@ if TYPE_CHECKING:
     from postproc.batch.second_opinion import TreeOpinion
 
 CellFile = Annotated[
-    Path | None, typer.Option("--cell", help="Cell of programs that no rule matches.")
+    Path | None,
+    typer.Option(
+        "--cell", help="Cell (TOML); with --plan, of programs that no rule matches."
+    ),
 ]
 ModelFile = Annotated[
-    Path | None, typer.Option("--model", help="Model of programs that no rule matches.")
+    Path | None,
+    typer.Option(
+        "--model", help="Model (JSON); with --plan, of programs that no rule matches."
+    ),
 ]
 PlanFile = Annotated[
-    Path | None, typer.Option("--plan", help="Plan file: pattern -> cell, model.")
+    Path | None,
+    typer.Option("--plan", help="Plan (TOML): the cell and model of each program."),
 ]
 
 
@@ -61,7 +68,10 @@ def batch(
     report: PageOption = None,
     changes: SetOption = None,
 ) -> None:
-    """Compensate a tree of programs; programs that fail are not written to DST."""
+    """Compensate a tree of programs; programs that fail are not written to DST.
+
+    Exit 0: every target that can be corrected is; 1: some are not; 2: a program failed.
+    """
     with report_errors():
         if not _is_address(jobs):
             _count(jobs)
@@ -163,11 +173,13 @@ def _write_reports(reports: Reports, title: str, log: Path) -> None:
 def check(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Compensated tree.")],
     model: Annotated[
-        Path | None, typer.Option("--model", help="Current model (JSON).")
+        Path | None,
+        typer.Option("--model", help="Current model (JSON). Default: any model."),
     ] = None,
     plan: PlanFile = None,
     source: Annotated[
-        Path | None, typer.Option("--source", help="Its source tree.")
+        Path | None,
+        typer.Option("--source", help="Tree of the originals. Default: not compared."),
     ] = None,
     allow_uncorrected: Annotated[
         bool,
@@ -179,9 +191,10 @@ def check(
 ) -> None:
     """Check whether a tree may be uploaded: exit 0 yes, 1 no, 2 error.
 
-    Every program must be compensated, with all its targets, with the current model,
-    from the source as it is now, and unchanged since. If pin and toppra are installed
-    and cells and models are given, these and ruckig check the motion too.
+    Every program must be compensated, with all its targets, and unchanged since. With
+    --model it must be by this model, with --source from the source as it is now. With
+    --cell and --model, or --plan, the libraries pin, toppra and ruckig check the motion
+    too, if they are installed.
     """
     from postproc.batch.check import check as look
     from postproc.robot.cell import verify_section
@@ -229,7 +242,7 @@ def _second_opinion(
         return None
     cell, model, plan = places
     if not asked and plan is None and None in (cell, model):
-        say("no second opinion: it takes --cell and --model, or --plan")
+        say("no second opinion on the motion: it needs --cell and --model, or --plan")
         return None
     if asked:
         load()

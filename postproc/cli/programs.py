@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from difflib import get_close_matches
 from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -47,8 +48,10 @@ def _explain_code(code: str | None) -> None:
     with report_errors():
         known = {one.value: one for one in Code}
         if code not in known:
-            names = ", ".join(sorted(known))
-            raise PostprocError(f"--code {code}: no such code. Known: {names}")
+            close = get_close_matches(code, known, n=3, cutoff=0.4)
+            near = f"Is it {' or '.join(close)}? " if close else ""
+            cure = f"{near}docs/findings.md lists all {len(known)} codes"
+            raise PostprocError(f"--code {code}: no such code. {cure}")
         found = known[code]
         print(f"{found} ({found.severity})", found.meaning, found.cure, sep="\n")
     raise typer.Exit
@@ -69,7 +72,9 @@ SHOWN = 20  # targets left alone whose source lines are shown
 
 @app.command()
 def compensate(
-    program: Annotated[str, typer.Argument(help="PROGRAM.pdl, or - for stdin.")],
+    program: Annotated[
+        str, typer.Argument(help="PROGRAM.pdl, .mod or .src; - for stdin.")
+    ],
     cell: CellOption,
     model: ModelOption,
     output: Annotated[
@@ -82,7 +87,7 @@ def compensate(
     variables_out: Annotated[
         Path | None,
         typer.Option(
-            "--variables-out", help="Output of the variable file, changed or not."
+            "--variables-out", help="Where to write the variable file, even unchanged."
         ),
     ] = None,
     report: PageOption = None,
@@ -98,7 +103,11 @@ def compensate(
     changes: SetOption = None,
     every: EveryOption = False,
 ) -> None:
-    """Correct the targets of a program, so that the tool lands on them."""
+    """Correct the targets of a program, so that the tool lands on them.
+
+    Exit 0: every target that can be corrected is; 1: some are not, each is listed with
+    the reason; 2: nothing is written.
+    """
     from postproc.cli.common import stages
     from postproc.cli.job_files import Destination
     from postproc.compensation import workers
@@ -156,11 +165,7 @@ def _why_nothing(outcome: Outcome) -> str:
 
 
 def _check_values(place: Path, files: ProgramFiles) -> None:
-    """Refuse a place for a variable file that is none, or where there is no such file.
-
-    Raises:
-        PostprocError: It is.
-    """
+    """Refuse a place that is none, or one for a variable file that is not there."""
     if place == Path(STREAM):
         raise PostprocError("--variables-out -: stdout holds the program. Name a file")
     if files.variables is None:
@@ -233,10 +238,12 @@ def explain(
     program: Path,
     cell: CellOption,
     model: Annotated[
-        Path | None, typer.Option("--model", help="Model file (JSON).")
+        Path | None,
+        typer.Option("--model", help="Model file (JSON). Default: show the plan only."),
     ] = None,
     line: Annotated[
-        int | None, typer.Option("--line", help="Only the visits of this line.")
+        int | None,
+        typer.Option("--line", help="Only this line, with the share of each effect."),
     ] = None,
     changes: SetOption = None,
     code: CodeOption = None,

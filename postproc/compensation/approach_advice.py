@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.findings import SURE
+from postproc.compensation.findings import SURE, name_axes
 from postproc.motion.cycle_time import ProgramCycle
 from postproc.robot.arm import Arm
 from postproc.robot.direction import half_width
@@ -69,17 +69,20 @@ def _advise_joints(
 ) -> str:
     """Say what to do about joints that lack some travel (6,) on their last piece."""
     joints = np.flatnonzero(missing > 0)
-    axes, turn = ("axes", "turn") if len(joints) > 1 else ("axis", "turns")
-    names = f"{axes} {' and '.join(str(j + 1) for j in joints.tolist())}"
-    angle = np.rad2deg(missing.max())
+    names, turn = name_axes(joints), "turn" if len(joints) > 1 else "turns"
+    angle = np.ceil(np.rad2deg(missing.max()) * 1e3) / 1e3
     if (np.abs(turned[joints]) < LOST).any():
         return (
-            f"start the approach where {names} {turn} by {angle:.3f} deg or more to it"
+            f"start the approach where {names} {turn} by {angle:.3f} deg or more on "
+            "the way to the target"
         )
     back = length * float((missing[joints] / np.abs(turned[joints])).max())
     if cartesian and 0 < back <= FAR:
         return f"start the approach {np.ceil(back / MM):.0f} mm farther back"
-    return f"start the approach where {names} still {turn} by {angle:.3f} deg more"
+    return (
+        f"start the approach farther back, so that {names} {turn} by {angle:.3f} deg "
+        "more"
+    )
 
 
 # Targets that are approached anew: from a stop on the way already travelled.

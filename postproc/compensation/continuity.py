@@ -19,7 +19,8 @@ LEAST_STEP = 0.1 * MM  # [m] a step that is never too large
 PER = 100.0 * MM  # [m] of path that `correction_step_mm` is for
 TURNED = 0.5  # change of a side by which a joint has turned
 ARC = Reason(
-    Code.PATH_BENT, "no point of its arc is corrected: its other point cannot be"
+    Code.PATH_BENT,
+    "all points of its arc are corrected or none: another of them cannot be corrected",
 )
 ANGLED = Reason(
     Code.PATH_BENT,

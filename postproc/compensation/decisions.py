@@ -201,7 +201,9 @@ EXPORTED = Reason(
     "other programs may read this variable too (see edit_exported)",
 )
 OTHER_ARRIVAL = Reason(
-    Code.DEPENDANT_WORSE, "another arrival at the same point cannot be corrected"
+    Code.DEPENDANT_WORSE,
+    "another arrival at this point cannot be corrected: give each move a point of its "
+    "own (see --shared-points clone)",
 )
 SEVERAL_MOVES = Reason(
     Code.SHARED_POINT, "several moves go to this point (shared_points = leave)"
@@ -272,8 +274,8 @@ def with_dependants(
 
 
 ALONG = 1e-6  # [m]: what moves by less stays
-WITH_POINT = "it moves along with the point that it is computed from"
-WITH_BEGIN = "it moves along with the target that it begins at"
+WITH_POINT = "it still moves with the point that it is computed from"
+WITH_BEGIN = "it still moves with the target that it begins at"
 
 
 def with_what_moves_along(
@@ -466,13 +468,13 @@ SWUNG = Reason(
 
 
 SHIFTED_APART = (
-    "its arrivals need numbers of its shift that differ by more than conflict_mm = "
-    "{:g}: give each a move of its own"
+    "its arrivals need shifts (such as Offs) that differ by more than conflict_mm = "
+    "{:g}: give each arrival a move of its own"
 )
 NOT_ABSORBED = Reason(
     Code.ARRIVALS_DIFFER,
-    "one set of numbers of its shift does not fit the corrections of all of its "
-    "points: give each a move of its own",
+    "one shift (such as Offs) does not fit the corrections of all points that it "
+    "shifts: give each point a move of its own",
 )
 
 

@@ -89,7 +89,8 @@ AFTER = Reason(
 )
 STRANDED = Reason(
     Code.UNKNOWN_POSITION_BEFORE,
-    "the arm cannot reach the target before it as it is written",
+    "the arm cannot reach the previous target as it is written, so that the approach "
+    "is not known: correct the previous target first",
 )
 
 

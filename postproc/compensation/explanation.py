@@ -140,7 +140,7 @@ class Explanation:
                 said.append(self.outcome.in_time.summary(self.visits))
             return "\n".join(said)
         known = np.isfinite(self.q).all(axis=1)
-        return f"{len(self.visits)} visits, {int((~known).sum())} of them not planned"
+        return f"{len(self.visits)} visits, {int((~known).sum())} without joint angles"
 
     def name_origins(self, i: int) -> str:
         """Name the lines that visit i is reached from."""

@@ -90,12 +90,12 @@ def list_followed_pages(visits: Visits, untouched: Collection[str]) -> list[Diag
 def _use(name: str, number: int, visits: Visits, untouched: Collection[str]) -> str:
     """Say what is done with a file of a job."""
     if is_shared_list(name) or is_submit(name):
-        return "is read, and not rewritten: all programs share it"
+        return "is read, but not written: all programs share it"
     pinned = [bool(why) for why in visits.literals.pinned]
     own = np.array(pinned, dtype=bool)[visits.literals.file == number]
     if name in untouched or (len(own) and own.all()):
-        return "is read, and not rewritten: its numbers must stay"
-    return "is followed, and rewritten, as a page of this program"
+        return "is read, but not written: its numbers must stay"
+    return "is a part of this program: it is read, and written with corrected targets"
 
 
 def missing_file(visits: Visits) -> list[Diagnostic]:
@@ -106,7 +106,7 @@ def missing_file(visits: Visits) -> list[Diagnostic]:
     none = np.array([one.code is Code.NO_VALUE for one in visits.reasons])
     lost = none[visits.reason]
     text = (
-        f"{lost.sum()} targets have no value, and there is no {name}: put it beside "
+        f"targets without a value: {lost.sum()}, and there is no {name}. Put it beside "
         "the program, or give it with --variables"
     )
     first = visits.line[np.flatnonzero(lost)[:1]].tolist()
@@ -329,9 +329,14 @@ def _how(side: Floats) -> str:
     """Say why the approach direction is uncertain."""
     if not side.any():
         return "the place before is not known"
-    return f"axis {_axes(side)} reversed shortly before"
+    return f"{name_axes(np.flatnonzero(np.abs(side) < SURE))} reversed shortly before"
 
 
-def _axes(side: Floats) -> str:
-    """Name the axes whose side is not known."""
-    return ", ".join(str(j + 1) for j in np.flatnonzero(np.abs(side) < SURE))
+def name_axes(joints: Ints) -> str:
+    """Name axes by their numbers from 0.
+
+    >>> name_axes(np.array([1, 2, 4])), name_axes(np.array([0]))
+    ('axes 2, 3 and 5', 'axis 1')
+    """
+    *most, last = [str(j + 1) for j in joints.tolist()]
+    return f"axes {', '.join(most)} and {last}" if most else f"axis {last}"

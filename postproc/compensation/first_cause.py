@@ -45,19 +45,23 @@ def first_cause(
     causes = sorted(one for one in reading.diagnostics if one.code in CAUSES)
     if not causes or not reading.visits.reason.any():
         return ()
-    free = replace(cell, motionless=("*",))
-    freed = _count_known(read_program(files, free).visits) - _count_known(
-        reading.visits
-    )
+    free = read_program(files, replace(cell, motionless=("*",))).visits
+    freed = _count_known(free) - _count_known(reading.visits)
     if freed <= 0:
         return ()
-    first, total = causes[0], int((reading.visits.literal >= 0).sum())
+    first, total = causes[0], max(map(_count_targets, (free, reading.visits)))
     text = (
-        f"what happens here is not known, and with what follows it leaves {freed} of "
-        f"{total} targets. Say under [routines] of the cell what the routines do that "
-        'no file holds (name = "motionless" or "moves"), or give their files'
+        f"{freed} of {total} targets are not corrected because it is not known what "
+        "this statement, and others after it, do. Declare under [routines] of the cell "
+        'the routines that no file holds (name = "motionless" or "moves"), or give '
+        "their files"
     )
     return (Diagnostic(first.file, first.line, Code.FIRST_CAUSE, text),)
+
+
+def _count_targets(visits: Visits) -> int:
+    """Count the targets that hold numbers."""
+    return int((visits.literal >= 0).sum())
 
 
 def _count_known(visits: Visits) -> int:

@@ -69,11 +69,7 @@ class Options:
         return found
 
     def _check(self) -> None:
-        """Refuse options that do not go together.
-
-        Raises:
-            PostprocError: They do not.
-        """
+        """Refuse options that do not go together."""
         tolerance = self.path_tolerance_mm
         if tolerance is not None and not tolerance > 0:
             raise PostprocError("path_tolerance_mm: give a distance of more than 0 mm")

@@ -10,6 +10,7 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import Visits
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
+from postproc.model.validity import name_range
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from postproc.robot.state import States
@@ -97,7 +98,7 @@ def load_reasons(model: Model, cell: Cell, states: States) -> dict[str, Bools]:
         error[beyond_survey(model, cell, states)] = np.inf
     low, high = range_of_loads(model, cell)
     text = (
-        f"the load is outside of the surveyed {low:g} to {high:g} kg and adds more "
+        f"the load is outside the surveyed {name_range(low, high)} kg and adds more "
         f"than {most:g} mm to the standard error. Survey with such a load, or "
         "allow more (payload_mm under [limits] of the cell)"
     )

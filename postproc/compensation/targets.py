@@ -88,8 +88,8 @@ def report_rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
     if len(far):
         worst = int(far[np.argmax(away[far])])
         text = (
-            f"the path passes {len(far)} fly points by more than {FAR:g} mm, this one "
-            f"by {away[worst]:.2f} mm, {visits.dialect.terms.corner}"
+            f"the path passes {len(far)} fly points at more than {FAR:g} mm, this one "
+            f"at {away[worst]:.2f} mm, {visits.dialect.terms.corner}"
         )
         found.append(_note(visits, worst, Code.FLY_CORNER, text))
     return found

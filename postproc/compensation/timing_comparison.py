@@ -70,7 +70,7 @@ class InTime:
     def summary(self, visits: Visits) -> str:
         """Say in one line how long it takes, and how well it keeps to its paths."""
         if not self.before.seconds:
-            return "no move leads from one known place to another: no time to tell"
+            return "no cycle time: no move leads from one known place to another"
         said = f"cycle {self.before.seconds:.1f} -> {self.after.seconds:.1f} s"
         if self.guessed:
             said += f" (from guessed limits: {', '.join(self.guessed)})"

@@ -192,7 +192,7 @@ class Arrived:
 NOWHERE = frozenset([ELSEWHERE])
 JUMPS = frozenset("goto return exit exitcycle raise retry trynext".split())
 """Words with which a statement leads to another place."""
-NOT_FOLLOWED = "may move the arm: it is not followed"
+NOT_FOLLOWED = "is not followed, and may move the arm"
 Place = tuple[CallContext, int]
 _PLAIN = (said.SourceStatement, said.LabelMark)
 M = TypeVar("M", bound="TaskMachine")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -91,15 +91,21 @@ class StatementText(Generic[T]):
         start, end = self.span(row)
         return self.source.text[start:end]
 
-    def words(self, rows: Iterable[int]) -> frozenset[str]:
-        """Return the words of some statements, in lower case."""
-        found = (_WORD.findall(self.text(row).lower()) for row in rows)
+    def words(self, rows: Iterable[int], but: Container[str] = ()) -> frozenset[str]:
+        """Return the words of some statements, in lower case.
+
+        Args:
+            rows: The statements.
+            but: What they do not begin with.
+        """
+        texts = (_WORD.findall(self.text(row).lower()) for row in rows)
+        found = (words for words in texts if words and words[0] not in but)
         return frozenset().union(*found)
 
     def quote(self, row: int) -> str:
         """Quote the beginning of a statement, on one line."""
         words = " ".join(self.text(row).split())
-        return words if len(words) <= SHOWN else f"{words[:SHOWN]} .."
+        return repr(words if len(words) <= SHOWN else f"{words[:SHOWN]} ..")
 
     def diagnostic(self, row: int, code: Code, message: str) -> Diagnostic:
         """Say something of a statement."""

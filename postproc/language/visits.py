@@ -436,9 +436,9 @@ def never_reached(
             name,
             int(lines[0]),
             Code.NEVER_REACHED,
-            f"{len(lines)} moves, lines {line_ranges(lines)}, are never reached from "
-            f"{begin}: they are not compensated. Give the {caller} that calls them, "
-            "or remove them",
+            f"moves that are never reached from {begin}: {len(lines)} (lines "
+            f"{line_ranges(lines)}). They are not compensated: give the {caller} that "
+            "calls their routine, or remove them",
         )
         for name, lines in missed.items()
     ]

@@ -26,6 +26,7 @@ from postproc.robot.arm import FLOOR
 FORMAT = 2
 NOT_CONTENT = ("id", "provenance")  # what an id is not made from
 MAX_BYTES = 200_000_000
+NO_MODEL = "Give the model that postproc fit or diagnose wrote"
 
 Method = Literal["full", "eja-elm", "elm", "interpolation", "kinematic-elm", "kriging"]
 
@@ -248,8 +249,9 @@ def parse_model_file(path: Path, raw: bytes) -> ModelFile:
         data = json.loads(raw)
         own = content_id(data) if isinstance(data, dict) else ""
     except (ValueError, RecursionError):  # also a number of thousands of digits
-        cure = "Make it again with postproc fit"
-        raise ModelError(path, "is not valid JSON", cure) from None
+        raise ModelError(path, "is not valid JSON", NO_MODEL) from None
+    if not isinstance(data, dict) or "format" not in data:
+        raise ModelError(path, "is no model: it states no format", NO_MODEL)
     try:
         file = ModelFile.model_validate(data)
     except pydantic.ValidationError as exc:

@@ -20,6 +20,7 @@ REACH_OF_PLATE = 0.5  # [m] how far from three or more probe points a tool may b
 PAYLOAD_MARGIN = 0.5  # [kg]
 TEMPERATURE_MARGIN = 1.0  # [K] steel of 2.5 m grows by 0.03 mm
 BENT_MARGIN = 0.05  # of the surveyed range, where a law is no straight line
+WARM = "survey at this temperature too, or correct [environment] of the cell"
 
 
 @dataclass(frozen=True)
@@ -105,17 +106,17 @@ class Ranges:
                 go on where no survey has been.
         """
         found = {**self._joints(states.q), **self._tools(states.tool)}
-        for name, unit, margin in (
-            ("payload", "kg", PAYLOAD_MARGIN),
-            ("temperature", "deg C", TEMPERATURE_MARGIN),
+        for name, unit, margin, cure in (
+            ("payload", "kg", PAYLOAD_MARGIN, "survey with this load too"),
+            ("temperature", "deg C", TEMPERATURE_MARGIN, WARM),
         ):
             value, span = getattr(states, name), getattr(self, name)
             if span is not None:
                 if name in bent:
                     margin = min(margin, BENT_MARGIN * (span[1] - span[0]))
                 low, high = span[0] - margin, span[1] + margin
-                text = f"{name} outside the surveyed {span[0]:g} to {span[1]:g} {unit}"
-                found[text] = (value < low) | (value > high)
+                text = f"{name} is outside the surveyed {name_range(*span)} {unit}"
+                found[f"{text}: {cure}"] = (value < low) | (value > high)
         for name in sorted(needs):
             value = getattr(states, name)
             unknown = np.isnan(value) if value.ndim == 1 else np.isnan(value).any(1)
@@ -131,8 +132,8 @@ class Ranges:
         out = ~whole & ((near < low - margin) | (near > high + margin))
         ends = np.rad2deg(np.stack([low, high], axis=1))
         return {
-            f"axis {j + 1} outside the surveyed {ends[j, 0]:.1f} to "
-            f"{ends[j, 1]:.1f} deg": out[:, j]
+            f"axis {j + 1} is outside the surveyed {ends[j, 0]:.1f} to "
+            f"{ends[j, 1]:.1f} deg: survey the range of the program": out[:, j]
             for j in range(6)
         }
 
@@ -141,9 +142,15 @@ class Ranges:
         points = np.array(self.tools).reshape(-1, 3)
         gap = np.linalg.norm(tool[:, None] - points, axis=2).min(axis=1, initial=np.inf)
         if self.see_all_rotations:
-            text = f"tool more than {REACH_OF_PLATE / MM:.0f} mm from the probe points"
+            text = (
+                f"the tool is more than {REACH_OF_PLATE / MM:.0f} mm from the probe "
+                "points: survey with a probe point nearer to it"
+            )
             return {text: gap > REACH_OF_PLATE}
-        text = "tool not surveyed: the survey's probe points fix it at one point only"
+        text = (
+            "the tool was not surveyed, and a survey with fewer than three probe "
+            "points does not hold for another tool: survey with three"
+        )
         return {text: gap > SAME_TOOL}
 
     @property
@@ -154,6 +161,16 @@ class Ranges:
         points = np.array(self.tools).reshape(-1, 3)
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         return len(spread) > 1 and bool(spread[1] > 0.02)  # [m]
+
+
+def name_range(low: float, high: float) -> str:
+    """Write a range as text; one number where it has no width.
+
+    >>> name_range(10.0, 118.0), name_range(118.0, 118.0)
+    ('10 to 118', '118')
+    """
+    ends = f"{low:g}", f"{high:g}"
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 @overload

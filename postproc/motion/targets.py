@@ -167,7 +167,7 @@ class Targets:
 REACHED = NO_REASON
 NO_TARGET = Reason(Code.RUNTIME_VALUE, "where this move goes is not known")
 OUT_OF_REACH = Reason(
-    Code.OUT_OF_REACH, "out of reach: check the target, $TOOL, $UFRAME and $BASE"
+    Code.OUT_OF_REACH, "out of reach: check the target, its tool and its frames"
 )
 NO_BRANCH = Reason(
     Code.CONFIGURATION_UNKNOWN,
@@ -175,8 +175,8 @@ NO_BRANCH = Reason(
 )
 NO_START = Reason(
     Code.CONFIGURATION_UNKNOWN,
-    "the branch is not known: no configuration string and an unknown start; write one, "
-    "or a joint target before it",
+    "the branch is not known: the target has no configuration flags, and the place "
+    "before it is not known. Write a joint target before it",
 )
 PATH_REACH = Reason(
     Code.SINGULAR_PATH,
@@ -202,12 +202,15 @@ OTHER_BRANCH = Reason(
 LIMITS = tuple(
     Reason(
         Code.TARGET_BEYOND_LIMIT,
-        f"axis {j} beyond its limit: check the target and its turns",
+        f"axis {j} would be beyond its limit: check the target and its turns",
     )
     for j in range(1, 7)
 )
 PATH_LIMITS = tuple(
-    Reason(Code.TARGET_BEYOND_LIMIT, f"axis {j} beyond its limit on the way to it")
+    Reason(
+        Code.TARGET_BEYOND_LIMIT,
+        f"axis {j} would be beyond its limit on the way to it: lead the path elsewhere",
+    )
     for j in range(1, 7)
 )
 WRIST = Reason(

@@ -134,16 +134,18 @@ def _tell_rest(report: FitReport) -> list[str]:
     if rest:
         size = float(np.sqrt(sum(f.size_mm**2 for f in rest)))
         names = _count_names(f.effect for f in rest)
-        lines.append(f"smaller or without evidence, {size:.3f} mm together: {names}")
+        lines.append(f"small or without evidence, {size:.3f} mm together: {names}")
     if report.unseen:
         names = _group_names(u.name for u in report.unseen)
         count = len(report.unseen)
-        lines.append(f"not determined, at the prior, {count} directions: {names}")
+        lines.append(
+            f"{count} parameters not determined by the rows, at the prior: {names}"
+        )
     if report.correlated:
         names = _count_names(a.partition(".")[0] for a, _, _ in report.correlated)
-        lines.append(f"strongly correlated, {len(report.correlated)} pairs: {names}")
+        lines.append(f"pairs of strongly correlated parameters: {names}")
     if lines:
-        lines.append("all parameters, directions and rows: --report FILE.json")
+        lines.append("--report FILE.json lists all parameters and rows")
     return lines
 
 
@@ -151,9 +153,9 @@ def _count_names(names: Iterable[str]) -> str:
     """Count names, the most frequent first.
 
     >>> _count_names(["a", "b", "b"])
-    'b 2, a 1'
+    '2 of b, 1 of a'
     """
-    return ", ".join(f"{name} {n}" for name, n in Counter(names).most_common())
+    return ", ".join(f"{n} of {name}" for name, n in Counter(names).most_common())
 
 
 def _group_names(names: Iterable[str]) -> str:

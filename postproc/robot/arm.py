@@ -533,6 +533,28 @@ def arm_of_text(path: Path, text: str) -> Arm:
     return build_arm(parse_toml(path, text.encode(), ArmFile, ArmError))
 
 
+def check_flanges(arm: Arm, path: Path, q: Floats, wanted: Floats) -> None:
+    """Refuse an arm that is not what the file says from which it was made.
+
+    Args:
+        arm: The arm.
+        path: That file.
+        q: Joint angles, (n, 6) [rad].
+        wanted: Its flanges there, (n, 4, 4) [m].
+
+    Raises:
+        ArmError: The arm places the flange elsewhere.
+    """
+    gap = float(np.abs(arm.flange(q) - wanted).max())
+    back = arm.flange(arm.nearest(wanted, q))
+    if arm.file.opw is None:  # Newton's method may miss a pose
+        back = np.where(np.isnan(back), wanted, back)
+    gap = max(gap, float(np.abs(back - wanted).max()))
+    if not gap < 1e-9:
+        problem = f"cannot be written as an arm file: flanges differ by {gap:.3g}"
+        raise ArmError(path, problem, "Write the arm file by hand")
+
+
 def _build_mounted(file: ArmFile, weight: Floats) -> Arm:
     """Build an arm with weight that pulls in a direction, (3,)."""
     return build_arm(file).mount(weight)
@@ -567,11 +589,7 @@ def build_arm(file: ArmFile) -> Arm:
 
 
 def _check_inverse(arm: Arm, path: Path) -> None:
-    """Refuse an arm file whose two kinematics disagree.
-
-    Raises:
-        ArmError: The closed-form inverse does not lead back to the pose.
-    """
+    """Refuse an arm file whose two kinematics disagree."""
     q = np.deg2rad(np.array([[20.0, 10, -100, 40, 50, -60], [0, 0, -90, 0, 30, 0]]))
     wanted = arm.flange(q)
     solved = arm.inverse(wanted).q.reshape(-1, 6)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeVar
 
@@ -13,6 +13,7 @@ import numpy as np
 import pydantic
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
+from postproc.arrays import Floats
 from postproc.exceptions import ArmError, FileError
 
 # Reading TOML files with messages that name the place.
@@ -311,3 +312,20 @@ def read_arm_file(path: Path) -> ArmFile:
         ArmError: Naming the place and the cure.
     """
     return read_toml(path, ArmFile, ArmError)
+
+
+# Numbers as they are written into arm files.
+
+
+def number_text(value: float) -> str:
+    """Write a number to 1e-9, without a sign of zero.
+
+    >>> number_text(-0.0000000001), number_text(89.9999999999)
+    ('0.0', '90.0')
+    """
+    return repr(round(float(value), 9) + 0.0)
+
+
+def list_text(values: Sequence[float] | Floats) -> str:
+    """Write a list of numbers."""
+    return f"[{', '.join(map(number_text, values))}]"

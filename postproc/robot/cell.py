@@ -548,8 +548,8 @@ def _with_change(file: CellFile, change: str) -> CellFile:
     place, _, text = change.partition("=")
     name, _, key = place.strip().partition(".")
     if name not in CHANGEABLE or not key or not text.strip():
-        cure = f"Write SECTION.KEY=VALUE, of the sections {', '.join(CHANGEABLE)}"
-        raise CellError(f"--set {change}", "sets nothing", cure)
+        cure = f"Write SECTION.KEY=VALUE. Sections: {', '.join(CHANGEABLE)}"
+        raise CellError(f"--set {change}", "names no section, key and value", cure)
     stated = getattr(file, name)
     data = {} if stated is None else stated.model_dump(exclude_unset=True)
     data.pop(key, None)

@@ -13,7 +13,8 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError
-from postproc.robot.arm import arm_of_text
+from postproc.robot.arm import arm_of_text, check_flanges
+from postproc.robot.arm_file import list_text, number_text
 from postproc.robot.pose import MM
 
 MAX_BYTES = 5_000_000  # no machine data are longer
@@ -285,12 +286,14 @@ def machine_arm_text(
         trafo=trafo or "a KUKA arm",
         file=data.path.name,
         name=json.dumps(name or trafo.lower().replace(" ", "-") or "kuka"),
-        repeatability=_number(repeatability_mm),
+        repeatability=number_text(repeatability_mm),
         **_lengths(shape),
         **_limits(data),
         coupling=_coupling(data),
     )
-    _verify(data.path, shape, text)
+    q = np.linspace(-2.0, 2.0, 60).reshape(10, 6) * [1.0, -0.7, 0.5, -0.9, 0.6, 0.8]
+    flanges = np.array([shape.place(angles) for angles in q])
+    check_flanges(arm_of_text(data.path, text), data.path, q, flanges)
     return text
 
 
@@ -300,11 +303,12 @@ def _lengths(shape: KukaShape) -> dict[str, str]:
     s = shape
     flips = ("true" if sign < 0 else "false" for sign in closed.tolist())
     return {
-        "a": _list([s.ahead, s.upper, s.lift, 0.0, 0.0, 0.0]),
-        "d": _list([s.height, 0.0, 0.0, s.forearm, 0.0, s.flange]),
+        "a": list_text([s.ahead, s.upper, s.lift, 0.0, 0.0, 0.0]),
+        "d": list_text([s.height, 0.0, 0.0, s.forearm, 0.0, s.flange]),
         "sense": str([int(sign) for sign in closed]),
-        "a1": _number(s.ahead), "a2": _number(-s.lift), "c1": _number(s.height),
-        "c2": _number(s.upper), "c3": _number(s.forearm), "c4": _number(s.flange),
+        "a1": number_text(s.ahead), "a2": number_text(-s.lift),
+        "c1": number_text(s.height), "c2": number_text(s.upper),
+        "c3": number_text(s.forearm), "c4": number_text(s.flange),
         "flips": f"[{', '.join(flips)}]",
     }  # fmt: skip
 
@@ -323,12 +327,12 @@ def _limits(data: MachineData) -> dict[str, str]:
     speed = 6.0 * data.six("VEL_AXIS_MA") / np.abs(ratio)  # [deg/s] of [1/min]
     acceleration = speed / FULL_SPEED
     return {
-        "lower": _list(data.six("SOFTN_END")),
-        "upper": _list(data.six("SOFTP_END")),
-        "velocity": _list(np.round(speed, 1)),
-        "acceleration": _list(np.round(acceleration, 1)),
-        "jerk": _list(np.round(acceleration / FULL_ACCELERATION)),
-        "ratio": _list(np.round(ratio, 5)),
+        "lower": list_text(data.six("SOFTN_END")),
+        "upper": list_text(data.six("SOFTP_END")),
+        "velocity": list_text(np.round(speed, 1)),
+        "acceleration": list_text(np.round(acceleration, 1)),
+        "jerk": list_text(np.round(acceleration / FULL_ACCELERATION)),
+        "ratio": list_text(np.round(ratio, 5)),
     }
 
 
@@ -355,35 +359,9 @@ def _coupling(data: MachineData) -> str:
             matrix[other - 1, axis - 1] = -n / d
     if not found:
         return "# $COUP_COMP couples no axes.\n"
-    rows = "".join(f"    {_list(row)},\n" for row in matrix)
+    rows = "".join(f"    {list_text(row)},\n" for row in matrix)
     return (
         f"# $COUP_COMP: {', '.join(found)}: what an axis turns by with its own drive\n"
         "# at rest. drive-side angle = drive_coupling . joint angle\n"
         f"drive_coupling = [\n{rows}]\n"
     )
-
-
-def _number(value: float) -> str:
-    """Write a number to 1e-9, without a sign of zero."""
-    return repr(round(float(value), 9) + 0.0)
-
-
-def _list(values: Sequence[float] | Floats) -> str:
-    return f"[{', '.join(map(_number, values))}]"
-
-
-def _verify(path: Path, shape: KukaShape, text: str) -> None:
-    """Refuse a text that does not say what the machine data do.
-
-    Raises:
-        ArmError: It places the flange elsewhere.
-    """
-    arm = arm_of_text(path, text)
-    q = np.linspace(-2.0, 2.0, 60).reshape(10, 6) * [1.0, -0.7, 0.5, -0.9, 0.6, 0.8]
-    wanted = np.array([shape.place(angles) for angles in q])
-    gap = float(np.abs(arm.flange(q) - wanted).max())
-    back = arm.flange(arm.nearest(wanted, q))
-    gap = max(gap, float(np.abs(back - wanted).max()))
-    if not gap < 1e-9:
-        problem = f"cannot be written as an arm file: flanges differ by {gap:.3g}"
-        raise ArmError(path, problem, "Write the arm file by hand")

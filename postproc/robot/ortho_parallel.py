@@ -10,7 +10,8 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError
-from postproc.robot.arm import Arm, arm_of_text
+from postproc.robot.arm import arm_of_text, check_flanges
+from postproc.robot.arm_file import list_text, number_text
 from postproc.robot.denavit_hartenberg import PARALLEL, DhParameters, dh_parameters
 from postproc.robot.pose import MM
 from postproc.robot.urdf import MOVING, UrdfChain, rotate_about
@@ -273,7 +274,7 @@ def arm_text(chain: UrdfChain, repeatability_mm: float, name: str | None = None)
             problem = f"{obstacle.problem}, and no joint angles move the flange freely"
             cure = "Check origins and axes of the joints"
             raise ArmError(obstacle.path, problem, cure, line=obstacle.line)
-    _verify(chain, arm)
+    check_flanges(arm, chain.path, Q, chain.flange(Q))
     return text + links_text(chain.weights, arm)
 
 
@@ -339,7 +340,7 @@ def _fill_arm_file(
     return TEMPLATE.format(
         robot=_quote(chain.name), file=_quote(chain.path.name),
         base=_quote(chain.base), tip=_quote(chain.tip),
-        name=_quote(name), repeatability=_number(repeatability_mm),
+        name=_quote(name), repeatability=number_text(repeatability_mm),
         **parts, **_joint_parts(chain),
     )  # fmt: skip
 
@@ -362,10 +363,10 @@ def _write_closed_form(shape: Shape) -> dict[str, str]:
     sense = [round(float(s)) for s in shape.sign]
     wrapped = 180.0 - (180.0 - offset) % 360.0
     return {
-        "a": _list(a / MM),
-        "d": _list(d / MM),
+        "a": list_text(a / MM),
+        "d": list_text(d / MM),
         "alpha": "[-90.0, 0.0, -90.0, 90.0, -90.0, 0.0]",
-        "offset": _list(wrapped),
+        "offset": list_text(wrapped),
         "sense": str(sense),
         "parallelogram": PARALLELOGRAM,
         "closed_form": CLOSED_FORM.format(**_opw_parts(shape)),
@@ -403,56 +404,26 @@ def _joint_parts(chain: UrdfChain) -> dict[str, str]:
     lower, upper, velocity = np.rad2deg(limits).T
     acceleration = velocity / FULL_SPEED
     return {
-        "lower": _list(lower),
-        "upper": _list(upper),
-        "velocity": _list(velocity),
-        "acceleration": _list(acceleration),
-        "jerk": _list(acceleration / FULL_ACCELERATION),
+        "lower": list_text(lower),
+        "upper": list_text(upper),
+        "velocity": list_text(velocity),
+        "acceleration": list_text(acceleration),
+        "jerk": list_text(acceleration / FULL_ACCELERATION),
     }
 
 
 def _opw_parts(shape: Shape) -> dict[str, str]:
     """Write the closed form."""
     lengths = (
-        f"{key}_mm = {_number(getattr(shape, key) / MM)}"
+        f"{key}_mm = {number_text(getattr(shape, key) / MM)}"
         for key in ("a1", "a2", "b", "c1", "c2", "c3", "c4")
     )
     flips = ("true" if s < 0 else "false" for s in shape.sign)
     return {
         "lengths": "\n".join(lengths),
-        "offsets": _list(-np.rad2deg(shape.zero)),
+        "offsets": list_text(-np.rad2deg(shape.zero)),
         "flips": f"[{', '.join(flips)}]",
     }
 
 
-def _number(value: float) -> str:
-    """Write a number to 1e-9, without a sign of zero.
-
-    >>> _number(-0.0000000001), _number(89.9999999999)
-    ('0.0', '90.0')
-    """
-    return repr(round(float(value), 9) + 0.0)
-
-
-def _list(values: Floats) -> str:
-    return f"[{', '.join(map(_number, values))}]"
-
-
 Q = np.linspace(-3.0, 3.0, 90).reshape(15, 6) * [1.0, -0.7, 0.5, -0.9, 0.6, 0.8]
-
-
-def _verify(chain: UrdfChain, arm: Arm) -> None:
-    """Refuse an arm that is not what the URDF says.
-
-    Raises:
-        ArmError: It places the flange elsewhere.
-    """
-    wanted = chain.flange(Q)
-    gap = float(np.abs(arm.flange(Q) - wanted).max())
-    back = arm.flange(arm.nearest(wanted, Q))
-    if arm.file.opw is None:  # Newton's method may miss a pose
-        back = np.where(np.isnan(back), wanted, back)
-    gap = max(gap, float(np.abs(back - wanted).max()))
-    if not gap < 1e-9:
-        problem = f"cannot be written as an arm file: flanges differ by {gap:.3g}"
-        raise ArmError(chain.path, problem, "Write the arm file by hand")

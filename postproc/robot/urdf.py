@@ -432,11 +432,7 @@ def _way(path: Path, joints: Mapping[str, UrdfJoint], link: str) -> list[UrdfJoi
 
 
 def _check_joints(chain: UrdfChain) -> None:
-    """Refuse a chain that is not one of six revolute joints with limits.
-
-    Raises:
-        ArmError: Naming the joint.
-    """
+    """Refuse a chain that is not one of six revolute joints with limits."""
     _refuse_joints(chain, _other_kind)
     if len(chain.moving) != 6:
         names = ", ".join(joint.name for joint in chain.moving) or "none"
@@ -451,11 +447,7 @@ def _check_joints(chain: UrdfChain) -> None:
 def _refuse_joints(
     chain: UrdfChain, complaints: Callable[[UrdfJoint], Iterator[tuple[str, str]]]
 ) -> None:
-    """Refuse a chain for the first complaint about one of its joints.
-
-    Raises:
-        ArmError: Naming the joint.
-    """
+    """Refuse a chain for the first complaint about one of its joints."""
     for joint in chain.joints:
         for problem, cure in complaints(joint):
             problem = f"joint {joint.name} {problem}"

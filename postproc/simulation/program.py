@@ -85,12 +85,7 @@ def run_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> ProgramR
 
 
 def _not_passed(visits: Visits, begun: Collection[int]) -> Ints:
-    """Find fly points that the program goes on from, but no move of a run.
-
-    Args:
-        visits: The program.
-        begun: Visits that moves of the run begin at.
-    """
+    """Find fly points that the program goes on from, but no move of a run."""
     goes_on = np.zeros(len(visits) + 1, dtype=bool)
     goes_on[visits.pred[visits.pred >= 0]] = True
     for i in range(1, len(visits)):  # before what is not followed

@@ -65,10 +65,23 @@ def test_a_job_knows_what_runs_beside_it(archive, job_folder):
     job = archive / "KRC/R1/Program/weld/job.src"
     run = cli("compensate", job, "--cell", archive / "cell.toml", "--model",
               job_folder / "model.json", "-o", archive / "job.src")  # fmt: skip
-    assert "sps.sub is read, and not rewritten" in run.output
+    assert "sps.sub is read, but not written" in run.output
     alone = cli("compensate", sub, "--cell", archive / "cell.toml", "--model",
                 job_folder / "model.json")  # fmt: skip
     assert alone.exit_code == 2 and "is a submit program" in alone.output
+
+
+def test_what_people_write_in_a_package_counts(archive, job_folder):
+    job, own = archive / "KRC/R1/Program/weld/job.src", b"LIN {X 1,Y 2,Z 3}\r\n"
+    job.write_bytes(job.read_bytes().replace(b"\nEND", b"\nUSERSPOT(1)\r\nEND", 1))
+    source = b"DEF USERSPOT(A :IN)\r\nINT A\r\n%bEND\r\n"
+    place = archive / "KRC/R1/System/USERSPOT.SRC"
+    for text, acts in ((source % own, True), (source % b"", False)):
+        place.write_bytes(text)
+        run = batch(archive, job_folder, "--report", archive / "report.json")
+        assert (archive / "out/R1/System/USERSPOT.SRC").read_bytes() == text
+        report = (archive / "report.json").read_text()
+        assert ("routine-assumed-motionless" in report) is not acts, run.output
 
 
 CONFIG = """DEFDAT $CONFIG

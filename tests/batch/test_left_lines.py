@@ -79,4 +79,4 @@ def test_targets_in_a_program_of_which_only_the_values_change_are_found(desk):
 
 def test_a_message_names_all_lines_that_are_never_reached(desk):
     job = desk.put("dead.pdl", with_dead_routine("dead"))
-    assert "2 moves, lines 5-6, are never reached" in desk.compensate(job).stderr
+    assert "never reached from the start: 2 (lines 5-6)" in desk.compensate(job).stderr

@@ -102,7 +102,7 @@ WRONG = {
     ),
     "plane": (
         lambda s: put(s, ["q1_deg", "q4_deg", "q6_deg"], np.zeros((300, 3))),
-        r"determine \d+ of \d+ directions of the geometry\. Measure more poses",
+        r"determine \d+ of \d+ independent geometric parameters\. Measure more poses",
     ),
 }
 
@@ -143,7 +143,7 @@ def test_sorted_rows_have_lost_their_directions(survey, fit):
 def test_rows_from_one_side_leave_the_backlash_unseen(survey, fit):
     found = fit(put(survey, SIDES, np.ones((300, 6))))
     assert found.exit_code == 0
-    (told,) = re.findall("not determined, at the prior, (.*)", found.stdout)
+    (told,) = re.findall("not determined by the rows, at the prior: (.*)", found.stdout)
     (joints,) = re.findall("backlash ([b1-6 ]+)", told)
     assert {"b1", "b2", "b3", "b4", "b5"} <= set(joints.split())
 

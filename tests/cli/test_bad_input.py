@@ -78,13 +78,13 @@ def test_an_unknown_statement_is_kept_and_reported(desk):
         ),
         (
             "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 125.5, 30.0}",
-            "axis 5 beyond its l",
+            "axis 5 would be beyond its l",
         ),
         (
             "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 0.5, 30.0}",
             "wrist singularity",
         ),
-        (LOOSE, "axis [23] beyond its limit|no solution for the config"),
+        (LOOSE, "axis [23] would be beyond its limit|no solution for the config"),
     ],
     ids=["reach", "limit", "wrist", "configuration"],
 )
@@ -192,7 +192,12 @@ def test_a_model_for_one_point_is_not_used_for_another_tool(desk, job_folder):
                 "--model", model)  # fmt: skip
     assert found.exit_code == 1
     assert (
-        len(re.findall(r"job\.pdl:\d: rejected: tool not surveyed", found.stderr)) == 2
+        len(
+            re.findall(
+                r"job\.pdl:\d: rejected: the tool was not surveyed", found.stderr
+            )
+        )
+        == 2
     )
 
 
@@ -224,10 +229,10 @@ def spoilt(rows, name):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("few", r"5 rows .* determine .* of .* directions.* Measure more"),
-        ("one pose", r"at 1 poses determine .*Measure more poses"),
-        ("one joint", r"determine .* directions of the geometry.*all joints moving"),
-        ("all zero", r"0 rows .*determine"),
+        ("few", r"5 rows, .* determine .* of .* parameters.* Measure more"),
+        ("one pose", r" 1 poses, .*determine .*Measure more poses"),
+        ("one joint", r"determine .* geometric parameters.*all joints moving"),
+        ("all zero", r"0 rows, .*determine"),
         ("nan", r"bad\.csv:5: 'NaN' in column y_mm is not a number\. Correct"),
         ("empty cell", r"bad\.csv:5: .*q2_deg"),
         ("metres", r"bad\.csv: .*look like metres: write millimetres"),
@@ -376,7 +381,7 @@ BOTH = LISTED + entry("a") + entry("b", 130.0)
 @pytest.mark.parametrize(
     ("values", "status", "said"),
     [
-        (None, ["runtime"] * 2, r"job\.pdl:6: no-variable-file: .*no job\.lsv: put"),
+        (None, ["runtime"] * 2, r"job\.pdl:6: no-variable-file: .*no job\.lsv\. Put"),
         (
             LISTED + entry("y") + entry("z"),
             ["runtime"] * 2,
@@ -495,7 +500,7 @@ def test_a_model_that_json_cannot_hold_is_refused_in_words(desk, text):
     odd = model_with(desk, '"rows": ', f'"rows": {text}')
     source = desk.put("job.pdl", program(FIRST, POSE))
     found = cli("compensate", source, "--cell", desk.cell, "--model", odd)
-    refused(found, r"odd\.json: is not valid JSON\. Make it again")
+    refused(found, r"odd\.json: is not valid JSON\. Give the model")
     refused(cli("report", odd, "-o", desk.folder / "o.html"), "is not valid JSON")
 
 
@@ -614,3 +619,16 @@ def test_a_closed_stdout_is_told_as_that(desk, name):
     done = run_with(desk, name, preexec_fn=lambda: os.close(1))
     assert done.returncode == 2
     assert "standard output: is closed" in done.stderr
+
+
+@pytest.mark.parametrize("name", ["s.mod", "s.SRC"])
+def test_a_survey_program_is_written_as_pdl2_alone(desk, name):
+    place = desk.folder / name
+    found = cli("survey", "--cell", desk.cell, "--poses", "20", "-o", place)
+    refused(found, r"survey programs are PDL2\. Write SURVEY\.pdl")
+    assert not place.exists()
+
+
+def test_a_code_that_is_none_is_answered_with_those_like_it():
+    found = cli("explain", "--code", "direction-unsure")
+    refused(found, "no such code. Is it direction-")

@@ -70,8 +70,8 @@ def test_the_help_of_compensate_fits_on_a_screen():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ("compensation.orientation", "Write SECTION.KEY=VALUE, of the sections comp"),
-        ("limits.conflict_mm=1", "Write SECTION.KEY=VALUE, of the sections comp"),
+        ("compensation.orientation", "Write SECTION.KEY=VALUE. Sections: comp"),
+        ("limits.conflict_mm=1", "Write SECTION.KEY=VALUE. Sections: comp"),
         ("compensation.nosuch=1", "unknown key @ $.nosuch. Known here: orientation"),
         ("compensation.nosuch=none", "unknown key @ $.nosuch"),
         ("compensation.shared_points=all", "'mean', 'clone' or 'leave' @ $.shared_poi"),

@@ -107,7 +107,7 @@ def test_another_model_is_no_ground_for_an_opinion(desk, tree, tmp_path):
 def test_without_a_cell_there_is_a_note(desk, tree):
     done = run("check", tree, "--allow-uncorrected")
     assert done.exit_code == 0
-    assert done.stderr.count("no second opinion: it takes --cell and --model") == 1
+    assert done.stderr.count("no second opinion on the motion: it needs --cell") == 1
     asked = run("check", tree, "--allow-uncorrected", *INSIST)
     assert asked.exit_code == 2 and "--cell and --model" in asked.stderr
 

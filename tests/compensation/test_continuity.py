@@ -152,7 +152,7 @@ def test_a_guarded_fly_point_takes_its_neighbours_along(job_cell, job_model):
     model = surveyed_up_to(job_model, last.mean())
     done = compensate(job(*lines), job_cell, model, name="p.pdl")
     why = reasons(done)
-    assert "outside the surveyed" in why[5]
+    assert "is outside the surveyed" in why[5]
     assert why[3] == why[4] == BENT.format(STEP_MM)
     assert why[0] == "", "a stop does not bend"
 

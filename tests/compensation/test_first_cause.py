@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from postproc.compensation.first_cause import read_with_cause
+from tests.language.krl.test_visits import CONFIG, DATA
 from tests.written import FIRST, NEXT, POSE, cli, program
 
 
@@ -21,3 +23,12 @@ def test_the_first_cause_is_told_once_with_what_it_frees(desk):
 def test_nothing_is_told_where_nothing_would_be_freed(desk):
     assert "first-cause" not in told(desk, POSE)
     assert "first-cause" not in told(desk, POSE, NEXT, "dock")
+
+
+def test_targets_that_are_read_only_once_it_is_known_count(job_cell):
+    lines = ["PTP XP1", "ours( )", "LIN XP1", "LIN XP2"]
+    source = "\n".join(["DEF m( )", "BAS(#TOOL,1)", "BAS(#BASE,2)", *lines, "END\n"])
+    lists = {"m.dat": f"DEFDAT m\n{DATA}ENDDAT\n", "$config.dat": CONFIG}
+    files = {"m.src": source, **lists}
+    found = read_with_cause({k: v.encode() for k, v in files.items()}, job_cell)
+    assert "leaves 2 of 3 targets" in found.diagnostics[0].message

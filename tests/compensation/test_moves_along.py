@@ -52,8 +52,10 @@ def test_a_reason_says_that_a_target_moves(bench_cell, bench_model, language, li
     for v in np.flatnonzero(d.status != Status.CORRECTED).tolist():
         reason = d.reasons[d.why[v]].text
         assert (
-            WITH_POINT in reason or WITH_BEGIN in reason or "missing" in reason
-        ) == (bool(moved[v]) or "missing" in reason), reason
+            WITH_POINT in reason
+            or WITH_BEGIN in reason
+            or "does not state all" in reason
+        ) == (bool(moved[v]) or "does not state all" in reason), reason
 
 
 @pytest.mark.parametrize(

@@ -103,7 +103,7 @@ def test_the_spot_job_lands(spot) -> None:
 
 def test_the_spot_job_says_what_it_assumes_of_fly_points(spot) -> None:
     notes = {d.code: d.message for d in spot.outcome.diagnostics}
-    assert "fly points by more than 0.1 mm" in notes["fly-corner"]
+    assert "fly points at more than 0.1 mm" in notes["fly-corner"]
     assert "fly-assumed" not in notes  # $FLY_TYPE and $FLY_PER are set
 
 

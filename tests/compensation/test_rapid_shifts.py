@@ -117,7 +117,7 @@ def test_a_routine_that_is_called_with_points_that_differ_shares_none(shop):
     calls = [(k, {"a": name}) for name in ("p1", "p2", "p3") for k in (0, 1)]
     far = AT.replace("0,0,100", "200,150,250")
     found = landed(shop, ["at p1;", "at p2;", "at p3;"], far, calls)
-    assert "numbers of its shift that differ" in found.whys
+    assert "shifts (such as Offs) that differ" in found.whys
     assert "Offs(a,200,150,250)" in found.text
 
 
@@ -139,7 +139,7 @@ def test_a_loop_over_points_compares_its_rounds(shop):
     done = shop.compensate({"m.mod": source})
     assert b"Offs(row{i},200,150,250)" in done.outputs["m.mod"]
     d = done.decisions
-    assert any("numbers of its shift" in d.reasons[k].text for k in d.why.tolist())
+    assert any("(such as Offs)" in d.reasons[k].text for k in d.why.tolist())
 
 
 def shop_point(source, name):

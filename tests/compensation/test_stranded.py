@@ -74,7 +74,7 @@ def test_behind_an_axis_that_leaves_its_range_on_the_way(cell, pos):
     upper = np.rad2deg(cell.arm.upper[0])
     far = f"MOVE JOINT TO {{{upper + 5:.1f}, 0, -90, 0, 45, 0}}"
     found = planned(cell, far, START)
-    assert found.reasons[1].text.startswith("axis 1 beyond its limit")
+    assert found.reasons[1].text.startswith("axis 1 would be beyond its limit")
     assert stranded(found) == [False, False, True]
 
 

@@ -178,7 +178,7 @@ def test_an_error_that_may_lead_anywhere_lets_nothing_be_read_at_once(
 def test_lines_are_found_by_the_statements_that_stand_on_them():
     text = read_statements(Source("a.mod", b"MODULE a\nVAR num x\n:=1;\nVAR num y;\n"))
     rows = rows_of_lines(text, {3})
-    assert [text.quote(row) for row in rows] == ["VAR num x :=1;"]
+    assert [text.quote(row) for row in rows] == ["'VAR num x :=1;'"]
     assert rows_of_lines(text, set()) == set()
 
 

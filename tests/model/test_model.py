@@ -213,16 +213,16 @@ def test_what_was_not_surveyed_is_said() -> None:
     longer = inside.with_(tool=inside.tool + np.array([0.0, 0.0, 0.1]))
     p = m.predict(NJ, longer)
     assert p.any_outside.all()
-    assert "tool not surveyed" in p.why(0)[0]
+    assert "the tool was not surveyed" in p.why(0)[0]
     q = np.array(inside.q)
     q[3, 0] = 2.5
     p = m.predict(NJ, inside.with_(q=q))
     assert np.flatnonzero(p.any_outside).tolist() == [3]
-    assert p.why(3)[0].startswith("axis 1 outside the surveyed")
+    assert p.why(3)[0].startswith("axis 1 is outside the surveyed")
     turned = inside.with_(q=inside.q + 2 * np.pi * np.eye(6)[3])
     assert not m.predict(NJ, turned).any_outside.any()
     heavy = inside.with_(payload=np.full(40, 300.0))
-    assert any("payload outside" in why for why in m.predict(NJ, heavy).outside)
+    assert any("payload is outside" in why for why in m.predict(NJ, heavy).outside)
     assert not model(3).predict(NJ, longer).any_outside.any()
 
 

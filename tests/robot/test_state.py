@@ -92,7 +92,7 @@ def test_another_state_is_another_correction(campaign):
 @pytest.mark.parametrize(
     ("payload", "temperature", "why"),
     [
-        (60, 45, r"temperature outside the surveyed 20.* to 3\d.* deg C"),
+        (60, 45, r"temperature is outside the surveyed 20.* to 3\d.* deg C"),
         (None, 26, r"payload is not known, and the model needs it"),
         (60, None, r"temperature is not known, and the model needs it"),
     ],

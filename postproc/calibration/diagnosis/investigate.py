@@ -23,6 +23,7 @@ from postproc.calibration.diagnosis.search import (
     search,
     stand,
 )
+from postproc.calibration.diagnosis.step_places import place_steps
 from postproc.calibration.diagnosis.table import Causes
 from postproc.calibration.diagnosis.weight import pass_on, weigh_laws
 from postproc.calibration.regression import Fit
@@ -36,9 +37,12 @@ STANDS_IN = 0.9  # share of the name's evidence that a free form must have
 
 
 def investigate(base: Fit, causes: Causes, null: Null, progress: Progress) -> Search:
-    """Search for what a fit lacks, take back names that do not hold, name waves."""
+    """Search for what a fit lacks, take back names that do not hold, name waves.
+
+    Steps are moved to the middle of where the rows let them be.
+    """
     found = withdraw(search(base, causes, null, progress))
-    return name_waves(pass_on(weigh_laws(found, progress), progress))
+    return place_steps(name_waves(pass_on(weigh_laws(found, progress), progress)))
 
 
 def withdraw(found: Search) -> Search:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.score import Score, rank_some
 from postproc.model.carrier import every_carrier
 from postproc.model.covariate import covariate, varies, varies_enough
-from postproc.model.effects.effect import Candidate, Effect
+from postproc.model.effects.effect import Candidate
 from postproc.model.effects.part_motion import OF_STATE, PartMotion, family_of
 from postproc.model.effects.step import CampaignStep
 from postproc.model.kinematics import ArmStates
@@ -18,19 +19,23 @@ from postproc.model.kinematics import ArmStates
 ALIKE = 0.98  # part of the rows that a value parts as the step does
 
 
-def jumps(effect: Effect, projection: Projection) -> list[Score]:
+def jumps(step: Score, projection: Projection) -> list[Score]:
     """Score all parts as if they jumped at a temperature, say, instead of at a row.
 
     Args:
-        effect: The step, at one row; of any other effect there are none.
+        step: The score of a step at one row; of any other effect there are none.
         projection: The fit without it.
 
     Returns:
-        The best first; none where nothing passes one value at that row alone.
+        The best first, each charged for its place as the step is; none where nothing
+        passes one value at that row alone.
     """
+    effect = step.best.effect
     if not isinstance(effect, CampaignStep):
         return []
-    return rank_some(projection, list(_candidates(effect, projection.at)))
+    found = rank_some(projection, list(_candidates(effect, projection.at)))
+    charge = step.best_evidence - step.evidence
+    return [replace(s, evidence=s.evidence - charge) for s in found]
 
 
 def _candidates(step: CampaignStep, batch: ArmStates) -> Iterator[Candidate]:

@@ -4,8 +4,8 @@ Whether a row is before or after a jump depends on the load, and the load on the
 moments of the links, which an arm file states to a tenth or so. A step has no slope in
 either. It therefore begins as a wide tanh, which has one, and is narrowed; at each
 width Gauss-Newton steps move its place and all moments, which have the normal prior of
-`moments`. They cost what Laplace's approximation says: their prior, and the share of it
-that the rows leave.
+`moment_root`. They cost what Laplace's approximation says: their prior, and the share
+of it that the rows leave.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.candidates import Projection
+from postproc.calibration.diagnosis.link_weights import links_beyond, moment_root
 from postproc.calibration.diagnosis.score import Score, rank_some
-from postproc.model.covariate import JOINTS, by_weight, covariate
-from postproc.model.effects.compliance import moments
+from postproc.model.covariate import by_weight, covariate
 from postproc.model.effects.part_motion import PartMotion
 
 WIDTHS = 0.3 * 0.6 ** np.arange(9)  # of half of the load's range
@@ -35,7 +35,7 @@ class _Jump:
         projection: The fit without it.
         moved: Motion of the tool point per unit of the carrier's motion, (n, 3).
         load: The load of nominal links, (n,), in halves of its range.
-        by_moment: Its slopes by the links' moments, each per its spread, (n, m).
+        by_moment: Its slopes by what is unsure of the links' moments, (n, m).
     """
 
     projection: Projection
@@ -146,20 +146,16 @@ def _move(
         cell: The step.
         per_moment: Slopes of its load by the moments of all links, (n, 6, 3).
     """
-    links = JOINTS[int(cell.source.split()[1][0]) - 1 :]
-    spreads = np.array([[moments(projection.at.arm, k)[0][1]] for k in links])
+    links = links_beyond(cell.source)
+    root = moment_root(projection.at.arm, links)
     load = covariate(projection.at, cell.source)
     half = float(np.ptp(load)) / 2
-    slopes = per_moment[:, links[0] - 1 :] * spreads / half
-    jump = _Jump(
-        projection,
-        cell.carrier.move(projection.at),
-        load / half,
-        slopes.reshape(len(load), -1),
-    )
+    slopes = per_moment[:, links[0] - 1 :].reshape(len(load), -1) @ root / half
+    jump = _Jump(projection, cell.carrier.move(projection.at), load / half, slopes)
     known = dict(cell.heavier)
-    start = np.array([known.get(k, np.zeros(3)) for k in links]) / spreads
-    at, charge = jump.narrow(np.r_[cell.middle / half, start.reshape(-1)])
-    more = at[1:].reshape(-1, 3) * spreads
+    start = np.array([known.get(k, np.zeros(3)) for k in links]).reshape(-1)
+    start = np.linalg.solve(root, start)
+    at, charge = jump.narrow(np.r_[cell.middle / half, start])
+    more = (root @ at[1:]).reshape(-1, 3)
     heavier = tuple((k, tuple(map(float, m))) for k, m in zip(links, more, strict=True))
     return replace(cell, middle=float(at[0]) * half, heavier=heavier), charge

@@ -139,7 +139,9 @@ def diagnose_path(
         PostprocError: A file cannot be used, or the model cannot be extended.
     """
     if program is None:
-        raise PostprocError("--path: name the program that ran with --program")
+        raise PostprocError(
+            "--path: the program that ran is not given. Name it with --program"
+        )
     cell = as_cell(cell)
     model, frame = as_model(model, cell.arm), frame_of(cell, frame)
     return _diagnose_track(track, cell, model, Path(program), frame, seed, progress)
@@ -216,7 +218,10 @@ def read_track(path: Path, reading: TableFormat = DETECT) -> tuple[Track, str]:
     track = Track(time, table.block(POSITION) * MM)
     if not RATES[0] <= 1.0 / track.period <= RATES[1]:
         problem = f"has {1.0 / track.period:.3g} readings in a second"
-        cure = f"Give {RATES[0]:.0f} to {RATES[1]:.0f}, with their times in seconds"
+        cure = (
+            f"A path needs {RATES[0]:.0f} to {RATES[1]:.0f}, with times in seconds. "
+            "Give the readings of a tracker that followed the tool"
+        )
         raise MeasurementError(path, problem, cure)
     return track, hashlib.sha256(path.read_bytes()).hexdigest()
 
@@ -338,13 +343,7 @@ def _move(sample: Ints, ways: PredictedWays) -> Ints:
 def _as_surveyed(
     found: Extension, model: Model, joints: tuple[JointInMotion, ...]
 ) -> Extension:
-    """Leave what one run tells nothing of: how poses repeat, where the tracker stood.
-
-    Args:
-        found: What a track says.
-        model: The given model.
-        joints: What its joints do in motion, for its history.
-    """
+    """Leave what one run tells nothing of: how poses repeat, where a tracker stood."""
     *earlier, record = found.model.history
     record = {**record, "in_motion": {str(j.joint): j.verdict for j in joints}}
     told = {k: v for k, v in model.statistics.items() if k == READING}

@@ -339,8 +339,8 @@ def refit(
         )
     if len(survey) < FEWEST:
         raise PostprocError(
-            f"{survey.path} has {len(survey)} rows once the readings of every stop are "
-            f"averaged; tracing an effect takes at least {FEWEST}. Measure more poses"
+            f"{survey.path}: has {len(survey)} rows once the readings of every stop "
+            f"are averaged, and a diagnosis needs at least {FEWEST}. Measure more poses"
         )
     origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
     batch = ArmStates(arm, survey.states)

@@ -34,7 +34,7 @@ from postproc.model.effects.effect import (
     Family,
 )
 from postproc.model.effects.joint_offset import JointOffset
-from postproc.model.effects.part_motion import PartMotion
+from postproc.model.effects.part_motion import OF_STATE, PartMotion
 from postproc.model.kinematics import ArmStates
 
 # Finer settings around a candidate that a grid found.
@@ -161,7 +161,7 @@ def ranking(projection: Projection, causes: Causes) -> list[Score]:
         found = lawful(view, refine(view, score), score.law)
         refined.append(readable(view, found, causes))
     rest = [s for s in scores if s not in leading]
-    rest += jumps(refined[0].best.effect, projection)
+    rest += jumps(refined[0], projection)
     return sorted([*refined, *rest], key=lambda s: -s.evidence)
 
 
@@ -252,13 +252,15 @@ def find_margin(name: Score, free: Score) -> float:
     """Return by how much a free form must be ahead of a name [nats].
 
     A law with one or two numbers is no freer than a name: it must be ahead for sure. A
-    step happens at one row: what varies smoothly and explains the rows as well, does.
+    step happens at one row: what varies smoothly and explains the rows as well, does. A
+    jump where the arm passed a temperature once is rarer than a crash or a tool that
+    slips, and takes their place where it explains more.
     """
     effect = free.best.effect
     if free.family.effect != PART_MOTION or effect.free:
         return ahead(name.evidence)
     if name.best.effect.at_one_row and not effect.at_one_row:
-        return 0.0
+        return NEAR if isinstance(effect, PartMotion) and effect.law == "step" else 0.0
     return max(CLEARLY[0], LAWFUL * name.evidence)
 
 
@@ -286,12 +288,7 @@ def plainest(best: Score, scores: list[Score]) -> Score:
 
 
 def _law(free: Score, names: list[Score]) -> Score | None:
-    """Find the law that the torque drives as it does a free form, if rows speak for it.
-
-    Args:
-        free: The free form.
-        names: Scores of names, best first.
-    """
+    """Find the law by the torque that drives a free form, if rows speak for it."""
     source = free.best.source
     for s in names if source.startswith("torque") else ():
         same = s.family.joint == free.family.joint and s.best.source == source
@@ -372,7 +369,8 @@ def names_instead(
         scores = ranking(Projection.of(fit), causes)
         left = next((s.evidence for s in scores if s.family == free.family), 0.0)
         if left < ahead(free.evidence):
-            return first if fit.log_evidence > alone else None
+            more = NEAR if first.best.effect.at_one_row else 0.0
+            return first if fit.log_evidence > alone + more else None
     return None
 
 
@@ -665,7 +663,8 @@ def stand(found: Search, number: int) -> JudgedAddition:
         within = CLEARLY[0] if alike and s.best.family.tier == FREE else NEAR
         if _same_load((own.source, s.best.source), projection.at):
             within = max(within, SAME_LOAD * here.evidence)
-        if s.evidence >= here.evidence - within and name not in names:
+        enough = s.evidence >= here.evidence - within or _same_moment(here, s)
+        if enough and name not in names:
             rivals.append(s)
             names.add(name)
     evidence = here.evidence
@@ -728,6 +727,20 @@ def _choose_reported(own: Family, rivals: Sequence[Score]) -> tuple[Score, ...]:
     others = [s for s in rivals if s.family.effect != PART_MOTION][:MOST_OTHERS]
     most = MOST_CELLS - len(others) if own.effect == PART_MOTION else MOST_OTHERS
     return (*others, *cells[:most])
+
+
+def _same_moment(own: Score, other: Score) -> bool:
+    """Tell whether a step in time may be a jump where the arm passed a value once.
+
+    A tool that slips may do so in any way, a jump is one of these: for what a step has
+    more of numbers it may be behind.
+    """
+    jump = own.best.effect
+    if not (isinstance(jump, PartMotion) and jump.source in OF_STATE):
+        return False
+    step = other.best.effect.at_one_row and other.family.tier == NAMED
+    more = NEAR + CLEARLY[0] * (other.best.width - own.best.width)
+    return step and other.best_evidence >= own.best_evidence - more
 
 
 def _same_load(both: tuple[str, str], at: ArmStates) -> bool:

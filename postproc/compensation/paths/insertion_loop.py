@@ -193,13 +193,7 @@ def _stop(work: InsertionPlan, k: int, v: int) -> float | None:
 
 
 def _on_path(work: InsertionPlan, k: int, v: int) -> list[float]:
-    """Find a point in every part of a path that is left too far, the worst first.
-
-    Args:
-        work: The points.
-        k: The path.
-        v: The visit at its end.
-    """
+    """Find a point in every part of a path that is left too far, the worst first."""
     paths, samples = work.paths, work.paths.samples(k)
     way, far = paths.way[samples], paths.after.across[samples]
     known, shut = work.points.get(v, ()), work.shut.get(v, ())

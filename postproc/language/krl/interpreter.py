@@ -111,10 +111,14 @@ class KrlMachine(TaskMachine):
         return own_numbers(one) if isinstance(one, said.KrlMove) else None
 
     def apart(self, context: CallContext) -> set[int] | None:
-        """Return the points of splines; all where an interrupt may end any move."""
-        if self._has_interrupts:
+        """Return the points of splines; all where an interrupt may end any move.
+
+        All of a system file, too, where numbers stay.
+        """
+        file = self.task.files[context.scope.file]
+        if self._has_interrupts or file.is_system:
             return None
-        blocks = self.task.files[context.scope.file].splines
+        blocks = file.splines
         return {row for rows in blocks for row in rows}
 
     def acts(self, one: said.SourceStatement) -> bool:
@@ -345,7 +349,7 @@ class KrlMachine(TaskMachine):
         """Allow for what a function does."""
         found = self.task.routine(name, context.scope)
         if found is not None:
-            if not self._moves(found[0], found[2]):
+            if not self.may_act(found[0], found[2]):
                 return _halt(here, None)
             self.run_beside(found[0], found[2])
             what = f"calls the function {name}, which moves: it is not followed"
@@ -647,8 +651,8 @@ class KrlMachine(TaskMachine):
 
     # What a routine may do, read off its text.
 
-    def _moves(self, file: int, routine: HeadedRows) -> bool:
-        """Tell whether a routine moves, or changes how moves are carried out."""
+    def may_act(self, file: int, routine: HeadedRows) -> bool:
+        """Return True if a routine moves, or changes how moves are carried out."""
         return bool(self._routine_effects(file, routine))
 
     def _routine_effects(self, file: int, routine: HeadedRows) -> frozenset[str]:

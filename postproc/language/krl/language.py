@@ -23,6 +23,7 @@ from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.krl.statements import KrlText
 from postproc.language.krl.symbols import KrlTask
 from postproc.language.krl.to_visits import visits_of
+from postproc.language.krl.user_sources import acting_sources
 from postproc.language.language import (
     Cloner,
     JobReading,
@@ -79,10 +80,11 @@ class Krl(Language):
         task = KrlTask(files, start.taught)
         machine = follow(lambda: KrlMachine.of(task, start))
         visits = visits_of(machine)
-        missed = machine.find_unreached({k: file.moves for k, file in enumerate(files)})
+        own = {k: f.moves for k, f in enumerate(files) if not f.is_system}
+        missed = machine.find_unreached(own)
         told = never_reached(missed, f"DEF {files[0].routines[0].head.name}", "program")
-        own = (d for file in files for d in file.diagnostics)
-        found = [*own, *machine.diagnostics, *told]
+        odd = (d for file in files for d in file.diagnostics)
+        found = [*odd, *machine.diagnostics, *told]
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
         kept = tuple(f for f in files if f.text.source.name not in corrected)
         texts = tuple(skeleton_of(file.text) for file in files)
@@ -102,6 +104,10 @@ class Krl(Language):
     def holds_joints(self, line: str) -> bool:
         """Tell whether a line holds joint angles."""
         return _JOINTS.match(line) is not None
+
+    def reads(self, program: Path) -> tuple[Path, ...]:
+        """Return sources of packages that people have written moves into."""
+        return acting_sources(program)
 
     def read_archive(self, folder: Path) -> Archive | None:
         """Read ``$config.dat`` and ``$machine.dat`` of an archive."""
@@ -138,11 +144,7 @@ def skeleton_of(text: KrlText) -> Skeleton:
 
 
 def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:
-    """Refuse a program that switches the controller's own accuracy model on.
-
-    Raises:
-        ProgramError: It does.
-    """
+    """Refuse a program that switches the controller's own accuracy model on."""
     for file in files:
         for row in file.text.where(lambda one: bool(_switches_on(one))):
             name = _switches_on(file.text.statement(row))

@@ -46,7 +46,9 @@ AXES = ("a1", "a2", "a3", "a4", "a5", "a6")
 OUTSIDE = ("e1", "e2", "e3", "e4", "e5", "e6")
 PLACE = COMPONENTS[:6]
 RUN_TIME = "it is known only when the program runs"
-AT_RUN_TIME = Reason(Code.RUNTIME_VALUE, RUN_TIME)
+AT_RUN_TIME = Reason(
+    Code.RUNTIME_VALUE, "the target is known only when the program runs"
+)
 
 
 def no_target(text: str) -> Reason:
@@ -72,8 +74,8 @@ _POINTS = {
 }
 PARTIAL = Reason(
     Code.PARTIAL_TARGET,
-    "numbers are missing: they stay what they were commanded before, so that it moves "
-    "along with the point before it",
+    "the target does not state all of its numbers: the others stay those of the "
+    "previous target. Write all of its numbers",
 )
 NO_STATUS = Reason(
     Code.CONFIGURATION_UNKNOWN,
@@ -84,10 +86,10 @@ ACCURATE = Reason(
     "S says that it was taught with the controller's own accuracy model",
 )
 NOT_BY_JOINTS = Reason(
-    Code.TRAJECTORY_UNKNOWN, "it is joint angles, and no PTP goes to them"
+    Code.TRAJECTORY_UNKNOWN, "the target is joint angles, and the move to it is no PTP"
 )
-COMPUTED = Reason(Code.COMPUTED_TARGET, "it is computed from other data")
-ODD_STATUS = Reason(Code.CONFIGURATION_UNKNOWN, "S or T is no such number")
+COMPUTED = Reason(Code.COMPUTED_TARGET, "the target is computed from other data")
+ODD_STATUS = Reason(Code.CONFIGURATION_UNKNOWN, "S or T is no valid number")
 ANGLE = Reason(
     Code.ENDS_ELSEWHERE, f"CA ends the arc elsewhere than at its end point: {RUN_TIME}"
 )
@@ -286,6 +288,8 @@ class _Goal:
             goal = self._axes(found)
         else:
             goal = self._pose(found)
+        if not name and goal.file >= 0:
+            return replace(goal, pins=self._system(goal.file))
         if not name:
             return goal
         if goal.why.code is Code.PARTIAL_TARGET:  # what data lack may be told elsewhere

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from postproc.diagnostics import Code
-from postproc.files import base_name, is_submit
+from postproc.files import base_name, is_submit, is_system_source
 from postproc.language.blocks import BlockWords, Outline
 from postproc.language.control_flow import HeadedRows
 from postproc.language.krl import syntax as said
@@ -73,10 +74,11 @@ class KrlFile:
     splines: tuple[range, ...]
     diagnostics: tuple[Diagnostic, ...]
 
-    @property
+    @cached_property
     def is_system(self) -> bool:
-        """Tell whether it is a list of the controller, such as ``$config.dat``."""
-        return self.name.startswith("$")
+        """Return True if it is of the controller: ``$config.dat``, or of a package."""
+        source = self.text.source
+        return self.name.startswith("$") or is_system_source(source.name, source.data)
 
     @property
     def is_submit(self) -> bool:

@@ -23,6 +23,13 @@ from postproc.language.krl.program import KrlDatum, KrlFile, whole
 CONFIG = "$config"
 ANY = -1  # an entry of a table whose number is not known
 POSITIONS = ("pos", "e6pos")  # types
+MOVE_WORDS = frozenset(
+    """
+    ptp lin circ sptp slin scirc spl ptp_rel lin_rel circ_rel sptp_rel slin_rel
+    scirc_rel spl_rel
+    """.split()
+)
+"""Words that a move begins with."""
 POINTS = (*POSITIONS, "axis", "e6axis")
 DEEPEST = 20  # names that stand for names
 
@@ -242,6 +249,15 @@ class KrlTask:
     @cached_property
     def odd_words(self) -> frozenset[str]:
         """Words of what is not understood: each may name what is set there."""
+        found = set[str]()
+        for file in (f for f in self.files if not f.is_submit):
+            words = file.text.words(file.text.where(is_odd), MOVE_WORDS)
+            found |= words if file.routines else words.difference(TABLES)
+        return frozenset(found)
+
+    @cached_property
+    def _odd_reads(self) -> frozenset[str]:
+        """Words of moves that are not understood: these set nothing."""
         programs = (file.text for file in self.files if not file.is_submit)
         return frozenset().union(*(one.words(one.where(is_odd)) for one in programs))
 
@@ -357,7 +373,7 @@ class KrlTask:
                     uses.written.add(one.target.name)
         written, read = self._uses_beside
         uses.changed |= written | self.odd_words
-        uses.read |= read | written
+        uses.read |= read | written | self._odd_reads
         uses.read |= {one for target, one in uses.copies if self._outlives(target)}
         uses.pass_on()
         return uses

@@ -139,11 +139,7 @@ class Pdl2(Language):
 
 
 def _refuse_other_arm(program: Program, start: Start) -> None:
-    """Refuse a program that says it is another arm's than the cell's.
-
-    Raises:
-        ProgramError: It is.
-    """
+    """Refuse a program that says it is another arm's than the cell's."""
     if program.arm not in (0, start.arm):
         problem = (
             f"PROG_ARM = {program.arm}: it is a program of arm {program.arm}, and the "

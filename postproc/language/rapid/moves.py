@@ -54,7 +54,9 @@ Z0 = 0.3  # [mm]
 PLACEHOLDER = 0.01  # [kg] masses up to here, as of tool0, state nothing
 UNKNOWN_ZONE = -1.0
 RUN_TIME = "it is known only when the program runs"
-AT_RUN_TIME = Reason(Code.RUNTIME_VALUE, RUN_TIME)
+AT_RUN_TIME = Reason(
+    Code.RUNTIME_VALUE, "the target is known only when the program runs"
+)
 # Options whose moves are left.
 _LEFT_BY = {
     "id": Reason(Code.COORDINATED_ARMS, "it moves together with another arm (\\ID)"),
@@ -70,9 +72,13 @@ AT_A_STOP = (
     "calibj",
 )  # they weld standing still
 _LOAD_UNKNOWN = Reason(Code.LOAD_UNKNOWN, "the load that \\TLoad names is not known")
-_COMPUTED = Reason(Code.COMPUTED_TARGET, "it is computed from other data")
-_NO_QUATERNION = Reason(Code.UNREADABLE_NUMBER, "no quaternion")
-_NO_TOOL = Reason(Code.FRAME_UNKNOWN, "its tool is declared in no given file")
+_COMPUTED = Reason(Code.COMPUTED_TARGET, "the target is computed from other data")
+_NO_QUATERNION = Reason(
+    Code.UNREADABLE_NUMBER, "the four numbers of its orientation are no quaternion"
+)
+_NO_TOOL = Reason(
+    Code.FRAME_UNKNOWN, "its tool is declared in no given file: give the file that does"
+)
 _SEARCH = Reason(Code.ENDS_ELSEWHERE, "a search ends at a place that is not known")
 _STAYS = Reason(
     Code.ENDS_ELSEWHERE, "only external axes move: the arm stays where it is"
@@ -389,7 +395,8 @@ class Goals:
             code = Code.UNDECLARED_VARIABLE
             text = "is declared in none of the given files, or more than once"
         elif found[1].declared.value is None and name not in self.task.written:
-            code, text = Code.NO_VALUE, "has no value in the given files"
+            text = "has no value in the given files: teach it first"
+            code = Code.NO_VALUE
         elif self.task.is_changed_beside(*found):
             code = Code.BESIDE_PROGRAM
             text = f"may be changed by another task at any time: {RUN_TIME}"

@@ -191,7 +191,12 @@ class RapidTask:
     @cached_property
     def _odd_words(self) -> frozenset[str]:
         """Words of what is not understood: each may name what is set there."""
-        found = (file.text.words(file.text.where(_is_odd)) for file in self.files)
+        return self._words_but(())
+
+    def _words_but(self, beginnings: Collection[str]) -> frozenset[str]:
+        """Return words of what is not understood, and does not begin with some."""
+        texts = (file.text for file in self.files)
+        found = (one.words(one.where(_is_odd), beginnings) for one in texts)
         return frozenset().union(*found)
 
     def _first_value(self, file: int, datum: Datum) -> Nested | None:
@@ -271,7 +276,7 @@ class RapidTask:
         for file in self.files:
             for statement in file.text.said:
                 uses.note(statement)
-        uses.changed |= self._odd_words
+        uses.changed |= self._words_but(_READING_MOVES)  # a move sets nothing
         uses.read |= self._odd_words
         uses.read |= {one for target, one in uses.copies if self._outlives(target)}
         uses.pass_on()
@@ -444,6 +449,9 @@ def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
     for file in files:
         tasks.setdefault(task_beside(file.text.source.name), []).append(file)
     return [RapidTask(own) for own in tasks.values()]
+
+
+_READING_MOVES = frozenset(name for name, one in MOTIONS.items() if one.given < 0)
 
 
 def _is_odd(one: said.RapidStatement) -> bool:

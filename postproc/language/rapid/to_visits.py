@@ -20,14 +20,20 @@ from postproc.language.visits import Meaning, Visits
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
-_GRIP = Reason(Code.LOAD_UNKNOWN, "what the arm carries is not known here (GripLoad)")
+_GRIP = Reason(
+    Code.LOAD_UNKNOWN,
+    "what the arm carries is not known here: call GripLoad after the statement that "
+    "is not followed",
+)
 _PART_ALONE = Reason(
     Code.LOAD_UNKNOWN,
     "GripLoad states a part, and the tool states no mass of its own: what the arm "
     "carries in all is not known. State the mass in tooldata",
 )
 _SHIFT = Reason(
-    Code.FRAME_UNKNOWN, "the program displacement (PDispOn, PDispSet) is not known here"
+    Code.FRAME_UNKNOWN,
+    "the program displacement is not known here: set it (PDispSet, PDispOff) after the "
+    "statement that is not followed",
 )
 
 

@@ -111,11 +111,7 @@ def propose(names: Iterable[str], arm: Arm, states: States) -> tuple[Effect, ...
 
 
 def _check_needs(kind: Effect, states: States) -> None:
-    """Refuse an effect whose covariate was not recorded.
-
-    Raises:
-        PostprocError: Naming the effect and the column.
-    """
+    """Refuse an effect whose covariate was not recorded."""
     for need in kind.requires():
         if len(states) and np.isnan(getattr(states, need)).all():
             raise PostprocError(

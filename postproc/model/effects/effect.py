@@ -72,7 +72,7 @@ class Effect(ABC):
         cells: The cells of the table of causes that it is: carrier, driver and law.
         acts: What it moves and what drives that, in the words of the table of causes,
             where it is more than `cells`, several of them at once say.
-        at_one_row: True for what happens once, or at one place of what drives it.
+        at_one_row: True for what happens once, at one moment of a campaign.
         free: True for a function that may have any shape: what no law predicts.
         everywhere: True for what is the same at all poses, unseen ones too.
         published: True for what a method of the literature trains: no fit of effects

@@ -195,8 +195,9 @@ class CarriedEffect(Effect):
 class PartMotion(CarriedEffect):
     """A carrier moves by a law of one covariate, perhaps times another one.
 
-    "linear": k (x - middle) / half; "harmonic n": a cos(n x) + b sin(n x); "step":
-    k sign(x - middle); "saturating": k tanh((x - middle) / half); "constant": k.
+    "linear": k (x - middle) / half; "harmonic n": a cos(n x) + b sin(n x); "step": -k
+    below the middle, k from there on; "saturating": k tanh((x - middle) / half);
+    "constant": k.
 
     Attributes:
         source: The covariate x.
@@ -218,8 +219,8 @@ class PartMotion(CarriedEffect):
 
     @property
     def at_one_row(self) -> bool:  # type: ignore[override]
-        """Whether it is a step."""
-        return self.law == "step"
+        """Whether it is a step in time, not one of what varies smoothly."""
+        return self.law == "step" and self.source in PASSING
 
     def covariates(self) -> tuple[str, ...]:
         """Name the source and the factor."""
@@ -268,7 +269,7 @@ class PartMotion(CarriedEffect):
         away = (x - self.middle) / self.half
         laws = {
             "linear": away,
-            "step": np.sign(away),
+            "step": np.where(away < 0.0, -1.0, 1.0),
             "saturating": np.tanh(away),
             "constant": np.ones_like(x),
         }

@@ -17,14 +17,12 @@ SCALE = 5e-5  # [m]
 
 
 @dataclass(frozen=True)
-class Probe(Effect):
-    """Shift of every probe point in the flange frame, besides the tool's own.
+class ProbeEffect(Effect):
+    """What is off at every probe point by itself.
 
     Attributes:
         tools: The `tool_id` of the points.
     """
-
-    name: ClassVar[str] = "probe"
 
     tools: tuple[int, ...] = (0,)
 
@@ -37,6 +35,19 @@ class Probe(Effect):
         """Say that it is the set-up's."""
         return "setup"
 
+    def flange_axes(self, batch: ArmStates) -> Floats:
+        """Return the flange's axes, at the point that a row measures, (n, 3, p)."""
+        R = batch.walk.flange
+        parts = [R * (batch.states.tool_id == t)[:, None, None] for t in self.tools]
+        return np.concatenate(parts, axis=2)
+
+
+@dataclass(frozen=True)
+class Probe(ProbeEffect):
+    """Shift of every probe point in the flange frame, besides the tool's own."""
+
+    name: ClassVar[str] = "probe"
+
     def parameters(self) -> tuple[Parameter, ...]:
         """Name three shifts per point."""
         return tuple(
@@ -45,6 +56,4 @@ class Probe(Effect):
 
     def columns(self, batch: ArmStates) -> Floats:
         """Shift the point that a row measures, (n, 3, p)."""
-        R = batch.walk.flange
-        parts = [R * (batch.states.tool_id == t)[:, None, None] for t in self.tools]
-        return np.concatenate(parts, axis=2)
+        return self.flange_axes(batch)

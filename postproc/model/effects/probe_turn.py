@@ -3,42 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.effects.effect import Parameter
+from postproc.model.effects.probe import ProbeEffect
 from postproc.model.kinematics import ArmStates
-from postproc.robot.arm import Arm
-from postproc.robot.state import States
 
 SCALE = 1e-4  # [rad] of a mounting that was measured
 
 
 @dataclass(frozen=True)
-class ProbeTurn(Effect):
+class ProbeTurn(ProbeEffect):
     """Turn of a 6D probe in the flange frame. It moves no point, only orientations.
 
     A turn of the flange about the TCP and a turn of the probe look the same: the
     flange is seen as well as the probe's mounting is known.
-
-    Attributes:
-        tools: The `tool_id` of the probe's points.
     """
 
     name: ClassVar[str] = "probe_turn"
-
-    tools: tuple[int, ...] = (0,)
-
-    @classmethod
-    def propose(cls, arm: Arm, states: States) -> Self:
-        """List the survey's probe points."""
-        return cls(tuple(int(t) for t in np.unique(states.tool_id)))
-
-    def belongs_to(self) -> Origin:
-        """Say that it is the set-up's."""
-        return "setup"
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name three turns per point."""
@@ -54,6 +39,4 @@ class ProbeTurn(Effect):
 
     def rotation_columns(self, batch: ArmStates) -> Floats:
         """Turn the probe that a row measures, (n, 3, p)."""
-        R = batch.walk.flange
-        parts = [R * (batch.states.tool_id == t)[:, None, None] for t in self.tools]
-        return np.concatenate(parts, axis=2)
+        return self.flange_axes(batch)

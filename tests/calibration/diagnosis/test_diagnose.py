@@ -186,7 +186,7 @@ def test_other_methods_and_other_arms_are_refused(
         extend_model(rows, ARM, replace(model, method="elm"))
     with pytest.raises(ModelError, match="was made for arm"):
         extend_model(rows, load_arm("ur10"), model)
-    with pytest.raises(PostprocError, match="takes at least"):
+    with pytest.raises(PostprocError, match="needs at least"):
         extend_model(rows[np.arange(5)], ARM, model)
 
 

@@ -28,7 +28,7 @@ NO_TARGET = (
     "the program runs",
     "that runs",
     "external",
-    "numbers are",
+    "does not state all",
 )
 
 

@@ -10,6 +10,7 @@ from postproc.language.visits import ELSEWHERE, START
 from tests.language.krl.test_visits import (
     CONFIG,
     DATA,
+    NEW,
     frame,
     job,
     names,
@@ -361,3 +362,15 @@ def test_a_statement_that_is_not_understood_may_lead_elsewhere(kind):
     lines, more = JUMPING[kind]
     found = job(*AS_BEFORE, *lines, "LIN XP2", more=more)
     assert ELSEWHERE in origins(found)[-1] and "not known" in reasons(found)[-1]
+
+
+def test_a_move_that_is_not_understood_sets_nothing():
+    found = job("SLIN XP1 WITH ?? XP2, $TOOL=STOOL2(FP1)", *AS_BEFORE, "LIN XP2")
+    assert reasons(found)[-1] == "" and any(found.visits.literals.pins)
+    modern = job(f"SLIN XP1 {NEW} ?? 3", *AS_BEFORE, f"SLIN XG{NEW}")
+    assert reasons(modern)[-1] == ""
+
+
+def test_an_entry_of_a_list_that_is_not_understood_is_no_other():
+    config = CONFIG.replace("ENDDAT", "LOAD_DATA[9]={M ?? 3}\nBASE_DATA[9]=?\nENDDAT")
+    assert reasons(job(*AS_BEFORE, "LIN XP2", config=config)) == ["", ""]

@@ -174,13 +174,13 @@ def test_the_cell_says_what_holds_at_first():
         (["$SOFT_PLCL[1]=TRUE", "LIN XP1"], "soft"),
         (["PTP XLIN"], "without S and T"),
         (["PTP {X 1,Y 2,Z 3,A 0,B 0,C 0}"], "without S and T"),
-        (["LIN {X 1,Y 2}"], "missing"),
-        (["LIN {Z 500,A 0,B 0,C 0}"], "missing"),
-        (["PTP {A1 5}"], "missing"),
+        (["LIN {X 1,Y 2}"], "does not state all of its numbers"),
+        (["LIN {Z 500,A 0,B 0,C 0}"], "does not state all of its numbers"),
+        (["PTP {A1 5}"], "does not state all of its numbers"),
         (["LIN XA"], "joint angles"),
         (["PTP {X 1,Y 2,Z 3,A 0,B 0,C 0,S 18,T 2}"], "accuracy model"),
         (["LIN {X 1,Y 2,Z 3,A 0,B 0,C 0,S 22,T 2}"], "accuracy model"),
-        (["PTP {X 1,Y 2,Z 3,A 0,B 0,C 0,S 99,T 2}"], "no such number"),
+        (["PTP {X 1,Y 2,Z 3,A 0,B 0,C 0,S 99,T 2}"], "no valid number"),
         (["CIRC XP1,XP2,CA XP1.X+$POS_ACT.X"], "CA"),
         (["LIN XNOT"], "declared in none of the given files"),
         (["XP1.X=5", "LIN XP1"], "may be changed"),
@@ -381,7 +381,7 @@ def test_missing_numbers_stay_what_they_were():
     v, nan = found.visits, np.nan
     pose, joints = Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS
     assert v.literal.tolist() == [-1] * 4
-    assert all("numbers are missing" in why for why in reasons(found))
+    assert all("does not state all of its numbers" in why for why in reasons(found))
     assert v.target.tolist() == [joints, pose, pose, joints]
     numbers = [[5, *[nan] * 5], [nan, nan, 500, *[nan] * 3], [1, 2, 3, *[nan] * 3],
                [nan, -90, *[nan] * 3, 1]]  # fmt: skip

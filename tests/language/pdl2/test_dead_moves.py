@@ -19,7 +19,7 @@ def lines(*body, routine=()):
         dead_lines([program], resolve(program).visits), "the start", "program"
     )
     assert {d.code for d in found} <= {Code.NEVER_REACHED}
-    return [(d.line, int(d.message.split()[0])) for d in found]
+    return [(d.line, int(d.message.split(": ")[1].split()[0])) for d in found]
 
 
 def test_all_that_is_reached_is_silent():

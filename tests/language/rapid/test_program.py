@@ -209,14 +209,14 @@ def test_numbers_of_one_form_are_found_in_every_statement_of_it():
 @pytest.mark.parametrize(
     ("body", "code", "text"),
     [
-        ("IF a THEN MoveL p1,v1,z1,t;", "open-block", "IF a THEN has no ENDIF"),
-        ("ENDFOR", "open-block", "ENDFOR ends no FOR"),
-        ("CASE 1:", "open-block", "CASE 1: stands in no TEST"),
-        ("MoveC p1;", "unknown-statement", "MoveC p1; has too few positions"),
-        ("Fly p1;", "unknown-instruction", "Fly p1; is neither .* may move"),
-        ("MoveL p1 v1;", "unknown-statement", "MoveL p1 v1; is not understood"),
+        ("IF a THEN MoveL p1,v1,z1,t;", "open-block", "'IF a THEN' has no ENDIF"),
+        ("ENDFOR", "open-block", "'ENDFOR' ends no FOR"),
+        ("CASE 1:", "open-block", "'CASE 1:' stands in no TEST"),
+        ("MoveC p1;", "unknown-statement", "'MoveC p1;' has too few positions"),
+        ("Fly p1;", "unknown-instruction", "Fly p1;' is neither .* may move"),
+        ("MoveL p1 v1;", "unknown-statement", "'MoveL p1 v1;' is not understood"),
         ("%x%;", "late-binding", "may move"),
-        ("IF a Fly p1;", "unknown-instruction", "IF a Fly p1; is neither"),
+        ("IF a Fly p1;", "unknown-instruction", "IF a Fly p1;' is neither"),
         ("StepBwdPath 3, 1;", "unknown-instruction", "may move"),
     ],
 )

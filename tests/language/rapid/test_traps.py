@@ -355,3 +355,8 @@ def test_a_handler_that_is_not_understood_may_go_on():
     lines = ["sub;", P2, "EXIT;", "ERROR", "?? TRYNEXT;"]
     found = task(*lines, more=MORE + routine("sub", SET, "WaitDI d1,1;", *AS_BEFORE))
     assert reasons(found)[-1]
+
+
+def test_a_move_that_is_not_understood_sets_nothing():
+    found = once(r"MoveL p2 ?? v200,fine,t\WObj:=w;", *AS_BEFORE, "VelSet 100,500;", P2)
+    assert reasons(found)[-1] == "" and any(found.visits.literals.pins)

@@ -1,0 +1,68 @@
+"""Sources of packages that people write in: what they move or set is theirs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+from postproc.exceptions import ProgramError
+from postproc.files import ARCHIVE_DEPTH, is_system_source, read_input
+from postproc.language.krl.interpreter import KrlMachine
+from postproc.language.krl.program import read_krl
+from postproc.language.krl.symbols import KrlTask
+from postproc.language.language import Start
+from postproc.language.source import source_from_bytes
+
+USER_SOURCES = ("user_grp.src", "userspot.src")
+FOLDERS = ("System", "TP", "Program")  # of an archive
+READ_BEFORE = 64  # sources of which is known what they do
+
+
+def acting_sources(program: Path) -> tuple[Path, ...]:
+    """Return sources of packages that move the arm, or set what moves need.
+
+    The list of routines that are known to be still does not hold for them. They stand
+    beside a program, or in its archive; they are read and never rewritten.
+
+    Args:
+        program: The source that runs.
+    """
+    own = program.absolute()
+    places = (place for place in _places(own) if place != own)
+    found = {place.name.lower(): place for place in places if _acts(place)}
+    return tuple(found.values())
+
+
+def _places(program: Path) -> Iterator[Path]:
+    """Yield where such sources stand, the nearest last."""
+    above = [*program.parents][: 1 + ARCHIVE_DEPTH]
+    roots = [folder for folder in above if (folder / "System").is_dir()][:1]
+    for place in (root / name for root in roots for name in FOLDERS):
+        yield from _spelt_in(place)
+    yield from _spelt_in(program.parent)
+
+
+def _spelt_in(folder: Path) -> Iterator[Path]:
+    """Yield the sources of a folder, in one of the usual spellings."""
+    for name in USER_SOURCES:
+        spellings = (name, name.upper(), name.capitalize(), name.upper()[:-3] + "src")
+        yield from [place for one in spellings if (place := folder / one).is_file()][:1]
+
+
+def _acts(place: Path) -> bool:
+    """Return True if a source may move the arm, or set what moves need."""
+    try:
+        return _acts_by_text(place.name, read_input(place))
+    except (OSError, ProgramError):
+        return False
+
+
+@lru_cache(READ_BEFORE)
+def _acts_by_text(name: str, text: bytes) -> bool:
+    """Return True if a source of a package does."""
+    if not is_system_source(name, text):
+        return False
+    file = read_krl(source_from_bytes(name, text))
+    machine = KrlMachine.of(KrlTask([file]), Start())
+    return any(machine.may_act(0, routine) for routine in file.routines)
