@@ -213,6 +213,7 @@ class TaskMachine(ABC):
         beside: Statements that run in ways that are not followed: file, first row, and
             the row behind the last.
         at_once: Moves that differ only in where they go are read at once.
+        paused: Visits behind which the arm may stop before the program goes on.
     """
 
     comments: ClassVar[Comments]
@@ -225,6 +226,7 @@ class TaskMachine(ABC):
     exhausted: bool = False
     beside: set[tuple[int, int, int]] = field(default_factory=set)
     at_once: bool = True
+    paused: set[int] = field(default_factory=set)
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
     _numbers: dict[tuple[CallContext, int], list[int]] = field(default_factory=dict)
     _entered: dict[Place, Arrived] = field(default_factory=dict)
@@ -735,6 +737,10 @@ class TaskMachine(ABC):
             known = visit.goal.given <= visit.points
             if not known or any(lost & point.names for point in visit.goal.given):
                 visit.goal = visit.goal.lost
+
+    def pause(self, here: Arrived) -> None:
+        """Note that the arm may stop where it stands, although a zone is written."""
+        self.paused |= here.origins
 
     def unknown(
         self, context: CallContext, row: int, here: Arrived, what: str = NOT_FOLLOWED

@@ -185,6 +185,14 @@ CORNERS = {  # what stands round a fly point, and whether its corner is not know
     "to a place that is not known": ([FIRST, FLY, "  MOVE LINEAR TO p", ON], True),
     "in a frame that is not known": ([FIRST, FLY, "$UFRAME := f", ON], True),
     "to joints in such a frame": ([FIRST, FLY, "$UFRAME := f", FIRST], False),
+    "before a wait": ([FIRST, FLY, "WAIT FOR $DIN[1]", ON], True),
+    "before a wait in a routine": ([FIRST, FLY, "rest", ON], True),
+    "before a delay": ([FIRST, FLY, "DELAY 200", ON], True),
+    "before a question": ([FIRST, FLY, "READ (n)", ON], True),
+    "before an output": ([FIRST, FLY, "$DOUT[1] := TRUE", ON], False),
+    "before a signal": ([FIRST, FLY, "SIGNAL s", ON], False),
+    "behind a wait": ([FIRST, "DELAY 200", FLY, ON], False),
+    "passed exactly": ([FIRST, "$FLY_DIST := -1", FLY, "DELAY 200", ON], False),
     "at the end": ([FIRST, "IF $DIN[1] THEN", ON, "ENDIF", FLY], False),
 }
 
@@ -192,7 +200,8 @@ CORNERS = {  # what stands round a fly point, and whether its corner is not know
 @pytest.mark.parametrize("title", CORNERS)
 def test_which_corners_are_not_known(bench_cell, title):
     lines, wanted = CORNERS[title]
-    head = ["PROGRAM job", "VAR p, f : POSITION", "BEGIN"]
+    head = ["PROGRAM job", "VAR p, f : POSITION", "n : INTEGER", "s : SEMAPHORE"]
+    head += ["ROUTINE rest", "BEGIN", "DELAY 200", "END rest", "BEGIN"]
     text = "\n".join([*head, *lines, "END job", ""]).encode()
     visits = read_program({"job.pdl": text}, bench_cell).visits
     assert find_open_corners(visits)[visits.fly].tolist() == [wanted]
@@ -204,3 +213,25 @@ def test_a_stop_before_two_ways_is_no_corner(bench_cell):
     text = "\n".join(["PROGRAM job", "BEGIN", *lines, "END job", ""]).encode()
     visits = read_program({"job.pdl": text}, bench_cell).visits
     assert not find_open_corners(visits).any()
+
+
+ZONE = "MoveL [[119,77,-105],[0.21,-0.144,0.921,-0.294],[0,0,0,0],{}],v200,z10,tool0;"
+WAYS_ON = {
+    "WaitDI di1,1;": True,
+    "WaitTime 0.2;": True,
+    "Stop;": True,
+    "n:=UINumEntry();": True,
+    "drill_hole;": True,  # of which the cell says that it moves nothing
+    "SetDO do1,1;": False,
+    "n:=n+1;": False,
+}
+
+
+@pytest.mark.parametrize("line", WAYS_ON)
+def test_what_may_stop_the_arm_at_a_zone(bench_cell, line):
+    move = ZONE.format("[9E9,9E9,9E9,9E9,9E9,9E9]")
+    lines = ["MODULE job", "VAR num n;", "PROC main()", move, line]
+    lines += [move.replace("z10", "fine"), "EXIT;", "ENDPROC", "ENDMODULE"]
+    text = "\n".join(lines).encode()
+    visits = read_program({"job.mod": text}, bench_cell).visits
+    assert find_open_corners(visits).tolist() == [WAYS_ON[line], False]

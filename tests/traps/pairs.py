@@ -33,6 +33,9 @@ DECLARED = re.compile(
 )
 OUTSIDE = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 UNCERTAIN = re.compile(r"(.*?):(\d+): direction-uncertain: .*\(\+-([\d.]+) mm\)")
+MAYBE = re.compile(r"(.*?):(\d+): fly-unknown: ()")
+PASSED = "0.02"
+"""How far a correction for a stop may be off where the point is passed [mm]."""
 TOLERANCE = 0.002
 """Corrections that differ by less are the same [mm, deg]."""
 
@@ -231,10 +234,13 @@ def doubts(files: Files, found: Outcome) -> dict[str, float]:
     """Return the stated errors of uncertain directions, by tag [mm]."""
     stated: dict[str, float] = {}
     for finding in found.diagnostics:
-        match = UNCERTAIN.match(str(finding))
+        match = UNCERTAIN.match(str(finding)) or MAYBE.match(str(finding))
         if match and match[1] in files:
             line = files[match[1]].splitlines()[int(match[2]) - 1]
-            stated |= dict.fromkeys(_tags_of(line, files), float(match[3]))
+            size = float(match[3] or PASSED)
+            stated |= {
+                tag: max(size, stated.get(tag, 0.0)) for tag in _tags_of(line, files)
+            }
     return stated
 
 

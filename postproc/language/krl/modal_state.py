@@ -176,7 +176,7 @@ PLANNED = frozenset(
     $ov_app $torqmon $torqmon_def $torqmon_com $torqmon_com_def $tech $red_vel $spl_tech
     $load_a1 $load_a2 $load_a3 $cp_vel_type $cp_statmon $nullframe $world $ex_ax_ignore
     $spl_ori_joint_auto $eko_mode $gear_jerk_def $abs_accur $abs_convert
-    $deactivate_abs_accur $suppress_abs_accur
+    $deactivate_abs_accur $suppress_abs_accur $out_c
     """.split()
 )
 _SETTING = frozenset(

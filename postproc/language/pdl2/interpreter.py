@@ -193,6 +193,8 @@ def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
         left = here.store.copy()
         left.last = frozenset({ELSEWHERE})
         machine.begin_cycle(here, left)
+    if _waits(statement):
+        machine.paused |= here.store.last
     if isinstance(statement, _OTHERS_RUN) or text:
         let_others_run(here)
     if text and not isinstance(statement, ast.Unknown):
@@ -228,6 +230,13 @@ def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
         case _:
             return _control(machine, here, statement)
     return True
+
+
+def _waits(statement: ast.Statement) -> bool:
+    """Tell whether a statement takes time that only the run tells."""
+    if isinstance(statement, ast.Transfer):
+        return statement.word == "READ"
+    return isinstance(statement, ast.Still) and statement.waits
 
 
 _RUNNING = re.compile(

@@ -169,6 +169,7 @@ class Machine:
         handler: Why no move can be compensated that a handler may interrupt.
         cycle_left: A condition handler may begin the cycle again at any time.
         exhausted: The program is too complex to be followed to the end.
+        paused: Visits behind which the arm may stop before the program goes on.
     """
 
     world: World
@@ -187,6 +188,7 @@ class Machine:
     handler: Reason = NO_REASON
     cycle_left: bool = False
     exhausted: bool = False
+    paused: set[int] = field(default_factory=set)
     rows: int = 0
     _heap: list[tuple[Point, int]] = field(default_factory=list)
     _queued: set[tuple[Context, int]] = field(default_factory=set)

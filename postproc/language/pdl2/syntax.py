@@ -261,11 +261,11 @@ class Still(Statement):
     """A statement that neither moves the arm nor changes a value: WAIT, DELAY, ..
 
     Attributes:
-        word: The first word.
+        waits: It takes time that only the run tells.
         terms: Names in the rest, which is not understood; functions that it calls.
     """
 
-    word: str
+    waits: bool
     terms: tuple[Reference | Invoke, ...] = ()
 
 

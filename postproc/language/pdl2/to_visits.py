@@ -36,6 +36,7 @@ from postproc.language.visits import (
     Meaning,
     NumberPlaces,
     Visits,
+    ZoneRule,
     texts_of,
 )
 
@@ -275,8 +276,9 @@ def collect(machine: Machine) -> Visits:
     literals, literal = find_literals(c, numbering, collector.names)
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     _mark_torn(collector, numbering, literal)
-    pred_start, pred = _predecessors(machine, ordered, offsets)
-    return Visits(
+    numbers = _number_visits(machine, ordered, offsets)
+    pred_start, pred = _predecessors(machine, ordered, offsets, numbers)
+    visits = Visits(
         files=tuple(world.files),
         file=slim(c.file),
         line=slim(c.line),
@@ -306,6 +308,7 @@ def collect(machine: Machine) -> Visits:
         dialect=PDL2_DIALECT,
         **collector.settings.columns(c.setting),
     )
+    return _mark_pauses(visits, machine, numbers)
 
 
 def _collect_visits(
@@ -354,21 +357,44 @@ def _most_axes(runs: list[MoveRun], world: World) -> int:
     return max([0, *(min(axis, MOST_AXES) for axis in axes)])
 
 
-def _predecessors(
+def _number_visits(
     machine: Machine, ordered: list[tuple[Key, MoveRun]], offsets: Ints
+) -> Indices:
+    """Return the visit of every id."""
+    ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
+    visit = np.full(machine.next_id, -1, dtype=np.int32)
+    visit[spans(ids, np.diff(offsets))] = np.arange(offsets[-1], dtype=np.int32)
+    return visit
+
+
+def _mark_pauses(visits: Visits, machine: Machine, visit: Indices) -> Visits:
+    """Say of which fly points it is not known whether the arm stops there."""
+    paused = [visit[k] for k in machine.paused if k >= 0]
+    rows = np.array([k for k in paused if k >= 0], dtype=np.int64)
+    rule = visits.zone_rule[rows]
+    exact = (rule == ZoneRule.PASS) | (visits.zone_mm[rows] < 0.0)
+    rows = rows[visits.fly[rows] & ~exact]
+    if len(rows) == 0:
+        return visits
+    rules = np.array(visits.zone_rule)
+    rules[rows] = ZoneRule.UNKNOWN
+    return replace(visits, zone_rule=rules)
+
+
+def _predecessors(
+    machine: Machine,
+    ordered: list[tuple[Key, MoveRun]],
+    offsets: Ints,
+    visit: Indices,
 ) -> tuple[Indices, Indices]:
     """Translate predecessor ids to visits, in CSR form."""
     n, first = int(offsets[-1]), offsets[:-1]
-    ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
-    visit = np.zeros(machine.next_id, dtype=np.int32)
-    visit[spans(ids, np.diff(offsets))] = np.arange(n, dtype=np.int32)
     origins = []
     for _, run in ordered:  # the visits that its first move may come from
         found = {int(visit[p]) if p >= 0 else p for p in run.predecessors - {MANY}}
         if MANY in run.predecessors or id(run.place.body) in machine.recursive:
             found.add(ELSEWHERE)
         origins.append(sorted(found))
-    del visit
     counts = np.ones(n, dtype=np.int32)
     counts[first] = [len(own) for own in origins]
     start = np.append(np.int32(0), np.cumsum(counts, dtype=np.int32))

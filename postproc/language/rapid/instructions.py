@@ -127,5 +127,18 @@ BUILT_IN_FUNCTIONS = frozenset(
 STILL_FUNCTIONS = BUILT_IN_FUNCTIONS | {"strtoval", "defaccframe"}
 """Functions that do not move."""
 
+WAITING = frozenset(
+    """
+    waittime waitdi waitdo waitai waitao waitgi waitgo waituntil waitrob waitsynctask
+    waittestandset waitload stop break systemstopaction
+    tpreadfk tpreadnum tpreaddnum uimsgbox uimessagebox uilistview uinumentry
+    uidnumentry uinumtune uidnumtune uialphaentry
+    socketaccept socketconnect socketreceive socketreceivefrom rmqreadwait rmqsendwait
+    camgetresult camloadjob camwaitloadjob stclose stopen stcalib openhighlift
+    closehighlift readstr readnum readbin readrawbytes readanybin readstrbin
+    """.split()
+)
+"""What may take so long that the arm stops at a point with a zone before it."""
+
 BY_STRING = frozenset(["setdataval", "setalldataval"])
 """Instructions that change data whose names they are given in strings."""

@@ -35,6 +35,7 @@ from postproc.language.rapid.errors import (
 from postproc.language.rapid.instructions import (
     MOTIONS,
     STILL_FUNCTIONS,
+    WAITING,
     read_known_instructions,
 )
 from postproc.language.rapid.modal_state import (
@@ -503,6 +504,8 @@ class RapidMachine(TaskMachine):
             self._run_named_beside(name)
             return self.unknown(context, row, here, "names several routines")
         kind = read_known_instructions().get(name)
+        if name in WAITING or self.declares_motionless(name):
+            self.pause(here)
         if name == EXIT_CYCLE:
             self.restarts.append(here)
             return None
@@ -611,6 +614,8 @@ class RapidMachine(TaskMachine):
         for name in functions_in(one):
             found = self.task.routine(name, context.scope)
             own = name in self.task.routines
+            if not own and name in WAITING:
+                self.pause(here)
             if not own and self._is_still_function(name):
                 continue
             if found is None:

@@ -41,6 +41,7 @@ def visits_of(machine: RapidMachine) -> Visits:
     """Put the arrivals into the order of the program, as columns."""
     base = cell_pose(machine.start.base)
     placed: dict[tuple[FrameOfMove, Pose], Pose] = {}
+    paused = {id(machine.visits[k]) for k in machine.paused if k >= 0}
 
     def conditions(v: RapidVisit) -> Conditions:
         key = v.wobj, v.modes.shift
@@ -48,14 +49,14 @@ def visits_of(machine: RapidMachine) -> Visits:
             placed[key] = pose = v.wobj.pose if v.modes.shift != UNKNOWN_SHIFT else ()
             if pose and v.modes.shift != NO_SHIFT:
                 placed[key] = compose_poses(pose, pose_of_numbers(v.modes.shift))
-        return _conditions(v, base, placed[key])
+        return _conditions(v, base, placed[key], id(v) in paused)
 
     files = enumerate(machine.task.files)
     moves = {k: [move.row for move in file.moves] for k, file in files}
     return to_visits.visits_of(machine, RAPID_DIALECT, conditions, COMMENTS, moves)
 
 
-def _conditions(v: RapidVisit, base: Pose, uframe: Pose) -> Conditions:
+def _conditions(v: RapidVisit, base: Pose, uframe: Pose, paused: bool) -> Conditions:
     """Say what an arrival is carried out with."""
     joint = v.motion == Motion.JOINT
     return Conditions(
@@ -69,7 +70,7 @@ def _conditions(v: RapidVisit, base: Pose, uframe: Pose) -> Conditions:
         flagged=v.goal.target == Meaning.POSE,
         law=v.modes.arc_law if v.motion == Motion.CIRCULAR else v.modes.law,
         zone_mm=v.zone_mm,
-        unsized=v.zone_mm == UNKNOWN_ZONE,
+        unsized=v.zone_mm == UNKNOWN_ZONE or (paused and v.zone_mm >= 0.0),
         speed=v.speed,
         wrist=bool(v.modes.wrist) and not joint,
         override=v.modes.override,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from postproc.language.grammars import grammar
-from postproc.language.visits import ELSEWHERE
+from postproc.language.visits import ELSEWHERE, ZoneRule
 from tests.language.pdl2.test_external_routines import (
     FIRST,
     followed,
@@ -43,6 +43,10 @@ CHECKS = {
     "`MOVE .. TIL`, `MOVEFLY .. TIL`": lambda: all(
         anywhere(FIRST, f"{line} TIL $DIN[1]+", LAST)
         for line in (LAST, LAST.replace("MOVE", "MOVEFLY"))),
+    "`WAIT`, `DELAY`, `PAUSE`, `READ` behind a fly point": lambda: all(
+        ZoneRule.UNKNOWN in
+        followed(FIRST, LAST.replace("MOVE", "MOVEFLY"), line, FIRST).visits.zone_rule
+        for line in ("WAIT FOR $DIN[1]", "DELAY 10", "PAUSE", "READ (n)")),
     "`CANCEL CURRENT`, `CANCEL ALL`": lambda: all(
         anywhere(FIRST, AHEAD, f"CANCEL {word}", LAST) for word in ("CURRENT", "ALL")),
     "`CANCEL .. FOR ARM[n]`": lambda: (

@@ -8,7 +8,7 @@ import pytest
 
 from postproc.language.rapid.errors import EXIT_CYCLE
 from postproc.language.rapid.instructions import MOTIONS, read_known_instructions
-from postproc.language.visits import ELSEWHERE, START, OrientationLaw, Switch
+from postproc.language.visits import ELSEWHERE, START, OrientationLaw, Switch, ZoneRule
 from tests.language.rapid.test_visits import L, origins, reasons, task
 
 PAGE = Path(__file__).parents[3] / "docs" / "rapid.md"
@@ -91,6 +91,10 @@ CHECKS = {
     "a `TRAP` that moves or changes modes, also by `TriggInt`": lambda: left(
         "TRAP", "CONNECT i WITH x;", "TriggInt g,5,i;",
         more="TRAP x\nPDispSet d;\nENDTRAP"),
+    "`WaitDI`, `WaitTime`, `Stop`, `TPReadNum` and the like behind a zone": lambda: all(
+        task(P1.replace("fine", "z10"), f"{line};", P2).visits.zone_rule[0]
+        == ZoneRule.UNKNOWN
+        for line in ("WaitDI di1,1", "WaitTime 1", "Stop", 'TPReadNum n,"?"')),
     "`MoveLSync`, `MoveJSync`, `MoveCSync`": lambda: left(
         SHIFT, r'MoveLSync p1,v200,z10,t\WObj:=w,"away";'),
     '`%"name"%`, `CallByVar`': lambda: (
