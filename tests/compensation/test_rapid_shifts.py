@@ -19,7 +19,7 @@ from tests.compensation.shift_jobs import (
     landed,
     rapid,
 )
-from tests.fuzz.case import check_bytes, records_of
+from tests.fuzz.case import check_bytes, records_of, rewrite
 
 END = ",v200,fine,t\\WObj:=w;"
 P1, P2, P3 = (f"MoveL {name}{END}" for name in ("p1", "p2", "p3"))
@@ -299,3 +299,12 @@ def test_a_long_program_in_windows_comes_out_as_one(shop, monkeypatch):
     for name, value in (("LEAST", 20), ("HALO", 8), ("BAND", 4), ("RUN_UP", 20)):
         monkeypatch.setattr(windowing, name, value)
     assert shop.compensate({"m.mod": text}).outputs == whole
+
+
+def test_a_shift_of_a_point_beyond_all_reach_is_read_as_it_was_written(shop):
+    move = f"MoveL RelTool(p4,0,0,-20){END}"
+    far = shop_point(rapid(shop, []), "p1")
+    far = far.replace(far.split(",")[2], "1591e9]", 1)
+    source = rapid(shop, [move], "", f"CONST robtarget p4:={far};")
+    assert b"1591e9" in source
+    assert rewrite({"m.mod": source}, shop.cell) == "rewritten"
