@@ -79,7 +79,9 @@ KNOWING = {
     "calibration.diagnosis.model_update": {"joint_offset"},
     "calibration.diagnosis.jumps": {"part_motion", "step"},
     # Where a load jumps depends on what the links weigh.
-    "calibration.diagnosis.load_jumps": {"compliance", "part_motion"},
+    "calibration.diagnosis.link_weights": {"compliance"},
+    "calibration.diagnosis.load_jumps": {"part_motion"},
+    "calibration.diagnosis.step_places": {"part_motion"},
     # A law of the weight goes on to further joints; a cell is told beside no name.
     "calibration.diagnosis.search": {
         "compliance",

@@ -79,7 +79,7 @@ def find_middle(fit: Fit, place: int) -> PartMotion:
         _measure_pull(fit, place, step),
     )
     middle = sides.find_mean(np.r_[(step.middle - level - mean @ own) / half, own])
-    middle[1:] = _shown(slopes - mean, middle[1:])
+    middle[1:] = _project_on_rows(slopes - mean, middle[1:])
     more = (root @ middle[1:]).reshape(-1, 3)
     return replace(
         step,
@@ -106,12 +106,12 @@ def _slopes(step: PartMotion, at: ArmStates) -> tuple[tuple[int, ...], Floats, F
     return links, root, own @ root
 
 
-def _shown(slopes: Floats, own: Floats) -> Floats:
+def _project_on_rows(slopes: Floats, own: Floats) -> Floats:
     """Take out of what is unsure (m,) what changes no row, slopes (n, m)."""
     _, size, ways = np.linalg.svd(slopes, full_matrices=False)
     ways = ways[size > CONSTANT * size.max(initial=0.0)]
-    shown: Floats = ways.T @ (ways @ own)
-    return shown
+    part: Floats = ways.T @ (ways @ own)
+    return part
 
 
 def _measure_pull(fit: Fit, place: int, step: PartMotion) -> Floats:
