@@ -193,7 +193,7 @@ def test_steps_of_a_reversal_are_poses_of_their_own() -> None:
 
 def test_a_refusal_counts_rows_as_the_file_has_them() -> None:
     _, survey = repeated(1, 30)
-    with pytest.raises(MeasurementError, match="30 rows at 1 poses"):
+    with pytest.raises(MeasurementError, match="30 rows, 1 poses"):
         fit_measurements(survey, CELL)
 
 

@@ -25,7 +25,7 @@ def test_pages_are_compensated_as_in_a_batch(desk):
     out.mkdir()
     found = desk.compensate(source / "main.pdl", "-o", out / "main.pdl")
     assert found.exit_code == 0, found.stderr
-    assert "page1.pdl is followed" in found.stderr
+    assert "page1.pdl is a part of this program" in found.stderr
     many = desk.folder / "many"
     given = ("--cell", desk.cell, "--model", desk.model)
     assert cli("batch", source, many, *given, "--jobs", 1).exit_code == 0
