@@ -113,7 +113,9 @@ class _BlockReader:
     def take(self, row: int) -> None:
         """Read the next row."""
         written = self._statements[int(self._lines.shape[row])]
-        if _may_jump(written):
+        odd = ast.action(written)
+        text = odd.text if isinstance(odd, ast.Unknown) else ""
+        if _JUMP.search(_STRING.sub("", text)):  # it may lead to another place
             self._problems.append((row, _LEADS))
         statement = recover_block(written)
         if isinstance(statement, ast.Label):
@@ -213,13 +215,6 @@ class _BlockReader:
             tuple(sorted(handlers)),
             min((int(self._lines.line[row]) for row, _ in self.problems), default=0),
         )
-
-
-def _may_jump(statement: ast.Statement) -> bool:
-    """Return True if a line that is not understood may lead to another place."""
-    odd = ast.action(statement)
-    text = odd.text if isinstance(odd, ast.Unknown) else ""
-    return _JUMP.search(_STRING.sub("", text)) is not None
 
 
 def _behind(statement: ast.Statement) -> ast.Statement:

@@ -174,7 +174,8 @@ def change_modes(
     placed = [one.value for one in arguments if not one.name]
     match name:
         case "confl" | "confj":
-            checked = _set_switches(switches)
+            checked = Switch.ON if switches <= {"on"} else Switch.UNKNOWN
+            checked = Switch.OFF if switches == {"off"} else checked
             if name == "confl":
                 return replace(modes, confl=checked)
             return replace(modes, confj=checked)
@@ -258,12 +259,6 @@ _ARC_LAWS = {
     frozenset(["objectframe"]): OrientationLaw.ALONG_PATH,
     frozenset(["cirpointori"]): OrientationLaw.ONE_AXIS,
 }
-
-
-def _set_switches(switches: set[str]) -> Switch:
-    if switches == {"off"}:
-        return Switch.OFF
-    return Switch.ON if switches <= {"on"} else Switch.UNKNOWN
 
 
 def _singular(switches: set[str], modes: Modes) -> Modes:
