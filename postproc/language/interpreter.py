@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Any, ClassVar, Protocol, TypeVar
@@ -91,6 +91,54 @@ def source_of(operand: said.Operand | None) -> said.DataObject | None:
     while isinstance(operand, said.FunctionCall) and operand.arguments:
         operand = operand.arguments[0].value
     return operand if isinstance(operand, said.DataObject) else None
+
+
+@dataclass
+class NamesUsed:
+    """Names that the statements of a task change and take.
+
+    Attributes:
+        written: Those that assignments change; what takes a value does not read them.
+        changed: Those that may be changed otherwise.
+        read: Those that something but the destination of a move takes.
+        copies: Points that are assigned, and those that they are made from.
+    """
+
+    written: set[str] = field(default_factory=set)
+    changed: set[str] = field(default_factory=set)
+    read: set[str] = field(default_factory=set)
+    copies: set[tuple[str, str]] = field(default_factory=set)
+
+    def pass_on(self) -> None:
+        """Note of points what is noted of those that are made from them."""
+        before = -1
+        while before != len(self.read):
+            before = len(self.read)
+            self.read |= {one for target, one in self.copies if target in self.read}
+
+
+class TaskSymbols(ABC):
+    """What the names of a task mean, as far as ways through it ask."""
+
+    @property
+    @abstractmethod
+    def uses(self) -> NamesUsed:
+        """The names that statements change and take."""
+
+    @abstractmethod
+    def place_of_point(
+        self, name: str, here: Scope
+    ) -> tuple[int, str, str, str] | None:
+        """Return the place of a point that only assignments change, None for others."""
+
+    def find_held(
+        self, operand: said.Operand | None, here: Scope
+    ) -> AssignedPoint | None:
+        """Return what an assignment gave to the point that an operand names."""
+        if not (here.points and isinstance(operand, said.DataObject)) or operand.steps:
+            return None
+        place = self.place_of_point(operand.name, here)
+        return next((point for point in here.points if point.place == place), None)
 
 
 class VisitLike(Protocol):
@@ -203,6 +251,7 @@ class TaskMachine(ABC):
     """The ways through a task.
 
     Attributes:
+        task: What its names mean.
         texts: The statements of its files, the main one first.
         start: What the cell says.
         visits: Arrivals by number.
@@ -217,6 +266,7 @@ class TaskMachine(ABC):
     """
 
     comments: ClassVar[Comments]
+    task: TaskSymbols = field(kw_only=True)
     texts: Sequence[StatementText[Any]]
     start: Start
     visits: list[Any] = field(default_factory=list)
@@ -342,17 +392,6 @@ class TaskMachine(ABC):
     def handles(self, one: said.SourceStatement) -> bool:
         """Tell whether the handlers of a routine begin with a statement."""
         return False
-
-    def place_of_point(
-        self, target: said.DataObject, scope: Scope
-    ) -> tuple[int, str, str, str] | None:
-        """Return the place of a point that assignments change, None for all else."""
-        return None
-
-    @property
-    def copies(self) -> Set[tuple[str, str]]:
-        """Names of points that are assigned, and of those that they are made from."""
-        return frozenset()
 
     def changes_of(self, one: said.SourceStatement) -> Iterable[str]:
         """Yield the names of data that a statement changes."""
@@ -697,31 +736,20 @@ class TaskMachine(ABC):
         """Note what an assignment gives to a point; a component leaves it unknown."""
         if not isinstance(one, said.Assignment):
             return here
-        place = self.place_of_point(one.target, context.scope)
+        place = self.task.place_of_point(one.target.name, context.scope)
         if place is None:
             return here
         held = frozenset[AssignedPoint]()
         if not one.target.steps:
-            held = frozenset([self._give(place, one.value, row, context, here)])
+            scope = replace(context.scope, points=here.points)
+            known = self.task.find_held(one.value, scope)
+            if known is not None:
+                given = replace(known, place=place, copied=known)
+            else:
+                given = AssignedPoint(place, one.value, row, context.scope)
+            held = frozenset([given])
         here = here.without(lambda point: point.place == place)
         return replace(here, points=here.points | held)
-
-    def _give(
-        self,
-        place: tuple[int, str, str, str],
-        value: said.Operand,
-        row: int,
-        context: CallContext,
-        here: Arrived,
-    ) -> AssignedPoint:
-        """Return what a point is given: what another one holds, or what is written."""
-        other = None
-        if isinstance(value, said.DataObject):
-            other = self.place_of_point(value, context.scope)
-        known = next((point for point in here.points if point.place == other), None)
-        if known is not None and isinstance(value, said.DataObject) and not value.steps:
-            return replace(known, place=place, copied=known)
-        return AssignedPoint(place, value, row, context.scope)
 
     def settle_points(self) -> None:
         """Forget where moves go whose points hold other values on other ways."""

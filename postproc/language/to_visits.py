@@ -490,7 +490,7 @@ def _literals(
                 index[file, slots[0]] = len(rows)
                 rows.append(v)
             literal[k] = index[file, slots[0]]
-    pinned = _find_pinned(found, rows, index, other, machine.copies)
+    pinned = _find_pinned(found, rows, index, other, machine.task.uses.copies)
     _hold_for_taught(pinned, found, index, machine, comments)
     taught = _find_taught(found, literal, len(rows), machine, comments)
     literals = _places(rows, machine, pinned, taught, width)
@@ -536,13 +536,15 @@ def _find_pinned(
         own = elements.get(_array_of(v.goal.name), "") if by is None else by.pins
         pinned.append(stays.get((file, slots[0]), "") or own)
     uncertain = _find_uncertain({*elements}, copies)
+    copied = uncertain - elements.keys()
     for v in found:
-        given = frozenset[str]().union(*(point.names for point in v.goal.given))
-        unknown = given & uncertain | {v.goal.name} & (uncertain - elements.keys())
-        place = v.goal.writes[0], v.goal.writes[1][0]
-        for at in {index.get(v.goal.point, -1), index.get(place, -1)} - {-1}:
-            text = ANY_VALUE.format(min(unknown)) if unknown else ""
-            pinned[at] = pinned[at] or text
+        unknown = {v.goal.name} & copied
+        for point in v.goal.given:
+            unknown |= point.names & uncertain
+        if unknown:
+            place = v.goal.writes[0], v.goal.writes[1][0]
+            for at in {index.get(v.goal.point, -1), index.get(place, -1)} - {-1}:
+                pinned[at] = pinned[at] or ANY_VALUE.format(min(unknown))
         at = index.get(v.goal.point, -1)
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins

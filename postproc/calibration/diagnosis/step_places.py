@@ -5,7 +5,7 @@ well, and where a load drives the step the links may weigh this or that besides,
 with a place of its own. The best one is any corner of what is open; the mean of what is
 open misses the fewest poses between the rows. It is found by walking: along a line
 through place and moments the rows change sides one after the other, so that the
-posterior along it is a normal density, weighed anew from row to row.
+posterior along it is a normal density, weighted otherwise from row to row.
 """
 
 from __future__ import annotations

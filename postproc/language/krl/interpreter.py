@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -581,17 +581,6 @@ class KrlMachine(TaskMachine):
         called = list[tuple[int, HeadedRows]]()
         self._own(file, one, called)
         return called
-
-    def place_of_point(
-        self, target: said.DataObject, scope: Scope
-    ) -> tuple[int, str, str, str] | None:
-        """Return the place of a point, see `TaskMachine.place_of_point`."""
-        return self.task.place_of_point(target.name, scope)
-
-    @property
-    def copies(self) -> Set[tuple[str, str]]:
-        """Names of points and of what they are made from, see `TaskMachine.copies`."""
-        return self.task.copies
 
     def changes_of(self, one: said.SourceStatement) -> Iterator[str]:
         """Yield the names of data that a statement changes, see `TaskMachine`."""

@@ -242,17 +242,6 @@ class _Goal:
         return motion_of(self.move.word) == Motion.JOINT
 
     def end(self, operand: said.Operand) -> FoundGoal:
-        """Read a destination, and note the assigned points that it names."""
-        found = self._end(operand)
-        if not self.here.points:
-            return found
-        operands = (
-            operand.operands if isinstance(operand, said.Operation) else (operand,)
-        )
-        held = (self.task.find_held(one, self.here) for one in operands)
-        return replace(found, given=frozenset(one for one in held if one is not None))
-
-    def _end(self, operand: said.Operand) -> FoundGoal:
         """Read a destination."""
         if self.move.word.endswith("_rel"):
             return self._step(operand)
@@ -311,7 +300,7 @@ class _Goal:
             if not point.place[2]
         ]
         pins = next(filter(None, (goal.pins, *why)), "")
-        return replace(goal, name=held.name, pins=pins)
+        return replace(goal, name=held.name, pins=pins, given=frozenset([held]))
 
     def _explain_unknown(self, name: str) -> Reason:
         """Say why a name stands for no known point."""
@@ -436,7 +425,7 @@ class _Goal:
             return FoundGoal(Meaning.HOME, NOTHING, name=name)
         goal = self._point(operand)
         if goal.target == Meaning.JOINTS:
-            return FoundGoal(Meaning.HOME, goal.values, name=name)
+            return FoundGoal(Meaning.HOME, goal.values, name=name, given=goal.given)
         return replace(goal, why=goal.why or AT_HOME)
 
     # Products of frames: the point is moved along.
@@ -458,12 +447,13 @@ class _Goal:
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
                 name=base.name, why=base.why or AT_RUN_TIME, pins=pins, holds=held,
+                given=base.given,
             )  # fmt: skip
         if behind and self._by_joints:
             pins = base.pins or f"{base.name} is shifted without S and T"
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
-                name=base.name, why=NO_STATUS, pins=pins, holds=held,
+                name=base.name, why=NO_STATUS, pins=pins, holds=held, given=base.given,
             )  # fmt: skip
         values, turns = _link(base.values, shift, behind)
         found = self._shift(base, other, shift, behind)
@@ -473,7 +463,7 @@ class _Goal:
             Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name,
             self._outside_of(base, other) if behind else base.aux,
             base.why, pins, base.shared, found,
-            held if found.slots[0] < 0 else (-1, -1),
+            held if found.slots[0] < 0 else (-1, -1), base.given,
         )  # fmt: skip
 
     def _find_own_shift(self, other: said.Operand) -> tuple[int, int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from postproc.diagnostics import Code
 from postproc.language.control_flow import HeadedRows
-from postproc.language.interpreter import AssignedPoint, Scope
+from postproc.language.interpreter import NamesUsed, Scope, TaskSymbols
 from postproc.language.ir import is_odd
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import TABLES
@@ -109,7 +109,7 @@ KEEPING = ((STILL - WRITING) | FUNCTIONS | package_routines().keys()) | {"bas"}
 
 
 @dataclass
-class KrlTask:
+class KrlTask(TaskSymbols):
     """The files of a job.
 
     Attributes:
@@ -203,38 +203,19 @@ class KrlTask:
     @cached_property
     def written(self) -> frozenset[str]:
         """Names of data that something may change."""
-        return frozenset(self._uses.written | self._uses.changed)
+        return frozenset(self.uses.written | self.uses.changed)
 
     def place_of_point(
         self, name: str, here: Scope
     ) -> tuple[int, str, str, str] | None:
         """Return the place of a point that only assignments change, None for others."""
         place = self.place(name, here)
-        if place is None or name in self.changed or name.startswith("$"):
+        if place is None or name in self.uses.changed or name.startswith("$"):
             return None
         found = self._own[(*place, name)]
         if found.keys() != {()} or found[()][1].type not in POINTS:
             return None
         return found[()][0], *place, name
-
-    def find_held(
-        self, operand: said.Operand | None, here: Scope
-    ) -> AssignedPoint | None:
-        """Return what an assignment gave to the point that an operand names."""
-        if not (here.points and isinstance(operand, said.DataObject)) or operand.steps:
-            return None
-        place = self.place_of_point(operand.name, here)
-        return next((point for point in here.points if point.place == place), None)
-
-    @cached_property
-    def changed(self) -> frozenset[str]:
-        """Names of data that something but an assignment by name may change."""
-        return frozenset(self._uses.changed)
-
-    @property
-    def copies(self) -> Set[tuple[str, str]]:
-        """Points that are assigned, and those that they are made from."""
-        return self._uses.copies
 
     @cached_property
     def assigned(self) -> frozenset[str]:
@@ -322,7 +303,7 @@ class KrlTask:
     @cached_property
     def read(self) -> frozenset[str]:
         """Names of data that something but the destination of a move takes."""
-        return frozenset(self._uses.read)
+        return frozenset(self.uses.read)
 
     @cached_property
     def beside(self) -> frozenset[str]:
@@ -352,7 +333,7 @@ class KrlTask:
         """Collect the names that submit programs may change, and those they take."""
         written, read = set[str](), set[str]()
         for part in self._beside:
-            uses = _Uses(self.routines, self._points)
+            uses = _Uses(own=self.routines, points=self._points)
             for one in part.said:
                 uses.note(one)
             written |= (uses.written | uses.changed | part.words) - part.own
@@ -360,8 +341,9 @@ class KrlTask:
         return frozenset(written), frozenset(read)
 
     @cached_property
-    def _uses(self) -> _Uses:
-        uses = _Uses(self.routines, self._points)
+    def uses(self) -> _Uses:
+        """The names that statements change and take."""
+        uses = _Uses(own=self.routines, points=self._points)
         for file in (f for f in self.files if not f.is_submit):
             lists = file.routines == ()
             for one in file.text.said:
@@ -374,21 +356,23 @@ class KrlTask:
         written, read = self._uses_beside
         uses.changed |= written | self.odd_words
         uses.read |= read | written | self._odd_reads
-        uses.read |= {one for target, one in uses.copies if self._outlives(target)}
+        alone = self._alone
+        uses.read |= {one for target, one in uses.copies if target not in alone}
         uses.pass_on()
         return uses
 
-    def _outlives(self, name: str) -> bool:
-        """Return True if data may hold what they are given beyond a routine, or a run.
+    @property
+    def _alone(self) -> frozenset[str]:
+        """Names of data that hold what they are given for one run of a routine alone.
 
         Parameters may stand for any data.
         """
-        routines = {
-            one.routine for f in self.files for one in f.data if one.name == name
-        }
-        heads = [scope.head for own in self.routines.values() for _, scope, _ in own]
-        given = any(name in getattr(head, "parameters", ()) for head in heads)
-        return given or not routines or "" in routines
+        data = [one for file in self.files for one in file.data]
+        kept = {one.name for one in data if not one.routine}
+        for own in self.routines.values():
+            for _, scope, _ in own:
+                kept.update(getattr(scope.head, "parameters", ()))
+        return frozenset(one.name for one in data) - kept
 
     @cached_property
     def _points(self) -> frozenset[str]:
@@ -571,30 +555,16 @@ def list_calls(one: said.SourceStatement) -> Iterator[str]:
 
 
 @dataclass
-class _Uses:
+class _Uses(NamesUsed):
     """Names that statements may change, and those that they take.
 
     Attributes:
         own: Names of the routines of the job.
         points: Names of positions.
-        written, changed: Names that assignments change, and those that may be changed
-            otherwise.
-        copies: Points that are assigned, and those that they are made from.
     """
 
-    own: Collection[str]
-    points: Collection[str]
-    written: set[str] = field(default_factory=set)
-    changed: set[str] = field(default_factory=set)
-    read: set[str] = field(default_factory=set)
-    copies: set[tuple[str, str]] = field(default_factory=set)
-
-    def pass_on(self) -> None:
-        """Note of points what is noted of those that are made from them."""
-        before = -1
-        while before != len(self.read):
-            before = len(self.read)
-            self.read |= {one for target, one in self.copies if target in self.read}
+    own: Collection[str] = field(kw_only=True)
+    points: Collection[str] = field(kw_only=True)
 
     def note(self, one: said.SourceStatement) -> None:
         """Note what a statement takes and changes."""

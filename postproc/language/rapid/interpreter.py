@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeGuard
@@ -390,17 +390,6 @@ class RapidMachine(TaskMachine):
             names |= {inner.name, *(_name_procedure(text) for text in texts if late)}
         found = [one for name in names for one in self.task.routines.get(name, [])]
         return [(at, routine) for at, _, routine in found]
-
-    def place_of_point(
-        self, target: said.DataObject, scope: Scope
-    ) -> tuple[int, str, str, str] | None:
-        """Return the place of a point, see `TaskMachine.place_of_point`."""
-        return self.task.place_of_point(target.name, scope)
-
-    @property
-    def copies(self) -> Set[tuple[str, str]]:
-        """Names of points and of what they are made from, see `TaskMachine.copies`."""
-        return self.task.copies
 
     def changes_of(self, one: said.RapidStatement) -> Iterator[str]:
         """Yield the names of data that a statement changes, see `TaskMachine`."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.interpreter import NO_POINTS, AssignedPoint, Scope, source_of
+from postproc.language.interpreter import NO_POINTS, AssignedPoint, Scope
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import POINT, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
@@ -160,12 +160,12 @@ class Goals:
         total, untold = self._total(one, row, scope)
         why = why or untold
         if signature.via >= 0:
-            goal = self._end(ends[1], signature, row, there)
+            goal = self.goal(ends[1], signature, row, there)
             yield RapidVisit(
                 scope, row, motion, True, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
             )  # fmt: skip
-        goal = self._end(ends[0], signature, row, there)
+        goal = self.goal(ends[0], signature, row, there)
         if not signature.reaches:
             goal = not_reached(goal, why)
         yield RapidVisit(
@@ -227,20 +227,6 @@ class Goals:
             self._known[key] = one, found  # it keeps its id from being used again
         return found
 
-    def _end(
-        self,
-        operand: said.Operand | None,
-        signature: Signature,
-        row: int,
-        scope: Scope,
-    ) -> FoundGoal:
-        """Read a destination, and note the assigned points that it names."""
-        found = self.goal(operand, signature, row, scope)
-        if not scope.points:
-            return found
-        held = self.task.find_held(source_of(operand), scope)
-        return found if held is None else replace(found, given=frozenset([held]))
-
     def _read_held(self, held: AssignedPoint, signature: Signature) -> FoundGoal:
         """Read the destination that an assignment gave to a point."""
         found = self.goal(held.operand, signature, held.row, held.scope)
@@ -249,7 +235,9 @@ class Goals:
         shift = found.shift
         if shift is not None:
             shift = replace(shift, pins=shift.pins or pins)
-        return replace(found, name=held.name, pins=pins, shift=shift)
+        return replace(
+            found, name=held.name, pins=pins, shift=shift, given=frozenset([held])
+        )
 
     def goal(
         self,
@@ -258,7 +246,10 @@ class Goals:
         row: int,
         scope: Scope,
     ) -> FoundGoal:
-        """Read a destination; numbers of system modules are to stay."""
+        """Read a destination, also of an assigned point.
+
+        Numbers of system modules are to stay.
+        """
         held = self.task.find_held(operand, scope)
         if held is not None:
             return self._read_held(held, signature)
@@ -274,12 +265,14 @@ class Goals:
         row: int,
         scope: Scope,
     ) -> FoundGoal:
-        written, names = operand, {g[0] for g in self.task.find_given(operand, scope)}
-        operand, row, scope = self.task.behind(operand, row, scope)
+        passed = [*self.task.find_given(operand, scope)]
+        if passed:  # given to a routine, which may read it
+            _, operand, row, scope = passed[-1]
         match operand:
             case said.Composite() | said.DataObject():
                 found = self._point(operand, signature.joints, row, scope)
-                why = [self._explain_pinned(one, scope) for one in sorted(names)]
+                names = sorted({name for name, *_ in passed})
+                why = [self._explain_pinned(one, scope) for one in names]
                 return replace(found, pins=next(filter(None, why), found.pins))
             case said.FunctionCall(name=name, arguments=arguments) if (
                 name in SHIFTS
@@ -287,8 +280,7 @@ class Goals:
                 and not signature.joints
             ):
                 shifted = self._read_shifted(name, arguments, row, scope)
-                own = operand is written  # not given to a routine, which may read it
-                if own or shifted.shift is None:
+                if not passed or shifted.shift is None:
                     return shifted
                 # Its numbers stay.
                 held, turned = shifted.shift.shift, "it is shifted and turned"
@@ -448,6 +440,7 @@ class Goals:
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=_from(base),
                 name=base.name, why=base.why or AT_RUN_TIME, pins=pins, holds=held,
+                given=base.given,
             )  # fmt: skip
         values = _move_point(np.array(base.values), name, shift, angles)
         turned = any(angles)
@@ -462,6 +455,7 @@ class Goals:
         return FoundGoal(
             Meaning.POSE, values, base.file, NO_SLOTS, _from(base), base.name, base.aux,
             base.why, pins, shift=found, holds=held if fixed else (-1, -1),
+            given=base.given,
         )  # fmt: skip
 
     def _place_shift(

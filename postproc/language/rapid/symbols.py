@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from postproc.files import task_beside
 from postproc.language.control_flow import HeadedRows
-from postproc.language.interpreter import AssignedPoint, Scope, source_of
+from postproc.language.interpreter import NamesUsed, Scope, TaskSymbols, source_of
 from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import (
@@ -47,7 +47,7 @@ Nested = WrittenNumber | str | tuple["Nested", ...]
 
 
 @dataclass
-class RapidTask:
+class RapidTask(TaskSymbols):
     """The modules of a task.
 
     Attributes:
@@ -219,29 +219,19 @@ class RapidTask:
     @cached_property
     def written(self) -> frozenset[str]:
         """Names of data that something may change."""
-        return frozenset(self._uses.written | self._uses.changed)
+        return frozenset(self.uses.written | self.uses.changed)
 
     @cached_property
     def read(self) -> frozenset[str]:
         """Names of data that something but the destination of a move takes."""
-        return frozenset(self._uses.read)
-
-    @cached_property
-    def changed(self) -> frozenset[str]:
-        """Names of data that something but an assignment by name may change."""
-        return frozenset(self._uses.changed)
-
-    @property
-    def copies(self) -> Set[tuple[str, str]]:
-        """Points that are assigned, and those that they are made from."""
-        return self._uses.copies
+        return frozenset(self.uses.read)
 
     def place_of_point(
         self, name: str, here: Scope
     ) -> tuple[int, str, str, str] | None:
         """Return the place of a point that only assignments change, None for others."""
         found = self.datum(name, here)
-        if found is None or name in self.changed or BY_STRING & self.find_calls:
+        if found is None or name in self.uses.changed or BY_STRING & self.find_calls:
             return None
         file, datum = found
         declared = datum.declared
@@ -249,15 +239,6 @@ class RapidTask:
         if not plain or declared.kind == "const" or self.is_used_beside(name, here):
             return None
         return file, datum.module, datum.routine, name
-
-    def find_held(
-        self, operand: said.Operand | None, here: Scope
-    ) -> AssignedPoint | None:
-        """Return what an assignment gave to the point that an operand names."""
-        if not (here.points and isinstance(operand, said.DataObject)) or operand.steps:
-            return None
-        place = self.place_of_point(operand.name, here)
-        return next((point for point in here.points if point.place == place), None)
 
     @cached_property
     def declared(self) -> frozenset[str]:
@@ -271,27 +252,30 @@ class RapidTask:
         return frozenset(pairs | {f"o_{name}" for name in pairs})
 
     @cached_property
-    def _uses(self) -> _NamesUsed:
-        uses = _NamesUsed(self.routines)
+    def uses(self) -> _NamesUsed:
+        """The names that statements change and take."""
+        uses = _NamesUsed(own=self.routines)
         for file in self.files:
             for statement in file.text.said:
                 uses.note(statement)
         uses.changed |= self._words_but(_READING_MOVES)  # a move sets nothing
         uses.read |= self._odd_words
-        uses.read |= {one for target, one in uses.copies if self._outlives(target)}
+        alone = self._alone
+        uses.read |= {one for target, one in uses.copies if target not in alone}
         uses.pass_on()
         return uses
 
-    def _outlives(self, name: str) -> bool:
-        """Return True if data may hold what they are given beyond a routine, or a run.
+    @property
+    def _alone(self) -> frozenset[str]:
+        """Names of data that hold what they are given for this run alone.
 
         Parameters may stand for any data.
         """
-        data = [one for file in self.files for one in file.data]
-        kinds = {one.declared.kind for one in data if one.declared.name == name}
+        data = (one.declared for file in self.files for one in file.data)
+        kept = {one.name for one in data if one.kind == "pers"}
         heads = (parameters_of(r) for own in self.routines.values() for *_, r in own)
-        given = any(one.name == name for parameters in heads for one in parameters)
-        return given or not kinds or "pers" in kinds
+        kept.update(one.name for parameters in heads for one in parameters)
+        return self.declared - kept
 
     def scope_of(self, number: int, module: str, routine: HeadedRows) -> Scope:
         """Return where the statements of a routine stand."""
@@ -520,24 +504,17 @@ def _compute(operator: str, parts: Sequence[float]) -> float:
 
 
 @dataclass
-class _NamesUsed:
+class _NamesUsed(NamesUsed):
     """Names that statements may change, and those that they take.
 
     Attributes:
         own: Routines of the task by name: what else has their names is hidden.
-        written: Names that assignments change; those that take a value are not `read`.
-        changed: Names that may be changed otherwise.
-        copies: Points that are assigned, and those that they are made from.
         passed: Data and the parameter that they are given to, and whether the routine
             may change them through it.
         parts: Names of which moves go to elements or components.
     """
 
-    own: Mapping[str, Sequence[tuple[int, str, HeadedRows]]]
-    written: set[str] = field(default_factory=set)
-    changed: set[str] = field(default_factory=set)
-    read: set[str] = field(default_factory=set)
-    copies: set[tuple[str, str]] = field(default_factory=set)
+    own: Mapping[str, Sequence[tuple[int, str, HeadedRows]]] = field(kw_only=True)
     passed: set[tuple[str, str, bool]] = field(default_factory=set)
     parts: set[str] = field(default_factory=set)
 
@@ -556,7 +533,7 @@ class _NamesUsed:
                     self.read.add(name)
                 if written and by_reference:
                     self.changed.add(name)
-            self.read |= {one for target, one in self.copies if target in self.read}
+            super().pass_on()
 
     def note(self, one: said.RapidStatement) -> None:
         """Note the names that a statement may change, and those that it takes."""
