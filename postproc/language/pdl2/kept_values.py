@@ -34,7 +34,7 @@ def keep_values(world: World, given: GivenValues, runs: int) -> bool:
         runs: How often it was followed.
     """
     found: dict[str, Value] = {}
-    for key, value in _list_left(world, given):
+    for key, value in _list_endings(world, given):
         found[key] = join_components(found.get(key, value), value)
     if runs >= RUNS:
         every = frozenset().union(*map(given.numbers, given))
@@ -53,7 +53,7 @@ def keep_values(world: World, given: GivenValues, runs: int) -> bool:
     return changed
 
 
-def _list_left(world: World, given: GivenValues) -> Iterator[tuple[str, Value]]:
+def _list_endings(world: World, given: GivenValues) -> Iterator[tuple[str, Value]]:
     """Yield keys that a run takes as it finds them, and what it may leave there."""
     kept = {key for key in given if ":" not in key.partition("/")[0]}
     asked = {*world.initial.asked}  # those of routines begin anew with every call
