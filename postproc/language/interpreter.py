@@ -263,6 +263,7 @@ class TaskMachine(ABC):
             the row behind the last.
         at_once: Moves that differ only in where they go are read at once.
         paused: Visits behind which the arm may stop before the program goes on.
+        lost: Visits behind which it may go anywhere.
     """
 
     comments: ClassVar[Comments]
@@ -277,6 +278,7 @@ class TaskMachine(ABC):
     beside: set[tuple[int, int, int]] = field(default_factory=set)
     at_once: bool = True
     paused: set[int] = field(default_factory=set)
+    lost: set[int] = field(default_factory=set)
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
     _numbers: dict[tuple[CallContext, int], list[int]] = field(default_factory=dict)
     _entered: dict[Place, Arrived] = field(default_factory=dict)
@@ -644,6 +646,8 @@ class TaskMachine(ABC):
     ) -> Arrived:
         """Call a routine that is not at hand: the cell may say what it does."""
         said_of_it = self.start.routines.get(name)
+        if said_of_it in ("moves", "sets-frames"):
+            self.lost |= here.origins
         if said_of_it == "moves":
             return replace(here, origins=NOWHERE)
         if said_of_it == "sets-frames":
@@ -770,10 +774,16 @@ class TaskMachine(ABC):
         """Note that the arm may stop where it stands, although a zone is written."""
         self.paused |= here.origins
 
+    def find_unsure_stops(self) -> set[int]:
+        """Return the visits at which it is not known whether the arm stops."""
+        leads = set[int]().union(*(visit.origins for visit in self.visits))
+        return self.lost | (self.paused & leads)
+
     def unknown(
         self, context: CallContext, row: int, here: Arrived, what: str = NOT_FOLLOWED
     ) -> Arrived:
         """Say that a statement may move, and forget what was known."""
+        self.lost |= here.origins
         self.say(context.scope.file, row, Code.MOTION_UNKNOWN, what, quote=True)
         return here.forget()
 

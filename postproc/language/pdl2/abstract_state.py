@@ -15,6 +15,7 @@ from postproc.language.pdl2.values import (
     join_components,
     may_be,
 )
+from postproc.language.visits import ELSEWHERE
 
 # A mapping that is cheap to copy and to compare: what copies share stays shared.
 
@@ -145,6 +146,7 @@ class Store:
         changing: Variables, by key, that another program may write at any time.
         exposed: Those of them that hold what this program has given them.
         given: What keys are given at any time; shared by all copies.
+        lost: Visits behind which the arm goes on nobody knows where; likewise.
     """
 
     initial: Callable[[str], Value | None]
@@ -156,6 +158,7 @@ class Store:
     changing: frozenset[str] = frozenset()
     exposed: frozenset[str] = frozenset()
     given: GivenValues = field(default_factory=GivenValues)
+    lost: set[int] = field(default_factory=set)
 
     def copy(self) -> Store:
         """Return a store that can change on its own."""
@@ -169,6 +172,7 @@ class Store:
             self.changing,
             self.exposed,
             self.given,
+            self.lost,
         )
 
     def read(self, key: str) -> Value:
@@ -226,6 +230,11 @@ class Store:
         held = self.read(key)
         self._drop_parts(key)
         self.write(key, add_unknown(unknown, held))
+
+    def lose_place(self) -> None:
+        """Where the arm is is no longer known."""
+        self.lost |= self.last
+        self.last = frozenset({ELSEWHERE})
 
     def set(self, **settings: Value) -> None:
         """Change frames or motion variables (names without ``$``)."""

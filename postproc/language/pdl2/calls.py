@@ -83,7 +83,7 @@ def summarise_call(
         why = f"a routine that {name} calls sets it"
         here.store.set(**{frame: Nothing(why) for frame in FRAMES})
     if reach.moves:
-        here.store.last = frozenset({ELSEWHERE})
+        here.store.lose_place()
 
 
 def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
@@ -170,7 +170,7 @@ def _refuse_recursion(machine: Machine, here: Execution, inside: Place) -> None:
         "at an unknown place. Write it as a loop",
     )
     summarise_call(machine, here, name, call_graph_of(here.world, inside))
-    here.store.last = frozenset({ELSEWHERE})
+    here.store.lose_place()
 
 
 def _bind(
@@ -226,14 +226,14 @@ def opaque_call(
         case RoutineEffect.TABLE:
             _frames_from_table(here, name, arguments)
         case RoutineEffect.MOVES:
-            here.store.last = frozenset({ELSEWHERE})
+            here.store.lose_place()
         case RoutineEffect.SETS_FRAMES:
             _unknown_frames(here, f"{name} sets it; give its table under "
                             f"[frames.routines.{name}] in the cell file")  # fmt: skip
         case RoutineEffect.TRACKS:
             on = here.value(arguments[0]) if arguments else Nothing("")
             here.store.set(**{TRACKING: on})
-            here.store.last = frozenset({ELSEWHERE})
+            here.store.lose_place()
             _say(here, Code.POSITION_UNKNOWN, name, "lets a sensor guide the arm, or "
                  "ends that: the next move starts at an unknown place")  # fmt: skip
         case RoutineEffect.KNOWN:
@@ -261,7 +261,7 @@ def forget_surroundings(here: Execution, why: str) -> None:
     """Forget where the arm is, its frames, and all motion settings of the program."""
     names = (*FRAMES, *here.store.settings)
     here.store.set(**dict.fromkeys(names, Nothing(why)))
-    here.store.last = frozenset({ELSEWHERE})
+    here.store.lose_place()
 
 
 def _frames_from_table(

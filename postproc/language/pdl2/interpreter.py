@@ -637,7 +637,7 @@ def _start(machine: Machine) -> None:
         base=frame_value(start.base, why),
         uframe=frame_value(start.uframe, why),
     )
-    machine.given = store.given
+    machine.given, machine.lost = store.given, store.lost
     _handlers(machine, store)
     if program.main is not None:
         machine.enter(machine.root, Place(program, program.main))
@@ -649,7 +649,8 @@ def _handlers(machine: Machine, store: Store) -> None:
     world = machine.world
     nothing = Nothing("a condition handler runs at any time")
     unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
-    unknown.changing, unknown.given = world.changing, store.given
+    unknown.changing = world.changing
+    unknown.given, unknown.lost = store.given, store.lost
     unknown.set(tool=nothing, base=nothing, uframe=nothing)
     for program in world.programs():
         for body in (program.main, *program.routines.values()):

@@ -176,6 +176,7 @@ class Machine:
         cycle_left: A condition handler may begin the cycle again at any time.
         exhausted: The program is too complex to be followed to the end.
         paused: Visits behind which the arm may stop before the program goes on.
+        lost: Visits behind which it may go anywhere.
         given: What variables are given at any time.
     """
 
@@ -196,6 +197,7 @@ class Machine:
     cycle_left: bool = False
     exhausted: bool = False
     paused: set[int] = field(default_factory=set)
+    lost: set[int] = field(default_factory=set)
     given: GivenValues = field(default_factory=GivenValues)
     rows: int = 0
     _heap: list[tuple[Point, int]] = field(default_factory=list)

@@ -499,6 +499,7 @@ class RapidMachine(TaskMachine):
             self.restarts.append(here)
             return None
         if name in STOPPED:
+            self.lost |= here.origins
             return here.forget()
         if kind == "modal":
             changed = self._change_modes(one, row, scope, here.modes)
