@@ -28,7 +28,12 @@ from postproc.files import (
     read_input,
     read_stream,
 )
-from postproc.language.languages import file_named, language_of, language_of_text
+from postproc.language.languages import (
+    UNNAMED,
+    file_named,
+    language_of,
+    language_of_text,
+)
 from postproc.language.stamp import read_stamp
 from postproc.language.visits import Diagnostic
 from postproc.robot.cell import Cell
@@ -240,7 +245,7 @@ class ProgramFiles:
 
 def program_files(
     program: str | Path | bytes | ProgramFiles,
-    name: str = "program.pdl",
+    name: str = UNNAMED,
     variables: bytes | str | Path | None = None,
     pages: Mapping[str, bytes] = NO_PAGES,
 ) -> ProgramFiles:

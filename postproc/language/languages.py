@@ -80,3 +80,6 @@ def _files(folder: str) -> type[FileName]:
 def _load(folder: str) -> Language:
     made: Language = import_module(f"{__package__}.{folder}.language").LANGUAGE()
     return made
+
+
+UNNAMED = "program" + _files(_FOLDERS[0]).programs[0]  # what bytes are called

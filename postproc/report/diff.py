@@ -27,7 +27,7 @@ from postproc.files import (
     open_text,
     read_input,
 )
-from postproc.language.languages import file_named, language_of
+from postproc.language.languages import UNNAMED, file_named, language_of
 from postproc.language.lexer import BLANKS, mask_of, scan_lines
 from postproc.language.stamp import read_stamp, stamp_span, strip_stamp
 
@@ -561,7 +561,7 @@ def diff(
     original: str | Path | bytes,
     compensated: str | Path | bytes,
     *,
-    name: str = "program.pdl",
+    name: str = UNNAMED,
 ) -> Difference:
     """Compare two programs, and the variable files beside them.
 
