@@ -106,7 +106,7 @@ class FoundGoal:
         shared: Other programs may read it too.
         shift: How it is shifted from a point, None where it is not, or not known.
         stays: The point that it is made from keeps its numbers for this move.
-        holds: File and first number of a shift that keeps its numbers for this move.
+        holds: Files and first numbers of shifts that keep their numbers for this move.
         given: What assignments gave to the points that the move names.
     """
 
@@ -122,7 +122,7 @@ class FoundGoal:
     shared: bool = False
     shift: FoundShift | None = None
     stays: bool = False
-    holds: tuple[int, int] = (-1, -1)
+    holds: frozenset[tuple[int, int]] = frozenset()
     given: frozenset[AssignedPoint] = frozenset()
 
     @property
@@ -181,14 +181,16 @@ def hold_numbers(
         values: Numbers of the goal, none where they are not known.
         aux: External axes.
     """
-    shift = base.writes if base.is_rewritten_by_shift else (-1, (-1,))
-    own = shift[0], shift[1][0]
+    own = set[tuple[int, int]]()
+    if base.is_rewritten_by_shift:
+        file, slots = base.writes
+        own = {(file, slots[0])}
     unknown = meaning == Meaning.UNKNOWN and base.origin[0] < 0
     return FoundGoal(
         meaning, values or tuple(math.nan for _ in base.values), base.file,
         tuple(-1 for _ in base.values), base.origin, _whole(name) if unknown else name,
         aux, why, pins or why.text, stays=True,
-        holds=base.holds if own[1] < 0 else own,
+        holds=base.holds | own,
     )  # fmt: skip
 
 
@@ -622,8 +624,7 @@ def _find_pinned(
         at = index.get(v.goal.point, -1)
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
-        shift = index.get(v.goal.holds, -1)
-        if shift >= 0:
+        for shift in {index.get(place, -1) for place in v.goal.holds} - {-1}:
             pinned[shift] = pinned[shift] or UNKNOWN_POINT
     return pinned
 

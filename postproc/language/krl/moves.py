@@ -498,7 +498,8 @@ class _Goal:
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, said.DataObject):
             return _unknown_goal(AT_RUN_TIME)
-        base, held = self._point(point), self._find_own_shift(other)
+        base = self._point(point)
+        holds = base.holds | self._find_own_shift(other)
         frames = FrameReader(self.task, self.row, self.here, _NO, _NO)
         shift = frames.frame(other)
         if base.target != Meaning.POSE or not shift.pose:
@@ -506,20 +507,23 @@ class _Goal:
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=base.origin,
                 name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
-                stays=base.stays, holds=base.holds if base.stays else held,
+                stays=base.stays, holds=holds,
             )  # fmt: skip
         if behind and self._by_joints:
             pins = base.pins or f"{base.name} is shifted without S and T"
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=base.origin,
                 name=base.name, why=NO_STATUS, pins=pins, stays=base.stays,
-                holds=base.holds if base.stays else held,
+                holds=holds,
             )  # fmt: skip
         values, turns = _link(base.values, shift, behind)
         if base.stays or base.slots[0] < 0:
             aux = self._outside_of(base, other) if behind else base.aux
             why = base.why or COMPUTED
-            return hold_numbers(base, base.name, why, "", base.target, values, aux)
+            kept = replace(base, holds=holds)
+            return hold_numbers(
+                kept, base.name, why, base.pins, base.target, values, aux
+            )
         found = self._shift(base, other, shift, behind)
         turned = turns and found.slots[0] < 0
         pins = base.pins or (f"{base.name} is turned too" if turned else "")
@@ -527,15 +531,15 @@ class _Goal:
             Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name,
             self._outside_of(base, other) if behind else base.aux,
             base.why, pins, base.shared, found,
-            holds=held if found.slots[0] < 0 else (-1, -1),
+            holds=holds if found.slots[0] < 0 else base.holds,
         )  # fmt: skip
 
-    def _find_own_shift(self, other: said.Operand) -> tuple[int, int]:
+    def _find_own_shift(self, other: said.Operand) -> set[tuple[int, int]]:
         """Return where the numbers of a shift begin that stand in the move itself."""
         value = self.task.value(other, self.row, self.here)
         numbers = _numbers(value, PLACE) if isinstance(value, KrlRecord) else None
         file, slots = _places(numbers or ())
-        return (file, slots[0]) if file == self.here.file and slots else (-1, -1)
+        return {(file, slots[0])} if file == self.here.file and slots else set()
 
     def _outside_of(self, base: FoundGoal, other: said.Operand) -> tuple[float, ...]:
         """Return the external axes of ``point : other``: those that stand on the right.

@@ -483,18 +483,19 @@ class Goals:
         base = self.goal(placed[0], POINT, row, scope)
         at = int(self.task.files[scope.file].text.first[row])
         x = placed[1]
-        held = (scope.file, at + x.slot) if isinstance(x, said.Num) else (-1, -1)
+        own = {(scope.file, at + x.slot)} if isinstance(x, said.Num) else set()
+        holds = base.holds | own
         if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
             pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=base.origin,
                 name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
-                stays=base.stays, holds=base.holds if base.stays else held,
+                stays=base.stays, holds=holds,
             )  # fmt: skip
         values = shift_point(np.array(base.values), name, shift, angles)
         turned = any(angles)
         if base.stays:
-            return replace(base, values=values)
+            return replace(base, values=values, holds=holds)
         kind = ShiftKind.AXES if name == "offs" else ShiftKind.OWN
         found = self._place_shift(
             Shift(kind, (*shift, *angles), base.values), base, [*placed[1:], *(
@@ -505,7 +506,7 @@ class Goals:
         pins = base.pins or (f"{name} turns it" if turned and fixed else "")
         return FoundGoal(
             Meaning.POSE, values, base.file, NO_SLOTS, base.origin, base.name, base.aux,
-            base.why, pins, shift=found, holds=held if fixed else (-1, -1),
+            base.why, pins, shift=found, holds=holds if fixed else base.holds,
         )  # fmt: skip
 
     def _place_shift(
