@@ -55,6 +55,7 @@ JOBS = {"mod": RAPID, "src": KRL, "pdl": PDL2}
         ("pdl", "", False),
         ("pdl", "what_is_it", True),
         ("pdl", "FROBNICATE p WITH 3", True),
+        ("pdl", "CANCEL ALL", True),
         ("pdl", "DELAY 200", True),
         ("pdl", "$DOUT[1] := TRUE", False),
         ("pdl", "DELAY 200\n  RETURN", False),  # it stops there

@@ -249,6 +249,7 @@ def _cancel(here: Execution) -> None:
     """End a move on its way, where the program may have gone on before its end."""
     programs = here.world.programs()
     if any(_RUNNING.search(one.lines.source.data) for one in programs):
+        here.store.lost |= here.store.last
         here.store.last |= {ELSEWHERE}
 
 
