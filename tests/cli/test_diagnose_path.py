@@ -69,6 +69,7 @@ def test_a_path_confirms_the_flanks_and_lacks_nothing(tracked):
     }
 
 
+@pytest.mark.slow
 def test_one_run_tells_nothing_of_how_poses_repeat_nor_of_the_rest_of_the_range(
     tracked,
 ):

@@ -73,6 +73,7 @@ def mixed():
     return out
 
 
+@pytest.mark.slow
 def test_mixed_programs(mixed, job_model):
     cell = load_cell(ROOT / "programs" / "cell.toml")
     meant = [said(alone(one, cell, job_model, DEFAULT_OPTIONS)) for one in mixed]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import hashlib
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -65,18 +66,31 @@ def run_at(commit: str, cases: Sequence[Case], workers: int) -> dict[str, Record
 
 @contextmanager
 def package_of(commit: str) -> Iterator[Path]:
-    """Give the folder of a commit's package, with the core that is built here.
+    """Give the folder of a commit's package, with its core: built where it is another.
 
     Raises:
-        SystemExit: The core was another one then.
+        subprocess.CalledProcessError: There is no such commit, or no core of it.
     """
-    if git("diff", "--stat", commit, "--", "native"):
-        sys.exit(f"{commit}: its core is another one: build it, and run check there")
     with tempfile.TemporaryDirectory(prefix="golden-base-") as name:
-        archive = git("archive", commit, "postproc", "grammars")
+        archive = git("archive", commit, "postproc", "grammars", "native")
         subprocess.run(["tar", "-x", "-C", name], input=archive, check=True)
-        shutil.copy(str(_native.__file__), Path(name) / "postproc")
+        core = Path(str(_native.__file__))
+        if git("diff", "--stat", commit, "--", "native"):
+            core = build_core(Path(name) / "native")
+        shutil.copy(core, Path(name) / "postproc" / "_native.abi3.so")
         yield Path(name).resolve()
+
+
+def build_core(folder: Path) -> Path:
+    """Compile the core of a commit in its folder; return the library."""
+    path = f"{Path.home() / '.cargo/bin'}:{os.environ['PATH']}"
+    subprocess.run(
+        ["cargo", "build", "--release", "--locked", "--target-dir", "target"],
+        cwd=folder,
+        env=os.environ | {"PYO3_PYTHON": sys.executable, "PATH": path},
+        check=True,
+    )
+    return folder / "target" / "release" / "libpostproc_native.so"
 
 
 def setup() -> str:

@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.files import task_beside
 from postproc.language.assigned_points import (
     AssignedPoint,
     FunctionBody,
@@ -26,6 +25,7 @@ from postproc.language.control_flow import HeadedRows
 from postproc.language.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said
+from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import (
     ANSWERS,
     BUILT_IN_FUNCTIONS,
@@ -622,7 +622,8 @@ def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
     """Group the files of tasks that run beside a program, by the names of files."""
     tasks: dict[str, list[RapidFile]] = {}
     for file in files:
-        tasks.setdefault(task_beside(file.text.source.name), []).append(file)
+        task = RapidFileName(file.text.source.name).task_beside
+        tasks.setdefault(task, []).append(file)
     return [RapidTask(own) for own in tasks.values()]
 
 

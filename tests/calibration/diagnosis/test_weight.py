@@ -51,6 +51,7 @@ def test_shapes_stay_alone_where_no_joint_yields():
     assert weigh_laws(found, no_progress) is found
 
 
+@pytest.mark.slow
 def test_a_search_without_shapes_is_not_asked(shaped):
     bare = replace(shaped, fit=shaped.base, additions=())
     assert weigh_laws(bare, no_progress) is bare

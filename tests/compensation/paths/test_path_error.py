@@ -199,6 +199,7 @@ def test_rounded_corners_are_passed_as_the_virtual_arm_does(shop: Path) -> None:
     assert most == pytest.approx(after.max(), abs=1e-5)
 
 
+@pytest.mark.slow
 def test_it_is_what_a_slow_loop_says(ran: tuple[InTime, Job]) -> None:
     found, setting = ran
     cell, model, cycle = setting.cell, setting.model, found.before

@@ -360,6 +360,7 @@ def test_words_are_explained_on_every_page(browser: Any, folder: Path) -> None:
         assert len(words) > 5 and all(word.text for word in words)
 
 
+@pytest.mark.slow
 def test_100_000_targets_are_usable(browser: Any, folder: Path) -> None:
     show(browser, folder, "large", program_report(outcome_of(MANY)))
     assert requests(browser) == [] and complaints(browser) == []
