@@ -292,7 +292,7 @@ class Run:
     def _set_part(self, one: SetPart) -> None:
         """Set one number of the place of a point."""
         old = self._place(one.point)
-        if isinstance(one.of, Inline):
+        if one.mark in self.shifts:
             number = self.shifts[one.mark][0] * MM
         else:
             by = self._number(one.by) * MM
