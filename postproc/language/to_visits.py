@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import (
     Callable,
     Collection,
@@ -14,7 +15,7 @@ from collections.abc import (
     Sequence,
     Set,
 )
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ ONLY_SHIFTED = Reason(
     "it is shifted from a point that no move goes to: what to correct?",
 )
 _NO_FRAME = -1
-MOST_LINES = 3  # named in a reason
+MOST_NAMED = 3  # lines, or data, in a reason
 NO_LOAD: tuple[float, ...] = (math.nan,) * 4  # one object: NaN differs from itself
 Pose = tuple[float, ...]
 """The rows of a pose (4, 4) [m] one after the other, empty where it is not known."""
@@ -107,7 +108,8 @@ class FoundGoal:
         shift: How it is shifted from a point, None where it is not, or not known.
         stays: The point that it is made from keeps its numbers for this move.
         holds: Files and first numbers of shifts that keep their numbers for this move.
-        given: What assignments gave to the points that the move names.
+        given: What assignments gave to the data that the move names.
+        doubtful: Names of data of which only the run tells what they hold.
     """
 
     target: Meaning
@@ -124,15 +126,16 @@ class FoundGoal:
     stays: bool = False
     holds: frozenset[tuple[int, int]] = frozenset()
     given: frozenset[AssignedPoint] = frozenset()
+    doubtful: frozenset[str] = frozenset()
 
     @property
     def lost(self) -> FoundGoal:
-        """The goal where its point holds different values on the ways here."""
-        text = f"{self.name} is given different values on the ways here, or beside them"
-        return FoundGoal(
-            Meaning.UNKNOWN, tuple(math.nan for _ in self.values),
-            name=_whole(self.name), aux=self.aux, why=Reason(Code.RUNTIME_VALUE, text),
-        )  # fmt: skip
+        """The goal where data that it names hold different values on the ways here."""
+        names = sorted({point.name for point in self.given})
+        text = f"{', '.join(names[:MOST_NAMED])} is given different values on the ways "
+        why = Reason(Code.RUNTIME_VALUE, f"{text}here, or beside them")
+        goal = hold_numbers(self, self.name, why, self.pins, aux=self.aux)
+        return replace(goal, doubtful=frozenset({*names, _array_of(self.name)} - {""}))
 
     @property
     def writes(self) -> tuple[int, tuple[int, ...]]:
@@ -218,13 +221,16 @@ def explain_components(
     """
     late = [one for one in held.components if one.value is None]
     meant = late or held.components
-    places = sorted({(one.file, files[one.file].text.line(one.row)) for one in meant})
-    lines = [
-        str(line) if len(files) == 1 else f"{line} of {files[at].text.source.name}"
-        for at, line in places[:MOST_LINES]
+    lines = defaultdict[int, set[int]](set)
+    for one in meant:
+        lines[one.file].add(files[one.file].text.line(one.row))
+    places = [
+        f"line {', '.join(map(str, sorted(own)[:MOST_NAMED]))} of "
+        f"{files[at].text.source.name}"
+        for at, own in sorted(lines.items())
     ]
     parts = ", ".join(one.name for one in meant)
-    text = f"{name}: {parts} set in line {', '.join(lines)}"
+    text = f"{name}: {parts} set in {', '.join(places)}"
     if late:
         text = f"{text} to what is known only when the program runs"
     elif not known:
@@ -603,6 +609,9 @@ def _find_pinned(
     elements = {goal.name: why for goal, why in (*goals, *other)
                 if goal.name and max(goal.slots[0], goal.follows[0]) < 0
                 and not _array_of(goal.name)}  # fmt: skip
+    elements |= {
+        name: ANY_VALUE.format(name) for v in found for name in v.goal.doubtful
+    }
     stays = {goal.point: why for goal, why in other}
     stays |= {(f, slots[0]): why for g, why in other for f, slots in [g.writes]}
     pinned = []

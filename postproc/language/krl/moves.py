@@ -343,7 +343,7 @@ class _Goal:
         """Read a point of which components have been set by themselves."""
         record = self.task.evaluate_held(held)
         found = _unknown_goal(PARTIAL)
-        if record is not None and record.whole:
+        if isinstance(record, KrlRecord) and record.whole:
             found = self._read_record(record)
         partial = found.why.code is Code.PARTIAL_TARGET
         known = found.target != Meaning.UNKNOWN and not partial

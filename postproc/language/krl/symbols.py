@@ -21,6 +21,7 @@ from postproc.language.assigned_points import (
     is_point,
 )
 from postproc.language.control_flow import HeadedRows
+from postproc.language.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import TABLES
@@ -54,6 +55,8 @@ FIELDS: Mapping[str, Collection[str]] = {
 }
 """Components of points by type."""
 WHOLE_NUMBERS = COMPONENTS[6:]
+NUMBERS = ("int", "real")
+FOLLOWED = (*POINTS, *NUMBERS)  # types of data whose assignments are followed
 DEEPEST = 20  # names that stand for names
 
 
@@ -236,14 +239,14 @@ class KrlTask(TaskSymbols):
         if place is None or name in self.uses.changed or name.startswith("$"):
             return None
         file, datum = self._own[(*place, name)].get((), (-1, None))
-        if datum is None or datum.type not in POINTS or name in self.counted:
+        if datum is None or datum.type not in FOLLOWED or name in self.counted:
             return None
         index: tuple[int, ...] | None = ()
         if datum.dimensions:
             index = self._find_element(file, datum, steps[:1], row, here)
             steps = steps[1:]
         component = ".".join(step for step in steps if isinstance(step, str))
-        known = not component or component in FIELDS[datum.type]
+        known = not component or component in FIELDS.get(datum.type, ())
         known = known and all(isinstance(step, str) for step in steps)
         return PointPart((file, *place, name), index if known else None, component)
 
@@ -265,10 +268,12 @@ class KrlTask(TaskSymbols):
     ) -> list[tuple[str, float | None]]:
         """Return what an assignment gives to components, see `TaskSymbols`."""
         found = self.value(value, row, here)
-        if part.component:
+        _, module, routine, name = part.place
+        type_ = self._own[module, routine, name][()][1].type
+        if part.component or type_ in NUMBERS:
             number = found.value if isinstance(found, KrlNumber) else None
-            if part.component in WHOLE_NUMBERS and number is not None:
-                number = None if whole(number) is None else number
+            if part.component in WHOLE_NUMBERS or type_ == "int":
+                number = None if number is None or whole(number) is None else number
             return [(part.component, number)]
         fields = found.fields if isinstance(found, KrlRecord) and found.whole else ()
         known = {key: one.value for key, one in fields if isinstance(one, KrlNumber)}
@@ -512,11 +517,22 @@ class KrlTask(TaskSymbols):
                 return _link(parts) if operator == ":" else _compute(operator, parts)
             case said.DataObject():
                 return self._data(operand, row, here, depth)
-            case said.FunctionCall():
+            case said.FunctionCall(name=name, arguments=arguments):
                 returned = self.find_returned(operand, row, here)
-                return None if returned is None else self.value(*returned, depth + 1)
+                if returned is not None:
+                    return self.value(*returned, depth + 1)
+                return self._apply(name, arguments, row, here)
             case _:
                 return None
+
+    def _apply(
+        self, name: str, arguments: Sequence[said.Argument], row: int, here: Scope
+    ) -> KrlNumber | None:
+        """Return what a function of the controller gives for a number."""
+        if name in self.routines or name not in ALIKE or len(arguments) != 1:
+            return None
+        found = apply_function(name, self.number(arguments[0].value, row, here))
+        return KrlNumber(found) if math.isfinite(found) else None
 
     def _aggregate(
         self, fields: Sequence[said.NamedField], row: int, here: Scope, depth: int
@@ -567,8 +583,11 @@ class KrlTask(TaskSymbols):
             value = _part_of(value, step)
         return value
 
-    def evaluate_held(self, held: AssignedPoint, depth: int = 0) -> KrlRecord | None:
-        """Evaluate what assignments gave to a point, None where it is not known."""
+    def evaluate_held(self, held: AssignedPoint, depth: int = 0) -> KrlValue | None:
+        """Evaluate what assignments gave to data, None where it is not known."""
+        type_ = self._own[held.place[1:]][()][1].type
+        if type_ in NUMBERS:
+            return self._evaluate_number(held, type_, depth)
         base = KrlRecord((), held.operand is None)
         if held.operand is not None:
             found = self.value(held.operand, held.row, held.scope, depth)
@@ -580,6 +599,19 @@ class KrlTask(TaskSymbols):
                 fields[one.name] = KrlNumber(one.value)
         known = known and all(one.value is not None for one in held.components)
         return KrlRecord(tuple(fields.items()), known)
+
+    def _evaluate_number(
+        self, held: AssignedPoint, type_: str, depth: int
+    ) -> KrlNumber | None:
+        """Evaluate what assignments gave to a number; whole ones are rounded to."""
+        if held.components:
+            value = held.components[0].value
+            return None if value is None else KrlNumber(value)
+        found = self.value(held.operand, held.row, held.scope, depth)
+        if not isinstance(found, KrlNumber):
+            return None
+        known = type_ == "real" or whole(found.value) is not None
+        return KrlNumber(found.value) if known else None
 
     def index(
         self, step: said.ElementStep | str, row: int, here: Scope

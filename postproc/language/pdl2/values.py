@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnostics import Code
+from postproc.language.functions import apply_function
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
 # What the analysis knows of a value: a number, a text, a position, or why nothing.
@@ -269,7 +270,6 @@ def _derive_position(
 
 RUN_TIME = Nothing("it is known only at run time")
 
-FUNCTIONS = frozenset("abs sqrt sin cos tan round trunc".split())
 _ARITHMETIC: dict[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
@@ -351,13 +351,8 @@ def _add(a: Vector, b: Vector, sign: str) -> Value:
 
 def function(name: str, x: float) -> Value:
     """Return what a built-in function of one number gives (angles in degrees)."""
-    if name in ("sin", "cos", "tan"):
-        return float(getattr(math, name)(math.radians(x)))
-    if name == "sqrt":
-        return math.sqrt(x) if x >= 0 else Nothing("the root of a negative number")
-    if name == "round":
-        return float(math.floor(x + 0.5))
-    return abs(x) if name == "abs" else float(math.trunc(x))
+    found = apply_function(name, x)
+    return Nothing("the root of a negative number") if math.isnan(found) else found
 
 
 # Where a reference leads.

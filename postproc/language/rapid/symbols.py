@@ -22,6 +22,7 @@ from postproc.language.assigned_points import (
     source_of,
 )
 from postproc.language.control_flow import HeadedRows
+from postproc.language.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.files import RapidFileName
@@ -37,6 +38,7 @@ from postproc.language.rapid.program import Datum, RapidFile
 from postproc.language.rapid.targets import RECORDS, operands_of, spell_components
 
 TARGETS = ("robtarget", "jointtarget")
+FOLLOWED = (*TARGETS, "num")  # types of data whose assignments are followed
 SHIFTS = ("offs", "reltool")  # functions whose first argument is a target
 CONSTANTS = {"true": 1.0, "false": 0.0, "pi": 3.141592653589793}
 
@@ -243,7 +245,7 @@ class RapidTask(TaskSymbols):
         """Find the point that only assignments change, see `TaskSymbols.locate`."""
         name, steps = data.name, data.steps
         found = self.datum(name, here)
-        if found is None or found[1].declared.type not in TARGETS:
+        if found is None or found[1].declared.type not in FOLLOWED:
             return None
         if name in self.uses.changed or BY_STRING & self.find_calls:
             return None
@@ -434,18 +436,30 @@ class RapidTask(TaskSymbols):
                 other, at, there = self.behind(operand, row, here)
                 if other is not operand:
                     return self.number(other, at, there)
+                held = self.find_held(operand, row, here)
+                if held is not None:
+                    return _number_in(self.evaluate_held(held))
                 found = self.constant(name, here)
                 if found is None:
                     return CONSTANTS.get(name, float("nan"))
                 return self._number_of_declaration(*found)
             case said.DataObject():
-                part = self._data_object(operand, row, here, 0)
-                return part.value if isinstance(part, WrittenNumber) else math.nan
-            case said.FunctionCall():
+                return _number_in(self._data_object(operand, row, here, 0))
+            case said.FunctionCall(name=name, arguments=arguments):
                 other, at, there = self.behind(operand, row, here)
-                return math.nan if other is operand else self.number(other, at, there)
+                if other is not operand:
+                    return self.number(other, at, there)
+                return self._compute(name, arguments, row, here)
             case _:
                 return float("nan")
+
+    def _compute(
+        self, name: str, arguments: Sequence[said.Argument], row: int, here: Scope
+    ) -> float:
+        """Return what a built-in function of one number gives, else NaN."""
+        if name in self.routines or name not in ALIKE or len(arguments) != 1:
+            return math.nan
+        return apply_function(name, self.number(arguments[0].value, row, here))
 
     def _number_of_declaration(self, file: int, datum: Datum) -> float:
         if datum.declared.dimensions:
@@ -539,6 +553,8 @@ class RapidTask(TaskSymbols):
                 found[one.name] = WrittenNumber(one.value)
         if len(found) < len(names):
             return None
+        if type_ not in RECORDS:
+            return found[""]
         return tuple(
             tuple(found[f"{part}.{name}"] for name in inside)
             for part, inside in RECORDS[type_].items()
@@ -913,6 +929,11 @@ def _parts_of(operands: Sequence[said.Operand | None]) -> Iterator[said.Operand]
                     waiting += at.subscripts if isinstance(at, said.ElementStep) else ()
             case said.Composite(items=items) | said.Operation(operands=items):
                 waiting += items
+
+
+def _number_in(found: Nested | None) -> float:
+    """Return a number, NaN where there is none."""
+    return found.value if isinstance(found, WrittenNumber) else math.nan
 
 
 def _leaves(found: Nested | None) -> Iterator[WrittenNumber]:

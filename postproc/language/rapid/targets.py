@@ -48,6 +48,8 @@ RECORDS: Mapping[str, Mapping[str, Sequence[str]]] = {
 def spell_components(type_: str, component: str) -> list[str]:
     """Return the numbers of data, or of a part of them, as they are spelt.
 
+    That of data that are a number is "".
+
     >>> spell_components("robtarget", "trans"), spell_components("pose", "rot.q1")
     (['trans.x', 'trans.y', 'trans.z'], ['rot.q1'])
     >>> len(spell_components("robtarget", "")), spell_components("pose", "z")
@@ -56,7 +58,7 @@ def spell_components(type_: str, component: str) -> list[str]:
     parts = RECORDS.get(type_, {})
     every = [f"{part}.{name}" for part, names in parts.items() for name in names]
     if not component:
-        return every
+        return every or [""]
     return [one for one in every if f"{one}.".startswith(f"{component}.")]
 
 

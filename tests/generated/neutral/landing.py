@@ -151,7 +151,10 @@ def count(
         size = np.linalg.norm(d.std_error[mine], axis=1).max() / MM
         if not safe:
             found.error_mm[ALONG].append(pair)
-            if not old.target.computed:
+            if old.target.parted:
+                text = "moves along, though a number of it is set by itself"
+                found.wrong.append((seed, line, text))
+            elif not old.target.computed:
                 why = {d.reasons[d.why[row]].text for row in mine}
                 text = f"went to new numbers, though: {' / '.join(why)}"
                 found.wrong.append((seed, line, text))
