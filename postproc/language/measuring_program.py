@@ -91,10 +91,10 @@ def refuse_other_name(program: MeasuringProgram, file: str, stem: str) -> None:
         raise ProgramError(file, problem, cure)
 
 
-def joined(numbers: tuple[float, ...], digits: int, separator: str = ",") -> str:
+def number_list(numbers: tuple[float, ...], digits: int, separator: str = ",") -> str:
     """Write numbers with so many digits.
 
-    >>> joined((1.0, -2.5), 2)
+    >>> number_list((1.0, -2.5), 2)
     '1.00,-2.50'
     """
     return separator.join(f"{v:.{digits}f}" for v in numbers)

@@ -8,7 +8,7 @@ from postproc.language.measuring_program import (
     MeasuringMove,
     MeasuringProgram,
     MountedProbe,
-    joined,
+    number_list,
 )
 
 
@@ -30,10 +30,10 @@ def _write_step(
 ) -> Iterator[str]:
     if isinstance(step, MountedProbe):
         yield f"  -- probe point {step.number}"
-        yield f"  $TOOL := POS({joined(step.xyz_mm, 3, ', ')}, 0, 0, 0, '')"
+        yield f"  $TOOL := POS({number_list(step.xyz_mm, 3, ', ')}, 0, 0, 0, '')"
         return
     if step.measured:
         yield f"  -- MEASURE {step.measured}"
-    yield f"  MOVE JOINT TO {{{joined(step.joints_deg, 5, ', ')}}}"
+    yield f"  MOVE JOINT TO {{{number_list(step.joints_deg, 5, ', ')}}}"
     if step.measured:
         yield f"  DELAY {1000 * program.settle_s:.0f}"

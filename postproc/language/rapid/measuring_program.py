@@ -9,7 +9,7 @@ from postproc.language.measuring_program import (
     MeasuringMove,
     MeasuringProgram,
     MountedProbe,
-    joined,
+    number_list,
 )
 
 _NO_LOAD = "[0.001,[0,0,0.001],[1,0,0,0],0,0,0]"  # as of tool0: it states nothing
@@ -24,7 +24,7 @@ def write_rapid(program: MeasuringProgram) -> str:
     load = _write_load(program)
     tools = (
         f"  LOCAL PERS tooldata {_tool(one)}:="
-        f"[TRUE,[[{joined(one.xyz_mm, 3)}],[1,0,0,0]],{load}];"
+        f"[TRUE,[[{number_list(one.xyz_mm, 3)}],[1,0,0,0]],{load}];"
         for one in program.probes
     )
     lines = [
@@ -48,7 +48,7 @@ def _write_load(program: MeasuringProgram) -> str:
     """Write the load that the arm carries with every tool."""
     if not program.mass_kg > 0.0:
         return _NO_LOAD
-    centre = joined(program.centre_mm, 3)
+    centre = number_list(program.centre_mm, 3)
     return f"[{program.mass_kg:g},[{centre}],[1,0,0,0],0,0,0]"
 
 
@@ -60,7 +60,7 @@ def _write_step(
         return
     if step.measured:
         yield f"    ! MEASURE {step.measured}"
-    joints = f"[[{joined(step.joints_deg, 5)}],{_OUTSIDE}]"
+    joints = f"[[{number_list(step.joints_deg, 5)}],{_OUTSIDE}]"
     yield f"    MoveAbsJ {joints},v{SLOW:.0f},fine,{tool};"
     if step.measured:
         yield f"    WaitTime \\InPos,{program.settle_s:g};"
