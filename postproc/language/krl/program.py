@@ -42,6 +42,7 @@ class KrlDatum:
         row: Its statement.
         routine: Name of the routine whose own it is, "" where it is the file's.
         shared: Every program knows it.
+        dimensions: Of an array.
     """
 
     name: str
@@ -51,6 +52,7 @@ class KrlDatum:
     row: int
     routine: str
     shared: bool
+    dimensions: tuple[said.Operand, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -179,7 +181,14 @@ class _KrlReader:
         routine = self.outline.name(*_ROUTINES)
         for item in one.items:
             datum = KrlDatum(
-                item.name, (), one.type, item.value, row, routine, one.shared
+                item.name,
+                (),
+                one.type,
+                item.value,
+                row,
+                routine,
+                one.shared,
+                item.dimensions,
             )
             self.data.append(datum)
 
