@@ -31,7 +31,6 @@ from postproc.cli.reports import (
     ReportOption,
     Reports,
 )
-from postproc.exceptions import PostprocError
 from postproc.files import check_places
 
 
@@ -49,23 +48,18 @@ class Method(StrEnum):
 @app.command()
 def survey(
     cell: CellOption,
-    output: Annotated[Path, typer.Option("-o", "--output", help="SURVEY.pdl (PDL2)")],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", help="SURVEY.pdl, .mod or .src: its language."),
+    ],
     poses: Annotated[int, typer.Option("--poses", help="Number of poses.")] = 300,
     changes: SetSurvey = None,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
     from postproc.calibration.survey_program import write_survey
-    from postproc.language.languages import file_named, language_of, languages
     from postproc.robot.cell import load_cell
 
     with report_errors():
-        own = language_of(output.name)
-        if file_named(output).is_program and own is not languages()[0]:
-            raise PostprocError(
-                f"{output}: survey programs are PDL2. Write SURVEY.pdl; for another "
-                "controller move its joint moves into a program of its language, with "
-                "the ids in comments (! MEASURE 1a in RAPID, ; MEASURE 1a in KRL)"
-            )
         check_places([output], [cell])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):

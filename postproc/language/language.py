@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from postproc.arrays import Floats, Ints
 from postproc.files import FolderListing
 from postproc.language.archive import Archive
+from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.number_edits import Skeleton
 from postproc.language.pose_encoding import Dialect
 from postproc.language.source import Edit, Source
@@ -345,6 +346,18 @@ class Language(ABC):
     def list_placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
         """Return the arms of an archive, and their poses (4, 4) [m] in the world."""
         return ()
+
+    @abstractmethod
+    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
+        """Write a measuring program as a controller takes it.
+
+        Args:
+            program: What it does.
+            file: Where it goes.
+
+        Raises:
+            ProgramError: It cannot be called as its file.
+        """
 
     def prepare(self) -> None:  # noqa: B027 - most have nothing to load
         """Load what reading the first program takes."""

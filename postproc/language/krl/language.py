@@ -31,6 +31,10 @@ from postproc.language.language import (
     Language,
     Start,
 )
+from postproc.language.measuring_program import (
+    MeasuringProgram,
+    refuse_other_name,
+)
 from postproc.language.number_edits import Skeleton
 from postproc.language.source import Source
 from postproc.language.visits import never_reached
@@ -121,6 +125,13 @@ class Krl(Language):
     def read_archive(self, folder: Path) -> Archive | None:
         """Read ``$config.dat`` and ``$machine.dat`` of an archive."""
         return read_archive(folder)
+
+    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
+        """Write joint moves that stop, with comments ``MEASURE``."""
+        from postproc.language.krl.measuring_program import write_krl
+
+        refuse_other_name(program, file.name, file.stem)
+        return write_krl(program)
 
     def prepare(self) -> None:
         """Load the parser of statements."""

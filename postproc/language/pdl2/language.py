@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from postproc.language.language import (
     Splitter,
     Start,
 )
+from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.number_edits import Skeleton
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve
@@ -132,6 +134,12 @@ class Pdl2(Language):
         from postproc.language.pdl2.names import entry_names
 
         return entry_names(lines, wanted)
+
+    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
+        """Write joint moves that stop, with comments ``MEASURE``."""
+        from postproc.language.pdl2.measuring_program import write_pdl2
+
+        return write_pdl2(program)
 
     def prepare(self) -> None:
         """Load the parsers of programs and variable files."""

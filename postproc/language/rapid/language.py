@@ -22,6 +22,7 @@ from postproc.language.language import (
     Language,
     Start,
 )
+from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.number_edits import Skeleton
 from postproc.language.rapid.backup import (
     modules_beside,
@@ -121,6 +122,12 @@ class Rapid(Language):
     def list_placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
         """Return the arms of a backup, and where ``MOC.cfg`` places them."""
         return tuple((arm.name, arm.pose) for arm in read_mounted_arms(program))
+
+    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
+        """Write joint moves that stop, with comments ``MEASURE``."""
+        from postproc.language.rapid.measuring_program import write_rapid
+
+        return write_rapid(program)
 
     def prepare(self) -> None:
         """Load the parser of statements."""
