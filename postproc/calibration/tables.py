@@ -604,6 +604,8 @@ def read_tools(table: TextTable, tools: Nests) -> tuple[Floats, NDArray[np.int64
         problem = "has columns nest and tool_id"
         raise MeasurementError(table.path, problem, cure, line=1)
     column = found[0] if found else ""
+    if column:
+        _check_filled(table, column)
     if column and table.has(*TOOL) and _all_numbers(table, column):
         named = named and set(table.text(column)) <= set(map(str, tools))
     if column and (named or not _all_numbers(table, column)):
@@ -630,6 +632,19 @@ def read_tools(table: TextTable, tools: Nests) -> tuple[Floats, NDArray[np.int64
                 line=int(table.line[i]),
             )
     return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
+
+
+def _check_filled(table: TextTable, column: str) -> None:
+    """Refuse a row that names no probe point, where others do.
+
+    Raises:
+        MeasurementError: With the line.
+    """
+    texts = table.text(column)
+    if "" in texts:
+        cure = "Name the probe point of every row, or omit the column"
+        line = int(table.line[texts.index("")])
+        raise MeasurementError(table.path, f"has no {column}", cure, line=line)
 
 
 def _all_numbers(table: TextTable, column: str) -> bool:
@@ -895,7 +910,8 @@ DETECT = TableFormat()
 #     header = false                                # columns are "1", "2", ..
 
 DEGREES = float(np.rad2deg(1.0))  # per radian
-TEXTS = ("id", "reference", "station", "nest")  # columns of ours that hold no numbers
+# Columns of ours that hold no numbers; tool_id may hold numbers or names.
+TEXTS = ("id", "reference", "station", "nest", "visit")
 MAP_KEYS = ("columns", "file")
 FILE_KEYS = ("delimiter", "decimal", "encoding", "comment", "header")
 
@@ -986,7 +1002,8 @@ def translate(table: TextTable, form: Format) -> TextTable:
     """Rename and scale columns; a file without ids gets its line numbers."""
     cells = []
     for column, terms in form.columns.items():
-        if column in TEXTS:
+        named = column == "tool_id" and not _all_numbers(table, terms[0][0])
+        if named or column in TEXTS:
             cells.append([text.strip("'\" ") for text in table.text(terms[0][0])])
         else:
             added = [

@@ -101,6 +101,16 @@ def test_what_the_cell_does_not_name_is_refused(tmp_path: Path) -> None:
     refused("columns nest and tool_id", both)
 
 
+@pytest.mark.parametrize("known", [NAMED, PLATE])
+@pytest.mark.parametrize("ids", [["left", "", "top"], ["0", "", "2"]])
+def test_a_row_without_a_name_is_refused_by_its_line(
+    tmp_path: Path, ids: list[str], known: object
+) -> None:
+    path = written(tmp_path / "s.csv", ids)
+    with pytest.raises(MeasurementError, match=r"s\.csv:3: has no tool_id"):
+        read_survey_file(path, NJ, known)  # type: ignore[arg-type]
+
+
 def survey(tmp_path: Path, section: str, ids: list[str]) -> Measurements:
     cell = tmp_path / "cell.toml"
     cell.write_text(f'[robot]\narm = "nj220-2.7"\n{section}\n')

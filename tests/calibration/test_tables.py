@@ -133,6 +133,24 @@ def test_a_column_may_be_a_sum(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.position, [[0.10075, 0.020, 0.007]], atol=1e-15)
 
 
+@pytest.mark.parametrize("points", [("a", "b"), ("1", "0")])
+def test_a_map_keeps_names_of_visits_and_probe_points(
+    tmp_path: Path, points: tuple[str, str]
+) -> None:
+    _, columns = mapped(tmp_path)
+    own = 'visit = "Stop"\ntool_id = "Ball"\n'
+    columns.write_text(columns.read_text() + own)
+    head = ",".join([*(f"A{j}" for j in range(1, 7)), "xt,xd,yt,zt,Stop,Ball"])
+    rows = [f"1,2,3,4,5,6,1,2,3,4,v{k},{p}" for k, p in enumerate(points)]
+    path = tmp_path / "t.csv"
+    path.write_text("\n".join([head, *rows]) + "\n")
+    named = {"a": TOOL, "b": TOOL + 1.0}
+    known = named if points[0] == "a" else np.stack([TOOL + 1.0, TOOL])
+    found = read_survey_file(path, NJ, known, reading=TableFormat(columns))
+    assert found.visit is not None and len(set(found.visit.tolist())) == 2
+    np.testing.assert_allclose(found.states.tool, [TOOL, TOOL + 1.0])
+
+
 @pytest.mark.parametrize("wrong", ["[]", "7", '["zt", 7]', '{ column = "zt", x = 1 }'])
 def test_an_entry_of_a_map_that_means_nothing_is_refused(
     tmp_path: Path, wrong: str
