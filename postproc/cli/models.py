@@ -32,7 +32,7 @@ from postproc.cli.reports import (
     Reports,
 )
 from postproc.exceptions import PostprocError
-from postproc.files import check_places, is_program
+from postproc.files import check_places
 
 
 class Method(StrEnum):
@@ -55,10 +55,12 @@ def survey(
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
     from postproc.calibration.survey_program import write_survey
+    from postproc.language.languages import file_named, language_of, languages
     from postproc.robot.cell import load_cell
 
     with report_errors():
-        if is_program(output.name) and output.suffix.lower() != ".pdl":
+        own = language_of(output.name)
+        if file_named(output).is_program and own is not languages()[0]:
             raise PostprocError(
                 f"{output}: survey programs are PDL2. Write SURVEY.pdl; for another "
                 "controller move its joint moves into a program of its language, with "

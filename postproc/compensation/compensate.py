@@ -62,7 +62,7 @@ from postproc.compensation.targets import report_rounded_points, unknown_blends
 from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.language import Language
-from postproc.language.languages import language_of
+from postproc.language.languages import UNNAMED, language_of
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
 from postproc.language.visits import Diagnostic, Visits, deduplicate
@@ -81,7 +81,7 @@ def compensate(
     cell: Cell | str | Path,
     model: Model | str | Path,
     *,
-    name: str = "program.pdl",
+    name: str = UNNAMED,
     variables: bytes | str | Path | None = None,
     pages: Mapping[str, bytes] = NO_PAGES,
     options: Options = DEFAULT_OPTIONS,

@@ -26,9 +26,9 @@ from postproc.files import (
     check_places,
     is_stream,
     make_folder,
-    variables_of,
     write_all,
 )
+from postproc.language.languages import file_named
 from postproc.language.visits import (
     NOT_FOLLOWED,
     Diagnostic,
@@ -168,7 +168,8 @@ class Outcome:
                 written.
         """
         names = {name: Path(folder, Path(name).name) for name in self.outputs}
-        own = [n for n in (variables_of(self.program), self.program) if n in names]
+        values = file_named(self.program).variables
+        own = [n for n in (values, self.program) if n in names]
         files: dict[Path, Content] = {}
         for name in reversed([name for name in names if name not in own]):
             files |= self.name_files({name: names[name]}, names[name])

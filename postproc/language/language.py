@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from postproc.arrays import Floats, Ints
+from postproc.files import FolderListing
 from postproc.language.archive import Archive
 from postproc.language.number_edits import Skeleton
 from postproc.language.pose_encoding import Dialect
@@ -324,8 +325,21 @@ class Language(ABC):
         """Return what the archive of a controller gives, None for any other folder."""
         return None
 
-    def reads(self, program: Path) -> tuple[Path, ...]:
-        """Return files of an archive that a program reads and that stay as they are."""
+    def reads(
+        self,
+        program: Path,
+        within: Path | None = None,
+        listing: FolderListing | None = None,
+    ) -> tuple[Path, ...]:
+        """Return what a program reads of its archive, and other programs too.
+
+        It is not rewritten.
+
+        Args:
+            program: The program.
+            within: A folder that no list outside of is looked for.
+            listing: What folders hold; default: they are read.
+        """
         return ()
 
     def list_placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:

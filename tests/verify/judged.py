@@ -14,7 +14,7 @@ from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import prepare_cell
 from postproc.compensation.program_files import read_files
 from postproc.compensation.second_opinion import second_opinion
-from postproc.files import variables_of
+from postproc.language.languages import file_named
 from postproc.model.model import Model, load_model
 from postproc.robot.arm_file import ArmFile
 from postproc.robot.cell import Cell, load_cell
@@ -74,8 +74,9 @@ def compensated(
 ) -> Compensated:
     """Compensate a program, the files of which begin with the program itself."""
     name, source = next(iter(files.items()))
-    rest = {k: v for k, v in files.items() if k not in (name, variables_of(name))}
-    values = files.get(variables_of(name))
+    own = file_named(name).variables
+    rest = {k: v for k, v in files.items() if k not in (name, own)}
+    values = files.get(own)
     outcome = compensate(
         source, cell, model, name=name, variables=values, pages=rest, options=options
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.interpreter import Scope
+from postproc.language.assigned_points import Scope
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import (
     CORRECTIONS,

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.exceptions import ProgramError
-from postproc.files import KRL_PROGRAMS
+from postproc.files import FolderListing
 from postproc.language.archive import Archive
 from postproc.language.blocks import read_once
 from postproc.language.grammars import line_parser
@@ -17,6 +17,7 @@ from postproc.language.interpreter import follow
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
 from postproc.language.krl.clones import KrlCloner
+from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import KrlFile, read_krl
@@ -51,7 +52,7 @@ class Krl(Language):
 
     name = "KRL"
     controller = "kuka"
-    suffixes = KRL_PROGRAMS
+    suffixes = KrlFileName.programs
     comment = ";"
     dialect = KRL_DIALECT
     tells_accuracy = False
@@ -105,9 +106,17 @@ class Krl(Language):
         """Tell whether a line holds joint angles."""
         return _JOINTS.match(line) is not None
 
-    def reads(self, program: Path) -> tuple[Path, ...]:
-        """Return sources of packages that people have written moves into."""
-        return acting_sources(program)
+    def reads(
+        self,
+        program: Path,
+        within: Path | None = None,
+        listing: FolderListing | None = None,
+    ) -> tuple[Path, ...]:
+        """Return what all share, and sources of packages that people wrote moves in."""
+        named = KrlFileName(str(program))
+        if not named.is_program:
+            return ()
+        return (*named.find_shared(within, listing), *acting_sources(program))
 
     def read_archive(self, folder: Path) -> Archive | None:
         """Read ``$config.dat`` and ``$machine.dat`` of an archive."""
@@ -117,6 +126,8 @@ class Krl(Language):
         """Load the parser of statements."""
         line_parser("krl", "statement")
 
+
+LANGUAGE = Krl
 
 _DECLARED = re.compile(
     r"\s*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:DECL\s+)?"

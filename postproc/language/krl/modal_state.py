@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 from postproc.diagnostics import Code, Reason
-from postproc.language.interpreter import Scope
+from postproc.language.assigned_points import Scope
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import (
     CORRECTION_FRAMES,

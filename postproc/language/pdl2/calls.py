@@ -37,6 +37,7 @@ from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.side_effects import (
     CHANGING,
     FRAMES,
+    NODES,
     PURE,
     CallGraph,
     call_graph_of,
@@ -211,10 +212,11 @@ def opaque_call(
     """Take in what a routine that the job does not hold is said, or assumed, to do."""
     built_in = name in CHANGING or name in PURE
     why = f"{name.upper()} computes with it" if built_in else f"{name} is given it"
-    for given in arguments:
-        here.world.pin(here.value(given), why)
-    named = frozenset(r.name for r in map(bare, arguments) if r is not None)
-    escape_names(here, named, why)
+    if name not in NODES:
+        for given in arguments:
+            here.world.pin(here.value(given), why)
+        named = frozenset(r.name for r in map(bare, arguments) if r is not None)
+        escape_names(here, named, why)
     for argument in list_changed_arguments(arguments):
         invalidate(here, argument, f"{name} may change it (arguments go by reference)")
     if built_in:
@@ -331,7 +333,7 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
     if isinstance(held, Position):
         held = set_owner(here, statement.target.name, target.key, held)
     if isinstance(held, Nothing) and target.component == ():
-        here.store.forget(target.key, Nothing(held.why, code=held.code))
+        here.store.forget(target.key, held)
     else:
         here.store.write(target.key, held)
 
@@ -421,9 +423,8 @@ def _new_value(
     match target.component:
         case ("pos", _):
             if not isinstance(value, Position):
-                if isinstance(value, Nothing):
-                    return Nothing(value.why, code=value.code)
-                return Nothing("it is no position")
+                known = isinstance(value, Nothing)
+                return value if known else Nothing("it is no position")
             return replace(value, aux=held.aux, taught=value.taught or held.taught)
         case ("aux", axis):
             return held.with_aux(axis, number)

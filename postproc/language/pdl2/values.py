@@ -173,6 +173,24 @@ def add_unknown(unknown: Nothing, *others: Value | None) -> Nothing:
     return unknown if of is unknown.of else replace(unknown, of=of)
 
 
+def join_components(a: Value, b: Value) -> Value:
+    """Return what holds when one of two values holds, of positions each number."""
+    if not (isinstance(a, Position) and isinstance(b, Position)):
+        return join(a, b)
+    if (a.joints, a.config) != (b.joints, b.config):
+        return join(a, b)
+    other = {at for at in range(6) if _component(a, at) != _component(b, at)}
+    if all(at in other or a.numbers[at] is None for at in range(6)):
+        return join(a, b)
+    for at in other:
+        a = a.with_component(at, SourceNumber(None))
+    return _mix(a, b)
+
+
+def _component(position: Position, at: int) -> tuple[float | None, int, bool]:
+    return position.numbers[at], position.slots[at], at in position.along
+
+
 def _join_positions(a: Position, b: Position) -> Value:
     same = (a.joints, a.numbers, a.slots, a.along, a.config) == (
         b.joints,
@@ -183,6 +201,11 @@ def _join_positions(a: Position, b: Position) -> Value:
     )
     if not same:
         return Nothing("it may hold different values here", may_be(a) | may_be(b))
+    return _mix(a, b)
+
+
+def _mix(a: Position, b: Position) -> Position:
+    """Return a position with all that is said beside the numbers of two."""
     return replace(
         a,
         aux=a.aux if a.aux == b.aux else None,
@@ -213,13 +236,13 @@ def invert_frame(a: Position) -> Value:
 def shift_position(a: Position, by: Vector) -> Value:
     """Return a position moved along its reference frame's axes (POS_SHIFT)."""
     if a.joints or not a.complete or None in by.numbers:
-        return Nothing("an argument of POS_SHIFT is not known")
+        return add_unknown(Nothing("an argument of POS_SHIFT is not known"), a)
     moved = tuple(
         n + d  # type: ignore[operator]
         for n, d in zip(a.numbers[:3], by.numbers, strict=True)
     )
     if max(map(abs, moved)) > FARTHEST:
-        return Nothing("POS_SHIFT takes it out of any reach")
+        return add_unknown(Nothing("POS_SHIFT takes it out of any reach"), a)
     return replace(
         a,
         numbers=moved + a.numbers[3:],

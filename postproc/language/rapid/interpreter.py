@@ -10,12 +10,12 @@ from functools import cached_property, partial
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
+from postproc.language.assigned_points import Scope
 from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import (
     NOWHERE,
     Arrived,
     CallContext,
-    Scope,
     TaskMachine,
 )
 from postproc.language.language import Start

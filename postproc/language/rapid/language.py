@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
-from postproc.files import MODULES, task_beside
+from postproc.files import FolderListing
 from postproc.language.archive import Archive
 from postproc.language.blocks import read_once
 from postproc.language.grammars import line_parser
@@ -30,6 +30,7 @@ from postproc.language.rapid.backup import (
     system_modules,
 )
 from postproc.language.rapid.clones import RapidCloner
+from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, read_rapid
@@ -49,7 +50,7 @@ class Rapid(Language):
 
     name = "RAPID"
     controller = "abb"
-    suffixes = MODULES
+    suffixes = RapidFileName.programs
     comment = "!"
     dialect = RAPID_DIALECT
     tells_accuracy = False
@@ -104,7 +105,12 @@ class Rapid(Language):
         """Tell whether a line declares joint angles, or moves to some."""
         return _JOINTS.match(line) is not None
 
-    def reads(self, program: Path) -> tuple[Path, ...]:
+    def reads(
+        self,
+        program: Path,
+        within: Path | None = None,
+        listing: FolderListing | None = None,
+    ) -> tuple[Path, ...]:
         """Return the system modules of the task, and the modules of others."""
         return (*system_modules(program), *modules_beside(program))
 
@@ -121,6 +127,9 @@ class Rapid(Language):
         line_parser("rapid", "statement")
 
 
+LANGUAGE = Rapid
+
+
 def _tasks(
     sources: Sequence[Source], start: Start, known: Sequence[RapidFile] = ()
 ) -> tuple[RapidTask, list[RapidFile]]:
@@ -129,7 +138,7 @@ def _tasks(
     Raises:
         ProgramError: A file of the task is none, or the first holds no routine.
     """
-    own = [source for source in sources if not task_beside(source.name)]
+    own = [source for source in sources if not RapidFileName(source.name).task_beside]
     files = [read_once(source, known, read_rapid) for source in own]
     if not files[0].routines:
         problem, cure = "the file holds no routine", "Give a RAPID module"

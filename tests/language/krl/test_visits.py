@@ -183,7 +183,7 @@ def test_the_cell_says_what_holds_at_first():
         (["PTP {X 1,Y 2,Z 3,A 0,B 0,C 0,S 99,T 2}"], "no valid number"),
         (["CIRC XP1,XP2,CA XP1.X+$POS_ACT.X"], "CA"),
         (["LIN XNOT"], "declared in none of the given files"),
-        (["XP1.X=5", "LIN XP1"], "may be changed"),
+        (["XP1.X=5", "LIN XP1"], "x set in line"),
         (["LIN XS[I]", "I=I+1"], "no value that is known"),
         (["other(XP1)", "LIN XP1"], "may be changed"),
         (["PTP INVERSE(XP1,XA,I)"], "run"),
