@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, map_chunks
 from postproc.compensation.continuity import on_path
+from postproc.compensation.outcome import Decisions
 from postproc.compensation.taught_frames import find_taught_records
 from postproc.diagnostics import Code
 from postproc.language.languages import file_named, language_of
@@ -260,6 +261,27 @@ def report_uncertain_frames(
         )
         where = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
         found.append(Diagnostic(*where, Code.DIRECTION_UNCERTAIN, text))
+    return found
+
+
+def report_averaged_points(visits: Visits, decisions: Decisions) -> list[Diagnostic]:
+    """List the points that have one correction for arrivals that need different ones.
+
+    Args:
+        visits: Every arrival.
+        decisions: What was decided for it.
+    """
+    found = []
+    for code in (Code.ARRIVALS_AVERAGED, Code.ARRIVALS_FAR_APART):
+        averaged = np.array([one.code is code for one in decisions.reasons])
+        rows = np.flatnonzero(averaged[decisions.why])
+        _, first = np.unique(visits.literal[rows], return_index=True)
+        for i in rows[np.sort(first)].tolist():
+            text = decisions.reasons[decisions.why[i]].text
+            if name := visits.names[visits.name[i]]:
+                text = f"{name}: {text}"
+            place = visits.files[visits.file[i]], int(visits.line[i])
+            found.append(Diagnostic(*place, code, text))
     return found
 
 

@@ -238,6 +238,8 @@ class Outcome:
         missed = any(d.code in NOT_FOLLOWED for d in self.diagnostics)
         missed |= self.in_time is not None and self.in_time.falls_short
         missed |= self.opinion is not None and not self.opinion.agrees
+        far = [one.code is Code.ARRIVALS_FAR_APART for one in self.decisions.reasons]
+        missed |= bool(np.array(far)[self.decisions.why].any())
         return NOT_ALL if missed or np.isin(self.decisions.status, left).any() else DONE
 
     def summary(self) -> str:

@@ -24,7 +24,18 @@ from postproc.simulation import virtual_arm
 from postproc.simulation.program import ProgramRun, run_program
 from tests.conftest import SEED
 from tests.fuzz.case import check_bytes, records_of, without_stamp
-from tests.generated.found import ALONG, FIRST, KNOWN, LOADED, ROUNDED, UNSURE, Found
+from tests.generated.found import (
+    ALONG,
+    AVERAGED,
+    FIRST,
+    KNOWN,
+    LOADED,
+    ROUNDED,
+    UNSURE,
+    Found,
+    is_averaged,
+)
+from tests.generated.landing import WORSE
 from tests.generated.neutral import in_krl, in_rapid
 from tests.generated.neutral.draw import Draw
 from tests.generated.neutral.follow import follow
@@ -166,6 +177,10 @@ def count(
             )
         elif (visits.fly & ~visits.via)[mine].any() or old.fly:
             found.error_mm[ROUNDED].append(pair)
+        elif is_averaged(d, mine):
+            found.error_mm[AVERAGED].append(pair)
+            if not unsure and now[k] > before[k] + MOST_MM:
+                found.wrong.append((seed, line, WORSE))
         elif unsure:
             found.error_mm[UNSURE].append(pair)
             found.z.append(now[k] / size)
