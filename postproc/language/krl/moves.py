@@ -17,7 +17,7 @@ from postproc.language.assigned_points import (
     Scope,
 )
 from postproc.language.krl import syntax as said
-from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame
+from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame, six_numbers
 from postproc.language.krl.pose_encoding import (
     COMPONENTS,
     MEASURED,
@@ -569,7 +569,7 @@ class _Goal:
         value = self.task.value(other, self.row, self.here)
         record = value if isinstance(value, KrlRecord) else KrlRecord(())
         numbers = _numbers(record, PLACE)
-        told = [n.value for n in numbers] if numbers else _six_numbers(frame)
+        told = [n.value for n in numbers] if numbers else six_numbers(frame)
         kind = ShiftKind.OWN if behind else ShiftKind.FRAME
         shift = Shift(kind, tuple(told), base.values, flagged=not behind)
         written = isinstance(other, said.KrlAggregate) and numbers is not None
@@ -648,13 +648,6 @@ def _places(numbers: Sequence[KrlNumber]) -> tuple[int, tuple[int, ...]]:
     if len(files) != 1 or -1 in files:
         return -1, (-1,) * len(numbers)
     return files.pop(), tuple(one.slot for one in numbers)
-
-
-def _six_numbers(frame: KrlFrame) -> list[float]:
-    """Return X, Y, Z [mm] and A, B, C [deg] of a frame."""
-    pose = np.array(frame.pose).reshape(4, 4)
-    angles = abc_from_rotation(pose[None, :3, :3], np.zeros((1, 3)))[0]
-    return [*(pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist()]
 
 
 def _link(
