@@ -90,14 +90,16 @@ class Points:
     Attributes:
         held: What they are given, by key.
         used: What of it has been asked for, by everybody who wants to know that.
+        places: Places of all points in it, and maybe of others.
     """
 
     held: Mapping[Key, AssignedPoint] = field(default_factory=dict, hash=False)
     used: tuple[set[Key], ...] = field(default=(), compare=False)
+    places: frozenset[Place] = field(default=frozenset(), compare=False)
 
     def watched(self) -> Points:
         """Return the same, which notes what is asked for from now on."""
-        return Points(self.held, (*self.used, set())) if self.held else self
+        return replace(self, used=(*self.used, set())) if self.held else self
 
     @property
     def given(self) -> frozenset[AssignedPoint]:
@@ -113,41 +115,39 @@ class Points:
 
     def give(self, point: AssignedPoint) -> Points:
         """Return it with what an assignment gives to a point."""
-        rest = self._without(lambda key: key == point.key)
-        if len(rest) >= MOST_POINTS:
-            del rest[next(iter(rest))]
-        return Points({**rest, point.key: point}, self.used)
+        held = {**self.held}
+        held.pop(point.key, None)
+        if len(held) >= MOST_POINTS:
+            del held[next(iter(held))]
+        held[point.key] = point
+        return Points(held, self.used, self.places | {point.place})
 
-    def forget(self, place: Place, index: tuple[int, ...] | None) -> Points:
-        """Return it without a point, or without all elements where none is named."""
-        if index is not None:
-            one = place, index
-            return self if one not in self.held else self._but(lambda key: key == one)
-        return self._but(lambda key: key[0] == place)
+    def forget(self, place: Place) -> Points:
+        """Return it without any element of an array, or without a point."""
+        return self._without(lambda key: key[0] == place)
 
     def leave(self, routine: tuple[int, str, str]) -> Points:
         """Return it without the points that a routine declares, by its place."""
-        return self._but(lambda key: key[0][:3] == routine)
+        return self._without(lambda key: key[0][:3] == routine)
 
     def join(self, other: Points) -> Points:
         """Keep what is the same on another way here."""
         if self.held is other.held or self.held == other.held:
             return self
-        return Points({
+        theirs = other.held
+        same = {
             key: point for key, point in self.held.items()
-            if other.held.get(key) == point
-        })  # fmt: skip
+            if (found := theirs.get(key)) is point or found == point
+        }  # fmt: skip
+        return Points(same, self.used, self.places)
 
     def agree(self, given: Iterable[AssignedPoint]) -> bool:
         """Return True if points hold what is given."""
         return all(self.held.get(point.key) == point for point in given)
 
-    def _but(self, lost: Callable[[Key], bool]) -> Points:
-        rest = self._without(lost)
-        return self if len(rest) == len(self.held) else Points(rest, self.used)
-
-    def _without(self, lost: Callable[[Key], bool]) -> dict[Key, AssignedPoint]:
-        return {key: point for key, point in self.held.items() if not lost(key)}
+    def _without(self, lost: Callable[[Key], bool]) -> Points:
+        rest = {key: point for key, point in self.held.items() if not lost(key)}
+        return self if len(rest) == len(self.held) else replace(self, held=rest)
 
 
 NO_POINTS = Points()
@@ -300,7 +300,7 @@ class TaskSymbols(ABC):
         if part is None:
             return points
         if part.index is None:
-            return points.forget(part.place, None)
+            return points.forget(part.place)
         there = replace(here, points=points.watched())
         return points.give(self._assigned(part, part.index, one.value, row, there))
 
@@ -318,8 +318,8 @@ class TaskSymbols(ABC):
                 known, place=place, index=index, copied=copied, names=known.names | own
             )
         names = self.names_of(value)
-        if not (names or part.component):
-            return AssignedPoint(place, value, row, plain, index, names=own)
+        if not (part.component or self._takes_held(value, row, here)):
+            return AssignedPoint(place, value, row, plain, index, names=own | names)
         numbers = self._read_components(part, value, row, here)
         names = names.union(own, *(point.names for point in points.given))
         if part.component:
@@ -373,6 +373,18 @@ class TaskSymbols(ABC):
                 return None
             points = self.assign(points, one, at, scope)
         return None
+
+    def _takes_held(self, value: said.Operand, row: int, here: Scope) -> bool:
+        """Return True if a value may be made from what assigned points hold."""
+        if not here.points.held:
+            return False
+        if self.calls_routine(value):
+            return True
+        parts = (
+            self.locate(said.DataObject(name), row, here)
+            for name in self.names_of(value)
+        )
+        return any(part and part.place in here.points.places for part in parts)
 
     def _read_components(
         self, part: PointPart, value: said.Operand, row: int, here: Scope

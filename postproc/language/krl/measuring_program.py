@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from postproc.language.krl.moves import AXES
+from postproc.language.krl.symbols import AXES
 from postproc.language.measuring_program import (
     GENTLY,
     SHARE,

@@ -17,7 +17,7 @@ from postproc.language.assigned_points import (
     Scope,
 )
 from postproc.language.krl import syntax as said
-from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame
+from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame, six_numbers
 from postproc.language.krl.pose_encoding import (
     COMPONENTS,
     MEASURED,
@@ -35,6 +35,7 @@ from postproc.language.krl.symbols import (
     KrlNumber,
     KrlRecord,
     KrlTask,
+    KrlValue,
 )
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.to_visits import (
@@ -347,14 +348,20 @@ class _Goal:
             found = self._read_record(record)
         partial = found.why.code is Code.PARTIAL_TARGET
         known = found.target != Meaning.UNKNOWN and not partial
+        known = known and not (held.operand is None and self._lacks_axis(record))
         why = explain_components(held, name, self.task.files, known)
         if held.operand is not None and found.why.code not in _OF_NUMBERS:
             why = found.why
-        if not known or (held.operand is None and self.goals.aux):
+        if not known:
             return hold_numbers(base, name, why, pins)
         return hold_numbers(
             base, name, why, pins, found.target, found.values, found.aux
         )
+
+    def _lacks_axis(self, found: KrlValue | None) -> bool:
+        """Return True if an external axis of the cell has no value."""
+        fields = dict(found.fields) if isinstance(found, KrlRecord) else {}
+        return any(OUTSIDE[axis - 1] not in fields for axis in self.goals.aux)
 
     def _read_record(self, found: KrlRecord) -> FoundGoal:
         """Read joint angles or a position."""
@@ -562,7 +569,7 @@ class _Goal:
         value = self.task.value(other, self.row, self.here)
         record = value if isinstance(value, KrlRecord) else KrlRecord(())
         numbers = _numbers(record, PLACE)
-        told = [n.value for n in numbers] if numbers else _six_numbers(frame)
+        told = [n.value for n in numbers] if numbers else six_numbers(frame)
         kind = ShiftKind.OWN if behind else ShiftKind.FRAME
         shift = Shift(kind, tuple(told), base.values, flagged=not behind)
         written = isinstance(other, said.KrlAggregate) and numbers is not None
@@ -641,13 +648,6 @@ def _places(numbers: Sequence[KrlNumber]) -> tuple[int, tuple[int, ...]]:
     if len(files) != 1 or -1 in files:
         return -1, (-1,) * len(numbers)
     return files.pop(), tuple(one.slot for one in numbers)
-
-
-def _six_numbers(frame: KrlFrame) -> list[float]:
-    """Return X, Y, Z [mm] and A, B, C [deg] of a frame."""
-    pose = np.array(frame.pose).reshape(4, 4)
-    angles = abc_from_rotation(pose[None, :3, :3], np.zeros((1, 3)))[0]
-    return [*(pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist()]
 
 
 def _link(

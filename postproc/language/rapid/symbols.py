@@ -474,7 +474,8 @@ class RapidTask(TaskSymbols):
         self, operand: said.Operand | None, row: int, here: Scope, depth: int = 0
     ) -> Nested | None:
         """Evaluate a record or array, None where it is not known."""
-        operand, row, here = self.behind(operand, row, here)
+        if isinstance(operand, said.DataObject | said.FunctionCall):
+            operand, row, here = self.behind(operand, row, here)
         match operand:
             case said.Composite(items=items):
                 parts = [self.record(one, row, here, depth) for one in items]

@@ -168,7 +168,7 @@ def test_the_cell_says_what_holds_at_first():
         (["$BASE=LK(a)", "LIN XP1"], "another axis or arm (LK)"),
         (["$BASE=BASE_DATA[N]", "N=N+1", "LIN XP1"], "when the program runs"),
         (["$BASE=BASE_DATA[9]", "LIN XP1"], "BASE_DATA[9]"),
-        (["$BASE.X=5", "LIN XP1"], "component"),
+        (["$BASE.X=I", "LIN XP1", "I=I+1"], "component"),
         (["$IPO_MODE=x", "LIN XP1"], "$IPO_MODE"),
         (["$ROBROOT={X 0,Y 0,Z 0,A 0,B 0,C 0}", "LIN XP1"], "$ROBROOT"),
         (["$SOFT_PLCL[1]=TRUE", "LIN XP1"], "soft"),
