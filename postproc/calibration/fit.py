@@ -33,6 +33,7 @@ from postproc.calibration.reversal_test import (
 )
 from postproc.calibration.stops import pool_readings
 from postproc.calibration.survey_checks import (
+    ask_about_signs,
     check_orientations,
     check_registered,
     check_stops,
@@ -313,7 +314,11 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
     if frame == "base":
         setup = (*setup, *file_shifts(survey, cell.arm, cell.tracker))
     survey = check_orientations(survey, cell.arm)
-    notes = (*survey.warnings, *list_losses(cell.arm, survey))
+    notes = (
+        *survey.warnings,
+        *list_losses(cell.arm, survey),
+        *ask_about_signs(survey, cell.arm),
+    )
     survey = replace(survey, warnings=notes)
     mounted = cell.file.robot.mounting is not None
     return PreparedRows(

@@ -7,6 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.calibration.direction_signs import (
+    Sided,
+    all_reversed,
+    find_change_of_sign,
+)
 from postproc.calibration.likely_causes import (
     CLOSE,
     UNKNOWN,
@@ -64,6 +69,7 @@ def check_survey(survey: Measurements, arm: Arm) -> None:
     _check_frame(survey, arm, gap, "nominal")
     check_tools(survey, arm)
     _check_kinds(survey, gap)
+    _check_change_of_sign(survey, arm, None)
 
 
 def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
@@ -90,7 +96,62 @@ def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
             "positive direction), or fit a new model if the survey had the same error"
         )
         raise MeasurementError(survey.path, wrong, cure)
+    _check_change_of_sign(survey, arm, model)
     _check_arm(survey, arm, error(survey.states))
+
+
+def _check_change_of_sign(survey: Measurements, arm: Arm, model: Model | None) -> None:
+    """Refuse rows of which lambda has the other sign from one row on."""
+    if survey.inferred.all():
+        return
+    found = find_change_of_sign(as_surveyed(survey, arm, model))
+    if found is None:
+        return
+    rows, place = found
+    at = int(np.argmax(rows)) if place == "from" else int(rows.sum()) - 1
+    row = survey.ids[at]
+    where = f"from row {row} on" if place == "from" else f"until row {row}"
+    raise MeasurementError(
+        survey.path,
+        f"lambda has the other sign in {int(rows.sum())} of {len(rows)} rows, {where}",
+        "Change the sign of these rows (lambda is 1 if the joint arrived in its "
+        "positive direction)",
+        line=int(survey.line[at]),
+    )
+
+
+def as_surveyed(survey: Measurements, arm: Arm, model: Model | None = None) -> Sided:
+    """Take the rows of a survey in the base frame, beside geometry.
+
+    Args:
+        survey: The rows.
+        arm: The arm.
+        model: What is known of the arm, or None. Beside a model the base, the tool and
+            the zeros of the joints are free.
+    """
+    batch = ArmStates(arm, survey.states)
+    left = survey.position - batch.walk.tcp
+    if model is not None:
+        nowhere = np.zeros_like(survey.states.direction)
+        left = left - model.error(arm, survey.states.with_(direction=nowhere))
+    if model is None:
+        free = Geometry.propose(arm, survey.states).columns(batch)
+    else:
+        parts = [rigid_motions(batch.walk.tcp), batch.walk.flange, batch.jacobian]
+        free = np.concatenate(parts, axis=2)
+    return Sided.of(batch, free, left)
+
+
+def ask_about_signs(survey: Measurements, arm: Arm) -> tuple[str, ...]:
+    """Ask about lambda columns by which links run ahead of their drives."""
+    if survey.inferred.all() or not all_reversed(as_surveyed(survey, arm)):
+        return ()
+    return (
+        f"{survey.path.name}: by the lambda columns the links of all joints run ahead "
+        "of their drives, which backlash does not do. Do the columns have the other "
+        "sign (lambda is 1 if the joint arrived in its positive direction)? Then every "
+        "backlash is corrected in the wrong direction",
+    )
 
 
 def _check_cause(survey: Measurements, cause: Cause | None) -> None:
