@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from postproc.calibration.likely_causes import (
     cause_in_any_frame,
     find_cause,
     find_cause_in_tracker_frame,
+    find_moved_tracker,
     no_error,
     wrong_directions,
 )
@@ -306,6 +308,7 @@ def check_registered(
     check_rows(survey, arm)
     check_places(survey, arm)
     _check_stations(survey, arm)
+    _check_moved_tracker(survey, registered, arm)
     if typical > CLOSE:
         check_tools(registered, arm)
         problem = f"the registration leaves {typical / MM:.0f} mm"
@@ -314,11 +317,42 @@ def check_registered(
 
 def _check_stations(survey: Measurements, arm: Arm) -> None:
     """Refuse rows of the tracker's frame that a mistake explains, by station."""
+    for rows in _rows_of_stations(survey):
+        _check_cause(rows, find_cause_in_tracker_frame(rows, arm))
+
+
+def _rows_of_stations(survey: Measurements) -> Iterator[Measurements]:
+    """Take the rows of one station after the other, each as the only one."""
     for number in range(len(survey.stations)):
         rows = survey[survey.states.station == number]
         here = np.zeros(len(rows), dtype=np.int64)
-        rows = rows.with_states(rows.states.with_(station=here))
-        _check_cause(rows, find_cause_in_tracker_frame(rows, arm))
+        yield rows.with_states(rows.states.with_(station=here))
+
+
+def _check_moved_tracker(
+    survey: Measurements, registered: Measurements, arm: Arm
+) -> None:
+    """Refuse rows of one station that were read from two places.
+
+    Args:
+        survey: The rows, tracker frame.
+        registered: The same in the base frame, as far as they could be placed.
+        arm: The arm.
+    """
+    tcp = ArmStates(arm, registered.states).walk.tcp
+    far = np.linalg.norm(registered.position - tcp, axis=1) > CLOSE
+    if far.mean() <= MANY:
+        return
+    for rows in _rows_of_stations(survey):
+        first = find_moved_tracker(rows, arm)
+        if first is not None:
+            raise MeasurementError(
+                survey.path,
+                f"{len(rows) - first} of {len(rows)} rows, from row {rows.ids[first]} "
+                "on, look read from another place of the tracker",
+                "Name both in a column station, or give each a file of its own",
+                line=int(rows.line[first]),
+            )
 
 
 def check_own_registration(survey: Measurements, arm: Arm) -> None:
@@ -332,6 +366,10 @@ def check_own_registration(survey: Measurements, arm: Arm) -> None:
     placed = register(
         arm, survey.states, survey.position, nothing, np.zeros(0), survey.stations
     )
+    states = placed.on_probes(survey.states)
+    position = placed.to_base(survey.position, states.station)
+    registered = replace(survey, states=states, position=position)
+    _check_moved_tracker(survey, registered, arm)
     typical = typical_gap(placed, arm, survey.states, survey.position)
     if typical > CLOSE:
         problem = f"the registration leaves {typical / MM:.0f} mm"
