@@ -439,8 +439,8 @@ def _contradicting_readings(fitted: Fit) -> tuple[str, ...]:
     return (
         f"readings of one stop scatter by {apart:.3f} mm per axis, but the model "
         f"leaves {left:.3f} mm of their means: they are not readings of one stop. If "
-        "poses were approached from both sides, add lambda1 to lambda6; backlash is not "
-        "corrected without them",
+        "poses were approached from both sides, add lambda1 to lambda6; backlash is "
+        "not corrected without them",
     )
 
 
