@@ -14,6 +14,7 @@ from postproc.files import write_all
 from postproc.language.language import Language
 from postproc.language.languages import file_named, language_of, languages
 from postproc.language.measuring_program import (
+    TITLE,
     MeasuringMove,
     MeasuringProgram,
     MountedProbe,
@@ -24,6 +25,7 @@ from postproc.robot.pose import MM
 
 BACK = np.deg2rad(2.0)  # how far to the side every approach starts [rad]
 SETTLE = 1.5  # [s] pause before the tracker reads
+ANY_TOOL = 3  # probe points of a survey that holds for any tool
 STEPS = np.array([0.1, 0.2, 0.4, 0.8, 1.6]) * 1e-3  # [rad] of a drive that turns back
 
 
@@ -53,7 +55,7 @@ def plan_survey(
     more = f", and {len(reversals)} reversals" if reversals else ""
     count = f"{len(q)} poses, each from both sides{more}: {measured} measurements"
     heading = (
-        f"Laser-tracker survey of {cell.arm.name}: {count}",
+        f"{TITLE} {cell.arm.name}: {count}",
         "After a MEASURE comment: read the tracker when the next move has settled.",
     )
     steps: list[MountedProbe | MeasuringMove] = []
@@ -119,7 +121,13 @@ def write_survey(cell: Cell | str | Path, output: Path, poses: int) -> str:
     program = plan_survey(cell, design.q, design.side, design.probe, name, turned)
     text = language.write_measuring(program, output)
     write_all({output: text.encode("ascii")})
-    return f"{output}: {design.summary()}"
+    told = f"{output}: {design.summary()}"
+    if len(probes) < ANY_TOOL:
+        told += (
+            f"\n{len(probes)} of {ANY_TOOL} probe points: the model will hold only for "
+            f"tools with the tip there. Give {ANY_TOOL} under [survey] points_mm"
+        )
+    return told
 
 
 def _language_for(cell: Cell, output: Path) -> Language:

@@ -10,6 +10,8 @@ SLOW = 200.0  # [mm/s] of the tool, where a move must say how fast it is
 SHARE = 20  # [%] of the speed of the axes, where the program says it once
 GENTLY = 50  # [%] of their acceleration
 NAME = 24  # letters that every controller takes
+TITLE = "Laser-tracker survey of"  # begins the first comment
+NEAR_ITS_BEGINNING = 200  # bytes in which the title stands
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,11 @@ class MeasuringProgram:
     def probes(self) -> tuple[MountedProbe, ...]:
         """Return the probe points in their order."""
         return tuple(one for one in self.steps if isinstance(one, MountedProbe))
+
+
+def is_measuring_program(text: bytes) -> bool:
+    """Tell whether a program is one of these: it is whole, and part of no job."""
+    return TITLE.encode() in text[:NEAR_ITS_BEGINNING]
 
 
 def name_of_file(stem: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from postproc.calibration.survey_program import BACK, write_survey
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import plan_visits, read_program
+from postproc.compensation.program_files import find_pages
 from postproc.compensation.sidecar import restore_file
 from postproc.language.languages import languages
 from postproc.language.measuring_program import name_of_file
@@ -25,6 +27,8 @@ POSES = 24
 SUFFIXES = [language.suffixes[0] for language in languages()]
 ARMS = {"nj130-2.6": ".pdl", "irb4600-60-2.05": ".mod", "kr210-r2700-extra": ".src"}
 NESTS = "[survey]\npoints_mm = [[100, 0, 100], [0, 100, 150], [-100, 0, 200]]\n"
+JOBS = dict(zip(ARMS, (".", "welding", "facing"), strict=True))
+MAIN = {"milling.pdl", "Welding.mod", "Facing.src"}
 PLACES = ["id", "x_mm", "y_mm", "z_mm"]
 LOAD = "[payload]\nmass_kg = 45.5\ncom_mm = [10, -20, 150]\n"
 
@@ -138,6 +142,26 @@ def test_a_survey_is_compensated_like_any_program(cell, models, surveys, tmp_pat
     given = ("--cell", cell.path, "--model", tmp_path / "model.json")
     models[0].save(tmp_path / "model.json")
     assert cli("check", outputs, *given, "--allow-uncorrected").exit_code == 0
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_survey_in_the_folder_of_a_job_is_no_part_of_it(tmp_path, arm):
+    folder = tmp_path / "job"
+    shutil.copytree(ROOT / "programs" / JOBS[arm], folder)
+    job = next(path for path in folder.glob("*") if path.name in MAIN)
+    before = find_pages(job)
+    place = tmp_path / "cell.toml"
+    place.write_text(f'[robot]\narm = "{arm}"\n{NESTS}')
+    survey = written(folder, load_cell(place), ARMS[arm])
+    assert find_pages(job) == before
+    assert find_pages(survey).paths == ()
+
+
+def test_a_survey_of_one_probe_point_says_what_it_is_worth(tmp_path):
+    place = tmp_path / "cell.toml"
+    place.write_text('[robot]\narm = "nj220-2.7"\n')
+    told = write_survey(load_cell(place), tmp_path / "s.pdl", POSES)
+    assert "1 of 3 probe points: the model will hold only for" in told
 
 
 @pytest.mark.parametrize(

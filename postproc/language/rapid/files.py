@@ -11,6 +11,7 @@ from typing import ClassVar
 
 from postproc.files import read_if_readable
 from postproc.language.file_name import FileName, Named, Skip
+from postproc.language.measuring_program import is_measuring_program
 
 SYSTEM_MODULES, SYSTEM_SUFFIXES = "SYSMOD/", (".sys", ".sysx")
 OTHER_TASKS = "TASKS/"
@@ -64,9 +65,12 @@ class RapidFileName(FileName):
         return self.place.rpartition("/")[0]
 
     def find_named(self, text: bytes, skip: Skip) -> tuple[Named, Named]:
-        """Name all modules beside the one with the main routine of a task."""
+        """Name all modules beside the one with the main routine of a task.
+
+        A survey is a task by itself, wherever it stands.
+        """
         found = _MAIN.search(text)
-        if found is None:
+        if found is None or is_measuring_program(text):
             return {}, {}
         line = text.count(b"\n", 0, found.start()) + 1
         beside = _modules_beside(Path(self.place), skip)
