@@ -33,6 +33,7 @@ from postproc.calibration.reversal_test import (
 )
 from postproc.calibration.stops import pool_readings
 from postproc.calibration.survey_checks import (
+    ask_about_signs,
     check_orientations,
     check_registered,
     check_stops,
@@ -76,6 +77,8 @@ Frame = Literal["base", "tracker"]
 SAME_POINT = 1e-4  # [m] nests that are nearer are one, or the cell has not said
 NOTABLE = 0.002  # [mm] at the tool by rounded joint angles
 OPEN = 0.01  # [mm] at the tool by effects that rows neither show nor rule out
+FEWEST_FREE = 30.0  # degrees of freedom of readings that can contradict each other
+CONTRADICTING = 0.25  # part of the variance that means of readings have at least
 TURNED = 3e-3  # [rad] that a plate may be turned by, as far as a tracker can tell
 
 
@@ -313,7 +316,11 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
     if frame == "base":
         setup = (*setup, *file_shifts(survey, cell.arm, cell.tracker))
     survey = check_orientations(survey, cell.arm)
-    notes = (*survey.warnings, *list_losses(cell.arm, survey))
+    notes = (
+        *survey.warnings,
+        *list_losses(cell.arm, survey),
+        *ask_about_signs(survey, cell.arm),
+    )
     survey = replace(survey, warnings=notes)
     mounted = cell.file.robot.mounting is not None
     return PreparedRows(
@@ -359,6 +366,7 @@ def _conclude(
         *drifts(fitted),
         *wrong_nests(fitted, rows.points),
         *_rounding(model, fitted),
+        *_contradicting_readings(fitted),
         *_explain_doubt(doubt, fitted),
         *found.notes,
         *direction,
@@ -406,6 +414,33 @@ def _rounding(model: Model, fitted: Fit) -> tuple[str, ...]:
         f"the joint angles of the file are rounded to {step:.3g} deg: that is "
         f"{size:.3f} mm at the tool (rms), which no effect can take out of these rows. "
         "Write more decimals, or give the survey program (--program)",
+    )
+
+
+def _contradicting_readings(fitted: Fit) -> tuple[str, ...]:
+    """Ask about readings that differ by far more than their means are off.
+
+    Means of readings of one stop scatter by what a reading does over the root of their
+    number, at least. Those of a pose that was approached from both sides do not: what
+    each differs by is the same.
+    """
+    states = fitted.batch.states
+    several = (states.readings > 1) & (fitted.rows.weight > 0)
+    free = 3.0 * float(several.sum()) - fitted.effective
+    if free < FEWEST_FREE:
+        return ()
+    more = float((states.readings[several] - 1.0).sum())
+    within = float(states.scatter[several].sum()) / (3.0 * more)
+    expected = within / states.readings[several]
+    seen = float((fitted.residual[several] ** 2).sum()) / free
+    if seen > CONTRADICTING * float(expected.mean()):
+        return ()
+    apart, left = (float(np.sqrt(v)) / MM for v in (within, seen))
+    return (
+        f"readings of one stop scatter by {apart:.3f} mm per axis, but the model "
+        f"leaves {left:.3f} mm of their means: they are not readings of one stop. If "
+        "poses were approached from both sides, add lambda1 to lambda6; backlash is "
+        "not corrected without them",
     )
 
 

@@ -359,6 +359,35 @@ def find_cause_in_tracker_frame(survey: Measurements, arm: Arm) -> Cause | None:
     return found
 
 
+def find_moved_tracker(survey: Measurements, arm: Arm) -> int | None:
+    """Find the row from which on the tracker of one station stood elsewhere.
+
+    Args:
+        survey: Rows of one station, in its frame.
+        arm: The arm.
+
+    Returns:
+        Number of the first row, None where the rows are not those of two places.
+    """
+    n = len(survey)
+    for known in (slice(0, n // 3), slice(n - n // 3, n)):
+        used = np.zeros(n, dtype=bool)
+        used[known] = True
+        if used.sum() < ENOUGH_ROWS:
+            return None
+        good = _gap(survey, arm, _place(survey, arm, used)) < CLOSE
+        early = good if known.start == 0 else ~good
+        seen = np.concatenate([[0], np.cumsum(np.where(early, 1, -1))])
+        first = int(np.argmax(seen))
+        behind = np.arange(n) >= first
+        if min(first, n - first) < ENOUGH_ROWS:
+            continue
+        gaps = [_gap(survey[p], arm, _place(survey, arm, p)) for p in (~behind, behind)]
+        if all(np.median(gap) < CLOSE for gap in gaps):
+            return first
+    return None
+
+
 def _subsets(n: int) -> Iterator[NDArray[np.int64]]:
     """Draw rows of which some hold no mistake: thirds in order, then a few each."""
     yield from np.array_split(np.arange(n), 3)

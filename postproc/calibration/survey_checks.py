@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.calibration.direction_signs import (
+    Sided,
+    all_reversed,
+    find_change_of_sign,
+)
 from postproc.calibration.likely_causes import (
     CLOSE,
     UNKNOWN,
@@ -14,6 +20,7 @@ from postproc.calibration.likely_causes import (
     cause_in_any_frame,
     find_cause,
     find_cause_in_tracker_frame,
+    find_moved_tracker,
     no_error,
     wrong_directions,
 )
@@ -64,6 +71,7 @@ def check_survey(survey: Measurements, arm: Arm) -> None:
     _check_frame(survey, arm, gap, "nominal")
     check_tools(survey, arm)
     _check_kinds(survey, gap)
+    _check_change_of_sign(survey, arm, None)
 
 
 def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
@@ -90,7 +98,62 @@ def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
             "positive direction), or fit a new model if the survey had the same error"
         )
         raise MeasurementError(survey.path, wrong, cure)
+    _check_change_of_sign(survey, arm, model)
     _check_arm(survey, arm, error(survey.states))
+
+
+def _check_change_of_sign(survey: Measurements, arm: Arm, model: Model | None) -> None:
+    """Refuse rows of which lambda has the other sign from one row on."""
+    if survey.inferred.all():
+        return
+    found = find_change_of_sign(as_surveyed(survey, arm, model))
+    if found is None:
+        return
+    rows, place = found
+    at = int(np.argmax(rows)) if place == "from" else int(rows.sum()) - 1
+    row = survey.ids[at]
+    where = f"from row {row} on" if place == "from" else f"until row {row}"
+    raise MeasurementError(
+        survey.path,
+        f"lambda has the other sign in {int(rows.sum())} of {len(rows)} rows, {where}",
+        "Change the sign of these rows (lambda is 1 if the joint arrived in its "
+        "positive direction)",
+        line=int(survey.line[at]),
+    )
+
+
+def as_surveyed(survey: Measurements, arm: Arm, model: Model | None = None) -> Sided:
+    """Take the rows of a survey in the base frame, beside geometry.
+
+    Args:
+        survey: The rows.
+        arm: The arm.
+        model: What is known of the arm, or None. Beside a model the base, the tool and
+            the zeros of the joints are free.
+    """
+    batch = ArmStates(arm, survey.states)
+    left = survey.position - batch.walk.tcp
+    if model is not None:
+        nowhere = np.zeros_like(survey.states.direction)
+        left = left - model.error(arm, survey.states.with_(direction=nowhere))
+    if model is None:
+        free = Geometry.propose(arm, survey.states).columns(batch)
+    else:
+        parts = [rigid_motions(batch.walk.tcp), batch.walk.flange, batch.jacobian]
+        free = np.concatenate(parts, axis=2)
+    return Sided.of(batch, free, left)
+
+
+def ask_about_signs(survey: Measurements, arm: Arm) -> tuple[str, ...]:
+    """Ask about lambda columns by which links run ahead of their drives."""
+    if survey.inferred.all() or not all_reversed(as_surveyed(survey, arm)):
+        return ()
+    return (
+        f"{survey.path.name}: by the lambda columns the links of all joints run ahead "
+        "of their drives, which backlash does not do. Do the columns have the other "
+        "sign (lambda is 1 if the joint arrived in its positive direction)? Then every "
+        "backlash is corrected in the wrong direction",
+    )
 
 
 def _check_cause(survey: Measurements, cause: Cause | None) -> None:
@@ -245,6 +308,7 @@ def check_registered(
     check_rows(survey, arm)
     check_places(survey, arm)
     _check_stations(survey, arm)
+    _check_moved_tracker(survey, registered, arm)
     if typical > CLOSE:
         check_tools(registered, arm)
         problem = f"the registration leaves {typical / MM:.0f} mm"
@@ -253,11 +317,42 @@ def check_registered(
 
 def _check_stations(survey: Measurements, arm: Arm) -> None:
     """Refuse rows of the tracker's frame that a mistake explains, by station."""
+    for rows in _rows_of_stations(survey):
+        _check_cause(rows, find_cause_in_tracker_frame(rows, arm))
+
+
+def _rows_of_stations(survey: Measurements) -> Iterator[Measurements]:
+    """Take the rows of one station after the other, each as the only one."""
     for number in range(len(survey.stations)):
         rows = survey[survey.states.station == number]
         here = np.zeros(len(rows), dtype=np.int64)
-        rows = rows.with_states(rows.states.with_(station=here))
-        _check_cause(rows, find_cause_in_tracker_frame(rows, arm))
+        yield rows.with_states(rows.states.with_(station=here))
+
+
+def _check_moved_tracker(
+    survey: Measurements, registered: Measurements, arm: Arm
+) -> None:
+    """Refuse rows of one station that were read from two places.
+
+    Args:
+        survey: The rows, tracker frame.
+        registered: The same in the base frame, as far as they could be placed.
+        arm: The arm.
+    """
+    tcp = ArmStates(arm, registered.states).walk.tcp
+    far = np.linalg.norm(registered.position - tcp, axis=1) > CLOSE
+    if far.mean() <= MANY:
+        return
+    for rows in _rows_of_stations(survey):
+        first = find_moved_tracker(rows, arm)
+        if first is not None:
+            raise MeasurementError(
+                survey.path,
+                f"{len(rows) - first} of {len(rows)} rows, from row {rows.ids[first]} "
+                "on, look read from another place of the tracker",
+                "Name both in a column station, or give each a file of its own",
+                line=int(rows.line[first]),
+            )
 
 
 def check_own_registration(survey: Measurements, arm: Arm) -> None:
@@ -271,6 +366,10 @@ def check_own_registration(survey: Measurements, arm: Arm) -> None:
     placed = register(
         arm, survey.states, survey.position, nothing, np.zeros(0), survey.stations
     )
+    states = placed.on_probes(survey.states)
+    position = placed.to_base(survey.position, states.station)
+    registered = replace(survey, states=states, position=position)
+    _check_moved_tracker(survey, registered, arm)
     typical = typical_gap(placed, arm, survey.states, survey.position)
     if typical > CLOSE:
         problem = f"the registration leaves {typical / MM:.0f} mm"

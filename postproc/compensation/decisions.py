@@ -651,7 +651,8 @@ class Round:
         status[display] = Status.RUNTIME
         status[unchanged] = Status.UNCHANGED
         corrected = status == Status.CORRECTED
-        left = np.where(corrected, agreement.radius_mm[agreement.group], 0.0)
+        left = np.zeros(len(visits))
+        left[corrected] = agreement.radius_mm[agreement.group[corrected]]
         self._mark_averaged(reasons, left)
         values = np.array(visits.values)
         values[corrected] = agreement.values[agreement.group[corrected]]

@@ -97,7 +97,7 @@ class Points:
     used: tuple[set[Key], ...] = field(default=(), compare=False)
     places: frozenset[Place] = field(default=frozenset(), compare=False)
 
-    def watched(self) -> Points:
+    def watch(self) -> Points:
         """Return the same, which notes what is asked for from now on."""
         return replace(self, used=(*self.used, set())) if self.held else self
 
@@ -301,10 +301,10 @@ class TaskSymbols(ABC):
             return points
         if part.index is None:
             return points.forget(part.place)
-        there = replace(here, points=points.watched())
-        return points.give(self._assigned(part, part.index, one.value, row, there))
+        there = replace(here, points=points.watch())
+        return points.give(self._give_value(part, part.index, one.value, row, there))
 
-    def _assigned(
+    def _give_value(
         self, part: PointPart, index: tuple[int, ...], value: said.Operand, row: int,
         here: Scope,
     ) -> AssignedPoint:  # fmt: skip

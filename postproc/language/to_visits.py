@@ -225,8 +225,8 @@ def explain_components(
     for one in meant:
         lines[one.file].add(files[one.file].text.line(one.row))
     places = [
-        f"line {', '.join(map(str, sorted(own)[:MOST_NAMED]))} of "
-        f"{files[at].text.source.name}"
+        f"line{'s' * (len(own) > 1)} {', '.join(map(str, sorted(own)[:MOST_NAMED]))} "
+        f"of {files[at].text.source.name}"
         for at, own in sorted(lines.items())
     ]
     parts = ", ".join(one.name for one in meant)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from postproc.calibration.fit import fit_measurements, into_base_frame
 from postproc.calibration.measurements import Measurements, concatenate
 from postproc.calibration.monuments import ReferenceRows
-from postproc.calibration.survey_checks import check_stops
+from postproc.calibration.survey_checks import check_stops, check_survey
 from postproc.exceptions import MeasurementError
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.station_shift import StationShift
@@ -108,6 +108,26 @@ def test_files_of_one_station_share_its_registration(cell) -> None:  # type: ign
     found = fit_measurements(survey, cell, effects=EFFECTS, frame="tracker")
     assert found.report.after.mean_mm < 0.06
     assert len(found.model.registration.transforms) == 2
+
+
+@pytest.mark.parametrize("split", [(40, 40), (24, 76), (76, 24)])
+def test_a_tracker_that_was_moved_within_a_station_is_named_by_the_row(
+    split: tuple[int, int],
+) -> None:
+    parts, _ = files(split, True)
+    survey = concatenate([replace(p, stations=("hall",)) for p in parts])
+    match = rf"{split[1]} of {sum(split)} rows, from row 1-1 on, .* another place"
+    with pytest.raises(MeasurementError, match=match):
+        into_base_frame(survey, NJ)
+
+
+def test_rows_that_are_off_for_another_reason_are_not_called_so() -> None:
+    (part,), _ = files((60,), True)
+    unlike = part.position.copy()
+    unlike[::3] += 0.3 * np.random.default_rng(2).standard_normal((20, 3))
+    with pytest.raises(MeasurementError) as other:
+        check_survey(into_base_frame(replace(part, position=unlike), NJ)[0], NJ)
+    assert "another place" not in str(other.value)
 
 
 @pytest.mark.parametrize("few", [2, 5])

@@ -263,3 +263,20 @@ def test_poses_that_lie_near_each_other_stay_apart(away_deg: float) -> None:
 def test_readings_whose_angles_are_equal_keep_them_to_the_last_bit() -> None:
     _, survey = repeated(8, 3)
     assert (pool_readings(survey).states.q == survey.states.q[::3]).all()
+
+
+@pytest.mark.parametrize("both", [True, False])
+def test_two_approaches_that_count_as_one_stop_are_asked_about(both: bool) -> None:
+    """The file has no directions: every pose looks as if it was read twice."""
+    rng = np.random.default_rng(4)
+    arm, states = random_arm(rng), random_states(40, rng)
+    q = np.repeat(states.q, 2, axis=0)
+    side = np.repeat(states.direction, 2, axis=0)
+    side[1::2] *= -1.0 if both else 1.0
+    rows = states[np.repeat(np.arange(40), 2)].with_(q=q, direction=side)
+    position = arm.measure(rows, rng)[0]
+    unknown = rows.with_(direction=np.zeros_like(side), order=np.arange(80.0))
+    survey = survey_of(unknown, position)
+    found = fit_measurements(survey, CELL, effects=("geometry",), validate=False)
+    asked = [w for w in found.report.warnings if "not readings of one stop" in w]
+    assert len(asked) == both

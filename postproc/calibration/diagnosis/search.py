@@ -386,6 +386,7 @@ MOST_OTHERS = 2  # that are told, and asked
 MOST_CELLS = 5  # the same of a cell without a name
 LOAD = re.compile(r"torque \d|moment \d[xy]")
 ALIKE = 0.98  # correlation of two loads that are one but for the weights of links
+ALWAYS = "constant"  # driver and law of a part that has moved once
 SAME_LOAD = 0.5  # part of the evidence that one may be behind the other
 RECENT = 2  # additions looked at again after each further one
 
@@ -679,7 +680,8 @@ def apart(own: Candidate, rivals: Sequence[Score], at: ArmStates) -> list[Score]
     """Leave out cells that a name in the group stands for, by whatever law.
 
     A joint 4 that turns by the moment across joint 5 is no cause beside compliance of
-    joint 4, where the two loads are one.
+    joint 4, where the two loads are one; nor is a link 6 that has turned about the axis
+    of joint 5 beside a joint 5 that was mastered again.
     """
     names = [c for c in (own, *(s.best for s in rivals)) if c.family.tier == NAMED]
     cells = [cell for name in names for cell in _cells_of(name)]
@@ -693,18 +695,21 @@ def apart(own: Candidate, rivals: Sequence[Score], at: ArmStates) -> list[Score]
 
 def _cells_of(name: Candidate) -> list[tuple[str, str]]:
     """List carrier and driver of the cells that a name is, at its joint."""
-    own = str(name.family.joint)
-    every = type(name.effect).cells
-    return [(c, driver) for c, driver, _ in every if own in f"{c} {driver}"]
+    own, effect = str(name.family.joint), type(name.effect)
+    constant = [(f"joint {own}", ALWAYS)] if ("joint", ALWAYS) in effect.acts else []
+    found = [(c, driver) for c, driver, _ in effect.cells if own in f"{c} {driver}"]
+    return constant + found
 
 
 def _same_cell(cell: tuple[str, str], other: Candidate, at: ArmStates) -> bool:
     """Tell whether a candidate moves what a cell moves, by the same driver."""
     moves, driver = cell
-    if driver != other.source and not _same_load((driver, other.source), at):
-        return False
     effect = other.effect
     assert isinstance(effect, PartMotion | Curve)
+    still = isinstance(effect, PartMotion) and effect.law == ALWAYS
+    source = ALWAYS if still else other.source
+    if driver != source and not _same_load((driver, source), at):
+        return False
     one, two = (carrier(c).move(at).reshape(-1) for c in (moves, effect.direction))
     return bool(abs(one @ two) > ALIKE * np.linalg.norm(one) * np.linalg.norm(two))
 

@@ -164,7 +164,7 @@ class KrlGoals:
             goal = not_reached(_Goal(self, move, row, here).end(move.to), SPLINE)
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
-        watched = points.watched()
+        watched = points.watch()
         reader = _Goal(self, move, row, replace(here, points=watched))
         angle = self._angle(move, row, here)
         unknown = move.angle is not None and math.isnan(angle)
@@ -268,13 +268,13 @@ class _Goal:
             case said.KrlAggregate() | said.DataObject():
                 return self._point(operand)
             case said.FunctionCall():
-                return self._returned(operand)
+                return self._read_returned(operand)
             case _:
                 return _unknown_goal(AT_RUN_TIME)
 
     # Points.
 
-    def _returned(self, call: said.FunctionCall) -> FoundGoal:
+    def _read_returned(self, call: said.FunctionCall) -> FoundGoal:
         """Read what a function of the files returns: its numbers stay."""
         returned = self.task.find_returned(call, self.row, self.here)
         if returned is None:
@@ -317,7 +317,7 @@ class _Goal:
             case said.Operation(operator=":", operands=(first, second)):
                 goal = there._product(first, second)
             case said.FunctionCall():
-                goal = there._returned(held.operand)
+                goal = there._read_returned(held.operand)
         why = [self._explain_pinned(place[-1], goal) for place in held.chain]
         why += [
             f"{place[-1]} stands in a data list: it outlives the run"

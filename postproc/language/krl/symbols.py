@@ -552,7 +552,7 @@ class KrlTask(TaskSymbols):
         if name in loops:
             return None if rest else KrlNumber(loops[name])
         if name in here.parameters:
-            return self._given(data, here, depth)
+            return self._read_parameter(data, here, depth)
         point = data if is_point(data) else replace(data, steps=data.steps[:-1])
         held = self.find_held(point, row, here)
         if held is not None:
@@ -573,7 +573,9 @@ class KrlTask(TaskSymbols):
             value = _part_of(value, step)
         return value
 
-    def _given(self, data: said.DataObject, here: Scope, depth: int) -> KrlValue | None:
+    def _read_parameter(
+        self, data: said.DataObject, here: Scope, depth: int
+    ) -> KrlValue | None:
         """Evaluate a parameter, None where what is given for it is not known."""
         given = next((one for one in here.given if one[0] == data.name), None)
         if given is None or not all(isinstance(step, str) for step in data.steps):

@@ -116,7 +116,7 @@ class GivenValues:
 
     def numbers(self, key: str) -> frozenset[int]:
         """Return the numbers of the positions that a key is ever given."""
-        return frozenset(self._numbers[key])
+        return frozenset(self._numbers.get(key, ()))
 
     def __iter__(self) -> Iterator[str]:
         """Go through the keys."""

@@ -41,7 +41,7 @@ def keep_values(world: World, given: GivenValues, runs: int) -> bool:
         found = dict.fromkeys(found, Nothing(CHANGED, every))
     changed = False
     for key, value in found.items():
-        numbers = given.numbers(key) if key in given else may_be(value)
+        numbers = given.numbers(key) | may_be(value)
         before = world.initial.find(key)
         after = _either(before, value, numbers)
         if after is None or after == before:
@@ -55,8 +55,9 @@ def keep_values(world: World, given: GivenValues, runs: int) -> bool:
 
 def _list_endings(world: World, given: GivenValues) -> Iterator[tuple[str, Value]]:
     """Yield keys that a run takes as it finds them, and what it may leave there."""
+    # Variables of routines begin anew with every call.
     kept = {key for key in given if ":" not in key.partition("/")[0]}
-    asked = {*world.initial.asked}  # those of routines begin anew with every call
+    asked = {*world.initial.asked}
     for key in kept:
         value = given.value(key)
         if world.initial.is_asked(key) or not asked.isdisjoint(wholes(key)):

@@ -239,7 +239,7 @@ class Goals:
         scope: Scope, points: Points,
     ) -> FoundGoal:  # fmt: skip
         """Read a destination, and note what it takes of assigned points."""
-        watched = points.watched()
+        watched = points.watch()
         there = replace(scope, points=watched)
         goal = self.goal(operand, signature, row, there)
         return replace(goal, given=watched.given) if watched.given else goal
@@ -323,11 +323,11 @@ class Goals:
                 pins = shifted.pins or (turned if any(held.numbers[3:]) else "")
                 return replace(shifted, shift=FoundShift(held), pins=pins)
             case said.FunctionCall():
-                return self._returned(operand, signature, row, scope)
+                return self._read_returned(operand, signature, row, scope)
             case _:
                 return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
 
-    def _returned(
+    def _read_returned(
         self, call: said.FunctionCall, signature: Signature, row: int, scope: Scope
     ) -> FoundGoal:
         """Read what a function of the task returns: its numbers stay."""

@@ -493,7 +493,7 @@ class RapidTask(TaskSymbols):
             case said.FunctionCall(name=name, arguments=arguments) if (
                 name in SHIFTS and name not in self.routines
             ):
-                return self._shifted(name, arguments, row, here, depth)
+                return self._evaluate_shift(name, arguments, row, here, depth)
             case _:
                 value = self.number(operand, row, here)
                 return None if value != value else WrittenNumber(value)
@@ -578,7 +578,7 @@ class RapidTask(TaskSymbols):
         ]
         return [self.number(one, row, here) for one in placed[1:]], angles
 
-    def _shifted(
+    def _evaluate_shift(
         self, name: str, arguments: Sequence[said.Argument], row: int, here: Scope,
         depth: int,
     ) -> Nested | None:  # fmt: skip

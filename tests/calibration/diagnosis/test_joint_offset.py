@@ -7,7 +7,18 @@ import pytest
 
 from postproc.calibration.diagnosis.diagnose import extend_model
 from postproc.calibration.diagnosis.result import Finding
+from postproc.calibration.diagnosis.score import Score
+from postproc.calibration.diagnosis.search import apart
+from postproc.model.effects.effect import (
+    FREE,
+    NAMED,
+    PART_MOTION,
+    Candidate,
+    Effect,
+    Family,
+)
 from postproc.model.effects.joint_offset import JointOffset
+from postproc.model.effects.part_motion import PartMotion
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.pose import lengths
@@ -72,6 +83,24 @@ def test_two_nests_tell_joint_6_from_a_tool() -> None:
     six = JointOffset((6,))
     assert six.list_tied(ArmStates(ARM, states)) == ("tool_shift",)
     assert six.list_tied(ArmStates(ARM, two)) == ()
+
+
+def _score(effect: Effect, name: str, joint: int | None, along: str) -> Score:
+    tier = NAMED if joint else FREE
+    family = Family(name, joint, None, tier, along or None)
+    return Score(family, 9.0, Candidate(family, effect, "joint 1", 0.0), 9.0, 0.0)
+
+
+def test_a_link_that_moves_as_the_joint_does_is_no_other_cause() -> None:
+    """The flange of a spherical wrist turns about the axis of joint 5."""
+    at = ArmStates(ARM, states_of(survey(remastered(6), SEED, 20)))
+    own = _score(JointOffset((5,)), "joint_offset", 5, "").best
+    rivals = [
+        _score(PartMotion(c, law="constant"), PART_MOTION, None, c)
+        for c in ("link 6 turn y", "link 6 turn x", "link 4 turn y")
+    ]
+    kept = apart(own, rivals, at)
+    assert [str(s.family.along) for s in kept] == ["link 6 turn x", "link 4 turn y"]
 
 
 @pytest.mark.slow
