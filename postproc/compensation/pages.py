@@ -36,9 +36,16 @@ def of_one_arm(program: int, page: int) -> bool:
 def names_in(path: Path) -> tuple[dict[str, int], dict[str, int]]:
     """Find the programs that a file names, none if unreadable.
 
-    See `FileName.find_named`; outputs belong to no program.
+    See `FileName.find_named`. Outputs belong to outputs alone, and a file that has its
+    output beside it to none of them.
     """
-    return file_named(path).find_named(read_if_readable(path), is_output)
+    written = is_output(path) or sidecar_path(path).is_file()
+    skip = _has_output if written else is_output
+    return file_named(path).find_named(read_if_readable(path), skip)
+
+
+def _has_output(path: Path) -> bool:
+    return path.with_name(f"{path.stem}{OUTPUT}{path.suffix}").is_file()
 
 
 def is_output(path: Path) -> bool:

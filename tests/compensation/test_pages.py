@@ -26,6 +26,26 @@ def test_outputs_are_no_modules_of_the_task(tmp_path, stamped):
     assert set(names_in(tmp_path / "main.mod")[0]) == {"part.mod"}
 
 
+@pytest.mark.parametrize("changed", [True, False])
+@pytest.mark.parametrize("end", ["", ".compensated"])
+def test_outputs_are_modules_of_an_output(tmp_path, end, changed):
+    for name, text in (("main.mod", MAIN), ("part.mod", PART), ("same.mod", PART)):
+        source = tmp_path / name
+        source.write_bytes(text)
+        if name != "same.mod":
+            stamp = stamp_line("1.0", "m", Source(name, text), "!")
+            first, _, rest = text.partition(b"\n")
+            output = source.with_stem(source.stem + end)
+            own = stamp if changed or name == "part.mod" else b""
+            output.write_bytes(first + b"\n" + own + rest)
+            sidecar_path(output).write_text("{}")
+    found = names_in(tmp_path / f"main{end}.mod")[0]
+    assert set(found) == {f"part{end}.mod", "same.mod"}
+    if not end:
+        pages = find_pages(tmp_path / "main.mod").paths
+        assert {path.name for path in pages} == {"part.mod", "same.mod"}
+
+
 def test_a_module_with_such_a_name_and_no_record_is_one(tmp_path):
     for name, text in (("main.mod", MAIN), ("part.compensated.mod", PART)):
         (tmp_path / name).write_bytes(text)
