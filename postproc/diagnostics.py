@@ -727,6 +727,21 @@ class Code(StrEnum):
         "Arrivals at one point need different corrections.",
         "Give each move a point of its own.",
     )
+    ARRIVALS_AVERAGED = (
+        "arrivals-averaged",
+        NOTE,
+        "Arrivals at one point need different corrections. The point has one that "
+        "leaves each of them less than without; half of what they differ by is in the "
+        "standard error.",
+        'Give each move a point of its own: shared_points = "clone".',
+    )
+    ARRIVALS_FAR_APART = (
+        "arrivals-far-apart",
+        WARNING,
+        "As arrivals-averaged, and half of what the arrivals differ by exceeds "
+        "averaged_mm.",
+        'Give each move a point of its own: shared_points = "clone".',
+    )
     SHARED_POINT = (
         "shared-point",
         WARNING,

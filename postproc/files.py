@@ -12,7 +12,7 @@ import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path, PurePath
+from pathlib import Path
 from types import FrameType
 from typing import IO, Any, BinaryIO, NoReturn, Self
 
@@ -315,117 +315,27 @@ def _reason(exc: OSError) -> str:
     return f"cannot be written ({exc.strerror})"
 
 
-# Kinds of files in a tree of programs, told by their names and contents.
+# Names of files, and what folders hold.
 
-_PROGRAM, _VARIABLES, _COMPILED = ".pdl", ".lsv", (".cod", ".var")
-MODULES = (".mod", ".modx", ".prg", ".sys", ".sysx")  # programs that hold their values
-KRL_PROGRAMS, KRL_DATA = (".src",), ".dat"  # sources, and the lists of their data
-KRL_SUBMITS = (".sub",)  # programs that run beside the one that moves the arm
-SHARED_LIST, ARCHIVE_DEPTH = "$config.dat", 4
-# Sources of a controller and its packages, and routines that tell them from others.
-_SYSTEM_SOURCES = {
-    "bas": ("bas", "initmov", "frames"),
-    "ir_stopm": ("ir_stopm",),
-    "msglib": ("msgnotify",),
-    "p00": ("p00",),
-    "h50": ("h50",),
-    "user_grp": ("user_grp",),
-    "userspot": ("userspot",),
-}
 LARGEST = 500_000_000  # bytes of a program or variable file; a longer one is neither
 
-_TARGETS = re.compile(
-    rb"^[ \t]*\w+[ \t]+A?(?:POS|XTND|JNTP|PATH)\b", re.IGNORECASE | re.MULTILINE
-)
 
+def base_name(place: str) -> str:
+    r"""Return a file's name without folders and suffix, in lower case.
 
-def is_program(place: str) -> bool:
-    """Tell whether a file is a program.
-
-    >>> is_program("a/JOB.PDL"), is_program("Welding.mod"), is_program("a.txt")
-    (True, True, False)
-    >>> is_program("job.src"), is_program("job.dat")
-    (True, False)
+    >>> base_name("a/JOB.PDL"), base_name(r"UD:\\USR\\Page2.cod")
+    ('job', 'page2')
     """
-    return _suffix(place) in (_PROGRAM, *MODULES, *KRL_PROGRAMS)
+    name = place.replace("\\", "/").rpartition("/")[2]
+    return os.path.splitext(name)[0].lower()
 
 
-def is_module(place: str) -> bool:
-    """Tell whether a file is a program that belongs to the modules beside it."""
-    return _suffix(place) in MODULES
-
-
-def is_data_list(place: str) -> bool:
-    """Tell whether a file may be the data list of a source beside it, or is a system's.
-
-    >>> is_data_list("a/Job.dat"), is_data_list("$config.dat")
-    (True, True)
-    """
-    return _suffix(place) == KRL_DATA
-
-
-def is_shared_list(place: str) -> bool:
-    """Tell whether a file is a list that all programs of a controller share.
-
-    >>> is_shared_list("R1/System/$config.dat"), is_shared_list("a/Job.dat")
-    (True, False)
-    """
-    return is_data_list(place) and base_name(place).startswith("$")
-
-
-def is_submit(place: str) -> bool:
-    """Tell whether a file is a program that runs beside the one that moves the arm.
-
-    >>> is_submit("R1/System/sps.sub"), is_submit("job.src")
-    (True, False)
-    """
-    return _suffix(place) in KRL_SUBMITS
-
-
-def is_system_source(place: str, text: bytes) -> bool:
-    """Tell whether a source is one of the controller or of its packages.
-
-    >>> is_system_source("IR_STOPM.src", b"DEF  IR_STOPM ( )")
-    True
-    >>> is_system_source("bas.src", b"DEF bas( )")
-    False
-    """
-    names = _SYSTEM_SOURCES.get(base_name(place), ())
-    if not names or _suffix(place) not in KRL_PROGRAMS:
-        return False
-    begin = rb"(?im)^[ \t]*(?:GLOBAL[ \t]+)?DEF[ \t]+"
-    own = (begin + name.encode() + rb"\b" for name in names)
-    return all(re.search(pattern, text) for pattern in own)
-
-
-def is_system_file(path: Path) -> bool:
-    """Tell whether a file on the disk is a source of the controller."""
-    if base_name(path.name) not in _SYSTEM_SOURCES:
-        return False
-    try:
-        return is_system_source(path.name, path.read_bytes())
-    except OSError:
-        return False
-
-
-def data_list_of(program: str) -> str:
-    """Name the data list of a source, "" where programs have none.
-
-    >>> data_list_of("a/Job.src"), data_list_of("a/job.pdl")
-    ('a/Job.dat', '')
-    """
-    stem, suffix = os.path.splitext(program)
-    return stem + KRL_DATA if suffix.lower() in KRL_PROGRAMS else ""
-
-
-def find_data_list(program: Path) -> Path | None:
-    """Find the data list of a source: same base name, in any case."""
-    return _beside(program, data_list_of(program.name))
-
-
-def find_source(data_list: Path) -> Path | None:
-    """Find the source of a data list: same base name, in any case."""
-    return _beside(data_list, data_list.stem + KRL_PROGRAMS[0])
+def find_beside(place: Path, name: str) -> Path | None:
+    """Find a file of a name, in any case, in the folder of another."""
+    if not name or not place.parent.is_dir():
+        return None
+    found = [p for p in place.parent.iterdir() if p.name.lower() == name.lower()]
+    return min(found, default=None)
 
 
 class FolderListing:
@@ -435,7 +345,7 @@ class FolderListing:
         """Begin without any folder."""
         self._entries: dict[Path, tuple[Path, ...]] = {}
         self._named: dict[Path, dict[str, Path]] = {}
-        self._submits: dict[Path, tuple[Path, ...]] = {}
+        self._below: dict[tuple[Path, tuple[str, ...]], tuple[Path, ...]] = {}
 
     def entries(self, folder: Path) -> tuple[Path, ...]:
         """Return what a folder holds, in order; nothing where it is none."""
@@ -451,144 +361,24 @@ class FolderListing:
             self._named[folder] = {path.name.lower(): path for path in entries}
         return self._named[folder].get(name.lower())
 
-    def submits(self, folder: Path, below: bool = False) -> tuple[Path, ...]:
-        """Return the submit programs of a folder, or of all folders below it, too."""
+    def ending(
+        self, folder: Path, suffixes: tuple[str, ...], below: bool = False
+    ) -> tuple[Path, ...]:
+        """Return the files of a folder that have one of some suffixes.
+
+        Args:
+            folder: Where they are.
+            suffixes: In lower case.
+            below: Those of all folders below it, too.
+        """
         if not below:
-            own = (p for p in self.entries(folder) if is_submit(p.name))
+            own = (p for p in self.entries(folder) if p.suffix.lower() in suffixes)
             return tuple(p for p in own if p.is_file())
-        if folder not in self._submits:
-            found = sorted(p for p in folder.rglob("*.*") if is_submit(p.name))
-            self._submits[folder] = tuple(p for p in found if p.is_file())
-        return self._submits[folder]
-
-
-def find_shared_list(
-    program: Path, within: Path | None = None, listing: FolderListing | None = None
-) -> Path | None:
-    """Find ``$config.dat``: beside a source, or where a controller keeps it.
-
-    In an archive programs stand in ``R1/Program``, at any depth, and the list in
-    ``R1/System``.
-
-    Args:
-        program: The source.
-        within: A folder that nothing outside of is looked at.
-        listing: What folders hold; default: they are read.
-    """
-    if not data_list_of(program.name):
-        return None
-    folder, listing = program.absolute().parent, listing or FolderListing()
-    found = listing.named(folder, SHARED_LIST)
-    for above in list(folder.parents)[:ARCHIVE_DEPTH]:
-        outside = within is not None and within not in (above, *above.parents)
-        if found is not None or outside:
-            break
-        found = listing.named(above / "System", SHARED_LIST)
-    return found
-
-
-def find_shared(
-    program: Path, within: Path | None = None, listing: FolderListing | None = None
-) -> tuple[Path, ...]:
-    """Find what a source shares with others: ``$config.dat``, and submit programs.
-
-    Submit programs stand beside either, or anywhere in the archive that the list
-    belongs to; they may change what programs read.
-
-    Args:
-        program: The source.
-        within: A folder that nothing outside of is looked at.
-        listing: What folders hold; default: they are read.
-    """
-    folder, listing = program.absolute().parent, listing or FolderListing()
-    if not data_list_of(program.name) or not folder.is_dir():
-        return ()
-    found = find_shared_list(program, within, listing)
-    submits: list[Path] = []
-    if found is not None and found.parent.name.lower() == "system":
-        submits += listing.submits(found.parent.parent, below=True)
-    for place in dict.fromkeys([folder] if found is None else [found.parent, folder]):
-        submits += listing.submits(place)
-    names = {path.name.lower(): path for path in submits}
-    return (*(() if found is None else (found,)), *names.values())
-
-
-def _beside(place: Path, name: str) -> Path | None:
-    """Find a file of a name, in any case, in the folder of another."""
-    if not name or not place.parent.is_dir():
-        return None
-    found = [p for p in place.parent.iterdir() if p.name.lower() == name.lower()]
-    return min(found, default=None)
-
-
-def holds_values(place: str) -> bool:
-    """Tell whether a file is of a language that has no variable files."""
-    return _suffix(place) in (*MODULES, *KRL_PROGRAMS, KRL_DATA)
-
-
-def program_key(place: str) -> str:
-    """Return what tells the programs of one folder apart, whatever their case.
-
-    >>> program_key("a/JOB.PDL"), program_key("a/Job.mod")
-    ('job', 'job.mod')
-    """
-    if not holds_values(place):
-        return base_name(place)
-    return place.replace("\\", "/").rpartition("/")[2].lower()
-
-
-def is_variables(place: str) -> bool:
-    """Tell whether a file is a variable file."""
-    return _suffix(place) == _VARIABLES
-
-
-def is_compiled(place: str) -> bool:
-    """Tell whether a file is a program or a variable file as controllers load it."""
-    return _suffix(place) in _COMPILED
-
-
-def variables_of(program: str) -> str:
-    """Name the variable file of a program, "" where programs hold their values.
-
-    >>> variables_of("a/JOB.PDL"), variables_of("a/job.mod")
-    ('a/JOB.lsv', '')
-    """
-    if holds_values(program):
-        return ""
-    return os.path.splitext(program)[0] + _VARIABLES
-
-
-def find_variables(program: Path) -> Path | None:
-    """Find the variable file of a program: same base name, in any case."""
-    return _beside(program, variables_of(program.name))
-
-
-def program_of(place: str) -> str:
-    """Name the program that a variable file, or a compiled one, belongs to."""
-    return os.path.splitext(place)[0] + _PROGRAM
-
-
-def _suffix(place: str) -> str:
-    return os.path.splitext(place)[1].lower()
-
-
-def base_name(place: str) -> str:
-    r"""Return a file's name without folders and suffix, in lower case.
-
-    >>> base_name("a/JOB.PDL"), base_name(r"UD:\\USR\\Page2.cod")
-    ('job', 'page2')
-    """
-    name = place.replace("\\", "/").rpartition("/")[2]
-    return os.path.splitext(name)[0].lower()
-
-
-def holds_targets(data: bytes) -> bool:
-    r"""Tell whether a variable file holds positions.
-
-    >>> holds_targets(b"p1 POS Priv\n X: 1 ..")
-    True
-    """
-    return _TARGETS.search(data) is not None
+        key = folder, suffixes
+        if key not in self._below:
+            found = (p for p in folder.rglob("*.*") if p.suffix.lower() in suffixes)
+            self._below[key] = tuple(p for p in sorted(found) if p.is_file())
+        return self._below[key]
 
 
 # Reading files and streams that somebody else has made.
@@ -610,6 +400,15 @@ def read_input(path: Path, cure: str = "Check the path") -> bytes:
     except OSError as exc:
         problem = f"cannot be read ({exc.strerror})"
         raise ProgramError(path, problem, cure) from None
+
+
+def read_if_readable(path: Path, size: int = -1) -> bytes:
+    """Read a file or its first bytes, nothing where it cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return file.read(size)
+    except OSError:
+        return b""
 
 
 def read_stream(stream: BinaryIO, name: str | Path) -> bytes:
@@ -661,59 +460,3 @@ def schema(kind: str) -> dict[str, Any]:
     {'schema': 'postproc-report', 'version': 2}
     """
     return {"schema": f"postproc-{kind}", "version": SCHEMAS[kind]}
-
-
-SYSTEM_MODULES, SYSTEM_SUFFIXES = "SYSMOD/", (".sys", ".sysx")
-OTHER_TASKS = "TASKS/"
-
-
-def name_read(path: PurePath, program: PurePath) -> str:
-    """Return the name of a file that a job reads and never rewrites.
-
-    Args:
-        path: The file.
-        program: The program of the job.
-
-    >>> job = Path("RAPID/TASK1/PROGMOD/job.mod")
-    >>> name_read(Path("RAPID/TASK1/SYSMOD/user.sys"), job)
-    'SYSMOD/user.sys'
-    >>> name_read(Path("RAPID/TASK2/PROGMOD/plc.mod"), job)
-    'TASKS/TASK2/PROGMOD/plc.mod'
-    >>> name_read(Path("System/$config.dat"), Path("Program/job.src"))
-    '$config.dat'
-    """
-    if not is_module(path.name):
-        return path.name
-    if is_beside(path, program):
-        return OTHER_TASKS + "/".join(path.parts[-3:])
-    return f"{SYSTEM_MODULES}{path.name}"
-
-
-def is_beside(path: PurePath, program: PurePath) -> bool:
-    """Return True if a module belongs to another task of a backup than a program."""
-    return is_module(path.name) and path.parent.parent != program.parent.parent
-
-
-def task_beside(name: str) -> str:
-    """Return the other task that a file of a job belongs to, "" for its own.
-
-    >>> task_beside("TASKS/TASK2/PROGMOD/plc.mod"), task_beside("SYSMOD/user.sys")
-    ('TASK2', '')
-    """
-    return name.split("/")[1] if name.startswith(OTHER_TASKS) else ""
-
-
-def is_named_as_system(name: str) -> bool:
-    """Return True if a module is a system module by its place or its suffix.
-
-    >>> is_named_as_system("SYSMOD/a.mod") and is_named_as_system("BASE.SYS")
-    True
-    >>> is_named_as_system("job.mod")
-    False
-    """
-    return name.startswith(SYSTEM_MODULES) or _suffix(name) in SYSTEM_SUFFIXES
-
-
-def is_from_elsewhere(name: str) -> bool:
-    """Return True if a file of a job was found in another folder of a backup."""
-    return name.startswith((SYSTEM_MODULES, OTHER_TASKS))

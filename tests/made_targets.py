@@ -44,6 +44,7 @@ def make_targets(
         "curved": np.zeros(n, dtype=bool),
         "along": np.zeros(n, dtype=bool),
         "past_start": np.zeros(n, dtype=bool),
+        "stops": np.zeros(n, dtype=bool),
         "pred_start": np.arange(n + 1),
         "pred": np.arange(n) - 1,
     }

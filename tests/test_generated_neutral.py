@@ -20,7 +20,7 @@ from tests.generated.neutral.run import Run
 from tests.generated.neutral.text import NUMBER
 
 LANGUAGES = ("rapid", "krl")
-SEEDS = range(100, 116)
+SEEDS = range(400, 416)
 # What stands in programs of a language that are drawn, by what it means.
 WRITTEN = {
     "rapid": (

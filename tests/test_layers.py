@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections import defaultdict
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -275,6 +277,45 @@ def test_languages_are_known_by_their_interface_alone() -> None:
     ]
     assert len(folders) > 1
     assert not wrong, wrong
+
+
+SUFFIX = re.compile(r"\.(?:pdl|lsv|cod|var|modx?|prg|sysx?|src|dat|sub)\b", re.I)
+LANGUAGES = re.compile(r"rapid|krl|pdl2", re.I)
+# Texts for people name files and languages; so does the list of languages itself, and
+# what reads the archive of one maker's controllers to describe an arm.
+NAMING = {"diagnostics", "language.languages", "robot.machine_data"}
+
+
+def words_of(path: Path, for_people: bool) -> Iterator[str]:
+    """Yield the names and the texts of a module, but for its docstrings.
+
+    Args:
+        path: Its file.
+        for_people: Its texts of several words are written for people.
+    """
+    nodes = list(ast.walk(syntax(path)))
+    told = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+    for node in nodes:
+        for field in ("id", "attr", "arg", "name"):
+            if isinstance(word := getattr(node, field, None), str):
+                yield word
+        if isinstance(node, ast.Constant) and id(node) not in told:
+            text = str(node.value)
+            if not (for_people and (" " in text or text.startswith("PROGRAM."))):
+                yield text
+
+
+def test_nothing_outside_of_its_folder_names_a_language() -> None:
+    """Neither by its name nor by the suffixes of its files."""
+    folders = {f"language.{p.parent.name}" for p in PACKAGE.glob("language/*/*.py")}
+    found = [
+        f"{name}: {word}"
+        for name, path in modules()
+        if not within(name, folders | NAMING)
+        for word in words_of(path, within(name, {"cli"}))
+        if LANGUAGES.search(word) or SUFFIX.search(word)
+    ]
+    assert not found, found
 
 
 def test_there_is_one_way_to_compensate() -> None:

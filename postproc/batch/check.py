@@ -25,20 +25,11 @@ from postproc.compensation.sidecar import (
 from postproc.diagnostics import Code
 from postproc.exceptions import PostprocError, ProgramError
 from postproc.files import (
-    KRL_DATA,
-    KRL_PROGRAMS,
     TEMPORARY,
-    holds_targets,
-    is_compiled,
-    is_data_list,
-    is_module,
-    is_program,
-    is_variables,
-    program_of,
     read_input,
     schema,
-    variables_of,
 )
+from postproc.language.languages import file_named
 from postproc.language.stamp import read_stamp
 from postproc.language.visits import line_ranges
 from postproc.model.model import Model, load_model
@@ -159,7 +150,7 @@ def _current_model(
         ids = [setup.model.id for setup in made.setups]
 
         def current_of(place: str) -> str | None:
-            which = made.setup_of(place, program_arm(read_head(folder / place)))
+            which = made.setup_of(place, program_arm(folder / place))
             return None if which is None else ids[which]
 
         return current_of
@@ -198,7 +189,7 @@ def check_tree(
     )
     if source is not None:
         findings += _absent(source, set(places))
-    programs = sum(map(is_program, places))
+    programs = sum(file_named(place).is_program for place in places)
     return Checked(programs, tuple(sorted(findings)))
 
 
@@ -222,12 +213,11 @@ def _find_mixed_models(root: Path, places: Sequence[str]) -> Iterator[CheckFindi
     """Find modules of a task, and sources with data lists, of different models."""
     models: dict[str, dict[str, str]] = {}
     for place in places:
-        if is_program(place) or is_data_list(place):
+        file = file_named(place)
+        if file.is_program or file.is_data_list:
             stamp = read_stamp(read_head(root / place))
-            folder, _, name = place.rpartition("/")
-            job = folder if is_module(name) else f"{folder}/{name.rpartition('.')[0]}"
             if stamp is not None:
-                models.setdefault(job, {}).setdefault(stamp.model, place)
+                models.setdefault(file.job, {}).setdefault(stamp.model, place)
     for found in models.values():
         (model, place), *others = found.items()
         for other, at in others:
@@ -245,7 +235,7 @@ def _absent(source: Path, places: set[str]) -> list[CheckFinding]:
             place, Code.ABSENT, "is in the source tree only: it was not compensated"
         )
         for place in _places(source)
-        if is_program(place) and place not in places
+        if file_named(place).is_program and place not in places
     ]
 
 
@@ -269,21 +259,20 @@ class _Look:
 
     def at(self, place: str) -> Iterator[CheckFinding]:
         """Find what is wrong with a file."""
+        file = file_named(place)
+        program = self._existing(file.program)
         if place.endswith(TEMPORARY):
             yield CheckFinding(
                 place, Code.UNFINISHED, "is a temporary file of a run that was killed"
             )
-        elif is_program(place) or (
-            is_data_list(place)
-            and any(self._existing(place[: -len(KRL_DATA)] + s) for s in KRL_PROGRAMS)
-        ):
+        elif file.is_program or (file.is_data_list and program):
             yield from self._program(place)
-        elif is_variables(place) and not self._existing(program_of(place)):
-            if holds_targets(read_input(self.root / place)):
+        elif file.is_variables and not program:
+            if file.holds_targets(read_input(self.root / place)):
                 yield CheckFinding(
                     place, Code.UNCOMPENSATED, "its program is not beside it"
                 )
-        elif is_compiled(place) and self._existing(program_of(place)):
+        elif file.is_compiled and program:
             if self.source is not None and (self.source / place).is_file():
                 if read_input(self.source / place) == read_input(self.root / place):
                     text = "is compiled from the uncompensated program: translate it "
@@ -319,7 +308,7 @@ class _Look:
                 code = Code.ROUTINE_ASSUMED_MOTIONLESS
                 yield CheckFinding(place, code, f"{text}assume_motion")
         yield from self._content(place, data, sidecar)
-        if values := self._existing(variables_of(place)):
+        if values := self._existing(file_named(place).variables):
             yield from self._content(values, read_input(self.root / values), sidecar)
 
     def _model(self, place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from shutil import copyfile
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,7 +23,8 @@ from postproc.compensation.sidecar import (
     sidecar_path,
 )
 from postproc.exceptions import PostprocError
-from postproc.files import name_read, program_of, read_input, variables_of
+from postproc.files import read_input
+from postproc.language.languages import file_named
 from postproc.verify.extra import require
 from postproc.verify.opinion import ENOUGH, Allowance, Opinion
 
@@ -101,7 +102,7 @@ def _restore_sources(folder: Path, target: Path) -> None:
 def _records(path: Path) -> Mapping[str, FileRecord]:
     """Return the records beside a file that tell of it: its own, its program's."""
     found: dict[str, FileRecord] = {}
-    program = Path(program_of(str(path)))  # whose record tells of a variable file too
+    program = Path(file_named(path).program)  # whose record tells of variables too
     for other in (path, program, program.with_suffix(program.suffix.upper())):
         record = sidecar_path(other)
         if record.is_file():
@@ -155,8 +156,8 @@ def _files(root: Path, unit: Unit) -> Iterator[tuple[str, bytes]]:
     for place in unit.programs:
         yield Path(place).name, read_input(root / place)
     for place in unit.reads:
-        name = name_read(Path(place), Path(unit.program))
+        name = file_named(place).name_for(PurePosixPath(unit.program))
         yield name, read_input(root / place)
     if unit.variables is not None:
-        name = variables_of(Path(unit.program).name)
+        name = file_named(Path(unit.program).name).variables
         yield name, read_input(root / unit.variables)

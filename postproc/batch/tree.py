@@ -14,7 +14,6 @@ from postproc.compensation.pages import (
     names_in,
     of_one_arm,
     program_arm,
-    read_head,
 )
 from postproc.compensation.sidecar import SUFFIX
 from postproc.exceptions import OutputError, ProgramError
@@ -23,17 +22,8 @@ from postproc.files import (
     TEMPORARY,
     FolderListing,
     base_name,
-    data_list_of,
-    find_shared,
-    holds_targets,
-    is_beside,
-    is_compiled,
-    is_program,
-    is_system_file,
-    is_variables,
-    program_key,
 )
-from postproc.language.languages import language_of
+from postproc.language.languages import file_named, language_of
 
 # The files of a tree, sorted folder by folder.
 
@@ -78,8 +68,9 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
             kind = "a symbolic link" if entry.is_symlink() else "no regular file"
             refused[place] = f"is {kind}: it is not followed; put the file itself here"
             continue
+        file = file_named(place)
         size = entry.stat(follow_symlinks=False).st_size
-        if size > LARGEST and (is_program(place) or is_variables(place)):
+        if size > LARGEST and (file.is_program or file.is_variables):
             refused[place] = f"is longer than {LARGEST} bytes: is it a program?"
             continue
         folders[place.rpartition("/")[0]].append(place)
@@ -91,7 +82,7 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
     read = [
         (place, PurePosixPath(unit.program)) for unit in units for place in unit.reads
     ]
-    only_read = {place for place, by in read if not is_beside(PurePosixPath(place), by)}
+    only_read = {place for place, by in read if not file_named(place).runs_beside(by)}
     kept = [p for unit in units if unit.program in only_read for p in unit.own]
     units = [unit for unit in units if unit.program not in only_read]
     # The largest first: no worker is left alone with one at the end.
@@ -144,26 +135,28 @@ def _sort(
 ) -> _Folder:
     """Sort the files of one folder into programs, what belongs to them, and others."""
     part = _Folder([], [], {}, [])
-    system = {p for p in places if is_system_file(root / p)}
-    sources = {data_list_of(place).lower() for place in places if place not in system}
-    ours = [p for p in places if is_program(p) or p.lower() in sources]
+    system = {p for p in places if file_named(root / p).is_system()}
+    files = {p: file_named(p) for p in places}
+    lists = {f.data_list.lower() for p, f in files.items() if p not in system}
+    ours = [p for p, f in files.items() if f.is_program or p.lower() in lists]
     ours = [p for p in ours if p not in system]
-    programs = _by_base(ours, program_key, part)
-    variables = _by_base(filter(is_variables, places), base_name, part)
+    programs = _by_base(ours, lambda place: files[place].key, part)
+    values = (p for p, f in files.items() if f.is_variables)
+    variables = _by_base(values, base_name, part)
     records = {place + SUFFIX for place in programs.values()}
     for place in places:
         if place in records or place in part.refused:
             continue  # a record of an earlier output would be taken for ours
-        if is_variables(place) and base_name(place) not in programs:
+        if files[place].is_variables and base_name(place) not in programs:
             _lone_variables(root, place, part)
-        elif not (place in ours or is_variables(place)):
+        elif not (place in ours or files[place].is_variables):
             part.copies.append(place)
-            if is_compiled(place) and base_name(place) in programs:
+            if files[place].is_compiled and base_name(place) in programs:
                 part.notes.append((place, _STALE))
     named, arms = {}, {}
     for base, place in programs.items():
         named[base], outside = names_in(root / place)
-        arms[base] = program_arm(read_head(root / place))
+        arms[base] = program_arm(root / place)
         part.notes += [
             (place, f"{n!r} is outside of its folder: not followed") for n in outside
         ]
@@ -179,9 +172,7 @@ def _find_shared(root: Path, program: str, listing: FolderListing) -> tuple[str,
     """Return the places of what a program shares with others, and only reads."""
     root = root.absolute()
     path = root / program
-    found = find_shared(path, within=root, listing=listing)
-    if is_program(program):
-        found += language_of(program).reads(path)
+    found = language_of(program).reads(path, root, listing)
     inside = (one for one in found if root in one.parents)
     return tuple(one.relative_to(root).as_posix() for one in inside)
 
@@ -237,7 +228,7 @@ def _add_unit(
         setup: Index of its setup, None where no rule fits.
         part: Where it is added.
     """
-    values = variables.get(program_key(program))
+    values = variables.get(file_named(program).key)
     if setup is not None:
         part.units.append(Unit(program, tuple(pages), values, setup, reads))
         return
@@ -252,7 +243,7 @@ def _lone_variables(root: Path, place: str, part: _Folder) -> None:
     except OSError as exc:
         part.refused[place] = f"cannot be read ({exc.strerror})"
         return
-    if holds_targets(data):
+    if file_named(place).holds_targets(data):
         part.refused[place] = "holds targets, and its program is not beside it"
     else:
         part.copies.append(place)

@@ -31,7 +31,7 @@ from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.sidecar import SUFFIX
 from postproc.compensation.workers import end_with_parent
 from postproc.exceptions import PostprocError
-from postproc.files import name_read, variables_of
+from postproc.language.languages import file_named
 from postproc.robot.pose import MM
 from postproc.threads import start_no_threads
 
@@ -253,7 +253,7 @@ def _name_files(task: Task) -> Given:
     unit, sources = task.unit, task.files
     pages = {_file_name(page): sources[page] for page in unit.pages}
     program = PurePosixPath(unit.program)
-    named = {name_read(PurePosixPath(one), program): one for one in unit.reads}
+    named = {file_named(one).name_for(program): one for one in unit.reads}
     reads = {name: sources[one] for name, one in named.items()}
     return Given(
         name=_file_name(unit.program),
@@ -290,7 +290,7 @@ def _outputs(
     """
     place_of = {_file_name(place): place for place in unit.programs}
     if unit.variables is not None:
-        place_of[variables_of(_file_name(unit.program))] = unit.variables
+        place_of[file_named(_file_name(unit.program)).variables] = unit.variables
     new = {place_of[name]: data for name, data in outcome.outputs.items()}
     outputs: dict[str, bytes] = {}
     for place in reversed(unit.programs):

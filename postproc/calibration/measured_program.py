@@ -23,6 +23,7 @@ from postproc.compensation.program import (
 from postproc.compensation.program_files import read_files
 from postproc.exceptions import MeasurementError
 from postproc.files import NamedText
+from postproc.language.languages import language_of
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 
@@ -54,7 +55,8 @@ def join_program(
     planned = plan_visits(visits, cell)
     places = _places(visits.measure_id, [visits.names[k] for k in visits.name])
     ids = table.text("id")
-    rows = np.array([_visit_of(places, i, table.path, line) for i, line in zip(
+    comment = language_of(program.name).comment
+    rows = np.array([_visit_of(places, i, table.path, line, comment) for i, line in zip(
         ids, table.line.tolist(), strict=True)], dtype=np.int64)  # fmt: skip
     order = np.argsort(rows, kind="stable")
     states = states_of(planned.plan, cell, cell.temperature, visits)[rows[order]]
@@ -92,7 +94,9 @@ def _places(measured: tuple[str, ...], names: list[str]) -> dict[str, list[int]]
     return places
 
 
-def _visit_of(places: dict[str, list[int]], key: str, path: Path, line: int) -> int:
+def _visit_of(
+    places: dict[str, list[int]], key: str, path: Path, line: int, comment: str
+) -> int:
     found = places.get(key.lower(), [])
     if len(found) == 1:
         return found[0]
@@ -100,6 +104,6 @@ def _visit_of(places: dict[str, list[int]], key: str, path: Path, line: int) -> 
     raise MeasurementError(
         path,
         f"id {key} {problem} in the program",
-        "Mark the move with a comment MEASURE <id>, such as -- MEASURE P12 in PDL2",
+        f"Mark the move with a comment MEASURE <id>, such as {comment} MEASURE P12",
         line=line,
     )

@@ -1,32 +1,43 @@
-"""Write a survey as a robot program."""
+"""Write a survey as a robot program, in the language of the arm's controller."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.calibration.pose_design import design_survey, where_to_reverse
+from postproc.exceptions import ProgramError
 from postproc.files import write_all
+from postproc.language.language import Language
+from postproc.language.languages import file_named, language_of, languages
+from postproc.language.measuring_program import (
+    TITLE,
+    MeasuringMove,
+    MeasuringProgram,
+    MountedProbe,
+    name_of_file,
+)
 from postproc.robot.cell import Cell, SurveySection, as_cell
 from postproc.robot.pose import MM
 
 BACK = np.deg2rad(2.0)  # how far to the side every approach starts [rad]
-SETTLE_MS = 1500  # pause before the tracker reads
+SETTLE = 1.5  # [s] pause before the tracker reads
+ANY_TOOL = 3  # probe points of a survey that holds for any tool
 STEPS = np.array([0.1, 0.2, 0.4, 0.8, 1.6]) * 1e-3  # [rad] of a drive that turns back
 
 
-def survey_program(
+def plan_survey(
     cell: Cell,
     q: Floats,
     side: Floats,
     probe: Ints,
     name: str,
     reversals: Sequence[tuple[int, int]] = (),
-) -> str:
-    """Write a survey: every pose is reached twice, with all joints from the other side.
+) -> MeasuringProgram:
+    """Plan a survey: every pose is reached twice, with all joints from the other side.
 
     Args:
         cell: The cell; its probe points become the program's tools.
@@ -37,55 +48,47 @@ def survey_program(
         reversals: Poses, from 0, at which drives, from 0, turn back step by step.
 
     Returns:
-        The program text. The measurement ids are the pose number with a or b; of
-        reversals the numbers of pose, drive and step.
+        The program. The measurement ids are the pose number with a or b; of reversals
+        the numbers of pose, drive and step.
     """
     measured = 2 * len(q) + len(reversals) * (1 + len(STEPS))
     more = f", and {len(reversals)} reversals" if reversals else ""
     count = f"{len(q)} poses, each from both sides{more}: {measured} measurements"
-    lines = [
-        f"-- Laser-tracker survey of {cell.arm.name}: {count}",
-        "-- After a MEASURE comment: read the tracker when the next move has settled.",
-        f"PROGRAM {name} EZ, HOLD",
-        "BEGIN",
-        "  $TERM_TYPE := FINE",
-    ]
+    heading = (
+        f"{TITLE} {cell.arm.name}: {count}",
+        "After a MEASURE comment: read the tracker when the next move has settled.",
+    )
+    steps: list[MountedProbe | MeasuringMove] = []
     mounted = -1
     for i in np.argsort(probe, kind="stable"):
         if probe[i] != mounted:
             mounted = int(probe[i])
-            lines.append(f"  -- probe point {mounted + 1}")
-            xyz = ", ".join(f"{v:.3f}" for v in cell.probes[mounted] / MM)
-            lines.append(f"  $TOOL := POS({xyz}, 0, 0, 0, '')")
+            place = tuple((cell.probes[mounted] / MM).tolist())
+            steps.append(MountedProbe(mounted + 1, place))
         for letter, sign in (("a", 1.0), ("b", -1.0)):
-            lines.append(f"  MOVE JOINT TO {_joints(q[i] - sign * BACK * side[i])}")
-            lines += _write_measured_move(f"{i + 1}{letter}", q[i])
+            steps.append(_move(q[i] - sign * BACK * side[i]))
+            steps.append(_move(q[i], f"{i + 1}{letter}"))
         for drive in (drive for pose, drive in reversals if pose == i):
-            lines += _reversal(cell, q[i], side[i], int(i), drive)
-    return "\n".join([*lines, f"END {name}", ""])
+            steps += _reversal(cell, q[i], side[i], int(i), drive)
+    centre = tuple((cell.payload_com / MM).tolist())
+    return MeasuringProgram(
+        name, heading, tuple(steps), SETTLE, cell.payload_mass, centre
+    )
 
 
-def _reversal(cell: Cell, q: Floats, side: Floats, pose: int, drive: int) -> list[str]:
-    """Write an arrival from afar, and steps of one drive back from there."""
+def _reversal(
+    cell: Cell, q: Floats, side: Floats, pose: int, drive: int
+) -> Iterator[MeasuringMove]:
+    """Arrive from afar, and go steps of one drive back from there."""
     coupling = cell.arm.coupling
     back = -np.sign(coupling[drive] @ side) * np.linalg.inv(coupling)[:, drive]
-    lines = [f"  MOVE JOINT TO {_joints(q - BACK * side)}"]
+    yield _move(q - BACK * side)
     for k, step in enumerate((0.0, *STEPS)):
-        lines += _write_measured_move(f"{pose + 1}.{drive + 1}.{k}", q + step * back)
-    return lines
+        yield _move(q + step * back, f"{pose + 1}.{drive + 1}.{k}")
 
 
-def _write_measured_move(name: str, q: Floats) -> list[str]:
-    return [
-        f"  -- MEASURE {name}",
-        f"  MOVE JOINT TO {_joints(q)}",
-        f"  DELAY {SETTLE_MS}",
-    ]
-
-
-def _joints(q: Floats) -> str:
-    """Write joint angles [rad] as a joint target."""
-    return "{" + ", ".join(f"{v:.5f}" for v in np.rad2deg(q)) + "}"
+def _move(q: Floats, measured: str = "") -> MeasuringMove:
+    return MeasuringMove(tuple(np.rad2deg(q).tolist()), measured)
 
 
 def write_survey(cell: Cell | str | Path, output: Path, poses: int) -> str:
@@ -93,26 +96,61 @@ def write_survey(cell: Cell | str | Path, output: Path, poses: int) -> str:
 
     Args:
         cell: The cell, or its file.
-        output: The program to write.
+        output: The program to write; its suffix names the language.
         poses: Number of poses.
 
     Returns:
         What was written, with the observability of the design, in words.
 
     Raises:
+        ProgramError: The arm has a controller of another language.
         PostprocError: A wrong number of poses.
         OutputError: The program cannot be written.
     """
     cell = as_cell(cell)
+    language = _language_for(cell, output)
     asked = cell.file.survey or SurveySection()
     arm, probes = cell.arm, cell.probes
     design = design_survey(arm, probes, poses, asked.mode, cell.tracker, asked.seed)
-    name = "".join(c if c.isalnum() else "_" for c in output.stem) or "survey"
     turned = (
         where_to_reverse(arm, design, probes, asked.reversals)
         if asked.reversals
         else []
     )
-    text = survey_program(cell, design.q, design.side, design.probe, name, turned)
+    name = name_of_file(output.stem)
+    program = plan_survey(cell, design.q, design.side, design.probe, name, turned)
+    text = language.write_measuring(program, output)
     write_all({output: text.encode("ascii")})
-    return f"{output}: {design.summary()}"
+    told = f"{output}: {design.summary()}"
+    if len(probes) < ANY_TOOL:
+        told += (
+            f"\n{len(probes)} of {ANY_TOOL} probe points: the model will hold only for "
+            f"tools with the tip there. Give {ANY_TOOL} under [survey] points_mm"
+        )
+    return told
+
+
+def _language_for(cell: Cell, output: Path) -> Language:
+    """Return the language that a survey is written in.
+
+    A file that is no program by its name is one of the arm's controller. A controller
+    that runs no language of ours gets any of them, to be translated.
+
+    Raises:
+        ProgramError: The arm has a controller of another language.
+    """
+    run = [one for one in languages() if one.controller in cell.controllers]
+    if not file_named(output).is_program:
+        return (run or languages())[0]
+    language = language_of(output.name)
+    if run and language not in run:
+        own, usual = " or ".join(cell.controllers), run[0].suffixes[0]
+        raise ProgramError(
+            output,
+            f"the controller of {cell.arm.name} is of {own}, and {language.name} "
+            f"programs run on those of {language.controller}",
+            f"Write {output.stem}{usual}; if the controller is of "
+            f'{language.controller}, write controller = "{language.controller}" under '
+            f"[robot] of {cell.path}",
+        )
+    return language

@@ -16,10 +16,9 @@ from postproc.files import (
     Content,
     check_places,
     is_stream,
-    is_variables,
-    variables_of,
     write_all,
 )
+from postproc.language.languages import file_named
 from postproc.report.json import report_pieces
 
 
@@ -104,7 +103,7 @@ class Destination:
                 files |= outcome.name_files({page.name: place}, place)
         own = self._own_places(outcome, target, values)
         variables = self.given.variables
-        unchanged = variables_of(self.given.name) not in own
+        unchanged = file_named(self.given.name).variables not in own
         if values and variables is not None and unchanged:
             files[values] = variables
         # A record speaks of the files beside it.
@@ -122,12 +121,12 @@ class Destination:
         self, outcome: Outcome, target: Path | None, values: Path | None
     ) -> dict[str, Path]:
         """Tell where the program and its values go, where those are files."""
-        name = variables_of(self.given.name)
+        name = file_named(self.given.name).variables
         own: dict[str, Path] = {}
         if name in outcome.outputs:
             changed = self.given.variables_path or Path(name)
             place = values or _file_of(target, changed)
-            beside = place.with_name(variables_of(place.name))
+            beside = place.with_name(file_named(place.name).variables)
             if place.suffix.isupper():  # JOB.PDL has JOB.LSV beside it
                 beside = beside.with_suffix(beside.suffix.upper())
             own[name] = values or beside
@@ -143,7 +142,7 @@ def _file_of(target: Path | None, part: Path) -> Path:
         OutputError: The program goes to standard output, a pipe or a device.
     """
     if target is None or is_stream(target):
-        how = "--variables-out FILE, or " if is_variables(part.name) else ""
+        how = "--variables-out FILE, or " if file_named(part).is_variables else ""
         raise OutputError(
             part,
             "changes too, and nothing says where it goes",

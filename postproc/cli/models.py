@@ -31,8 +31,7 @@ from postproc.cli.reports import (
     ReportOption,
     Reports,
 )
-from postproc.exceptions import PostprocError
-from postproc.files import check_places, is_program
+from postproc.files import check_places
 
 
 class Method(StrEnum):
@@ -49,7 +48,10 @@ class Method(StrEnum):
 @app.command()
 def survey(
     cell: CellOption,
-    output: Annotated[Path, typer.Option("-o", "--output", help="SURVEY.pdl (PDL2)")],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", help="SURVEY.pdl, .mod or .src: its language."),
+    ],
     poses: Annotated[int, typer.Option("--poses", help="Number of poses.")] = 300,
     changes: SetSurvey = None,
 ) -> None:
@@ -58,12 +60,6 @@ def survey(
     from postproc.robot.cell import load_cell
 
     with report_errors():
-        if is_program(output.name) and output.suffix.lower() != ".pdl":
-            raise PostprocError(
-                f"{output}: survey programs are PDL2. Write SURVEY.pdl; for another "
-                "controller move its joint moves into a program of its language, with "
-                "the ids in comments (! MEASURE 1a in RAPID, ; MEASURE 1a in KRL)"
-            )
         check_places([output], [cell])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):

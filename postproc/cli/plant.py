@@ -20,7 +20,7 @@ from postproc.cli.common import (
 from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.exceptions import PostprocError
-from postproc.files import check_places, is_program
+from postproc.files import check_places
 
 if TYPE_CHECKING:
     from postproc.batch.journal import Summary
@@ -252,12 +252,13 @@ def _second_opinion(
     from postproc.batch.plan import make_plan
     from postproc.batch.second_opinion import judge_tree
     from postproc.batch.tree import scan
+    from postproc.language.languages import file_named
 
     own = (None, None) if cell is None and plan is not None else (cell, model)
     made = make_plan(plan, *own, DEFAULT_OPTIONS, changes)
     judged = judge_tree(folder, made)
     refused = sorted(scan(folder, made).refused.items())
-    outside = [(place, why) for place, why in refused if is_program(place)]
+    outside = [(place, why) for place, why in refused if file_named(place).is_program]
     return replace(judged, skipped=(*judged.skipped, *outside))
 
 

@@ -20,6 +20,7 @@ from postproc.compensation.findings import (
     listing_cost,
     missing_file,
     no_advice,
+    report_averaged_points,
     report_controller_assumption,
     report_uncertain_frames,
     report_uncertain_sides,
@@ -61,7 +62,7 @@ from postproc.compensation.targets import report_rounded_points, unknown_blends
 from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.language import Language
-from postproc.language.languages import language_of
+from postproc.language.languages import UNNAMED, language_of
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
 from postproc.language.visits import Diagnostic, Visits, deduplicate
@@ -80,7 +81,7 @@ def compensate(
     cell: Cell | str | Path,
     model: Model | str | Path,
     *,
-    name: str = "program.pdl",
+    name: str = UNNAMED,
     variables: bytes | str | Path | None = None,
     pages: Mapping[str, bytes] = NO_PAGES,
     options: Options = DEFAULT_OPTIONS,
@@ -341,6 +342,7 @@ def _findings(
         *unknown_blends(visits, rows),
         *report_uncertain_sides(visits, rows, d.side, d.std_error, advice),
         *report_uncertain_frames(visits, rows, d.std_error, cell),
+        *report_averaged_points(visits, d),
         *flank_steps(visits, rows, kept.position, d.side, setting.gap, cell.arm),
         *listing_cost(visits, rows, d.q, cell.arm),
         *(in_time.findings(visits) if in_time is not None else ()),

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Interned, Ints, any_in_rows
-from postproc.compensation.agreement import LEVER_MM, Agreement, agree
+from postproc.compensation.agreement import LEVER_MM, Agreement, agree, average
 from postproc.compensation.arc_angles import ASTRAY
 from postproc.compensation.continuity import (
     PathCorrection,
@@ -24,6 +24,7 @@ from postproc.compensation.inverse_model import (
     change_mm,
     new_numbers,
     solve_written,
+    std_errors_at,
     turns_in_file,
 )
 from postproc.compensation.options import Job, Options
@@ -39,6 +40,7 @@ from postproc.motion.targets import TargetKind
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell, LimitSection
 from postproc.robot.pose import MM, has_unknown, lengths
+from postproc.robot.state import States
 
 # Targets that the program computes from others: they move along with them.
 
@@ -170,7 +172,7 @@ def mark_disagreement(
     """
     limit = cell.limits.conflict_mm
     has = agreement.group >= 0
-    apart = ~(agreement.spread_mm <= limit)
+    apart = agreement.find_apart(limit)
     stays = np.any([apart, *stay.values()], axis=0)
     together = agreement.usable & ~stays
     if len(together) == 0:
@@ -471,6 +473,10 @@ SHIFTED_APART = (
     "its arrivals need shifts (such as Offs) that differ by more than conflict_mm = "
     "{:g}: give each arrival a move of its own"
 )
+AVERAGED = (
+    "its arrivals need different corrections: the point has one that is at most {:.3f} "
+    "mm off each"
+)
 NOT_ABSORBED = Reason(
     Code.ARRIVALS_DIFFER,
     "one shift (such as Offs) does not fit the corrections of all points that it "
@@ -495,7 +501,7 @@ class Settled:
 
     def together(self, agree_mm: float) -> Bools:
         """Tell which literals can be given new numbers, (m,)."""
-        apart = ~(self.agreement.spread_mm <= agree_mm)
+        apart = self.agreement.find_apart(agree_mm)
         stays = np.any([apart, *self.stay.values()], axis=0)
         return np.asarray(self.agreement.usable & ~stays)
 
@@ -513,6 +519,8 @@ class Proposal:
         change_mm: What they would be corrected by, as arrivals at one point compare
             it, (n, k) [mm].
         fixed: Literals that must keep their values for what else depends on them, (k,).
+        left_mm: The most that one correction for arrivals which need different ones is
+            off what an arrival needs, (n,) [mm]; 0 where they agree.
     """
 
     edited: Ints
@@ -522,6 +530,7 @@ class Proposal:
     usable: Bools
     change_mm: Floats
     fixed: Ints
+    left_mm: Floats
 
 
 @dataclass(frozen=True)
@@ -531,6 +540,7 @@ class Round:
     Attributes:
         reading: The program.
         planned: Its plan, n visits.
+        states: The same in the model's terms.
         solved: The corrected command of every visit.
         departure: How far the commands lead the arm from where it was, n visits.
         aside: From targets to where the corrected path passes them, (n, 3) [m].
@@ -541,6 +551,7 @@ class Round:
 
     reading: ParsedProgram
     planned: PlannedProgram
+    states: States
     solved: Commands
     departure: JointDeviation
     aside: Floats
@@ -640,6 +651,9 @@ class Round:
         status[display] = Status.RUNTIME
         status[unchanged] = Status.UNCHANGED
         corrected = status == Status.CORRECTED
+        left = np.zeros(len(visits))
+        left[corrected] = agreement.radius_mm[agreement.group[corrected]]
+        self._mark_averaged(reasons, left)
         values = np.array(visits.values)
         values[corrected] = agreement.values[agreement.group[corrected]]
         move_dependants(visits, agreement, chosen, values)
@@ -649,11 +663,20 @@ class Round:
             literals,
             new,
             corrected,
-            self._decisions(status, reasons, values),
+            self._decisions(status, reasons, values, agreement),
             usable,
             settled.change,
             agreement.literal[np.any([*stay.values()], axis=0)],
+            left,
         )
+
+    def _mark_averaged(self, reasons: Reasons, left_mm: Floats) -> None:
+        """Say of arrivals that need different corrections what one leaves of them."""
+        most = self.setting.cell.limits.averaged_mm
+        for size in np.unique(np.round(left_mm[left_mm > 0.0], 3)).tolist():
+            code = Code.ARRIVALS_AVERAGED if size <= most else Code.ARRIVALS_FAR_APART
+            rows = np.isclose(left_mm, size, atol=5.1e-4)
+            reasons.mark(rows & (left_mm > 0.0), Reason(code, AVERAGED.format(size)))
 
     def _guard(self, reasons: Reasons, strays: Bools, border: Bools) -> None:
         """Mark the visits whose corrections are not trusted."""
@@ -700,7 +723,9 @@ class Round:
         """
         visits, limit = self.reading.visits, self.setting.cell.limits.conflict_mm
         numbers, change, both = self._collect_needs()
-        points = agree(visits.literal, usable, numbers, both)
+        points = self._average(
+            agree(visits.literal, usable, numbers, both), numbers, both
+        )
         shifts, lost = own_shifts(visits), np.zeros(len(points.literal), dtype=bool)
         absorbing = shifts & points.usable[points.group] if shifts.any() else shifts
         while True:
@@ -719,6 +744,34 @@ class Round:
             lost = np.array(lost)
             lost[points.group[failed]] = True
             absorbing = absorbing & ~failed
+
+    def _average(self, found: Agreement, numbers: Floats, change: Floats) -> Agreement:
+        """Give arrivals that do not agree one correction, where it helps all of them.
+
+        The args are those of `agree`. Fly points and points of arcs and curves are not
+        averaged, nor points reached in several frames, or shifted.
+        """
+        limits, options = self.setting.cell.limits, self.setting.options
+        apart = found.usable & found.find_apart(limits.conflict_mm)
+        if options.shared_points != "mean" or not apart.any():
+            return found
+        visits, via = self.reading.visits, self.reading.visits.via
+        other = visits.fly | via | np.append(False, via[:-1]) | visits.curved
+        other |= (visits.block >= 0) | (visits.shift >= 0)
+        apart[found.group[other & (found.group >= 0)]] = False
+        for frame in (visits.uframe, visits.base, visits.tool):
+            low, high = np.full(len(apart), 2**31), np.full(len(apart), -1)
+            rows = found.group >= 0
+            np.minimum.at(low, found.group[rows], frame[rows])
+            np.maximum.at(high, found.group[rows], frame[rows])
+            apart &= low == high
+        return average(found, numbers, change, apart, self._measure_doubt)
+
+    def _measure_doubt(self, rows: Ints) -> Floats:
+        """Measure how uncertain the errors at some visits are, (k,) [mm]."""
+        job = self.setting
+        states, solved = self.states, self.solved
+        return lengths(std_errors_at(job.model, job.cell, states, solved, rows)) / MM
 
     def _find_pinned(
         self, agreement: Agreement, change: Floats, absorbing: Bools
@@ -768,11 +821,14 @@ class Round:
             both = np.concatenate([both, anew * FLAG_MM], axis=1)
         return numbers, change, both
 
-    def _decisions(self, status: Ints, reasons: Reasons, values: Floats) -> Decisions:
+    def _decisions(
+        self, status: Ints, reasons: Reasons, values: Floats, agreement: Agreement
+    ) -> Decisions:
         """Say what was decided for every visit, but for standard errors."""
         side, moves = self.solved.direction, (status == Status.CORRECTED)[:, None]
+        moved = agreement.share_out(self.correction)
         turn = (
-            np.where(moves, self.solved.turn, 0.0)
+            np.where(moves, agreement.share_out(self.solved.turn), 0.0)
             if self.setting.options.orientation
             else NONE
         )
@@ -784,7 +840,7 @@ class Round:
             direction=(side >= KNOWN).astype(np.int8) - (side <= -KNOWN),
             side=side,
             corrected=values,
-            correction=np.where(moves, self.correction, 0.0),
-            std_error=np.full_like(self.correction, np.nan),  # when all is settled
+            correction=np.where(moves, moved, 0.0),
+            std_error=np.full_like(moved, np.nan),  # when all is settled
             turn=turn,
         )

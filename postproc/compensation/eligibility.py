@@ -92,6 +92,13 @@ STRANDED = Reason(
     "the arm cannot reach the previous target as it is written, so that the approach "
     "is not known: correct the previous target first",
 )
+STOPPED = Reason(
+    Code.UNKNOWN_POSITION_BEFORE,
+    "the controller stops at the previous target, or may, because of its configuration "
+    "flags, so that the approach is not known: correct these first",
+)
+CONTRADICTED, BEYOND_REACH, BEHIND_STOP = 1, 2, 4
+"""Why what comes from a visit is doubtful."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +127,20 @@ def find_overruled(targets: Targets, plan: Plan) -> Overruled:
         path & (plan.slot != targets.slot),
         path & on_other_turns(plan.q, targets.turns) & ~targets.nearest_turn,
     )
+
+
+def find_stops(visits: Visits, targets: Targets, plan: Plan) -> Bools:
+    """Find where the controller stops, or may, because of configuration flags, (n,).
+
+    Args:
+        visits: What the program says.
+        targets: Its n moves.
+        plan: Where they lead.
+    """
+    path = find_overruled(targets, plan)
+    checked = (visits.care == Switch.ON) | (visits.care == Switch.UNKNOWN)
+    found = (path.branch & checked[:, CNFG]) | (path.turn & checked[:, TURN])
+    return np.asarray(found | _find_misses(visits, targets, plan))
 
 
 def mark_configuration_flags(
@@ -158,9 +179,9 @@ def mark_configuration_flags(
 
 
 def mark_stranded(
-    visits: Visits, targets: Targets, plan: Plan, reasons: Reasons
-) -> None:
-    """Leave alone what comes from targets that the arm cannot reach.
+    visits: Visits, targets: Targets, plan: Plan, reasons: Reasons, begun: int = 0
+) -> Ints:
+    """Leave alone what comes from targets that the arm does not reach.
 
     There the controller stops with an error, and who goes on comes from anywhere.
 
@@ -169,11 +190,23 @@ def mark_stranded(
         targets: Its n moves.
         plan: Where they lead.
         reasons: Why visits must not be compensated; more are added.
+        begun: Whether what comes from the first visit is doubtful, as returned.
+
+    Returns:
+        Whether what comes from a visit is doubtful, and why: 0, or BEYOND_REACH and
+        BEHIND_STOP, (n,).
     """
-    stranded = STRANDS[plan.reason]
-    if stranded.any():
-        reached, _ = _followers(visits, stranded, _find_placed(targets))
-        reasons.mark(reached, STRANDED)
+    found = np.zeros(len(visits), dtype=np.int64)
+    for why, rows, reason in (
+        (BEYOND_REACH, STRANDS[plan.reason], STRANDED),
+        (BEHIND_STOP, np.array(targets.stops), STOPPED),
+    ):
+        rows[:1] |= bool(begun & why)
+        if rows.any():
+            reached, on = _followers(visits, rows, _find_placed(targets))
+            reasons.mark(reached, reason)
+            found[on] |= why
+    return found
 
 
 def _find_placed(targets: Targets) -> Bools:
@@ -199,14 +232,19 @@ def _mark_misses(
     visits: Visits, targets: Targets, plan: Plan, reasons: Reasons
 ) -> None:
     """Leave alone where finer flags than branch and turn are not those of the plan."""
+    text = visits.dialect.terms.branch_stops
+    reason = Reason(Code.CONFIGURATION_CONTRADICTED, text)
+    reasons.mark(_find_misses(visits, targets, plan), reason)
+
+
+def _find_misses(visits: Visits, targets: Targets, plan: Plan) -> Bools:
+    """Find checked flags, finer than branch and turn, that are not the plan's, (n,)."""
+    off = np.zeros(len(visits), dtype=bool)
     rows = np.flatnonzero((targets.kind == TargetKind.POSE) & (targets.slot >= 0))
     missed = visits.dialect.misses(visits.values[rows], plan.q[rows])
-    if missed is None:
-        return
-    off, terms = np.zeros(len(visits), dtype=bool), visits.dialect.terms
-    off[rows] = missed & ~np.isnan(plan.q[rows, 0])
-    off &= visits.care[:, CNFG] != Switch.OFF
-    reasons.mark(off, Reason(Code.CONFIGURATION_CONTRADICTED, terms.branch_stops))
+    if missed is not None:
+        off[rows] = missed & ~np.isnan(plan.q[rows, 0])
+    return np.asarray(off & (visits.care[:, CNFG] != Switch.OFF))
 
 
 def _mark_either_way(

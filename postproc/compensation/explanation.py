@@ -24,6 +24,7 @@ from postproc.compensation.program_files import NO_PAGES, ProgramFiles, program_
 from postproc.compensation.timing_comparison import InTime
 from postproc.diagnostics import Reason
 from postproc.exceptions import ProgramError
+from postproc.language.languages import UNNAMED
 from postproc.language.visits import (
     ELSEWHERE,
     START,
@@ -182,7 +183,7 @@ def explain(
     cell: Cell | str | Path,
     model: Model | str | Path | None = None,
     *,
-    name: str = "program.pdl",
+    name: str = UNNAMED,
     variables: bytes | str | Path | None = None,
     pages: Mapping[str, bytes] = NO_PAGES,
     options: Options = DEFAULT_OPTIONS,

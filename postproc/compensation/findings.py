@@ -8,16 +8,10 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, map_chunks
 from postproc.compensation.continuity import on_path
+from postproc.compensation.outcome import Decisions
 from postproc.compensation.taught_frames import find_taught_records
 from postproc.diagnostics import Code
-from postproc.files import (
-    is_from_elsewhere,
-    is_shared_list,
-    is_submit,
-    is_variables,
-    variables_of,
-)
-from postproc.language.languages import language_of
+from postproc.language.languages import file_named, language_of
 from postproc.language.visits import Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -78,10 +72,11 @@ def list_followed_pages(visits: Visits, untouched: Collection[str]) -> list[Diag
         visits: The arrivals of the job.
         untouched: Names of files that are never rewritten.
     """
+    files = enumerate(map(file_named, visits.files[1:]), start=1)
     pages = [
-        (number, name)
-        for number, name in enumerate(visits.files[1:], start=1)
-        if not (is_variables(name) or is_from_elsewhere(name))
+        (number, file.place)
+        for number, file in files
+        if not (file.is_variables or file.is_from_elsewhere)
     ]
     uses = [f"{name} {_use(name, k, visits, untouched)}" for k, name in pages]
     return [Diagnostic(visits.files[0], 1, Code.PAGE, use) for use in uses]
@@ -89,7 +84,7 @@ def list_followed_pages(visits: Visits, untouched: Collection[str]) -> list[Diag
 
 def _use(name: str, number: int, visits: Visits, untouched: Collection[str]) -> str:
     """Say what is done with a file of a job."""
-    if is_shared_list(name) or is_submit(name):
+    if file_named(name).is_shared:
         return "is read, but not written: all programs share it"
     pinned = [bool(why) for why in visits.literals.pinned]
     own = np.array(pinned, dtype=bool)[visits.literals.file == number]
@@ -100,8 +95,8 @@ def _use(name: str, number: int, visits: Visits, untouched: Collection[str]) -> 
 
 def missing_file(visits: Visits) -> list[Diagnostic]:
     """Tell that a program came without the variable file that holds its targets."""
-    name = variables_of(visits.files[0])
-    if not name or any(map(is_variables, visits.files)):
+    name = file_named(visits.files[0]).variables
+    if not name or any(file_named(one).is_variables for one in visits.files):
         return []
     none = np.array([one.code is Code.NO_VALUE for one in visits.reasons])
     lost = none[visits.reason]
@@ -186,7 +181,7 @@ def listing_cost(
     """
     if len(visits.literals) == 0:
         return []
-    files = np.array([*map(is_variables, visits.files)])
+    files = np.array([file_named(name).is_variables for name in visits.files])
     rows = corrected & files[visits.literals.file[visits.literal]]
     found = []
     poses = rows & (visits.target != Meaning.JOINTS)
@@ -266,6 +261,27 @@ def report_uncertain_frames(
         )
         where = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
         found.append(Diagnostic(*where, Code.DIRECTION_UNCERTAIN, text))
+    return found
+
+
+def report_averaged_points(visits: Visits, decisions: Decisions) -> list[Diagnostic]:
+    """List the points that have one correction for arrivals that need different ones.
+
+    Args:
+        visits: Every arrival.
+        decisions: What was decided for it.
+    """
+    found = []
+    for code in (Code.ARRIVALS_AVERAGED, Code.ARRIVALS_FAR_APART):
+        averaged = np.array([one.code is code for one in decisions.reasons])
+        rows = np.flatnonzero(averaged[decisions.why])
+        _, first = np.unique(visits.literal[rows], return_index=True)
+        for i in rows[np.sort(first)].tolist():
+            text = decisions.reasons[decisions.why[i]].text
+            if name := visits.names[visits.name[i]]:
+                text = f"{name}: {text}"
+            place = visits.files[visits.file[i]], int(visits.line[i])
+            found.append(Diagnostic(*place, code, text))
     return found
 
 

@@ -317,11 +317,17 @@ def std_errors(model: Model, cell: Cell, states: States, solved: Commands) -> Fl
     """
     out = np.array(solved.std_error)
     rows = np.flatnonzero(solved.known & np.isnan(out[:, 0]))
+    out[rows] = std_errors_at(model, cell, states, solved, rows)
+    return out
+
+
+def std_errors_at(
+    model: Model, cell: Cell, states: States, solved: Commands, rows: Ints
+) -> Floats:
+    """Standard errors at some visits of known joint angles, per axis, (k, 3) [m]."""
     here = states.with_(direction=solved.direction)[rows]
     near = with_surveyed_load(model, cell, here)
-    added = load_error(model, cell, here)
-    out[rows] = np.hypot(model.std_error(cell.arm, near), added)
-    return out
+    return np.hypot(model.std_error(cell.arm, near), load_error(model, cell, here))
 
 
 def turns_between(new: Floats, old: Floats) -> Floats:

@@ -54,7 +54,7 @@ from postproc.motion.replan import Reached, Replanned, replan, replan_all
 from postproc.motion.targets import Targets
 from postproc.robot.cell import Cell
 from postproc.robot.direction import FlankState
-from postproc.robot.pose import has_unknown
+from postproc.robot.pose import MM, has_unknown
 from postproc.robot.state import States
 
 # The side at which aim and arrival agree, searched joint by joint.
@@ -229,9 +229,10 @@ class Iteration:
         with self.setting.clock("decide"):
             plan = self.planned.plan
             aside = passing_after(plan, self.find_wanted_shifts(current)) + current.bent
-            given = self.reading, self.planned, current.solved, current.departure
+            given = self.reading, self.planned, self.states
+            found = current.solved, current.departure, aside
             left = current.held, current.swung
-            return Round(*given, aside, *left, self.setting).propose(), aside
+            return Round(*given, *found, *left, self.setting).propose(), aside
 
     def find_wanted_shifts(self, current: SolverState) -> Floats:
         """Say what the path should move by at every target, (n, 3) [m]."""
@@ -531,6 +532,8 @@ def _read_back(
         model, cell = setting.model, setting.cell
         std_error = std_errors(model, cell, iteration.states, current.solved)
         std_error = iteration.planned.with_frame(std_error)
+        shared = proposal.left_mm * MM / np.sqrt(3.0)  # an axis
+        std_error = np.hypot(std_error, shared[:, None])
     decided = replace(proposal.decisions, std_error=std_error)
     proposal = replace(proposal, decisions=decided)
     with setting.clock("verify"):

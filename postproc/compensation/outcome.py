@@ -26,9 +26,9 @@ from postproc.files import (
     check_places,
     is_stream,
     make_folder,
-    variables_of,
     write_all,
 )
+from postproc.language.languages import file_named
 from postproc.language.visits import (
     NOT_FOLLOWED,
     Diagnostic,
@@ -168,7 +168,8 @@ class Outcome:
                 written.
         """
         names = {name: Path(folder, Path(name).name) for name in self.outputs}
-        own = [n for n in (variables_of(self.program), self.program) if n in names]
+        values = file_named(self.program).variables
+        own = [n for n in (values, self.program) if n in names]
         files: dict[Path, Content] = {}
         for name in reversed([name for name in names if name not in own]):
             files |= self.name_files({name: names[name]}, names[name])
@@ -237,6 +238,8 @@ class Outcome:
         missed = any(d.code in NOT_FOLLOWED for d in self.diagnostics)
         missed |= self.in_time is not None and self.in_time.falls_short
         missed |= self.opinion is not None and not self.opinion.agrees
+        far = [one.code is Code.ARRIVALS_FAR_APART for one in self.decisions.reasons]
+        missed |= bool(np.array(far)[self.decisions.why].any())
         return NOT_ALL if missed or np.isin(self.decisions.status, left).any() else DONE
 
     def summary(self) -> str:

@@ -262,7 +262,7 @@ class Corrected:
         right: .. of those beside the cut behind, and of the next window's halo.
         exit: Where the arm stands at the first visit of that halo.
         arrivals: How it arrives there.
-        doubtful: Whether what comes from there is doubtful.
+        doubtful: Why what comes from there is doubtful; 0 where it is not.
     """
 
     window: Window
@@ -272,7 +272,7 @@ class Corrected:
     right: Mapping[str, NDArray[Any]]
     exit: StartState
     arrivals: Arrivals
-    doubtful: bool
+    doubtful: int
 
 
 def correct(reading: ParsedProgram, setting: Job) -> tuple[ParsedProgram, WindowResult]:
@@ -334,7 +334,7 @@ def _correct_visits(
     setting: Job,
     lead: Boundary = FROM_START,
     arrived: Arrivals = UNLED,
-    doubtful: bool = False,
+    doubtful: int = 0,
     trail: RoundLog | None = None,
 ) -> tuple[PlannedProgram, WindowResult, Proposal]:
     """Plan and correct some visits.
@@ -344,7 +344,7 @@ def _correct_visits(
         setting: What they are compensated with.
         lead: How they go on from others, see `iterate`.
         arrived: How the arm arrives at the first of them, see `plan_visits`.
-        doubtful: What comes from the first one is doubtful.
+        doubtful: Why what comes from the first one is doubtful, 0 where it is not.
         trail: See `iterate`.
     """
     cell, model, visits = setting.cell, setting.model, reading.visits
@@ -409,7 +409,7 @@ class _WindowWork:
             right=kept.rows(trail.right),
             exit=planned.plan.exact.at(at),
             arrivals=deepcopy(planned.plan.lead(rows)),
-            doubtful=bool(planned.doubtful[at : at + 1].any()),
+            doubtful=int(planned.doubtful[at : at + 1].max(initial=0)),
         )
 
     def _after(self, own: Window) -> int:
@@ -461,10 +461,10 @@ class _WindowWork:
         return [cuts.window(self.quiet, a, b) for a, b in bounds]
 
 
-def _lead(window: Window, before: Corrected | None) -> tuple[Boundary, Arrivals, bool]:
+def _lead(window: Window, before: Corrected | None) -> tuple[Boundary, Arrivals, int]:
     """Say how a window goes on from the one before."""
     if before is None or window.begin == 0:
-        return FROM_START, UNLED, False
+        return FROM_START, UNLED, 0
     rows = slice(0, window.first - window.begin)
     looks = Glimpses(before.trail.end)[rows]
     return Boundary(before.exit, looks), before.arrivals, before.doubtful

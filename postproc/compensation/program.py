@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Floats, Ints
 from postproc.compensation.eligibility import (
+    CONTRADICTED,
     Reasons,
+    find_stops,
     mark_arcs,
     mark_configuration_flags,
     mark_orientation_interpolation,
@@ -89,7 +91,8 @@ class PlannedProgram:
         shift: From where the controller takes every target to be to where it is, as
             far as a frame was taught with the arm's error in it, (n, 3) [m].
         shift_variance: Of it, (n, 3) [m^2].
-        doubtful: What comes from these targets is doubtful (see `eligibility`), (n,).
+        doubtful: Why what comes from these targets is doubtful (see `eligibility`),
+            (n,); 0 where it is not.
     """
 
     targets: Targets
@@ -97,7 +100,7 @@ class PlannedProgram:
     reasons: Reasons
     shift: Floats
     shift_variance: Floats
-    doubtful: Bools
+    doubtful: Ints
 
     def reference_poses(self, rows: Ints) -> Floats:
         """Return the TCP poses that should be reached at visits, (k, 4, 4) [m]."""
@@ -194,7 +197,7 @@ def plan_visits(
     timed: bool = True,
     begin: StartState = NOWHERE,
     lead: Arrivals = UNLED,
-    doubtful: bool = False,
+    doubtful: int = 0,
 ) -> PlannedProgram:
     """Plan every move of a program, with the time that it takes or without.
 
@@ -204,18 +207,25 @@ def plan_visits(
         timed: As in `plan`.
         begin: Where the arm stands at the first visit, if that is known beforehand.
         lead: What is known of the first arrivals, see `direction.arrivals`.
-        doubtful: What comes from there is doubtful (see `eligibility`).
+        doubtful: Why what comes from there is doubtful (see `eligibility`).
     """
     targets, reasons = targets_from_visits(visits, cell)
     wrist = np.deg2rad(cell.limits.wrist_deg)
     planned = plan(cell.arm, targets, wrist, timed, begin, lead)
+    stops = find_stops(visits, targets, planned)
+    if stops.any():  # the same ways, but that nobody knows how they go on from there
+        targets = replace(targets, stops=stops)
+        planned = plan(cell.arm, targets, wrist, timed, begin, lead)
     reasons.adopt(planned.reason, planned.reasons)
-    on = mark_configuration_flags(visits, targets, planned, cell.arm, reasons, doubtful)
-    mark_stranded(visits, targets, planned, reasons)
+    begun = bool(doubtful & CONTRADICTED)
+    on = mark_configuration_flags(visits, targets, planned, cell.arm, reasons, begun)
+    behind = mark_stranded(visits, targets, planned, reasons, doubtful)
     mark_orientation_interpolation(visits, targets, planned, reasons)
     mark_arcs(targets, planned, reasons)
     none = np.zeros((len(visits), 3))
-    return PlannedProgram(targets, planned, reasons, none, none, on)
+    return PlannedProgram(
+        targets, planned, reasons, none, none, behind | (CONTRADICTED * on)
+    )
 
 
 def states_of(

@@ -24,22 +24,16 @@ from postproc.exceptions import ProgramError
 from postproc.files import (
     STREAM,
     base_name,
-    find_shared,
-    find_variables,
-    is_data_list,
-    is_program,
-    is_shared_list,
     is_stream,
-    is_system_file,
-    is_variables,
-    name_read,
-    program_key,
-    program_of,
     read_input,
     read_stream,
-    variables_of,
 )
-from postproc.language.languages import language_of, language_of_text
+from postproc.language.languages import (
+    UNNAMED,
+    file_named,
+    language_of,
+    language_of_text,
+)
 from postproc.language.stamp import read_stamp
 from postproc.language.visits import Diagnostic
 from postproc.robot.cell import Cell
@@ -79,23 +73,21 @@ def find_pages(program: Path) -> Pages:
         _not_followed(program, line, f"{name!r} leads out of the folder: not followed")
         for name, line in outside.items()
     ]
-    main = program_key(program.name)
-    reads = find_shared(program)
-    if is_program(program.name):  # of an archive, what it reads in other folders
-        reads = (*reads, *language_of(program.name).reads(program))
+    main = file_named(program).key
+    reads = language_of(program.name).reads(program)
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes), reads)
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
-    values = {base_name(p.name) for p in files if is_variables(p.name)}
+    values = {base_name(p.name) for p in files if file_named(p).is_variables}
     stamped = read_stamp(read_head(program)) is not None
     outputs = stamped or sidecar_path(program).is_file()
-    programs = {program_key(p.name): p for p in files if _is_page(p, outputs)}
+    programs = {file_named(p).key: p for p in files if _is_page(p, outputs)}
     programs |= {main: program}
     named = {
         base: {name: k for name, k in names_in(path)[0].items() if name != main}
         for base, path in programs.items()
     }
-    arms = {base: program_arm(read_head(path)) for base, path in programs.items()}
+    arms = {base: program_arm(path) for base, path in programs.items()}
     apart = dict.fromkeys(values, "it has a variable file of its own")
     for base, arm in arms.items():
         if not of_one_arm(arms[main], arm):
@@ -112,8 +104,6 @@ def find_pages(program: Path) -> Pages:
 def archive_notes(program: Path, cell: Cell) -> tuple[Diagnostic, ...]:
     """Say what the backup of a program knows of the arm, and the cell does not."""
     notes: list[Diagnostic] = []
-    if not is_program(program.name):
-        return ()
     arms = language_of(program.name).list_placed_arms(program)
     for name, pose in arms[cell.arm_number - 1 : cell.arm_number]:
         apart = np.abs(pose - cell.base.pose)
@@ -134,12 +124,11 @@ def _not_followed(program: Path, line: int, text: str) -> Diagnostic:
 
 def _is_page(path: Path, outputs: bool) -> bool:
     """Tell whether a file is a program or a data list, be it an output or not."""
-    ours = is_program(path.name) or is_data_list(path.name)
-    if not (ours and path.is_file()) or is_shared_list(path.name):
+    file = file_named(path)
+    ours = file.is_program or file.is_data_list
+    if not (ours and path.is_file()) or file.is_shared or file.is_system():
         return False
-    if is_system_file(path):
-        return False
-    return outputs or is_data_list(path.name) or not is_output(path)
+    return outputs or file.is_data_list or not is_output(path)
 
 
 def _list_omitted(
@@ -220,15 +209,17 @@ class ProgramFiles:
         name = program_name(program, lsv)
         source = read_program_file(program)
         name = name_of_text(program, name, source)
-        if lsv is not None and not variables_of(name):
+        if lsv is not None and not file_named(name).variables:
             problem = f"a {language_of(name).name} program has no variable file"
             raise ProgramError(name, problem, "Leave --variables out")
-        lsv = lsv or (None if path is None else find_variables(path))
+        lsv = lsv or (None if path is None else file_named(path).find_variables())
         values = None if lsv is None else read_input(lsv)
         found = Pages() if path is None else find_pages(path)
         pages = {page.name: read_input(page) for page in found.paths}
         here = Path() if path is None else path.absolute()
-        pages |= {name_read(page, here): read_input(page) for page in found.reads}
+        pages |= {
+            file_named(page).name_for(here): read_input(page) for page in found.reads
+        }
         return cls(
             name, source, values, pages, path, lsv, found.paths, found.reads,
             found.notes,
@@ -254,7 +245,7 @@ class ProgramFiles:
 
 def program_files(
     program: str | Path | bytes | ProgramFiles,
-    name: str = "program.pdl",
+    name: str = UNNAMED,
     variables: bytes | str | Path | None = None,
     pages: Mapping[str, bytes] = NO_PAGES,
 ) -> ProgramFiles:
@@ -292,7 +283,7 @@ def name_files(
     """Name a program, its pages and its variable file, the program first."""
     files = {name: source, **pages}
     if variables is not None:
-        files[variables_of(name)] = variables
+        files[file_named(name).variables] = variables
     return files
 
 
@@ -303,9 +294,9 @@ def program_name(program: str, lsv: Path | None) -> str:
     ('job.pdl', 'weld.pdl')
     """
     name = Path(program).name
-    if not is_stream(program) or is_program(name):
+    if not is_stream(program) or file_named(name).is_program:
         return name
-    return program_of("stdin" if lsv is None else lsv.name)
+    return file_named("stdin" if lsv is None else lsv.name).program
 
 
 def name_of_text(program: str, name: str, source: bytes) -> str:
@@ -314,7 +305,7 @@ def name_of_text(program: str, name: str, source: bytes) -> str:
     >>> name_of_text("-", "stdin.pdl", b"MODULE weld")
     'stdin.mod'
     """
-    if not is_stream(program) or is_program(Path(program).name):
+    if not is_stream(program) or file_named(program).is_program:
         return name
     return Path(name).stem + language_of_text(source).suffixes[0]
 

@@ -255,6 +255,7 @@ def _targets(
         curved=visits.curved,
         along=along,
         past_start=find_past_start(visits),
+        stops=np.zeros(len(visits), dtype=bool),
         pred_start=pred_start,
         pred=pred,
     )

@@ -14,6 +14,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, all_in_rows
 from postproc.diagnostics import Code
 from postproc.language import ir as said
+from postproc.language.assigned_points import NO_POINTS, Points, Scope, TaskSymbols
 from postproc.language.comment_directives import Comments
 from postproc.language.control_flow import EXIT, HeadedRows, RoutineFlow, flow_of
 from postproc.language.language import Start
@@ -26,121 +27,6 @@ MOST_ROUNDS = 10_000  # rounds of loops within each other, followed one by one
 DEEPEST = 60  # calls within calls
 
 
-@dataclass(frozen=True)
-class Scope:
-    """Where a statement stands, and what loop variables hold there.
-
-    Attributes:
-        file: Index of its file.
-        module, routine: Names, "" outside of all.
-        parameters: Of the routine.
-        loops: Values of loop variables that are known.
-        given: What the routine is called with, by parameter: the operand, its row and
-            where that stands. Parameters without an entry are not known.
-        points: What points hold that assignments have changed, where a move is read.
-    """
-
-    file: int
-    module: str
-    routine: str
-    parameters: frozenset[str] = frozenset()
-    loops: tuple[tuple[str, float], ...] = ()
-    given: tuple[tuple[str, said.Operand, int, Scope], ...] = ()
-    points: frozenset[AssignedPoint] = frozenset()
-
-
-@dataclass(frozen=True)
-class AssignedPoint:
-    """What an assignment gives to a point.
-
-    Attributes:
-        place: File, module and routine that declare the point, and its name.
-        operand, row, scope: What is assigned, and where that stands.
-        copied: What another point holds that it is a copy of.
-    """
-
-    place: tuple[int, str, str, str]
-    operand: said.Operand
-    row: int
-    scope: Scope
-    copied: AssignedPoint | None = None
-
-    @property
-    def name(self) -> str:
-        """The name of the point."""
-        return self.place[-1]
-
-    @property
-    def names(self) -> frozenset[str]:
-        """Its name, and those of the points that it was copied or shifted from."""
-        named = source_of(self.operand)
-        own = set() if named is None else {named.name}
-        return frozenset(own.union(point.name for point in self.chain))
-
-    @property
-    def chain(self) -> list[AssignedPoint]:
-        """It, and what it is a copy of."""
-        return [self, *(self.copied.chain if self.copied else ())]
-
-
-NO_POINTS: frozenset[AssignedPoint] = frozenset()
-
-
-def source_of(operand: said.Operand | None) -> said.DataObject | None:
-    """Return the point that an operand names, or shifts, None where it does neither."""
-    while isinstance(operand, said.FunctionCall) and operand.arguments:
-        operand = operand.arguments[0].value
-    return operand if isinstance(operand, said.DataObject) else None
-
-
-@dataclass
-class NamesUsed:
-    """Names that the statements of a task change and take.
-
-    Attributes:
-        written: Those that assignments change; what takes a value does not read them.
-        changed: Those that may be changed otherwise.
-        read: Those that something but the destination of a move takes.
-        copies: Points that are assigned, and those that they are made from.
-    """
-
-    written: set[str] = field(default_factory=set)
-    changed: set[str] = field(default_factory=set)
-    read: set[str] = field(default_factory=set)
-    copies: set[tuple[str, str]] = field(default_factory=set)
-
-    def pass_on(self) -> None:
-        """Note of points what is noted of those that are made from them."""
-        before = -1
-        while before != len(self.read):
-            before = len(self.read)
-            self.read |= {one for target, one in self.copies if target in self.read}
-
-
-class TaskSymbols(ABC):
-    """What the names of a task mean, as far as ways through it ask."""
-
-    @property
-    @abstractmethod
-    def uses(self) -> NamesUsed:
-        """The names that statements change and take."""
-
-    @abstractmethod
-    def place_of_point(
-        self, name: str, here: Scope
-    ) -> tuple[int, str, str, str] | None:
-        """Return the place of a point that only assignments change, None for others."""
-
-    def find_held(
-        self, operand: said.Operand | None, here: Scope
-    ) -> AssignedPoint | None:
-        """Return what an assignment gave to the point that an operand names."""
-        if not (here.points and isinstance(operand, said.DataObject)) or operand.steps:
-            return None
-        place = self.place_of_point(operand.name, here)
-        return next((point for point in here.points if point.place == place), None)
-
-
 class VisitLike(Protocol):
     """An arrival as it is found."""
 
@@ -148,7 +34,7 @@ class VisitLike(Protocol):
     origins: frozenset[int]
     count: int
     goal: Any
-    points: frozenset[AssignedPoint] | None
+    agreed: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +101,7 @@ class Arrived:
 
     origins: frozenset[int]
     modes: Any
-    points: frozenset[AssignedPoint] = NO_POINTS
+    points: Points = NO_POINTS
 
     def join(self, other: Arrived) -> Arrived:
         """Allow for another way here."""
@@ -224,17 +110,16 @@ class Arrived:
         modes = self.modes
         if modes != other.modes:
             modes = modes.join(other.modes)
-        points = self.points & other.points
+        points = self.points.join(other.points)
         return Arrived(self.origins | other.origins, modes, points)
 
     def forget(self) -> Arrived:
         """Forget where the arm is, what moves are carried out with, and points."""
         return Arrived(NOWHERE, self.modes.forget())
 
-    def without(self, lost: Callable[[AssignedPoint], bool]) -> Arrived:
-        """Forget what some points hold."""
-        kept = frozenset(point for point in self.points if not lost(point))
-        return self if len(kept) == len(self.points) else replace(self, points=kept)
+    def with_points(self, points: Points) -> Arrived:
+        """Return it where points hold something else."""
+        return self if points is self.points else replace(self, points=points)
 
 
 NOWHERE = frozenset([ELSEWHERE])
@@ -263,6 +148,7 @@ class TaskMachine(ABC):
             the row behind the last.
         at_once: Moves that differ only in where they go are read at once.
         paused: Visits behind which the arm may stop before the program goes on.
+        lost: Visits behind which it may go anywhere.
     """
 
     comments: ClassVar[Comments]
@@ -277,6 +163,7 @@ class TaskMachine(ABC):
     beside: set[tuple[int, int, int]] = field(default_factory=set)
     at_once: bool = True
     paused: set[int] = field(default_factory=set)
+    lost: set[int] = field(default_factory=set)
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
     _numbers: dict[tuple[CallContext, int], list[int]] = field(default_factory=dict)
     _entered: dict[Place, Arrived] = field(default_factory=dict)
@@ -644,6 +531,8 @@ class TaskMachine(ABC):
     ) -> Arrived:
         """Call a routine that is not at hand: the cell may say what it does."""
         said_of_it = self.start.routines.get(name)
+        if said_of_it in ("moves", "sets-frames"):
+            self.lost |= here.origins
         if said_of_it == "moves":
             return replace(here, origins=NOWHERE)
         if said_of_it == "sets-frames":
@@ -692,7 +581,7 @@ class TaskMachine(ABC):
             self._contexts[key] = CallContext(scope, routine, flow, depth, caller, back)
         context = self._contexts[key]
         own = file, module, context.scope.routine
-        here = here.without(lambda point: point.place[:3] == own)  # declared anew
+        here = here.with_points(here.points.leave(own))  # declared anew
         here = self.at_call(context, here)
         self.enter(context, context.flow.first, here)
 
@@ -725,31 +614,18 @@ class TaskMachine(ABC):
             visit = self.visits[number]
             if visit.modes != here.modes:
                 visit.modes = visit.modes.join(here.modes)
-            held = here.points if visit.points is None else visit.points
-            visit.points = held & here.points
+            visit.agreed = visit.agreed and here.points.agree(visit.goal.given)
         self.visits[known[0]].origins |= here.origins
         return replace(here, origins=frozenset([known[-1]]))
 
     def assign_point(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
     ) -> Arrived:
-        """Note what an assignment gives to a point; a component leaves it unknown."""
+        """Note what an assignment gives to a point, or to a component of it."""
         if not isinstance(one, said.Assignment):
             return here
-        place = self.task.place_of_point(one.target.name, context.scope)
-        if place is None:
-            return here
-        held = frozenset[AssignedPoint]()
-        if not one.target.steps:
-            scope = replace(context.scope, points=here.points)
-            known = self.task.find_held(one.value, scope)
-            if known is not None:
-                given = replace(known, place=place, copied=known)
-            else:
-                given = AssignedPoint(place, one.value, row, context.scope)
-            held = frozenset([given])
-        here = here.without(lambda point: point.place == place)
-        return replace(here, points=here.points | held)
+        points = self.task.assign(here.points, one, row, context.scope)
+        return here.with_points(points)
 
     def settle_points(self) -> None:
         """Forget where moves go whose points hold other values on other ways."""
@@ -762,18 +638,23 @@ class TaskMachine(ABC):
             for name in self.changes_of(self.texts[at].statement(row))
         }  # fmt: skip
         for visit in given:
-            known = visit.goal.given <= visit.points
-            if not known or any(lost & point.names for point in visit.goal.given):
+            if not visit.agreed or any(lost & one.names for one in visit.goal.given):
                 visit.goal = visit.goal.lost
 
     def pause(self, here: Arrived) -> None:
         """Note that the arm may stop where it stands, although a zone is written."""
         self.paused |= here.origins
 
+    def find_unsure_stops(self) -> set[int]:
+        """Return the visits at which it is not known whether the arm stops."""
+        leads = set[int]().union(*(visit.origins for visit in self.visits))
+        return self.lost | (self.paused & leads)
+
     def unknown(
         self, context: CallContext, row: int, here: Arrived, what: str = NOT_FOLLOWED
     ) -> Arrived:
         """Say that a statement may move, and forget what was known."""
+        self.lost |= here.origins
         self.say(context.scope.file, row, Code.MOTION_UNKNOWN, what, quote=True)
         return here.forget()
 

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from postproc.arrays import Floats, Ints
+from postproc.files import FolderListing
 from postproc.language.archive import Archive
+from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.number_edits import Skeleton
 from postproc.language.pose_encoding import Dialect
 from postproc.language.source import Edit, Source
@@ -324,13 +326,38 @@ class Language(ABC):
         """Return what the archive of a controller gives, None for any other folder."""
         return None
 
-    def reads(self, program: Path) -> tuple[Path, ...]:
-        """Return files of an archive that a program reads and that stay as they are."""
+    def reads(
+        self,
+        program: Path,
+        within: Path | None = None,
+        listing: FolderListing | None = None,
+    ) -> tuple[Path, ...]:
+        """Return what a program reads of its archive, and other programs too.
+
+        It is not rewritten.
+
+        Args:
+            program: The program.
+            within: A folder that no list outside of is looked for.
+            listing: What folders hold; default: they are read.
+        """
         return ()
 
     def list_placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
         """Return the arms of an archive, and their poses (4, 4) [m] in the world."""
         return ()
+
+    @abstractmethod
+    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
+        """Write a measuring program as a controller takes it.
+
+        Args:
+            program: What it does.
+            file: Where it goes.
+
+        Raises:
+            ProgramError: It cannot be called as its file.
+        """
 
     def prepare(self) -> None:  # noqa: B027 - most have nothing to load
         """Load what reading the first program takes."""

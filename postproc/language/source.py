@@ -292,15 +292,15 @@ def source_from_bytes(name: str, data: bytes) -> Source:
         )
     said = data.removeprefix(UTF8_MARK)  # itself where there is no mark: no copy
     if not said or said.isspace():
-        raise ProgramError(name, "the file is empty", "Give a PDL2 program text.")
+        raise ProgramError(name, "the file is empty", "Give the text of a program")
     nul = data.find(b"\0")
     if nul >= 0:
         line = len(_LINE_END.findall(data, 0, nul)) + 1
         raise ProgramError(
             name,
             "the file is binary (it holds NUL bytes)",
-            "Give the text form (.pdl, .lsv), not the compiled one (.cod, .var), "
-            "in an 8-bit encoding.",
+            "Give the text of the program, not what was compiled from it, in an 8-bit "
+            "encoding",
             line=line,
         )
     return Source(name, data)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import (
     Callable,
     Collection,
@@ -14,20 +15,16 @@ from collections.abc import (
     Sequence,
     Set,
 )
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from postproc.arrays import Floats, Interned, Ints, slim
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language.assigned_points import AssignedPoint, Scope
 from postproc.language.comment_directives import MEASURE, Comments
-from postproc.language.interpreter import (
-    NO_POINTS,
-    AssignedPoint,
-    Scope,
-    TaskMachine,
-)
+from postproc.language.interpreter import TaskMachine
 from postproc.language.move_runs import unfold, within
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
@@ -51,6 +48,7 @@ ONLY_SHIFTED = Reason(
     "it is shifted from a point that no move goes to: what to correct?",
 )
 _NO_FRAME = -1
+MOST_NAMED = 3  # lines, or data, in a reason
 NO_LOAD: tuple[float, ...] = (math.nan,) * 4  # one object: NaN differs from itself
 Pose = tuple[float, ...]
 """The rows of a pose (4, 4) [m] one after the other, empty where it is not known."""
@@ -108,8 +106,10 @@ class FoundGoal:
         pins: Why the numbers must stay, "" where they need not.
         shared: Other programs may read it too.
         shift: How it is shifted from a point, None where it is not, or not known.
-        holds: File and first number of a shift that keeps its numbers for this move.
-        given: What assignments gave to the points that the move names.
+        stays: The point that it is made from keeps its numbers for this move.
+        holds: Files and first numbers of shifts that keep their numbers for this move.
+        given: What assignments gave to the data that the move names.
+        doubtful: Names of data of which only the run tells what they hold.
     """
 
     target: Meaning
@@ -123,17 +123,19 @@ class FoundGoal:
     pins: str = ""
     shared: bool = False
     shift: FoundShift | None = None
-    holds: tuple[int, int] = (-1, -1)
-    given: frozenset[AssignedPoint] = NO_POINTS
+    stays: bool = False
+    holds: frozenset[tuple[int, int]] = frozenset()
+    given: frozenset[AssignedPoint] = frozenset()
+    doubtful: frozenset[str] = frozenset()
 
     @property
     def lost(self) -> FoundGoal:
-        """The goal where its point holds different values on the ways here."""
-        text = f"{self.name} is given different values on the ways here, or beside them"
-        return FoundGoal(
-            Meaning.UNKNOWN, tuple(math.nan for _ in self.values), name=self.name,
-            aux=self.aux, why=Reason(Code.RUNTIME_VALUE, text),
-        )  # fmt: skip
+        """The goal where data that it names hold different values on the ways here."""
+        names = sorted({point.name for point in self.given})
+        text = f"{', '.join(names[:MOST_NAMED])} is given different values on the ways "
+        why = Reason(Code.RUNTIME_VALUE, f"{text}here, or beside them")
+        goal = hold_numbers(self, self.name, why, self.pins, aux=self.aux)
+        return replace(goal, doubtful=frozenset({*names, _array_of(self.name)} - {""}))
 
     @property
     def writes(self) -> tuple[int, tuple[int, ...]]:
@@ -149,12 +151,91 @@ class FoundGoal:
         return self.shift is not None and self.shift.slots[0] >= 0
 
     @property
+    def origin(self) -> tuple[int, ...]:
+        """The numbers that it holds, or that it moves along with."""
+        return self.follows if self.slots[0] < 0 <= self.follows[0] else self.slots
+
+    @property
     def point(self) -> tuple[int, int]:
         """The file of its point, or the point that it is shifted from, and its place.
 
         The place is that of the first number, -1 where it is not written.
         """
         return self.file, max(self.slots[0], self.follows[0])
+
+
+def hold_numbers(
+    base: FoundGoal,
+    name: str,
+    why: Reason,
+    pins: str,
+    meaning: Meaning = Meaning.UNKNOWN,
+    values: tuple[float, ...] = (),
+    aux: tuple[float, ...] = (math.nan,) * 6,
+) -> FoundGoal:
+    """Return a goal that is computed from what a point was given: that stays.
+
+    Args:
+        base: What the point was given.
+        name: Of the point.
+        why: Why the goal cannot be compensated.
+        pins: Why the numbers of the base stay.
+        meaning: What the values mean.
+        values: Numbers of the goal, none where they are not known.
+        aux: External axes.
+    """
+    own = set[tuple[int, int]]()
+    if base.is_rewritten_by_shift:
+        file, slots = base.writes
+        own = {(file, slots[0])}
+    unknown = meaning == Meaning.UNKNOWN and base.origin[0] < 0
+    return FoundGoal(
+        meaning, values or tuple(math.nan for _ in base.values), base.file,
+        tuple(-1 for _ in base.values), base.origin, _whole(name) if unknown else name,
+        aux, why, pins or why.text, stays=True,
+        holds=base.holds | own,
+    )  # fmt: skip
+
+
+def spell_element(held: AssignedPoint, brackets: str) -> str:
+    """Spell a point, or an element of an array.
+
+    Args:
+        held: The point.
+        brackets: Those around an index.
+    """
+    index = ",".join(map(str, held.index))
+    return held.name + (index and f"{brackets[0]}{index}{brackets[1]}")
+
+
+def explain_components(
+    held: AssignedPoint, name: str, files: Sequence[Any], known: bool
+) -> Reason:
+    """Say which components of a point are set by themselves, and where.
+
+    Args:
+        held: The point.
+        name: As it is spelt.
+        files: Of the task.
+        known: All of its numbers are known.
+    """
+    late = [one for one in held.components if one.value is None]
+    meant = late or held.components
+    lines = defaultdict[int, set[int]](set)
+    for one in meant:
+        lines[one.file].add(files[one.file].text.line(one.row))
+    places = [
+        f"line{'s' * (len(own) > 1)} {', '.join(map(str, sorted(own)[:MOST_NAMED]))} "
+        f"of {files[at].text.source.name}"
+        for at, own in sorted(lines.items())
+    ]
+    parts = ", ".join(one.name for one in meant)
+    text = f"{name}: {parts} set in {', '.join(places)}"
+    if late:
+        text = f"{text} to what is known only when the program runs"
+    elif not known:
+        text = f"{text}; its other numbers are known only when the program runs"
+    return Reason(Code.COMPUTED_TARGET if known else Code.RUNTIME_VALUE, text)
 
 
 def not_reached(goal: FoundGoal, why: Reason) -> FoundGoal:
@@ -188,7 +269,7 @@ class FoundVisit:
         curved: As in `Visits`.
         count: How many moves it stands for that follow each other and differ only in
             where they go: this one is the first.
-        points: What assigned points hold on every way here, None before any is known.
+        agreed: The points that it names hold the same on every way here.
     """
 
     scope: Scope
@@ -203,7 +284,7 @@ class FoundVisit:
     block: Hashable = None
     curved: bool = False
     count: int = 1
-    points: frozenset[AssignedPoint] | None = None
+    agreed: bool = True
 
 
 @dataclass(frozen=True)
@@ -503,13 +584,14 @@ def _find_followed(
 ) -> Ints:
     """Find the literals that computed targets move along with, (n,), -1 for none.
 
-    Where a shift can make up for all, the point need be no move's own.
+    Where a shift can make up for all, the point need be no move's own. Targets do not
+    move along with a point that stays.
     """
     follows = np.full(len(found), -1, dtype=np.int64)
     for k, v in enumerate(found):
         if v.goal.slots[0] < 0 <= v.goal.follows[0]:
             none = -1 if v.goal.is_rewritten_by_shift else _NO_LITERAL
-            known = v.goal.target == Meaning.POSE
+            known = v.goal.target == Meaning.POSE and not v.goal.stays
             follows[k] = index.get(v.goal.point, none) if known else -1
     return follows
 
@@ -527,6 +609,9 @@ def _find_pinned(
     elements = {goal.name: why for goal, why in (*goals, *other)
                 if goal.name and max(goal.slots[0], goal.follows[0]) < 0
                 and not _array_of(goal.name)}  # fmt: skip
+    elements |= {
+        name: ANY_VALUE.format(name) for v in found for name in v.goal.doubtful
+    }
     stays = {goal.point: why for goal, why in other}
     stays |= {(f, slots[0]): why for g, why in other for f, slots in [g.writes]}
     pinned = []
@@ -548,8 +633,7 @@ def _find_pinned(
         at = index.get(v.goal.point, -1)
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
-        shift = index.get(v.goal.holds, -1)
-        if shift >= 0:
+        for shift in {index.get(place, -1) for place in v.goal.holds} - {-1}:
             pinned[shift] = pinned[shift] or UNKNOWN_POINT
     return pinned
 
@@ -604,6 +688,15 @@ def _goals_beside(
         why = BESIDE.format(text.line(row), text.source.name)
         for goal in machine.goals_of(file, row):
             yield goal, why
+
+
+def _whole(name: str) -> str:
+    """Return the name of data without an index.
+
+    >>> _whole("xs[1]"), _whole("p1")
+    ('xs', 'p1')
+    """
+    return re.split(r"[{\[]", name, maxsplit=1)[0]
 
 
 def _array_of(name: str) -> str:

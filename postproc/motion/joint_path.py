@@ -584,6 +584,7 @@ class Trace:
         overruled: Continuity took another branch or turn than the string says, (n,).
         aside: From the targets to where the path passes them, (n, 3) [m], NaN where not
             known.
+        stops: As of the targets, (n,).
         pull: How rounded fly points move with their neighbours.
     """
 
@@ -597,14 +598,14 @@ class Trace:
     reason: Ints
     overruled: Bools
     aside: Floats
+    stops: Bools
     pull: BlendCoupling = field(default_factory=BlendCoupling)
 
     @property
     def driven(self) -> Edges:
         """The edges, but that nobody knows how the arm leaves where it strands."""
-        edges = self.edges
-        source = np.maximum(edges.source, 0)
-        lost = (edges.source >= 0) & STRANDS[self.reason[source]]
+        edges, strands = self.edges, STRANDS[self.reason] | self.stops
+        lost = (edges.source >= 0) & strands[np.maximum(edges.source, 0)]
         if not lost.any():
             return edges
         count = np.diff(edges.start)
@@ -804,7 +805,7 @@ def _finish(work: PathSolver) -> Trace:
     aside[is_unknown(work.flange) | is_unknown(t.tool)] = np.nan
     return Trace(
         work.q, work.flange, work.slot, edges, samples.length, samples.turning, share,
-        work.reason, np.asarray(written & other), aside,
+        work.reason, np.asarray(written & other), aside, t.stops,
     )  # fmt: skip
 
 

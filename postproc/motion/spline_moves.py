@@ -102,6 +102,8 @@ def turns_at_unknown_blends(
     ):
         np.logical_or.at(out, at, ~(way * side[at] >= 0.0))
     out[unknown] |= side[unknown] == 0.0
+    leads = np.isin(np.arange(len(q)), source)
+    out[unknown & ~leads] = True  # a joint that goes on anywhere may turn back
     return out
 
 

@@ -72,6 +72,8 @@ class Targets:
             (n,).
         past_start: A point of an arc that goes all around, and ends between its start
             and the point on its way, (n,).
+        stops: There the controller stops, or may, because of flags that the path
+            contradicts: who goes on begins anywhere, (n,).
         pred_start: Predecessors of move v are pred[pred_start[v] : pred_start[v + 1]].
         pred: Predecessors; negative for a place that is not known.
     """
@@ -98,6 +100,7 @@ class Targets:
     curved: Bools
     along: Bools
     past_start: Bools
+    stops: Bools
     pred_start: Ints
     pred: Ints
 

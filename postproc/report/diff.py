@@ -24,14 +24,10 @@ from postproc.compensation.outcome import (
 from postproc.compensation.workers import in_background
 from postproc.files import (
     NamedText,
-    find_data_list,
-    find_variables,
-    holds_values,
-    is_variables,
     open_text,
     read_input,
 )
-from postproc.language.languages import language_of
+from postproc.language.languages import UNNAMED, file_named, language_of
 from postproc.language.lexer import BLANKS, mask_of, scan_lines
 from postproc.language.stamp import read_stamp, stamp_span, strip_stamp
 
@@ -384,7 +380,8 @@ class Compared:
 
 def is_named_by_file(place: str) -> bool:
     """Tell whether a line alone does not tell which target it belongs to."""
-    return is_variables(place) or holds_values(place)
+    file = file_named(place)
+    return file.is_variables or not file.variables
 
 
 def _read_lines(file: Path | NamedText) -> tuple[TextLines, bool]:
@@ -564,7 +561,7 @@ def diff(
     original: str | Path | bytes,
     compensated: str | Path | bytes,
     *,
-    name: str = "program.pdl",
+    name: str = UNNAMED,
 ) -> Difference:
     """Compare two programs, and the variable files beside them.
 
@@ -581,8 +578,8 @@ def diff(
         only = compare_files(first, second)
         return Difference((only.rows,), only.stamped)
     pairs = [(first, second)]
-    old, new = (find_variables(p) or find_data_list(p) for p in pairs[0])
-    if not is_variables(first.name) and old is not None and new is not None:
+    old, new = (file_named(p).find_values() for p in pairs[0])
+    if not file_named(first).is_variables and old is not None and new is not None:
         pairs.append((old, new))
     ask = in_background(partial(read_arrivals, second, pairs))
     files = [compare_files(*pair) for pair in pairs]

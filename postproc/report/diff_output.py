@@ -21,7 +21,8 @@ from postproc.arrays import (
     text_of,
     whole,
 )
-from postproc.files import is_variables, schema
+from postproc.files import schema
+from postproc.language.languages import file_named
 from postproc.report.diff import STATUSES, Difference, DiffRow, DiffRows
 from postproc.report.terminal import (
     ARROWS,
@@ -162,7 +163,7 @@ def print_difference(found: Difference, out: TextIO | None = None) -> None:
     """Print a row for every line that differs, uncorrected targets, a summary."""
     out = out or sys.stdout
     names = {r.file for r in (*found.differing, *found.untouched) if len(r)}
-    skip = 0 if len(names) > 1 or any(map(is_variables, names)) else 1
+    skip = 0 if len(names) > 1 or any(file_named(n).is_variables for n in names) else 1
     told = bool(found.counts)
     size = Column("|c| mm") if told else Column("change mm", "left")
     columns = [*PLACE, *NUMBERS, size, *(TOLD if told else ())]

@@ -12,18 +12,19 @@ from postproc.arrays import Ints
 from postproc.compensation.paths.write_points import points_on_ways
 from postproc.compensation.program import read_program
 from postproc.compensation.program_files import read_files
-from postproc.exceptions import CellError
 from postproc.files import schema
 from postproc.language.languages import language_of
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.json import finite
-from postproc.robot.arm import load_arm
+from postproc.robot.arm_file import ArmFile
 from postproc.robot.cell import Cell, as_cell
 from postproc.robot.pose import MM
 from postproc.simulation import (
     DEFAULT,
+    NJ220,
     Campaign,
+    Chain,
     GearKind,
     Landing,
     Planted,
@@ -40,8 +41,6 @@ from postproc.simulation import (
 )
 from postproc.simulation.path import PathScores, score_paths
 from postproc.simulation.track import VirtualTrack, record_track
-
-VIRTUAL = "nj220-2.7"  # the shipped arm whose numbers the virtual one has
 
 
 @dataclass(frozen=True)
@@ -161,6 +160,7 @@ def setup_of(cell: Cell) -> VirtualCell:
     usual = VirtualCell()
     warm = cell.temperature
     return VirtualCell(
+        chain=chain_of(cell.arm.file),
         coupling=cell.arm.coupling,
         tool=cell.tool.pose,
         base=cell.base.pose,
@@ -176,16 +176,28 @@ def setup_of(cell: Cell) -> VirtualCell:
     )
 
 
-def check_arm(cell: Cell, path: Path) -> None:
-    """Refuse a cell of another arm than the virtual one.
+def chain_of(file: ArmFile) -> Chain:
+    """Take the numbers of an arm file into the virtual arm's own chain.
 
-    Raises:
-        CellError: The virtual arm's chain, which is its own, is not the cell's.
+    An arm whose masses or speeds are not known has those of the usual virtual arm.
     """
-    if cell.arm.id != load_arm(VIRTUAL).id:
-        problem = f"the virtual arm is {VIRTUAL}, not {cell.arm.name}"
-        cure = f'Simulate in a cell with arm = "{VIRTUAL}"'
-        raise CellError(path, problem, cure, place="$.robot.arm")
+    dh, joints, links = file.dh, file.joints, file.links
+    speed = joints.velocity_deg_s
+    return Chain(
+        a=np.array(dh.a_mm) * MM,
+        d=np.array(dh.d_mm) * MM,
+        alpha=np.deg2rad(dh.alpha_deg),
+        offset=np.deg2rad(dh.offset_deg),
+        sense=np.array(dh.sense, dtype=float),
+        shift=np.deg2rad(dh.shift_deg),
+        beta=np.zeros(6),
+        mass=NJ220.mass if links is None else np.array(links.mass_kg),
+        centre=NJ220.centre if links is None else np.array(links.com_mm) * MM,
+        speed=NJ220.speed if speed is None else np.deg2rad(speed),
+        lower=np.deg2rad(joints.lower_deg),
+        upper=np.deg2rad(joints.upper_deg),
+        parallelogram=dh.axis3_adds_axis2,
+    )
 
 
 def simulate_file(
@@ -214,13 +226,13 @@ def simulate_file(
         PostprocError: A file cannot be used, or an effect is not known.
     """
     cell = as_cell(cell)
-    check_arm(cell, cell.path)
     setup = setup_of(cell)
     names: list[str | Planted] = [*DEFAULT, *parse_effects(effects or "")]
     if program.suffix.lower() == ".csv":
         rows = read_rows(program)
         arm = virtual_arm(
-            seed, names, coupling=setup.coupling, rows=len(rows.ids), tool=setup.tool,
+            seed, names, chain=setup.chain, coupling=setup.coupling,
+            rows=len(rows.ids), tool=setup.tool,
             gears=gears, tracker=setup.tracker, gravity=setup.gravity,
         )  # fmt: skip
         return Simulation(program.name, measure_rows(arm, setup, rows), None)
@@ -228,6 +240,7 @@ def simulate_file(
     arm = virtual_arm(
         seed,
         names,
+        chain=setup.chain,
         coupling=setup.coupling,
         rows=campaign_length(visits),
         tool=setup.tool,

@@ -224,8 +224,10 @@ class LimitSection(Strict):
 
     Attributes:
         correction_mm, correction_deg: Most that a target moves and turns.
-        conflict_mm: Arrivals at one point whose corrections differ by more are in
-            conflict: the point stays.
+        conflict_mm: Arrivals at one point whose corrections differ by more do not
+            agree.
+        averaged_mm: Most that one correction for arrivals that do not agree leaves of
+            each; more is listed, and the exit code is 1.
         correction_step_mm: Most that the correction changes along 100 mm of a
             continuous path.
         wrist_deg: Axis 5 nearer to zero than this is the wrist singularity.
@@ -241,6 +243,7 @@ class LimitSection(Strict):
     correction_mm: PositiveFloat = 5.0
     correction_deg: PositiveFloat = 1.0
     conflict_mm: PositiveFloat = 0.02
+    averaged_mm: PositiveFloat = 0.3
     payload_mm: PositiveFloat = 0.1
     correction_step_mm: PositiveFloat = 0.5
     wrist_deg: PositiveFloat = 3.0
@@ -268,8 +271,9 @@ class CompensationSection(Strict):
     Attributes:
         orientation: Correct the orientation of targets as well as their position.
         shared_points: What is done with a point that several arrivals share: "mean"
-            gives it the mean of corrections that agree within limits.conflict_mm,
-            "clone" gives moves whose arrivals are in conflict points of their own,
+            gives it the mean of corrections that agree within limits.conflict_mm, else
+            the one whose worst arrival is best, where that helps every arrival;
+            "clone" gives moves whose arrivals do not agree points of their own;
             "leave" corrects no point that several moves go to.
         edit_exported: Edit variables that other programs may read.
         assume_motion: Assume that a routine that the cell does not name moves the arm,

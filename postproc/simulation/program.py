@@ -26,7 +26,8 @@ from postproc.simulation.state import USUAL_SPEED, VirtualArrivals, make_arrival
 # Run a program on the virtual arm.
 
 SETTLE = 0.3  # [s] to start and stop a move
-# Where the arm stands when the cell names no home: its upright pose, wrist bent.
+# Where the arm stands when the cell names no home: upright, wrist bent, as far as its
+# joints turn.
 UPRIGHT = np.radians([0.0, 0.0, -90.0, 0.0, 90.0, 0.0])
 
 
@@ -179,7 +180,8 @@ def run_moves(
 
 
 def _start(arm: VirtualArm, setup: VirtualCell) -> _ProgramPlace:
-    joints = UPRIGHT if setup.home is None else setup.home
+    upright = np.clip(UPRIGHT, setup.chain.lower, setup.chain.upper)
+    joints = upright if setup.home is None else setup.home
     side = stream(arm.seed, "start").choice([-1.0, 1.0], 6)
     return _ProgramPlace(joints, at_start(arm.gears, joints, side))
 

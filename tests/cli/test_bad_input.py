@@ -621,14 +621,6 @@ def test_a_closed_stdout_is_told_as_that(desk, name):
     assert "standard output: is closed" in done.stderr
 
 
-@pytest.mark.parametrize("name", ["s.mod", "s.SRC"])
-def test_a_survey_program_is_written_as_pdl2_alone(desk, name):
-    place = desk.folder / name
-    found = cli("survey", "--cell", desk.cell, "--poses", "20", "-o", place)
-    refused(found, r"survey programs are PDL2\. Write SURVEY\.pdl")
-    assert not place.exists()
-
-
 def test_a_code_that_is_none_is_answered_with_those_like_it():
     found = cli("explain", "--code", "direction-unsure")
     refused(found, "no such code. Is it direction-")

@@ -78,6 +78,10 @@ def batch(place):
     return cli("batch", place.folder / "tree", place.folder / "new", *given)
 
 
+def survey(place, to):
+    return cli("survey", "--cell", place.cell, "--poses", "40", "-o", to)
+
+
 def run(command, place, name):
     """Run the command of a cell."""
     given, to = source(place, name), place.folder / f"out{Path(name).suffix}"
@@ -120,6 +124,14 @@ def run(command, place, name):
             return batch(place)
         case "simulate":
             return cli("simulate", given, "--cell", place.cell, "-o", to)
+        case "survey":
+            return survey(place, to)
+        case "fit --program":
+            assert survey(place, to).exit_code == 0
+            rows = place.folder / "rows.csv"
+            cli("simulate", to, "--cell", place.cell, *ARM, "-o", rows)
+            model = place.folder / "new.json"
+            return cli("fit", rows, "--program", to, "--cell", place.cell, "-o", model)
         case "report":
             place.compensate(given, "-o", to, *pair)
             return cli("report", pair[1], "-o", place.folder / "page.html")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.compensation.sidecar import FileRecord, restore
+from postproc.diagnostics import Code
 from postproc.report.simulation import setup_of
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
@@ -75,9 +77,9 @@ def masked(data: bytes) -> list[str]:
 def test_moves_that_disagree_get_points_of_their_own(run, job_cell):
     source = text_of(SET + " -- where", *BOTH)
     plain, outcome = run(source, clone=False), run(source)
-    assert [Status(s).name for s in plain.decisions.status] == [
-        "CORRECTED", "CONFLICT", "CORRECTED", "CONFLICT",
-    ]  # fmt: skip
+    codes = [plain.decisions.reasons[k].code for k in plain.decisions.why]
+    assert codes == [None, Code.ARRIVALS_AVERAGED, None, Code.ARRIVALS_AVERAGED]
+    assert all_safe(plain) and plain.exit_code == 0
     assert all_safe(outcome) and outcome.exit_code == 0
     assert masked(outcome.outputs["job.pdl"])[2:7] == [
         "  p : POSITION",
@@ -97,6 +99,39 @@ def test_moves_that_disagree_get_points_of_their_own(run, job_cell):
     size = 1e3 * np.linalg.norm(landing.error, axis=1)
     assert len(size) == 4 and size[1:].max() < 0.06  # the start's sides are not known
     assert size[1:].mean() < 0.03
+
+
+def test_one_correction_helps_each_of_two_arrivals(run, job_cell):
+    source = text_of(SET, *BOTH)
+    outcome = run(source, clone=False)
+    wanted = read_program({"job.pdl": source}, job_cell).visits
+    done = read_program(dict(outcome.outputs), job_cell).visits
+    arm, setup = virtual_arm(SEED), setup_of(job_cell)
+    before, after = (
+        1e3 * np.linalg.norm(land(arm, setup, wanted, ran).error, axis=1)[[1, 3]]
+        for ran in (wanted, done)
+    )
+    assert (after < before - 0.1).all()
+    assert abs(after[0] - after[1]) < 0.06  # the worst of them is as good as it can be
+    stated = 1e3 * np.linalg.norm(outcome.decisions.std_error[[1, 3]], axis=1)
+    assert (stated > 0.9 * after).all()
+
+
+def test_arrivals_farther_apart_than_the_limit_end_with_exit_1(job_cell, job_model):
+    limits = job_cell.limits.model_copy(update={"averaged_mm": 0.05})
+    cell, source = replace(job_cell, limits=limits), text_of(SET, *BOTH)
+    outcome = compensate(source, cell, job_model, name="job.pdl")
+    assert all_safe(outcome) and outcome.exit_code == 1
+    (note,) = notes(outcome, Code.ARRIVALS_FAR_APART)
+    assert note.startswith("p: its arrivals need different corrections")
+
+
+def test_fly_points_have_no_correction_for_several_arrivals(run):
+    flown = [line.replace("MOVE ", "MOVEFLY ") for line in BOTH]
+    outcome = run(text_of(SET, *flown), clone=False)
+    codes = {one.code for one in outcome.decisions.reasons}
+    assert Code.ARRIVALS_AVERAGED not in codes
+    assert Code.ARRIVALS_FAR_APART not in codes
 
 
 def test_moves_that_agree_go_on_sharing(run):

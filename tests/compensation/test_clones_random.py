@@ -59,7 +59,8 @@ def all_disagree(reading: ParsedProgram, seed: int) -> Proposal:
     for row, place in enumerate(zip(*places, strict=True)):
         change[row] = own.setdefault(place, change[row])  # one move agrees with itself
     empty = np.zeros(0, dtype=np.int64)
-    return Proposal(empty, nothing, usable & False, decisions, usable, change, empty)
+    none, left = usable & False, np.zeros(len(visits))
+    return Proposal(empty, nothing, none, decisions, usable, change, empty, left)
 
 
 def with_clones(made: Generated, text: str) -> tuple[Generated, dict[int, int]]:

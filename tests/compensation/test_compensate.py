@@ -148,6 +148,13 @@ def test_guarded_targets_keep_their_value(run, line, said):
     assert line.encode() in outcome.outputs["job.pdl"]
 
 
+def test_a_program_without_a_target_of_its_own_stays_as_it_is(run):
+    line = "MOVE LINEAR RELATIVE VEC(1, 2, 3) IN TOOL"
+    found = run(line)
+    assert found.decisions.status.tolist() == [Status.UNCHANGED]
+    assert line.encode() in found.outputs["job.pdl"]
+
+
 def test_unknown_frame_is_not_compensated(run):
     outcome = run(JOINTS, "$UFRAME := frame_from_vision()", POSE, NEXT)
     assert statuses(outcome) == ["CORRECTED", "RUNTIME", "RUNTIME"]

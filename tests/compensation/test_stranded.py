@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.compensation.eligibility import STRANDED
+from postproc.compensation.eligibility import STOPPED, STRANDED
 from postproc.compensation.program import PlannedProgram, plan_visits, read_program
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import record_from_pose
@@ -98,3 +98,15 @@ def test_only_ways_from_there_are_in_doubt(cell, pos):
     lines = ["IF $DIN[1] THEN", f"MOVE LINEAR TO {pos(THERE, x=9.0)}", "ENDIF",
              f"MOVE JOINT TO {pos(NEAR)}", f"MOVE JOINT TO {pos(FAR)}"]  # fmt: skip
     assert stranded(planned(cell, *lines)) == [False, False, True, False]
+
+
+@pytest.mark.parametrize("care", ["TRUE", "$DIN[1]"])
+def test_behind_a_stop_because_of_flags_no_side_is_known(cell, pos, care):
+    named = f"MOVE LINEAR TO {pos(THERE)}".replace("''", "'W'")
+    behind = f"MOVE JOINT TO {pos(NEAR)}", f"MOVE LINEAR TO {pos(FAR)}"
+    found = planned(cell, f"$CNFG_CARE := {care}", named, *behind)
+    assert found.reasons[1].text.startswith("$CNFG_CARE is")
+    assert found.reasons[2] == STOPPED and not found.reasons[3]
+    assert not found.plan.direction[2].any()
+    unchecked = planned(cell, "$CNFG_CARE := FALSE", named, *behind)
+    assert unchecked.reasons[2] != STOPPED and unchecked.plan.direction[2].all()

@@ -108,6 +108,7 @@ WAYS = {  # predecessors of four moves, and whether axis 1 is sure at the second
     "one way in of two turns back": ([[-1], [0, 3], [1], [1]], False),
     "one way out of two turns back": ([[-1], [0], [1], [1]], False),
     "from anywhere, too": ([[-1], [0, -1], [1], [2]], True),
+    "no known way out": ([[-1], [0], [-1], [2]], False),
     "from nowhere": ([[-1], [-1], [1], [2]], True),
 }
 

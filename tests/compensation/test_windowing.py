@@ -133,7 +133,15 @@ def by_joints(nth: int, line: str) -> str:
     return line.replace("LINEAR", "JOINT") if nth % 29 < 2 else line
 
 
-MORE = [dwelling, in_arcs, changing, shared, by_joints]
+def stopping(nth: int, line: str) -> str:
+    """Name another branch here and there, where the controller checks it."""
+    if nth not in (LEAST - 1, 3 * LEAST + 1, 700):
+        return line
+    named = line.replace("''", "'W'")
+    return f"  $CNFG_CARE := TRUE\n{named}\n  $CNFG_CARE := FALSE"
+
+
+MORE = [stopping, dwelling, in_arcs, changing, shared, by_joints]
 
 
 @pytest.mark.parametrize("change", [None, reversing, leaving, *slow(MORE)])

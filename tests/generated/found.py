@@ -8,14 +8,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from postproc.compensation.outcome import Decisions
+from postproc.diagnostics import Code
+
 KNOWN = "compensated arrivals, sides known"
 UNSURE = "compensated arrivals, a side listed as not sure"
 CLONED = "of these, at clones"
 FIRST = "of these, first moves of programs"
 ROUNDED = "compensated fly points, rounded on the way"
 LOADED = "compensated arrivals with a load that the program states"
+AVERAGED = "arrivals at points with one correction for several"
 ALONG = "targets that move along with one (NEAR, FOR, POS_SHIFT)"
-PAIRS = (KNOWN, CLONED, UNSURE, FIRST, ROUNDED, LOADED, ALONG)
+PAIRS = (KNOWN, CLONED, UNSURE, FIRST, ROUNDED, LOADED, AVERAGED, ALONG)
+ONE_FOR_ALL = (Code.ARRIVALS_AVERAGED, Code.ARRIVALS_FAR_APART)
 ALL = "all compensated arrivals"
 DONE = "compensated"
 MOST = 12  # reasons that are listed
@@ -64,6 +69,11 @@ class Found:
         kinds = (KNOWN, UNSURE) if kind == ALL else (kind,)
         found = [pair for one in kinds for pair in self.error_mm[one]]
         return np.array(found).reshape(-1, 2)
+
+
+def is_averaged(decisions: Decisions, rows: list[int]) -> bool:
+    """Tell whether visits have one correction for arrivals that need different ones."""
+    return any(decisions.reasons[k].code in ONE_FOR_ALL for k in decisions.why[rows])
 
 
 def lines(found: Found) -> Iterable[str]:

@@ -16,13 +16,25 @@ from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from tests.fuzz.case import check_bytes, records_of
 from tests.generated.execution import Ran, executed
-from tests.generated.found import ALONG, CLONED, FIRST, KNOWN, ROUNDED, UNSURE, Found
+from tests.generated.found import (
+    ALONG,
+    AVERAGED,
+    CLONED,
+    FIRST,
+    KNOWN,
+    ROUNDED,
+    UNSURE,
+    Found,
+    is_averaged,
+)
 from tests.generated.once import count_once
 from tests.language.pdl2.executed import PAGE, Generated
 from tests.language.pdl2.reachable import OPENING, reachable
 from tests.language.pdl2.reread import CLONE
 from tests.language.pdl2.test_flow_random import follow
 
+WORSE = "is farther off than without a correction"
+MOST_MM = 0.05  # by more: then it is
 STUCK = "the arm can make this move as it was written, but not as it was corrected"
 COMPUTED = re.compile(r"\((?:NEAR|FOR|POS_SHIFT)\)|is computed, not written")
 
@@ -76,6 +88,10 @@ def count_errors(
                 found.wrong.append((seed, step.line, f"{text}: {' / '.join(why)}"))
         elif (visits.fly & ~visits.via)[mine].any():
             found.error_mm[ROUNDED].append(pair)
+        elif is_averaged(d, mine):
+            found.error_mm[AVERAGED].append(pair)
+            if (np.abs(d.side[mine]) >= SURE).all() and pair[1] > pair[0] + MOST_MM:
+                found.wrong.append((seed, step.line, WORSE))
         else:
             unsure = bool((np.abs(d.side[mine]) < SURE).any())
             found.error_mm[UNSURE if unsure else KNOWN].append(pair)

@@ -14,10 +14,9 @@ import argparse
 import csv
 import re
 import tempfile
-import tomllib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
@@ -37,11 +36,10 @@ from postproc.exceptions import PostprocError
 from postproc.language.languages import languages
 from postproc.language.visits import NOT_FOLLOWED
 from postproc.model.effects import BASE_EFFECTS
-from postproc.report.simulation import setup_of
-from postproc.robot.arm_file import arm_path
+from postproc.report.simulation import chain_of, setup_of
+from postproc.robot.arm_file import arm_path, read_arm_file
 from postproc.robot.cell import Cell, load_cell
 from postproc.simulation import (
-    NJ220,
     Campaign,
     VirtualArm,
     follow_rows,
@@ -50,7 +48,6 @@ from postproc.simulation import (
     virtual_arm,
     write_measurements,
 )
-from postproc.simulation.kinematics import Chain
 from postproc.simulation.reference import MEASURED_EVERY, working_angles
 
 HERE = Path(__file__).parent
@@ -72,31 +69,9 @@ Place = tuple[str, int]
 # A virtual arm of a shipped arm's dimensions, surveyed once.
 
 
-def chain_of(arm: str) -> Chain:
-    """Return the virtual arm's own chain for the dimensions of a shipped arm."""
-    with arm_path(arm).open("rb") as text:
-        file = tomllib.load(text)
-    dh, joints = file["dh"], file["joints"]
-    turns = {key: np.radians(joints[f"{key}_deg"]) for key in ("lower", "upper")}
-    return Chain(
-        a=np.array(dh["a_mm"]) * 1e-3,
-        d=np.array(dh["d_mm"]) * 1e-3,
-        alpha=np.radians(dh["alpha_deg"]),
-        offset=np.radians(dh["offset_deg"]),
-        sense=np.array(dh["sense"], float),
-        shift=np.radians(dh.get("shift_deg", np.zeros(6))),
-        beta=np.zeros(6),
-        mass=NJ220.mass,
-        centre=NJ220.centre,
-        speed=np.radians(joints["velocity_deg_s"]),
-        lower=turns["lower"],
-        upper=turns["upper"],
-    )
-
-
 def arm_of(arm: str) -> VirtualArm:
     """Return the virtual arm that stands for a shipped one."""
-    return virtual_arm(SEED, chain=chain_of(arm))
+    return virtual_arm(SEED, chain=chain_of(read_arm_file(arm_path(arm))))
 
 
 def cell_of(folder: Path) -> Path:
@@ -305,7 +280,6 @@ def landed(folder: Path, options: Options = DEFAULT_OPTIONS) -> Misses:
 
 def _landed(outcome: Outcome, cell: Cell) -> Misses:
     arm, setup = arm_of(cell.arm.name), setup_of(cell)
-    setup = replace(setup, chain=arm.nominal)
     given, made = (
         read_program(files, cell).visits
         for files in (outcome.sources, {**outcome.sources, **outcome.outputs})

@@ -8,9 +8,13 @@ import json
 import numpy as np
 import pytest
 
-from postproc.report.simulation import setup_of, simulate_file
+from postproc.calibration.fit import fit
+from postproc.calibration.survey_program import write_survey
+from postproc.language.languages import language_of_text
+from postproc.report.simulation import chain_of, setup_of, simulate_file
+from postproc.robot.arm_file import arm_path, list_shipped_arms, read_arm_file
 from postproc.robot.cell import load_cell
-from postproc.simulation import land, virtual_arm
+from postproc.simulation import NJ220, land, virtual_arm
 from tests.conftest import SEED
 from tests.written import FIRST, NEXT, POSE, cli, program
 
@@ -133,11 +137,25 @@ def test_the_cell_gives_the_probe_points(desk):
     np.testing.assert_allclose(tools[:, :3, 3], cell.probes)
 
 
-@pytest.mark.parametrize("name", ["irb6640-185-2.8", "nj130-2.6", "ur10"])
-def test_another_arm_than_the_virtual_one_is_refused(desk, name):
-    """Its chain is its own: readings would be those of the wrong arm."""
-    source, out = desk.put("job.pdl", program(FIRST)), desk.folder / "m.csv"
-    cell = desk.put("other.toml", f'[robot]\narm = "{name}"\n')
-    found = cli("simulate", source, "--cell", cell, "-o", out)
-    said = f"the virtual arm is nj220-2.7, not {name} @ $.robot.arm"
-    assert found.exit_code == 2 and said in found.stderr and not out.exists()
+def test_the_usual_virtual_arm_is_the_one_of_its_file():
+    chain = chain_of(read_arm_file(arm_path("nj220-2.7")))
+    for name, value in vars(NJ220).items():
+        np.testing.assert_array_equal(getattr(chain, name), value)
+
+
+@pytest.mark.parametrize("name", [a for a in list_shipped_arms() if "nj2" not in a])
+def test_any_arm_file_has_its_virtual_arm(desk, name):
+    """A survey of it is run, and its model finds the errors of its own chain."""
+    nests = "[survey]\npoints_mm = [[100, 0, 100], [0, 100, 150], [-100, 0, 200]]\n"
+    cell = load_cell(desk.put("own.toml", f'[robot]\narm = "{name}"\n{nests}'))
+    source, rows = desk.folder / "survey", desk.folder / "m.csv"
+    write_survey(cell, source, 60)
+    source = source.rename(source.with_suffix(suffix_of(source.read_bytes())))
+    simulate_file(source, cell).write(rows)
+    found = fit(rows, cell=cell, program=source, effects=("geometry", "backlash"))
+    assert found.report.before.mean_mm > 1.0
+    assert found.report.after.mean_mm < 0.1
+
+
+def suffix_of(text):
+    return language_of_text(text).suffixes[0]

@@ -6,20 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import prepare_cell
 from postproc.compensation.program_files import read_files
 from postproc.compensation.second_opinion import second_opinion
-from postproc.files import variables_of
+from postproc.language.languages import file_named
 from postproc.model.model import Model, load_model
-from postproc.robot.arm_file import ArmFile
+from postproc.report.simulation import chain_of
 from postproc.robot.cell import Cell, load_cell
-from postproc.robot.pose import MM
-from postproc.simulation.kinematics import Chain
 from postproc.verify.opinion import Opinion, OpinionRow
 from tests.conftest import make_job
 
@@ -74,8 +70,9 @@ def compensated(
 ) -> Compensated:
     """Compensate a program, the files of which begin with the program itself."""
     name, source = next(iter(files.items()))
-    rest = {k: v for k, v in files.items() if k not in (name, variables_of(name))}
-    values = files.get(variables_of(name))
+    own = file_named(name).variables
+    rest = {k: v for k, v in files.items() if k not in (name, own)}
+    values = files.get(own)
     outcome = compensate(
         source, cell, model, name=name, variables=values, pages=rest, options=options
     )
@@ -106,23 +103,6 @@ def surveyed(folder: Path, cell: Path) -> Path:
     text = cell.read_text()
     text += "" if "[survey]" in text else PROBES
     return make_job(folder, text, chain=chain_of(load_cell(cell).arm.file))
-
-
-def chain_of(file: ArmFile) -> Chain:
-    """Return the arm of an arm file as the virtual arm has it."""
-    dh, joints, links = file.dh, file.joints, file.links
-    angles = dh.alpha_deg, dh.offset_deg, dh.shift_deg
-    alpha, offset, shift = map(np.deg2rad, angles)
-    return Chain(
-        a=np.array(dh.a_mm) * MM, d=np.array(dh.d_mm) * MM,
-        alpha=alpha, offset=offset, sense=np.array(dh.sense), shift=shift,
-        beta=np.zeros(6),
-        mass=np.zeros(6) if links is None else np.array(links.mass_kg),
-        centre=np.zeros((6, 3)) if links is None else np.array(links.com_mm) * MM,
-        speed=np.deg2rad(joints.velocity_deg_s or [100.0] * 6),
-        lower=np.deg2rad(joints.lower_deg), upper=np.deg2rad(joints.upper_deg),
-        parallelogram=dh.axis3_adds_axis2,
-    )  # fmt: skip
 
 
 def row(opinion: Opinion, what: str) -> OpinionRow:

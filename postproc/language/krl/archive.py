@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from postproc.exceptions import ProgramError
-from postproc.files import SHARED_LIST, read_input
+from postproc.files import read_input
 from postproc.language.archive import Archive
-from postproc.language.interpreter import Scope
-from postproc.language.krl.moves import AXES, OUTSIDE
+from postproc.language.assigned_points import Scope
+from postproc.language.krl.files import SHARED_LIST
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import read_krl
-from postproc.language.krl.symbols import KrlRecord, KrlTask
+from postproc.language.krl.symbols import AXES, OUTSIDE, KrlRecord, KrlTask
 from postproc.language.source import source_from_bytes
 from postproc.robot.pose import record_from_pose
 

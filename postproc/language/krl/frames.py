@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.interpreter import Scope
+from postproc.language.assigned_points import Scope
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import (
     CORRECTIONS,
@@ -18,10 +18,21 @@ from postproc.language.krl.abstract_state import (
     KrlStore,
     entry_name,
 )
-from postproc.language.krl.pose_encoding import COMPONENTS, KRL_DIALECT
+from postproc.language.krl.pose_encoding import (
+    COMPONENTS,
+    KRL_DIALECT,
+    abc_from_rotation,
+)
 from postproc.language.krl.program import whole
-from postproc.language.krl.symbols import CONFIG, KrlRecord, KrlTask
+from postproc.language.krl.symbols import (
+    CONFIG,
+    KrlNumber,
+    KrlRecord,
+    KrlTask,
+    KrlValue,
+)
 from postproc.language.to_visits import IDENTITY, Pose, compose_poses, flat
+from postproc.robot.pose import MM
 
 
 @dataclass(frozen=True)
@@ -237,3 +248,42 @@ def pose_of(value: object) -> Pose:
     if any(map(math.isnan, numbers)):
         return ()
     return flat(KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])))
+
+
+def six_numbers(frame: KrlFrame) -> list[float]:
+    """Return X, Y, Z [mm] and A, B, C [deg] of a frame."""
+    pose = np.array(frame.pose).reshape(4, 4)
+    angles = abc_from_rotation(pose[None, :3, :3], np.zeros((1, 3)))[0]
+    return [*(pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist()]
+
+
+UPRIGHT = 1e-6  # cosine of B up to which A and C are not told apart
+
+
+def set_component(held: object, name: str, value: float) -> KrlFrame | KrlRecord | None:
+    """Return a frame of which one component is set, a record where not all are known.
+
+    Args:
+        held: What it was, or which of its components are known; anything else: none.
+        name: The component.
+        value: Its number [mm, deg], NaN where only the run tells it.
+    """
+    fields = dict[str, KrlValue]()
+    if isinstance(held, KrlFrame) and held.pose:
+        numbers = six_numbers(held)
+        upright = abs(math.cos(math.radians(numbers[4]))) < UPRIGHT
+        known = zip(COMPONENTS[:6], numbers, strict=True)
+        fields = {} if upright else {key: KrlNumber(one) for key, one in known}
+    elif isinstance(held, KrlRecord):
+        fields = dict(held.fields)
+    fields.pop(name, None)
+    if name not in COMPONENTS[:6]:
+        return None
+    if not math.isnan(value):
+        fields[name] = KrlNumber(value)
+    record = KrlRecord(tuple(sorted(fields.items(), key=lambda one: one[0])))
+    pose = pose_of(record)
+    if not pose:
+        return record
+    frame = held if isinstance(held, KrlFrame) else ZERO
+    return replace(frame, pose=pose)

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from postproc.diagnostics import Code, Reason
+from postproc.language.assigned_points import Scope
 from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import (
     NOWHERE,
     Arrived,
     CallContext,
-    Scope,
     TaskMachine,
 )
 from postproc.language.krl import syntax as said

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.exceptions import ProgramError
-from postproc.files import KRL_PROGRAMS
+from postproc.files import FolderListing
 from postproc.language.archive import Archive
 from postproc.language.blocks import read_once
 from postproc.language.grammars import line_parser
@@ -17,6 +17,7 @@ from postproc.language.interpreter import follow
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
 from postproc.language.krl.clones import KrlCloner
+from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import KrlFile, read_krl
@@ -29,6 +30,10 @@ from postproc.language.language import (
     JobReading,
     Language,
     Start,
+)
+from postproc.language.measuring_program import (
+    MeasuringProgram,
+    refuse_other_name,
 )
 from postproc.language.number_edits import Skeleton
 from postproc.language.source import Source
@@ -51,7 +56,7 @@ class Krl(Language):
 
     name = "KRL"
     controller = "kuka"
-    suffixes = KRL_PROGRAMS
+    suffixes = KrlFileName.programs
     comment = ";"
     dialect = KRL_DIALECT
     tells_accuracy = False
@@ -105,18 +110,35 @@ class Krl(Language):
         """Tell whether a line holds joint angles."""
         return _JOINTS.match(line) is not None
 
-    def reads(self, program: Path) -> tuple[Path, ...]:
-        """Return sources of packages that people have written moves into."""
-        return acting_sources(program)
+    def reads(
+        self,
+        program: Path,
+        within: Path | None = None,
+        listing: FolderListing | None = None,
+    ) -> tuple[Path, ...]:
+        """Return what all share, and sources of packages that people wrote moves in."""
+        named = KrlFileName(str(program))
+        if not named.is_program:
+            return ()
+        return (*named.find_shared(within, listing), *acting_sources(program))
 
     def read_archive(self, folder: Path) -> Archive | None:
         """Read ``$config.dat`` and ``$machine.dat`` of an archive."""
         return read_archive(folder)
 
+    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
+        """Write joint moves that stop, with comments ``MEASURE``."""
+        from postproc.language.krl.measuring_program import write_krl
+
+        refuse_other_name(program, file.name, file.stem)
+        return write_krl(program)
+
     def prepare(self) -> None:
         """Load the parser of statements."""
         line_parser("krl", "statement")
 
+
+LANGUAGE = Krl
 
 _DECLARED = re.compile(
     r"\s*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:DECL\s+)?"

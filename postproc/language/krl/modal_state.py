@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 from postproc.diagnostics import Code, Reason
-from postproc.language.interpreter import Scope
+from postproc.language.assigned_points import Scope
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import (
     CORRECTION_FRAMES,
@@ -20,7 +20,14 @@ from postproc.language.krl.abstract_state import (
     KrlStore,
     entry_name,
 )
-from postproc.language.krl.frames import NUMBERS, ZERO, FrameReader, KrlFrame, no_frame
+from postproc.language.krl.frames import (
+    NUMBERS,
+    ZERO,
+    FrameReader,
+    KrlFrame,
+    no_frame,
+    set_component,
+)
 from postproc.language.krl.program import whole
 from postproc.language.krl.symbols import (
     KrlRecord,
@@ -316,9 +323,12 @@ class ModeReader:
         return next((name for name in called if name in self.task.routines), "")
 
     def _frame(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
-        """``$TOOL = ..``, ``$BASE = ..``; of a component: nobody knows all of it."""
+        """``$TOOL = ..``, ``$BASE = ..``, or a component of them."""
         which = one.target.name[1:]
         if one.target.steps:
+            new = self._component(getattr(modes, which), one.target.steps, one.value)
+            if isinstance(new, KrlFrame):
+                return modes.with_(**{which: new})
             why = f"a component of {one.target.name.upper()} is set by the program"
             return modes.with_(**{which: no_frame(why)})
         found = self.frames(modes).frame(one.value)
@@ -338,10 +348,25 @@ class ModeReader:
             index = self.task.index(one.target.steps[0], self.row, self.here)
         if index is None or len(index) != 1:
             return store.without(table)
-        whole_of_it = len(one.target.steps) == 1
-        known = whole_of_it and self.task.is_global(table, self.here)
-        value = self._entry_value(modes, one) if known else None
-        return store.with_(entry_name(table, index[0]), value)
+        key, parts = entry_name(table, index[0]), one.target.steps[1:]
+        value: object | None = None
+        if not self.task.is_global(table, self.here):
+            return store.with_(key, value)
+        if not parts:
+            value = self._entry_value(modes, one)
+        elif table != "load_data":
+            value = self._component(store.get(key), parts, one.value)
+        if isinstance(value, KrlFrame) and table in self.task.taught:
+            value = replace(value, taught=True)
+        return store.with_(key, value)
+
+    def _component(
+        self, held: object, parts: Sequence[str | said.ElementStep], value: said.Operand
+    ) -> KrlFrame | KrlRecord | None:
+        """Set a component of a frame, None where what it then is is not known."""
+        if len(parts) != 1 or not isinstance(parts[0], str):
+            return None
+        return set_component(held, parts[0], self._number(value))
 
     def _entry_value(self, modes: KrlModes, one: said.Assignment) -> object | None:
         """Read the frame that an entry gets, or the mass of a load."""
@@ -349,8 +374,7 @@ class ModeReader:
             load = load_of(self._record(one.value))
             return None if load == LOST_LOAD else load
         found = self.frames(modes).frame(one.value)
-        taught = found.taught or one.target.name in self.task.taught
-        return None if found.why or not found.pose else replace(found, taught=taught)
+        return None if found.why or not found.pose else found
 
     def _correction(self, modes: KrlModes, one: said.Assignment) -> KrlStore:
         """``M_BASE_CORR = {..}``, ``M_BAS_COR_ON = TRUE``."""

@@ -10,9 +10,14 @@ from typing import Any
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.interpreter import NO_POINTS, AssignedPoint, Scope
+from postproc.language.assigned_points import (
+    NO_POINTS,
+    AssignedPoint,
+    Points,
+    Scope,
+)
 from postproc.language.krl import syntax as said
-from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame
+from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame, six_numbers
 from postproc.language.krl.pose_encoding import (
     COMPONENTS,
     MEASURED,
@@ -24,17 +29,23 @@ from postproc.language.krl.pose_encoding import (
 )
 from postproc.language.krl.program import whole
 from postproc.language.krl.symbols import (
+    AXES,
+    OUTSIDE,
     POSITIONS,
     KrlNumber,
     KrlRecord,
     KrlTask,
+    KrlValue,
 )
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.to_visits import (
     FoundGoal,
     FoundShift,
     FoundVisit,
+    explain_components,
+    hold_numbers,
     not_reached,
+    spell_element,
 )
 from postproc.language.visits import Meaning
 from postproc.robot.pose import MM
@@ -42,8 +53,6 @@ from postproc.robot.trajectory import Motion
 
 NOTHING = (math.nan,) * WIDTH
 NO_SLOTS = (-1,) * WIDTH
-AXES = ("a1", "a2", "a3", "a4", "a5", "a6")
-OUTSIDE = ("e1", "e2", "e3", "e4", "e5", "e6")
 PLACE = COMPONENTS[:6]
 RUN_TIME = "it is known only when the program runs"
 AT_RUN_TIME = Reason(
@@ -90,6 +99,7 @@ NOT_BY_JOINTS = Reason(
 )
 COMPUTED = Reason(Code.COMPUTED_TARGET, "the target is computed from other data")
 ODD_STATUS = Reason(Code.CONFIGURATION_UNKNOWN, "S or T is no valid number")
+_OF_NUMBERS = (None, Code.PARTIAL_TARGET, Code.COMPUTED_TARGET)
 ANGLE = Reason(
     Code.ENDS_ELSEWHERE, f"CA ends the arc elsewhere than at its end point: {RUN_TIME}"
 )
@@ -138,7 +148,7 @@ class KrlGoals:
         row: int,
         here: Scope,
         modes: object,
-        points: frozenset[AssignedPoint] = NO_POINTS,
+        points: Points = NO_POINTS,
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
@@ -154,19 +164,20 @@ class KrlGoals:
             goal = not_reached(_Goal(self, move, row, here).end(move.to), SPLINE)
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
-        there = replace(here, points=points) if points else here
-        reader = _Goal(self, move, row, there)
+        watched = points.watch()
+        reader = _Goal(self, move, row, replace(here, points=watched))
         angle = self._angle(move, row, here)
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
         if move.via is not None:
-            goal = reader.end(move.via)
+            goal = _note_given(reader.end(move.via), watched)
             yield KrlVisit(
                 here, row, motion, True, goal, modes, why=why, **given, move=move
             )
         goal = reader.end(move.to)
         if why:
             goal = not_reached(goal, ANGLE)
+        goal = _note_given(goal, watched)
         yield KrlVisit(
             here, row, motion, False, goal, modes,
             why=SPLINE if in_joints else NO_REASON,
@@ -256,14 +267,29 @@ class _Goal:
                 return self._product(first, second)
             case said.KrlAggregate() | said.DataObject():
                 return self._point(operand)
+            case said.FunctionCall():
+                return self._read_returned(operand)
             case _:
                 return _unknown_goal(AT_RUN_TIME)
 
     # Points.
 
+    def _read_returned(self, call: said.FunctionCall) -> FoundGoal:
+        """Read what a function of the files returns: its numbers stay."""
+        returned = self.task.find_returned(call, self.row, self.here)
+        if returned is None:
+            return _unknown_goal(AT_RUN_TIME)
+        operand, row, here = returned
+        found = replace(self, row=row, here=here).end(operand)
+        text = f"the function {call.name.upper()} returns the target"
+        why = found.why or Reason(Code.COMPUTED_TARGET, text)
+        return hold_numbers(
+            found, "", why, found.pins or text, found.target, found.values, found.aux
+        )
+
     def _point(self, operand: said.KrlAggregate | said.DataObject) -> FoundGoal:
         """Read a point that is written or named."""
-        held = self.task.find_held(operand, self.here)
+        held = self.task.find_held(operand, self.row, self.here)
         if held is not None:
             return self._read_held(held)
         name = operand.name if isinstance(operand, said.DataObject) else ""
@@ -272,11 +298,7 @@ class _Goal:
             return _unknown_goal(
                 self._explain_unknown(name) if name else AT_RUN_TIME, name=name
             )
-        names = {key for key, _ in found.fields}
-        if names & set(AXES):
-            goal = self._axes(found)
-        else:
-            goal = self._pose(found)
+        goal = self._read_record(found)
         if not name and goal.file >= 0:
             return replace(goal, pins=self._system(goal.file))
         if not name:
@@ -286,21 +308,65 @@ class _Goal:
         return self._describe_point(goal, operand)
 
     def _read_held(self, held: AssignedPoint) -> FoundGoal:
-        """Read the destination that an assignment gave to a point."""
+        """Read the destination that assignments gave to a point."""
         there = replace(self, row=held.row, here=held.scope)
         goal = _unknown_goal(AT_RUN_TIME)
-        if isinstance(held.operand, said.KrlAggregate | said.DataObject):
-            goal = there._point(held.operand)
+        match held.operand:
+            case said.KrlAggregate() | said.DataObject():
+                goal = there._point(held.operand)
+            case said.Operation(operator=":", operands=(first, second)):
+                goal = there._product(first, second)
+            case said.FunctionCall():
+                goal = there._read_returned(held.operand)
+        why = [self._explain_pinned(place[-1], goal) for place in held.chain]
+        why += [
+            f"{place[-1]} stands in a data list: it outlives the run"
+            for place in held.chain
+            if not place[2]
+        ]
+        pins, name = (
+            next(filter(None, (goal.pins, *why)), ""),
+            spell_element(held, "[]"),
+        )
+        if held.components:
+            return self._set_components(held, goal, name, pins)
         if goal.why.code is Code.PARTIAL_TARGET:  # the others are what they were before
             goal = _unknown_goal(PARTIAL)
-        why = [self._explain_pinned(point.name, goal) for point in held.chain]
-        why += [
-            f"{point.name} stands in a data list: it outlives the run"
-            for point in held.chain
-            if not point.place[2]
-        ]
-        pins = next(filter(None, (goal.pins, *why)), "")
-        return replace(goal, name=held.name, pins=pins, given=frozenset([held]))
+        unknown, shift = goal.target == Meaning.UNKNOWN, goal.shift
+        if shift is not None:
+            shift = replace(shift, pins=shift.pins or pins)
+        name = held.name if unknown else name
+        return replace(goal, name=name, pins=pins, shift=shift)
+
+    def _set_components(
+        self, held: AssignedPoint, base: FoundGoal, name: str, pins: str
+    ) -> FoundGoal:
+        """Read a point of which components have been set by themselves."""
+        record = self.task.evaluate_held(held)
+        found = _unknown_goal(PARTIAL)
+        if isinstance(record, KrlRecord) and record.whole:
+            found = self._read_record(record)
+        partial = found.why.code is Code.PARTIAL_TARGET
+        known = found.target != Meaning.UNKNOWN and not partial
+        known = known and not (held.operand is None and self._lacks_axis(record))
+        why = explain_components(held, name, self.task.files, known)
+        if held.operand is not None and found.why.code not in _OF_NUMBERS:
+            why = found.why
+        if not known:
+            return hold_numbers(base, name, why, pins)
+        return hold_numbers(
+            base, name, why, pins, found.target, found.values, found.aux
+        )
+
+    def _lacks_axis(self, found: KrlValue | None) -> bool:
+        """Return True if an external axis of the cell has no value."""
+        fields = dict(found.fields) if isinstance(found, KrlRecord) else {}
+        return any(OUTSIDE[axis - 1] not in fields for axis in self.goals.aux)
+
+    def _read_record(self, found: KrlRecord) -> FoundGoal:
+        """Read joint angles or a position."""
+        by_axes = {key for key, _ in found.fields} & set(AXES)
+        return self._axes(found) if by_axes else self._pose(found)
 
     def _explain_unknown(self, name: str) -> Reason:
         """Say why a name stands for no known point."""
@@ -425,7 +491,7 @@ class _Goal:
             return FoundGoal(Meaning.HOME, NOTHING, name=name)
         goal = self._point(operand)
         if goal.target == Meaning.JOINTS:
-            return FoundGoal(Meaning.HOME, goal.values, name=name, given=goal.given)
+            return FoundGoal(Meaning.HOME, goal.values, name=name)
         return replace(goal, why=goal.why or AT_HOME)
 
     # Products of frames: the point is moved along.
@@ -439,23 +505,32 @@ class _Goal:
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, said.DataObject):
             return _unknown_goal(AT_RUN_TIME)
-        base, held = self._point(point), self._find_own_shift(other)
+        base = self._point(point)
+        holds = base.holds | self._find_own_shift(other)
         frames = FrameReader(self.task, self.row, self.here, _NO, _NO)
         shift = frames.frame(other)
         if base.target != Meaning.POSE or not shift.pose:
             pins = base.pins or f"{base.name} is shifted by what {RUN_TIME}"
             return FoundGoal(
-                Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
-                name=base.name, why=base.why or AT_RUN_TIME, pins=pins, holds=held,
-                given=base.given,
+                Meaning.UNKNOWN, NOTHING, base.file, follows=base.origin,
+                name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
+                stays=base.stays, holds=holds,
             )  # fmt: skip
         if behind and self._by_joints:
             pins = base.pins or f"{base.name} is shifted without S and T"
             return FoundGoal(
-                Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
-                name=base.name, why=NO_STATUS, pins=pins, holds=held, given=base.given,
+                Meaning.UNKNOWN, NOTHING, base.file, follows=base.origin,
+                name=base.name, why=NO_STATUS, pins=pins, stays=base.stays,
+                holds=holds,
             )  # fmt: skip
         values, turns = _link(base.values, shift, behind)
+        if base.stays or base.slots[0] < 0:
+            aux = self._outside_of(base, other) if behind else base.aux
+            why = base.why or COMPUTED
+            kept = replace(base, holds=holds)
+            return hold_numbers(
+                kept, base.name, why, base.pins, base.target, values, aux
+            )
         found = self._shift(base, other, shift, behind)
         turned = turns and found.slots[0] < 0
         pins = base.pins or (f"{base.name} is turned too" if turned else "")
@@ -463,15 +538,15 @@ class _Goal:
             Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name,
             self._outside_of(base, other) if behind else base.aux,
             base.why, pins, base.shared, found,
-            held if found.slots[0] < 0 else (-1, -1), base.given,
+            holds=holds if found.slots[0] < 0 else base.holds,
         )  # fmt: skip
 
-    def _find_own_shift(self, other: said.Operand) -> tuple[int, int]:
+    def _find_own_shift(self, other: said.Operand) -> set[tuple[int, int]]:
         """Return where the numbers of a shift begin that stand in the move itself."""
         value = self.task.value(other, self.row, self.here)
         numbers = _numbers(value, PLACE) if isinstance(value, KrlRecord) else None
         file, slots = _places(numbers or ())
-        return (file, slots[0]) if file == self.here.file and slots else (-1, -1)
+        return {(file, slots[0])} if file == self.here.file and slots else set()
 
     def _outside_of(self, base: FoundGoal, other: said.Operand) -> tuple[float, ...]:
         """Return the external axes of ``point : other``: those that stand on the right.
@@ -494,7 +569,7 @@ class _Goal:
         value = self.task.value(other, self.row, self.here)
         record = value if isinstance(value, KrlRecord) else KrlRecord(())
         numbers = _numbers(record, PLACE)
-        told = [n.value for n in numbers] if numbers else _six_numbers(frame)
+        told = [n.value for n in numbers] if numbers else six_numbers(frame)
         kind = ShiftKind.OWN if behind else ShiftKind.FRAME
         shift = Shift(kind, tuple(told), base.values, flagged=not behind)
         written = isinstance(other, said.KrlAggregate) and numbers is not None
@@ -550,6 +625,11 @@ class _Goal:
 _NO = no_frame(RUN_TIME)
 
 
+def _note_given(goal: FoundGoal, watched: Points) -> FoundGoal:
+    """Note what a goal takes of assigned points."""
+    return replace(goal, given=watched.given) if watched.given else goal
+
+
 def _unknown_goal(why: Reason, name: str = "") -> FoundGoal:
     """Return a destination that nobody knows."""
     return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
@@ -568,13 +648,6 @@ def _places(numbers: Sequence[KrlNumber]) -> tuple[int, tuple[int, ...]]:
     if len(files) != 1 or -1 in files:
         return -1, (-1,) * len(numbers)
     return files.pop(), tuple(one.slot for one in numbers)
-
-
-def _six_numbers(frame: KrlFrame) -> list[float]:
-    """Return X, Y, Z [mm] and A, B, C [deg] of a frame."""
-    pose = np.array(frame.pose).reshape(4, 4)
-    angles = abc_from_rotation(pose[None, :3, :3], np.zeros((1, 3)))[0]
-    return [*(pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist()]
 
 
 def _link(

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from postproc.diagnostics import Code
-from postproc.files import base_name, is_submit, is_system_source
+from postproc.files import base_name
 from postproc.language.blocks import BlockWords, Outline
 from postproc.language.control_flow import HeadedRows
 from postproc.language.krl import syntax as said
+from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.statements import KrlText, read_krl_statements
 from postproc.language.source import Source
 from postproc.language.visits import Diagnostic
@@ -41,6 +42,7 @@ class KrlDatum:
         row: Its statement.
         routine: Name of the routine whose own it is, "" where it is the file's.
         shared: Every program knows it.
+        dimensions: Of an array.
     """
 
     name: str
@@ -50,6 +52,7 @@ class KrlDatum:
     row: int
     routine: str
     shared: bool
+    dimensions: tuple[said.Operand, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -74,16 +77,20 @@ class KrlFile:
     splines: tuple[range, ...]
     diagnostics: tuple[Diagnostic, ...]
 
+    @property
+    def _named(self) -> KrlFileName:
+        return KrlFileName(self.text.source.name)
+
     @cached_property
     def is_system(self) -> bool:
         """Return True if it is of the controller: ``$config.dat``, or of a package."""
         source = self.text.source
-        return self.name.startswith("$") or is_system_source(source.name, source.data)
+        return self.name.startswith("$") or self._named.is_system_source(source.data)
 
     @property
     def is_submit(self) -> bool:
         """Return True if it runs beside the program, and moves no arm."""
-        return is_submit(self.text.source.name)
+        return self._named.is_submit
 
 
 def read_krl(source: Source) -> KrlFile:
@@ -174,7 +181,14 @@ class _KrlReader:
         routine = self.outline.name(*_ROUTINES)
         for item in one.items:
             datum = KrlDatum(
-                item.name, (), one.type, item.value, row, routine, one.shared
+                item.name,
+                (),
+                one.type,
+                item.value,
+                row,
+                routine,
+                one.shared,
+                item.dimensions,
             )
             self.data.append(datum)
 

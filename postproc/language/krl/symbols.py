@@ -11,13 +11,26 @@ from functools import cached_property
 import numpy as np
 
 from postproc.diagnostics import Code
+from postproc.language.assigned_points import (
+    AssignedPoint,
+    FunctionBody,
+    NamesUsed,
+    PointPart,
+    Scope,
+    TaskSymbols,
+    is_point,
+)
 from postproc.language.control_flow import HeadedRows
-from postproc.language.interpreter import NamesUsed, Scope, TaskSymbols
+from postproc.language.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import TABLES
 from postproc.language.krl.external_routines import package_routines
-from postproc.language.krl.pose_encoding import COMMENTS
+from postproc.language.krl.pose_encoding import (
+    COMMENTS,
+    COMPONENTS,
+    compose_numbers,
+)
 from postproc.language.krl.program import KrlDatum, KrlFile, whole
 
 CONFIG = "$config"
@@ -30,7 +43,20 @@ MOVE_WORDS = frozenset(
     """.split()
 )
 """Words that a move begins with."""
-POINTS = (*POSITIONS, "axis", "e6axis")
+POINTS = (*POSITIONS, "axis", "e6axis", "frame")
+AXES = tuple(f"a{k}" for k in range(1, 7))
+OUTSIDE = tuple(f"e{k}" for k in range(1, 7))
+FIELDS: Mapping[str, Collection[str]] = {
+    "frame": COMPONENTS[:6],
+    "pos": COMPONENTS,
+    "e6pos": (*COMPONENTS, *OUTSIDE),
+    "axis": AXES,
+    "e6axis": (*AXES, *OUTSIDE),
+}
+"""Components of points by type."""
+WHOLE_NUMBERS = COMPONENTS[6:]
+NUMBERS = ("int", "real")
+FOLLOWED = (*POINTS, *NUMBERS)  # types of data whose assignments are followed
 DEEPEST = 20  # names that stand for names
 
 
@@ -123,6 +149,7 @@ class KrlTask(TaskSymbols):
         field(default_factory=lambda: defaultdict(dict))
     )
     _shared: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+    _names: dict[int, tuple[said.Operand, frozenset[str]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Index data by the scopes that declare them."""
@@ -205,17 +232,88 @@ class KrlTask(TaskSymbols):
         """Names of data that something may change."""
         return frozenset(self.uses.written | self.uses.changed)
 
-    def place_of_point(
-        self, name: str, here: Scope
-    ) -> tuple[int, str, str, str] | None:
-        """Return the place of a point that only assignments change, None for others."""
+    def locate(self, data: said.DataObject, row: int, here: Scope) -> PointPart | None:
+        """Find the point that only assignments change, see `TaskSymbols.locate`."""
+        name, steps = data.name, data.steps
         place = self.place(name, here)
         if place is None or name in self.uses.changed or name.startswith("$"):
             return None
-        found = self._own[(*place, name)]
-        if found.keys() != {()} or found[()][1].type not in POINTS:
+        file, datum = self._own[(*place, name)].get((), (-1, None))
+        if datum is None or datum.type not in FOLLOWED or name in self.counted:
             return None
-        return found[()][0], *place, name
+        index: tuple[int, ...] | None = ()
+        if datum.dimensions:
+            index = self._find_element(file, datum, steps[:1], row, here)
+            steps = steps[1:]
+        component = ".".join(step for step in steps if isinstance(step, str))
+        known = not component or component in FIELDS.get(datum.type, ())
+        known = known and all(isinstance(step, str) for step in steps)
+        return PointPart((file, *place, name), index if known else None, component)
+
+    def _find_element(
+        self, file: int, datum: KrlDatum, steps: Sequence[str | said.ElementStep],
+        row: int, here: Scope,
+    ) -> tuple[int, ...] | None:  # fmt: skip
+        """Return the index of an element, None where it is not known, or no element."""
+        there = Scope(file, self.files[file].name, datum.routine)
+        sizes = [self.number(one, datum.row, there) for one in datum.dimensions]
+        found = self.index(steps[0], row, here) if steps else None
+        if found is None or len(found) != len(sizes):
+            return None
+        inside = all(1 <= at <= n for at, n in zip(found, sizes, strict=True))
+        return found if inside else None
+
+    def evaluate_components(
+        self, part: PointPart, value: said.Operand, row: int, here: Scope
+    ) -> list[tuple[str, float | None]]:
+        """Return what an assignment gives to components, see `TaskSymbols`."""
+        found = self.value(value, row, here)
+        _, module, routine, name = part.place
+        type_ = self._own[module, routine, name][()][1].type
+        if part.component or type_ in NUMBERS:
+            number = found.value if isinstance(found, KrlNumber) else None
+            if part.component in WHOLE_NUMBERS or type_ == "int":
+                number = None if number is None or whole(number) is None else number
+            return [(part.component, number)]
+        fields = found.fields if isinstance(found, KrlRecord) and found.whole else ()
+        known = {key: one.value for key, one in fields if isinstance(one, KrlNumber)}
+        return [(key, known.get(key)) for key in known or COMPONENTS[:6]]
+
+    def names_of(self, operand: said.Operand) -> frozenset[str]:
+        """Return the names in an operand, see `TaskSymbols.names_of`."""
+        key = id(operand)
+        if key not in self._names:
+            named = said.DataObject | said.FunctionCall
+            parts = (one for one in parts_of([operand]) if isinstance(one, named))
+            self._names[key] = operand, frozenset(one.name for one in parts)
+        return self._names[key][1]
+
+    def calls_routine(self, operand: said.Operand) -> bool:
+        """Return True if an operand calls a function of the files."""
+        return not self.names_of(operand).isdisjoint(self.routines)
+
+    def open_function(
+        self, call: said.FunctionCall, row: int, here: Scope
+    ) -> FunctionBody | None:
+        """Return the statements of a function, see `TaskSymbols.open_function`."""
+        found = self.routine(call.name, here)
+        if found is None or getattr(found[2].head, "kind", "") != "deffct":
+            return None
+        file, module, routine = found
+        names = getattr(routine.head, "parameters", ())
+        if len(names) != len(call.arguments):
+            return None
+        given = tuple(
+            (name, argument.value, row, here)
+            for name, argument in zip(names, call.arguments, strict=True)
+            if argument.value is not None and name not in self.written
+        )
+        scope = replace(self.scope_of(file, module, routine), given=given)
+        text = self.files[file].text
+        rows = range(routine.first + 1, routine.last)
+        every = ((k, text.statement(k)) for k in rows)
+        body = [(k, o) for k, o in every if not isinstance(o, said.KrlDeclaration)]
+        return FunctionBody(scope, body)
 
     @cached_property
     def assigned(self) -> frozenset[str]:
@@ -416,11 +514,25 @@ class KrlTask(TaskSymbols):
                 return self._aggregate(fields, row, here, depth)
             case said.Operation(operator=operator, operands=operands):
                 parts = [self.value(one, row, here, depth + 1) for one in operands]
-                return _compute(operator, parts)
-            case said.DataObject(name=name, steps=steps):
-                return self._data(name, steps, row, here, depth)
+                return _link(parts) if operator == ":" else _compute(operator, parts)
+            case said.DataObject():
+                return self._data(operand, row, here, depth)
+            case said.FunctionCall(name=name, arguments=arguments):
+                returned = self.find_returned(operand, row, here)
+                if returned is not None:
+                    return self.value(*returned, depth + 1)
+                return self._apply(name, arguments, row, here)
             case _:
                 return None
+
+    def _apply(
+        self, name: str, arguments: Sequence[said.Argument], row: int, here: Scope
+    ) -> KrlNumber | None:
+        """Return what a function of the controller gives for a number."""
+        if name in self.routines or name not in ALIKE or len(arguments) != 1:
+            return None
+        found = apply_function(name, self.number(arguments[0].value, row, here))
+        return KrlNumber(found) if math.isfinite(found) else None
 
     def _aggregate(
         self, fields: Sequence[said.NamedField], row: int, here: Scope, depth: int
@@ -433,17 +545,19 @@ class KrlTask(TaskSymbols):
         return KrlRecord(known, len(known) == len(fields))
 
     def _data(
-        self,
-        name: str,
-        steps: Sequence[str | said.ElementStep],
-        row: int,
-        here: Scope,
-        depth: int,
+        self, data: said.DataObject, row: int, here: Scope, depth: int
     ) -> KrlValue | None:
         """Evaluate data by name, and what the steps behind it lead to."""
-        loops, rest = dict(here.loops), list(steps)
+        name, loops, rest = data.name, dict(here.loops), list(data.steps)
         if name in loops:
             return None if rest else KrlNumber(loops[name])
+        if name in here.parameters:
+            return self._read_parameter(data, here, depth)
+        point = data if is_point(data) else replace(data, steps=data.steps[:-1])
+        held = self.find_held(point, row, here)
+        if held is not None:
+            record = self.evaluate_held(held, depth + 1)
+            return record if point is data else _part_of(record, rest[-1])
         index: tuple[int, ...] | None = ()
         if rest and isinstance(rest[0], said.ElementStep):
             index = self.index(rest.pop(0), row, here)
@@ -456,10 +570,50 @@ class KrlTask(TaskSymbols):
         there = Scope(file, self.files[file].name, datum.routine)
         value = self.value(datum.value, datum.row, there, depth + 1)
         for step in rest:
-            if not (isinstance(step, str) and isinstance(value, KrlRecord)):
-                return None
-            value = value.get(step)
+            value = _part_of(value, step)
         return value
+
+    def _read_parameter(
+        self, data: said.DataObject, here: Scope, depth: int
+    ) -> KrlValue | None:
+        """Evaluate a parameter, None where what is given for it is not known."""
+        given = next((one for one in here.given if one[0] == data.name), None)
+        if given is None or not all(isinstance(step, str) for step in data.steps):
+            return None
+        value = self.value(*given[1:], depth + 1)
+        for step in data.steps:
+            value = _part_of(value, step)
+        return value
+
+    def evaluate_held(self, held: AssignedPoint, depth: int = 0) -> KrlValue | None:
+        """Evaluate what assignments gave to data, None where it is not known."""
+        type_ = self._own[held.place[1:]][()][1].type
+        if type_ in NUMBERS:
+            return self._evaluate_number(held, type_, depth)
+        base = KrlRecord((), held.operand is None)
+        if held.operand is not None:
+            found = self.value(held.operand, held.row, held.scope, depth)
+            base = found if isinstance(found, KrlRecord) and found.whole else base
+        fields, known = dict(base.fields), base.whole
+        for one in held.components:
+            fields.pop(one.name, None)
+            if one.value is not None:
+                fields[one.name] = KrlNumber(one.value)
+        known = known and all(one.value is not None for one in held.components)
+        return KrlRecord(tuple(fields.items()), known)
+
+    def _evaluate_number(
+        self, held: AssignedPoint, type_: str, depth: int
+    ) -> KrlNumber | None:
+        """Evaluate what assignments gave to a number; whole ones are rounded to."""
+        if held.components:
+            value = held.components[0].value
+            return None if value is None else KrlNumber(value)
+        found = self.value(held.operand, held.row, held.scope, depth)
+        if not isinstance(found, KrlNumber):
+            return None
+        known = type_ == "real" or whole(found.value) is not None
+        return KrlNumber(found.value) if known else None
 
     def index(
         self, step: said.ElementStep | str, row: int, here: Scope
@@ -470,6 +624,24 @@ class KrlTask(TaskSymbols):
         values = [whole(self.number(one, row, here)) for one in step.subscripts]
         known = tuple(k for k in values if k is not None)
         return known if len(known) == len(values) and known else None
+
+
+def _part_of(value: KrlValue | None, step: str | said.ElementStep) -> KrlValue | None:
+    """Return a component of a value, None where it has none of that name."""
+    if isinstance(step, str) and isinstance(value, KrlRecord):
+        return value.get(step)
+    return None
+
+
+def _link(parts: Sequence[KrlValue | None]) -> KrlRecord | None:
+    """Link two frames: what stands on the right tells what comes out."""
+    records = [part for part in parts if isinstance(part, KrlRecord) and part.whole]
+    numbers = [[one.number(name) for name in COMPONENTS[:6]] for one in records]
+    if len(records) != 2 or np.isnan(numbers).any():
+        return None
+    place = zip(COMPONENTS[:6], compose_numbers(*numbers), strict=True)
+    fields = dict(records[1].fields) | {key: KrlNumber(one) for key, one in place}
+    return KrlRecord(tuple(fields.items()))
 
 
 def _compute(operator: str, parts: Sequence[KrlValue | None]) -> KrlNumber | None:
@@ -593,9 +765,9 @@ class _Uses(NamesUsed):
 
     def _note_assignment(self, target: said.DataObject, value: said.Operand) -> None:
         """Note what an assignment takes: a point that moves go to by another name."""
-        plain = isinstance(value, said.DataObject) and not (value.steps or target.steps)
-        if plain and isinstance(value, said.DataObject):
+        if isinstance(value, said.DataObject) and is_point(value) and is_point(target):
             self.copies.add((target.name, value.name))
+            self._subscripts(value)
         else:
             self.take(value)
 

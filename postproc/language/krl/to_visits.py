@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 from postproc.diagnostics import NO_REASON, Code, Reason
@@ -66,7 +66,7 @@ def visits_of(machine: KrlMachine) -> Visits:
     found: Sequence[KrlVisit] = machine.visits
     _keep_orientation(machine, found)
     _follow_partial(machine, found)
-    ends, odd = _ends(found), _odd_status(found)
+    ends, odd = _ends(found, machine.lost), _odd_status(found)
     base = cell_pose(machine.start.base)
     number = {id(v): k for k, v in enumerate(found)}
 
@@ -198,7 +198,7 @@ def _blending(v: KrlVisit, modes: KrlModes, end: str) -> _Blending:
 # What stands behind a point decides whether it is passed.
 
 
-def _ends(found: Sequence[KrlVisit]) -> Sequence[str]:
+def _ends(found: Sequence[KrlVisit], lost: Container[int]) -> Sequence[str]:
     """Tell of every visit whether the arm stops there, as far as what follows tells.
 
     The old planner and that of splines do not blend into each other, statements that
@@ -208,12 +208,18 @@ def _ends(found: Sequence[KrlVisit]) -> Sequence[str]:
     for v in found:
         for origin in v.origins:
             after[origin].append(v)
-    return [_end(v, after[k]) for k, v in enumerate(found)]
+    return [_end(v, after[k], k in lost) for k, v in enumerate(found)]
 
 
-def _end(v: KrlVisit, after: Sequence[KrlVisit]) -> str:
-    """Tell whether the arm stops at a visit, by those behind it."""
-    stops: list[bool | None] = []
+def _end(v: KrlVisit, after: Sequence[KrlVisit], lost: bool) -> str:
+    """Tell whether the arm stops at a visit, by those behind it.
+
+    Args:
+        v: The visit.
+        after: Those behind it.
+        lost: The arm may go anywhere behind it.
+    """
+    stops: list[bool | None] = [None] if lost else []
     for one in after:
         if one.by_spline_planner != v.by_spline_planner:
             stops.append(True)

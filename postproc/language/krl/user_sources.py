@@ -7,7 +7,8 @@ from functools import lru_cache
 from pathlib import Path
 
 from postproc.exceptions import ProgramError
-from postproc.files import ARCHIVE_DEPTH, is_system_source, read_input
+from postproc.files import read_input
+from postproc.language.krl.files import ARCHIVE_DEPTH, KrlFileName
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.symbols import KrlTask
@@ -61,7 +62,7 @@ def _acts(place: Path) -> bool:
 @lru_cache(READ_BEFORE)
 def _acts_by_text(name: str, text: bytes) -> bool:
     """Return True if a source of a package does."""
-    if not is_system_source(name, text):
+    if not KrlFileName(name).is_system_source(text):
         return False
     file = read_krl(source_from_bytes(name, text))
     machine = KrlMachine.of(KrlTask([file]), Start())

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 from postproc.diagnostics import Code
-from postproc.language.pdl2.values import Nothing, Value, add_unknown, join
+from postproc.language.pdl2.values import (
+    Nothing,
+    Value,
+    add_unknown,
+    join,
+    join_components,
+    may_be,
+)
+from postproc.language.visits import ELSEWHERE
 
 # A mapping that is cheap to copy and to compare: what copies share stays shared.
 
@@ -80,6 +88,41 @@ Log = tuple[str, "Log | None"]
 MANY = -3  # origin: one of so many visits that they are not told apart
 MOST_ORIGINS = 500
 
+
+class GivenValues:
+    """What variables are given while a program runs, by key, in whatever order."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._values: dict[str, Value] = {}
+        self._numbers: dict[str, set[int]] = {}  # a set takes in many
+
+    def note(self, key: str, value: Value) -> None:
+        """Note that a key is given a value at some time."""
+        known = self._values.setdefault(key, value)
+        if known is not value:
+            known = join_components(known, value)
+        self._numbers.setdefault(key, set()).update(may_be(value), may_be(known))
+        if isinstance(known, Nothing):
+            known = replace(known, of=frozenset())
+        self._values[key] = known
+
+    def value(self, key: str) -> Value:
+        """Return what a key is given, whenever it is."""
+        value = self._values[key]
+        if isinstance(value, Nothing):
+            return replace(value, of=self.numbers(key))
+        return value
+
+    def numbers(self, key: str) -> frozenset[int]:
+        """Return the numbers of the positions that a key is ever given."""
+        return frozenset(self._numbers.get(key, ()))
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the keys."""
+        return iter(self._values)
+
+
 NEVER_SET = Nothing(
     "it has no value in the program or its variable file", code=Code.NO_VALUE
 )
@@ -102,6 +145,8 @@ class Store:
         compound: Keys that ever had elements or fields; shared by all copies.
         changing: Variables, by key, that another program may write at any time.
         exposed: Those of them that hold what this program has given them.
+        given: What keys are given at any time; shared by all copies.
+        lost: Visits behind which the arm goes on nobody knows where; likewise.
     """
 
     initial: Callable[[str], Value | None]
@@ -112,6 +157,8 @@ class Store:
     compound: set[str] = field(default_factory=set)
     changing: frozenset[str] = frozenset()
     exposed: frozenset[str] = frozenset()
+    given: GivenValues = field(default_factory=GivenValues)
+    lost: set[int] = field(default_factory=set)
 
     def copy(self) -> Store:
         """Return a store that can change on its own."""
@@ -124,6 +171,8 @@ class Store:
             self.compound,
             self.changing,
             self.exposed,
+            self.given,
+            self.lost,
         )
 
     def read(self, key: str) -> Value:
@@ -153,6 +202,7 @@ class Store:
                 self.logs[whole] = (key, self.logs.get(whole))
                 self.compound.add(whole)
         self.values[key] = value
+        self.given.note(key, value)
 
     def parts(self, key: str) -> list[str]:
         """Return the keys of elements and fields that a key has."""
@@ -180,6 +230,11 @@ class Store:
         held = self.read(key)
         self._drop_parts(key)
         self.write(key, add_unknown(unknown, held))
+
+    def lose_place(self) -> None:
+        """Where the arm is is no longer known."""
+        self.lost |= self.last
+        self.last = frozenset({ELSEWHERE})
 
     def set(self, **settings: Value) -> None:
         """Change frames or motion variables (names without ``$``)."""

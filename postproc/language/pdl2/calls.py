@@ -37,6 +37,7 @@ from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.side_effects import (
     CHANGING,
     FRAMES,
+    NODES,
     PURE,
     CallGraph,
     call_graph_of,
@@ -82,7 +83,7 @@ def summarise_call(
         why = f"a routine that {name} calls sets it"
         here.store.set(**{frame: Nothing(why) for frame in FRAMES})
     if reach.moves:
-        here.store.last = frozenset({ELSEWHERE})
+        here.store.lose_place()
 
 
 def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
@@ -169,7 +170,7 @@ def _refuse_recursion(machine: Machine, here: Execution, inside: Place) -> None:
         "at an unknown place. Write it as a loop",
     )
     summarise_call(machine, here, name, call_graph_of(here.world, inside))
-    here.store.last = frozenset({ELSEWHERE})
+    here.store.lose_place()
 
 
 def _bind(
@@ -211,10 +212,11 @@ def opaque_call(
     """Take in what a routine that the job does not hold is said, or assumed, to do."""
     built_in = name in CHANGING or name in PURE
     why = f"{name.upper()} computes with it" if built_in else f"{name} is given it"
-    for given in arguments:
-        here.world.pin(here.value(given), why)
-    named = frozenset(r.name for r in map(bare, arguments) if r is not None)
-    escape_names(here, named, why)
+    if name not in NODES:
+        for given in arguments:
+            here.world.pin(here.value(given), why)
+        named = frozenset(r.name for r in map(bare, arguments) if r is not None)
+        escape_names(here, named, why)
     for argument in list_changed_arguments(arguments):
         invalidate(here, argument, f"{name} may change it (arguments go by reference)")
     if built_in:
@@ -224,14 +226,14 @@ def opaque_call(
         case RoutineEffect.TABLE:
             _frames_from_table(here, name, arguments)
         case RoutineEffect.MOVES:
-            here.store.last = frozenset({ELSEWHERE})
+            here.store.lose_place()
         case RoutineEffect.SETS_FRAMES:
             _unknown_frames(here, f"{name} sets it; give its table under "
                             f"[frames.routines.{name}] in the cell file")  # fmt: skip
         case RoutineEffect.TRACKS:
             on = here.value(arguments[0]) if arguments else Nothing("")
             here.store.set(**{TRACKING: on})
-            here.store.last = frozenset({ELSEWHERE})
+            here.store.lose_place()
             _say(here, Code.POSITION_UNKNOWN, name, "lets a sensor guide the arm, or "
                  "ends that: the next move starts at an unknown place")  # fmt: skip
         case RoutineEffect.KNOWN:
@@ -259,7 +261,7 @@ def forget_surroundings(here: Execution, why: str) -> None:
     """Forget where the arm is, its frames, and all motion settings of the program."""
     names = (*FRAMES, *here.store.settings)
     here.store.set(**dict.fromkeys(names, Nothing(why)))
-    here.store.last = frozenset({ELSEWHERE})
+    here.store.lose_place()
 
 
 def _frames_from_table(
@@ -331,7 +333,7 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
     if isinstance(held, Position):
         held = set_owner(here, statement.target.name, target.key, held)
     if isinstance(held, Nothing) and target.component == ():
-        here.store.forget(target.key, Nothing(held.why, code=held.code))
+        here.store.forget(target.key, held)
     else:
         here.store.write(target.key, held)
 
@@ -421,9 +423,8 @@ def _new_value(
     match target.component:
         case ("pos", _):
             if not isinstance(value, Position):
-                if isinstance(value, Nothing):
-                    return Nothing(value.why, code=value.code)
-                return Nothing("it is no position")
+                known = isinstance(value, Nothing)
+                return value if known else Nothing("it is no position")
             return replace(value, aux=held.aux, taught=value.taught or held.taught)
         case ("aux", axis):
             return held.with_aux(axis, number)

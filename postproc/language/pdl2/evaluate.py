@@ -318,14 +318,16 @@ class ProgramPoint:
                 [float(x)],
             ):
                 return function(name, x)
-        return Nothing(f"it comes from {name.upper()}, known only at run time")
+        why = f"it comes from {name.upper()}, known only at run time"
+        return add_unknown(Nothing(why), *values)
 
     def _position(self, arguments: tuple[ast.Expression | None, ...]) -> Value:
         config = None
         if len(arguments) == 7:
             text = self.value(arguments[6])
             if not isinstance(text, str):
-                return Nothing("its configuration is known only at run time")
+                why = "its configuration is known only at run time"
+                return add_unknown(Nothing(why), self._components(arguments[:6]))
             config = text
         elif len(arguments) == 1 and self.real(arguments[0]) == 0.0:
             return Position(
@@ -388,7 +390,8 @@ def bare(value: ast.Expression | None) -> ast.Reference | None:
 def parts_of(here: ProgramPoint, origin: ast.Reference) -> dict[str, Value]:
     """Return what is known of the elements and fields of a variable.
 
-    Standard fields of nodes count too where what they hold is not known.
+    Where what they hold is not known, those count too that may be positions of the
+    text, and standard fields of nodes.
 
     Returns:
         Values by what follows the variable's own key: ``[2]``, ``.place``.
@@ -397,14 +400,15 @@ def parts_of(here: ProgramPoint, origin: ast.Reference) -> dict[str, Value]:
     for key in sorted(here.locate(origin).keys):
         for part in parts_under(here, key):
             value = here.store.read(part)
-            if not isinstance(value, Nothing) or is_standard(part):
+            if not isinstance(value, Nothing) or value.of or is_standard(part):
                 found[part[len(key) :]] = value
     return found
 
 
 def parts_under(here: ProgramPoint, key: str) -> list[str]:
     """Return the keys of elements and fields that a key has or ever had."""
-    return here.world.first_parts(key) + here.store.parts(key)
+    world = here.world
+    return world.first_parts(key) + world.later_parts(key) + here.store.parts(key)
 
 
 def is_standard(key: str) -> bool:

@@ -30,6 +30,7 @@ from postproc.language.pdl2.exported_variables import (
     find_imported_points,
 )
 from postproc.language.pdl2.job import FilePoints, Place, World, base_variable
+from postproc.language.pdl2.kept_values import keep_values
 from postproc.language.pdl2.machine import (
     MAX_ROWS,
     MAX_STEPS,
@@ -248,6 +249,7 @@ def _cancel(here: Execution) -> None:
     """End a move on its way, where the program may have gone on before its end."""
     programs = here.world.programs()
     if any(_RUNNING.search(one.lines.source.data) for one in programs):
+        here.store.lost |= here.store.last
         here.store.last |= {ELSEWHERE}
 
 
@@ -512,7 +514,9 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
         arm = world.other_arm(place, root)
         _enter(world, file, entries.entry(row), key, arm)
     prefix = f"{place.program.name}/"
-    world.initial.points = FilePoints(prefix, own, other, entries, base, shared, taught)
+    world.initial.points = FilePoints(
+        prefix, own, other, entries, base, shared, taught, np.zeros(len(own), bool)
+    )
 
 
 def _list_rows_where(
@@ -589,6 +593,9 @@ def resolve(
     world = World(program, dict(others or {}), start or Start(), variables)
     fill_initial(world)
     machine = _follow(world)
+    runs = 1
+    while not machine.exhausted and keep_values(world, machine.given, runs):
+        machine, runs = _follow(world), runs + 1
     if machine.exhausted:
         world.report_once(
             program, 0, Code.TOO_COMPLEX, "", "the program has too many ways, or "
@@ -631,6 +638,7 @@ def _start(machine: Machine) -> None:
         base=frame_value(start.base, why),
         uframe=frame_value(start.uframe, why),
     )
+    machine.given, machine.lost = store.given, store.lost
     _handlers(machine, store)
     if program.main is not None:
         machine.enter(machine.root, Place(program, program.main))
@@ -643,6 +651,7 @@ def _handlers(machine: Machine, store: Store) -> None:
     nothing = Nothing("a condition handler runs at any time")
     unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
     unknown.changing = world.changing
+    unknown.given, unknown.lost = store.given, store.lost
     unknown.set(tool=nothing, base=nothing, uframe=nothing)
     for program in world.programs():
         for body in (program.main, *program.routines.values()):

@@ -38,15 +38,17 @@ class FilePoints:
         base: Global index of the file's first number.
         shared: Another program may read it too, by row of `entries`.
         taught: Marked as taught where it is declared, likewise.
+        asked: The program takes it as it is in the file, likewise.
     """
 
     prefix: str
     own: Bools
-    other: Mapping[str, int]
+    other: dict[str, int]
     entries: Entries
     base: int
     shared: Bools
     taught: Bools
+    asked: Bools
 
     def row(self, key: str) -> int:
         """Return the row of a key, -1 where it is no point."""
@@ -97,10 +99,19 @@ class FilePoints:
 
 @dataclass
 class InitialValues:
-    """Values by key; those of points are made when they are asked for."""
+    """Values by key; those of points are made when they are asked for.
+
+    Attributes:
+        other: Values that are no points of the variable file.
+        points: Points of the variable file.
+        asked: Keys of others that the program takes as they are when it starts.
+        unset: Keys that no file gives a value, and what else they may begin with.
+    """
 
     other: dict[str, Value] = field(default_factory=dict)
     points: FilePoints | None = None
+    asked: set[str] = field(default_factory=set)
+    unset: dict[str, Value] = field(default_factory=dict)
 
     def point(self, key: str) -> int:
         """Return the row of a point that the variable file tells, -1 for all else."""
@@ -121,8 +132,29 @@ class InitialValues:
         """Return what a key holds, None where it holds nothing."""
         row = self.point(key)
         if row >= 0 and self.points is not None:
+            self.points.asked[row] = True
             return self.points.position(row)
-        return self.other.get(key)
+        self.asked.add(key)
+        return self.other.get(key, self.unset.get(key))
+
+    def is_asked(self, key: str) -> bool:
+        """Tell whether the program takes what a key holds when it starts."""
+        row = self.point(key)
+        if row >= 0 and self.points is not None:
+            return bool(self.points.asked[row])
+        return key in self.asked
+
+    def change(self, key: str, value: Value) -> None:
+        """Let a key hold a value, whatever the variable file says."""
+        if key not in self:
+            self.unset[key] = value
+            return
+        row = self.point(key)
+        if row >= 0 and self.points is not None:
+            self.points.own[row] = False
+            self.points.other.pop(key, None)
+            self.asked.add(key)
+        self.other[key] = value
 
     def __contains__(self, key: str) -> bool:
         """Tell whether a key holds anything."""
@@ -194,6 +226,7 @@ class World:
     _said: set[tuple[str, str]] = field(default_factory=set)
     _kept: set[frozenset[int]] = field(default_factory=set)
     _first: dict[str, list[str]] | None = None
+    _later: tuple[int, dict[str, list[str]]] | None = None
 
     def __post_init__(self) -> None:
         base = 0
@@ -260,12 +293,17 @@ class World:
     def first_parts(self, key: str) -> list[str]:
         """Return the elements and fields that a key has when the job starts."""
         if self._first is None:
-            self._first = {}
-            for part in self.initial.parts():
-                if "[" in part or "." in part:
-                    for whole in wholes(part):
-                        self._first.setdefault(whole, []).append(part)
+            self._first = _by_whole(self.initial.parts())
         return self._first.get(key, [])
+
+    def later_parts(self, key: str) -> list[str]:
+        """Return those that it has only where an earlier run has given it them."""
+        unset = self.initial.unset
+        if not unset:
+            return []
+        if self._later is None or self._later[0] != len(unset):
+            self._later = len(unset), _by_whole(unset)
+        return self._later[1].get(key, [])
 
     def loosen(self, key: str, why: str) -> None:
         """Note that some part of a variable is used, which only the run tells."""
@@ -378,6 +416,16 @@ class World:
         """Return the program that a name or a file's name means."""
         own = {self.main.name, base_name(self.main.lines.source.name)}
         return self.others.get(name) or (self.main if name in own else None)
+
+
+def _by_whole(parts: Iterable[str]) -> dict[str, list[str]]:
+    """Return elements and fields by what they are parts of, at any depth."""
+    found: dict[str, list[str]] = {}
+    for part in parts:
+        if "[" in part or "." in part:
+            for whole in wholes(part):
+                found.setdefault(whole, []).append(part)
+    return found
 
 
 def base_variable(name: str) -> str:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from postproc.arrays import release_memory
 from postproc.exceptions import ProgramError
-from postproc.files import base_name, is_variables
+from postproc.files import base_name
 from postproc.language.grammars import line_parser
 from postproc.language.language import (
     Cloner,
@@ -19,7 +20,9 @@ from postproc.language.language import (
     Splitter,
     Start,
 )
+from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.number_edits import Skeleton
+from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.pose_encoding import AT_APPROACH, AT_VIA, MARK, PDL2_DIALECT
 from postproc.language.pdl2.program import Program, parse, parse_again
@@ -44,7 +47,7 @@ class Pdl2(Language):
 
     name = "PDL2"
     controller = "comau"
-    suffixes = (".pdl",)
+    suffixes = Pdl2FileName.programs
     comment = "--"
     dialect = PDL2_DIALECT
 
@@ -65,7 +68,7 @@ class Pdl2(Language):
         variables: VariableFile | None = None
         texts = [Skeleton.of(program.lines)]
         for source in sources[1:]:
-            if is_variables(source.name):
+            if Pdl2FileName(source.name).is_variables:
                 variables = _variables(source, known)
                 texts.append(Skeleton.of(variables.lines))
             else:
@@ -94,7 +97,7 @@ class Pdl2(Language):
         """Parse the files of a job to clone variables in them."""
         from postproc.language.pdl2.clones import Pdl2Cloner
 
-        own = [source for source in sources if not is_variables(source.name)]
+        own = [one for one in sources if not Pdl2FileName(one.name).is_variables]
         values = next((source for source in sources if source not in own), None)
         taken = {
             word.decode("ascii").lower()
@@ -107,7 +110,7 @@ class Pdl2(Language):
         """Parse the files of a job to put points on the ways of its moves."""
         from postproc.language.pdl2.insert_moves import Pdl2Splitter
 
-        own = [source for source in sources if not is_variables(source.name)]
+        own = [one for one in sources if not Pdl2FileName(one.name).is_variables]
         return Pdl2Splitter([parse(source) for source in own])
 
     def is_inserted(self, line: bytes) -> bool:
@@ -132,10 +135,19 @@ class Pdl2(Language):
 
         return entry_names(lines, wanted)
 
+    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
+        """Write joint moves that stop, with comments ``MEASURE``."""
+        from postproc.language.pdl2.measuring_program import write_pdl2
+
+        return write_pdl2(program)
+
     def prepare(self) -> None:
         """Load the parsers of programs and variable files."""
         for grammar in ("pdl2", "lsv"):
             line_parser(grammar, "line")
+
+
+LANGUAGE = Pdl2
 
 
 def _refuse_other_arm(program: Program, start: Start) -> None:

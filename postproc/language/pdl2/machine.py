@@ -12,7 +12,13 @@ import numpy as np
 from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.abstract_state import MANY, MOST_ORIGINS, Settings, Store
+from postproc.language.pdl2.abstract_state import (
+    MANY,
+    MOST_ORIGINS,
+    GivenValues,
+    Settings,
+    Store,
+)
 from postproc.language.pdl2.call_context import CALLED, Context, Point
 from postproc.language.pdl2.evaluate import ProgramPoint, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
@@ -170,6 +176,8 @@ class Machine:
         cycle_left: A condition handler may begin the cycle again at any time.
         exhausted: The program is too complex to be followed to the end.
         paused: Visits behind which the arm may stop before the program goes on.
+        lost: Visits behind which it may go anywhere.
+        given: What variables are given at any time.
     """
 
     world: World
@@ -189,6 +197,8 @@ class Machine:
     cycle_left: bool = False
     exhausted: bool = False
     paused: set[int] = field(default_factory=set)
+    lost: set[int] = field(default_factory=set)
+    given: GivenValues = field(default_factory=GivenValues)
     rows: int = 0
     _heap: list[tuple[Point, int]] = field(default_factory=list)
     _queued: set[tuple[Context, int]] = field(default_factory=set)

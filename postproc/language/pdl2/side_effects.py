@@ -40,6 +40,9 @@ CHANGING = frozenset(
 )
 """Built-in routines: they may change their arguments, nothing else."""
 
+NODES = frozenset({"node_app", "node_del", "node_ins"})
+"""Those of them that change how many nodes a path has, and no number in them."""
+
 
 FRAMES = ("tool", "base", "uframe")
 CANCELLING = (ast.CancelMove, ast.ExitCycle)

@@ -369,8 +369,10 @@ def _number_visits(
 
 def _mark_pauses(visits: Visits, machine: Machine, visit: Indices) -> Visits:
     """Say of which fly points it is not known whether the arm stops there."""
-    paused = [visit[k] for k in machine.paused if k >= 0]
-    rows = np.array([k for k in paused if k >= 0], dtype=np.int64)
+    paused, lost = ([visit[k] for k in ids if k >= 0]
+                    for ids in (machine.paused, machine.lost))  # fmt: skip
+    unsure = {*lost, *np.intersect1d(paused, visits.pred).tolist()}
+    rows = np.array(sorted(k for k in unsure if k >= 0), dtype=np.int64)
     rule = visits.zone_rule[rows]
     exact = (rule == ZoneRule.PASS) | (visits.zone_mm[rows] < 0.0)
     rows = rows[visits.fly[rows] & ~exact]

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnostics import Code
+from postproc.language.functions import apply_function
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
 # What the analysis knows of a value: a number, a text, a position, or why nothing.
@@ -173,6 +174,24 @@ def add_unknown(unknown: Nothing, *others: Value | None) -> Nothing:
     return unknown if of is unknown.of else replace(unknown, of=of)
 
 
+def join_components(a: Value, b: Value) -> Value:
+    """Return what holds when one of two values holds, of positions each number."""
+    if not (isinstance(a, Position) and isinstance(b, Position)):
+        return join(a, b)
+    if (a.joints, a.config) != (b.joints, b.config):
+        return join(a, b)
+    other = {at for at in range(6) if _component(a, at) != _component(b, at)}
+    if all(at in other or a.numbers[at] is None for at in range(6)):
+        return join(a, b)
+    for at in other:
+        a = a.with_component(at, SourceNumber(None))
+    return _mix(a, b)
+
+
+def _component(position: Position, at: int) -> tuple[float | None, int, bool]:
+    return position.numbers[at], position.slots[at], at in position.along
+
+
 def _join_positions(a: Position, b: Position) -> Value:
     same = (a.joints, a.numbers, a.slots, a.along, a.config) == (
         b.joints,
@@ -183,6 +202,11 @@ def _join_positions(a: Position, b: Position) -> Value:
     )
     if not same:
         return Nothing("it may hold different values here", may_be(a) | may_be(b))
+    return _mix(a, b)
+
+
+def _mix(a: Position, b: Position) -> Position:
+    """Return a position with all that is said beside the numbers of two."""
     return replace(
         a,
         aux=a.aux if a.aux == b.aux else None,
@@ -213,13 +237,13 @@ def invert_frame(a: Position) -> Value:
 def shift_position(a: Position, by: Vector) -> Value:
     """Return a position moved along its reference frame's axes (POS_SHIFT)."""
     if a.joints or not a.complete or None in by.numbers:
-        return Nothing("an argument of POS_SHIFT is not known")
+        return add_unknown(Nothing("an argument of POS_SHIFT is not known"), a)
     moved = tuple(
         n + d  # type: ignore[operator]
         for n, d in zip(a.numbers[:3], by.numbers, strict=True)
     )
     if max(map(abs, moved)) > FARTHEST:
-        return Nothing("POS_SHIFT takes it out of any reach")
+        return add_unknown(Nothing("POS_SHIFT takes it out of any reach"), a)
     return replace(
         a,
         numbers=moved + a.numbers[3:],
@@ -246,7 +270,6 @@ def _derive_position(
 
 RUN_TIME = Nothing("it is known only at run time")
 
-FUNCTIONS = frozenset("abs sqrt sin cos tan round trunc".split())
 _ARITHMETIC: dict[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
@@ -328,13 +351,8 @@ def _add(a: Vector, b: Vector, sign: str) -> Value:
 
 def function(name: str, x: float) -> Value:
     """Return what a built-in function of one number gives (angles in degrees)."""
-    if name in ("sin", "cos", "tan"):
-        return float(getattr(math, name)(math.radians(x)))
-    if name == "sqrt":
-        return math.sqrt(x) if x >= 0 else Nothing("the root of a negative number")
-    if name == "round":
-        return float(math.floor(x + 0.5))
-    return abs(x) if name == "abs" else float(math.trunc(x))
+    found = apply_function(name, x)
+    return Nothing("the root of a negative number") if math.isnan(found) else found
 
 
 # Where a reference leads.

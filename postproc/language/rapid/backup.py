@@ -12,8 +12,9 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import ProgramError
-from postproc.files import is_module, read_input
+from postproc.files import read_input
 from postproc.language.archive import Archive
+from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import read_rapid
 from postproc.language.source import source_from_bytes
@@ -94,7 +95,7 @@ def _modules(folder: Path | None) -> tuple[Path, ...]:
         return ()
     readable = []
     for path in sorted(folder.iterdir()):
-        if is_module(path.name) and path.is_file():
+        if RapidFileName(path.name).is_program and path.is_file():
             at = path.stat()  # system modules may be encoded
             if _is_text(path, at.st_mtime_ns, at.st_size):
                 readable.append(path)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
-from postproc.language.interpreter import Scope
+from postproc.language.assigned_points import Scope
 from postproc.language.language import Cloner, NamedPoint
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.program import Datum, MotionCall, RapidFile

@@ -130,7 +130,7 @@ STILL_FUNCTIONS = BUILT_IN_FUNCTIONS | {"strtoval", "defaccframe"}
 WAITING = frozenset(
     """
     waittime waitdi waitdo waitai waitao waitgi waitgo waituntil waitrob waitsynctask
-    waittestandset waitload stop break systemstopaction
+    waittestandset waitload stop break systemstopaction stopmove
     tpreadfk tpreadnum tpreaddnum uimsgbox uimessagebox uilistview uinumentry
     uidnumentry uinumtune uidnumtune uialphaentry
     socketaccept socketconnect socketreceive socketreceivefrom rmqreadwait rmqsendwait

@@ -10,12 +10,12 @@ from functools import cached_property, partial
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
+from postproc.language.assigned_points import Scope
 from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import (
     NOWHERE,
     Arrived,
     CallContext,
-    Scope,
     TaskMachine,
 )
 from postproc.language.language import Start
@@ -499,6 +499,7 @@ class RapidMachine(TaskMachine):
             self.restarts.append(here)
             return None
         if name in STOPPED:
+            self.lost |= here.origins
             return here.forget()
         if kind == "modal":
             changed = self._change_modes(one, row, scope, here.modes)

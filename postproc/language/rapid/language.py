@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
-from postproc.files import MODULES, task_beside
+from postproc.files import FolderListing
 from postproc.language.archive import Archive
 from postproc.language.blocks import read_once
 from postproc.language.grammars import line_parser
@@ -22,6 +22,7 @@ from postproc.language.language import (
     Language,
     Start,
 )
+from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.number_edits import Skeleton
 from postproc.language.rapid.backup import (
     modules_beside,
@@ -30,6 +31,7 @@ from postproc.language.rapid.backup import (
     system_modules,
 )
 from postproc.language.rapid.clones import RapidCloner
+from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, read_rapid
@@ -49,7 +51,7 @@ class Rapid(Language):
 
     name = "RAPID"
     controller = "abb"
-    suffixes = MODULES
+    suffixes = RapidFileName.programs
     comment = "!"
     dialect = RAPID_DIALECT
     tells_accuracy = False
@@ -104,7 +106,12 @@ class Rapid(Language):
         """Tell whether a line declares joint angles, or moves to some."""
         return _JOINTS.match(line) is not None
 
-    def reads(self, program: Path) -> tuple[Path, ...]:
+    def reads(
+        self,
+        program: Path,
+        within: Path | None = None,
+        listing: FolderListing | None = None,
+    ) -> tuple[Path, ...]:
         """Return the system modules of the task, and the modules of others."""
         return (*system_modules(program), *modules_beside(program))
 
@@ -116,9 +123,18 @@ class Rapid(Language):
         """Return the arms of a backup, and where ``MOC.cfg`` places them."""
         return tuple((arm.name, arm.pose) for arm in read_mounted_arms(program))
 
+    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
+        """Write joint moves that stop, with comments ``MEASURE``."""
+        from postproc.language.rapid.measuring_program import write_rapid
+
+        return write_rapid(program)
+
     def prepare(self) -> None:
         """Load the parser of statements."""
         line_parser("rapid", "statement")
+
+
+LANGUAGE = Rapid
 
 
 def _tasks(
@@ -129,7 +145,7 @@ def _tasks(
     Raises:
         ProgramError: A file of the task is none, or the first holds no routine.
     """
-    own = [source for source in sources if not task_beside(source.name)]
+    own = [source for source in sources if not RapidFileName(source.name).task_beside]
     files = [read_once(source, known, read_rapid) for source in own]
     if not files[0].routines:
         problem, cure = "the file holds no routine", "Give a RAPID module"

@@ -11,14 +11,19 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.interpreter import NO_POINTS, AssignedPoint, Scope
+from postproc.language.assigned_points import (
+    NO_POINTS,
+    AssignedPoint,
+    Points,
+    Scope,
+)
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import POINT, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
 from postproc.language.rapid.pose_encoding import (
     RAPID_DIALECT,
     WIDTH,
-    rotation_from_quaternion,
+    shift_point,
 )
 from postproc.language.rapid.symbols import (
     SHIFTS,
@@ -35,8 +40,11 @@ from postproc.language.to_visits import (
     FoundVisit,
     Pose,
     compose_poses,
+    explain_components,
     flat,
+    hold_numbers,
     not_reached,
+    spell_element,
 )
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
@@ -147,10 +155,9 @@ class Goals:
         row: int,
         scope: Scope,
         modes: Modes,
-        points: frozenset[AssignedPoint] = NO_POINTS,
+        points: Points = NO_POINTS,
     ) -> Iterator[RapidVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
-        there = replace(scope, points=points) if points else scope
         ends = signature.operands(one.arguments)
         tool, wobj, zone, speed = self._conditions(one, ends, row, scope)
         motion = _motion(one.name, signature)
@@ -160,12 +167,12 @@ class Goals:
         total, untold = self._total(one, row, scope)
         why = why or untold
         if signature.via >= 0:
-            goal = self.goal(ends[1], signature, row, there)
+            goal = self._read_end(ends[1], signature, row, scope, points)
             yield RapidVisit(
                 scope, row, motion, True, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
             )  # fmt: skip
-        goal = self.goal(ends[0], signature, row, there)
+        goal = self._read_end(ends[0], signature, row, scope, points)
         if not signature.reaches:
             goal = not_reached(goal, why)
         yield RapidVisit(
@@ -227,17 +234,46 @@ class Goals:
             self._known[key] = one, found  # it keeps its id from being used again
         return found
 
+    def _read_end(
+        self, operand: said.Operand | None, signature: Signature, row: int,
+        scope: Scope, points: Points,
+    ) -> FoundGoal:  # fmt: skip
+        """Read a destination, and note what it takes of assigned points."""
+        watched = points.watch()
+        there = replace(scope, points=watched)
+        goal = self.goal(operand, signature, row, there)
+        return replace(goal, given=watched.given) if watched.given else goal
+
     def _read_held(self, held: AssignedPoint, signature: Signature) -> FoundGoal:
-        """Read the destination that an assignment gave to a point."""
-        found = self.goal(held.operand, signature, held.row, held.scope)
-        why = [self._explain_pinned(p.name, Scope(*p.place[:3])) for p in held.chain]
+        """Read the destination that assignments gave to a point."""
+        found = FoundGoal(Meaning.UNKNOWN, NOTHING)
+        if held.operand is not None:
+            found = self.goal(held.operand, signature, held.row, held.scope)
+        why = [self._explain_pinned(p[-1], Scope(*p[:3])) for p in held.chain]
         pins = next(filter(None, (found.pins, *why)), "")
+        name = spell_element(held, "{}")
+        if held.components:
+            return self._set_components(held, found, signature.joints, pins)
         shift = found.shift
         if shift is not None:
             shift = replace(shift, pins=shift.pins or pins)
-        return replace(
-            found, name=held.name, pins=pins, shift=shift, given=frozenset([held])
-        )
+        return replace(found, name=name, pins=pins, shift=shift)
+
+    def _set_components(
+        self, held: AssignedPoint, base: FoundGoal, joints: bool, pins: str
+    ) -> FoundGoal:
+        """Read a point of which components have been set by themselves."""
+        name = spell_element(held, "{}")
+        found = _numbers(self.task.evaluate_held(held), joints)
+        why = explain_components(held, name, self.task.files, found is not None)
+        if found is None:
+            return hold_numbers(base, name, why, pins)
+        values = [one.value for one in found[0]]
+        values += [0.0] * (WIDTH - len(values))
+        if not (joints or _is_unit(values[3:7])):
+            return hold_numbers(base, name, _NO_QUATERNION, pins)
+        meaning = Meaning.JOINTS if joints else Meaning.POSE
+        return hold_numbers(base, name, why, pins, meaning, tuple(values), found[1])
 
     def goal(
         self,
@@ -250,7 +286,7 @@ class Goals:
 
         Numbers of system modules are to stay.
         """
-        held = self.task.find_held(operand, scope)
+        held = self.task.find_held(operand, row, scope)
         if held is not None:
             return self._read_held(held, signature)
         found = self._goal(operand, signature, row, scope)
@@ -286,8 +322,25 @@ class Goals:
                 held, turned = shifted.shift.shift, "it is shifted and turned"
                 pins = shifted.pins or (turned if any(held.numbers[3:]) else "")
                 return replace(shifted, shift=FoundShift(held), pins=pins)
+            case said.FunctionCall():
+                return self._read_returned(operand, signature, row, scope)
             case _:
                 return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
+
+    def _read_returned(
+        self, call: said.FunctionCall, signature: Signature, row: int, scope: Scope
+    ) -> FoundGoal:
+        """Read what a function of the task returns: its numbers stay."""
+        returned = self.task.find_returned(call, row, scope)
+        if returned is None:
+            return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
+        operand, at, there = returned
+        found = self.goal(operand, signature, at, there)
+        text = f"the function {call.name} returns the target"
+        why = found.why or Reason(Code.COMPUTED_TARGET, text)
+        return hold_numbers(
+            found, "", why, found.pins or text, found.target, found.values, found.aux
+        )
 
     def _point(
         self,
@@ -422,28 +475,27 @@ class Goals:
         self, name: str, arguments: Sequence[said.Argument], row: int, scope: Scope
     ) -> FoundGoal:
         """Read Offs and RelTool: the point is moved along, the shift stays."""
-        placed = [one.value for one in arguments if not one.name]
-        turns = {one.name: one.value for one in arguments if one.name}
-        if len(placed) != 4:
+        by = self.task.read_shift(arguments, row, scope)
+        if by is None:
             return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
+        (shift, angles), turns = by, {one.name: one.value for one in arguments}
+        placed = [one.value for one in arguments if not one.name]
         base = self.goal(placed[0], POINT, row, scope)
         at = int(self.task.files[scope.file].text.first[row])
         x = placed[1]
-        held = (scope.file, at + x.slot) if isinstance(x, said.Num) else (-1, -1)
-        shift = [self.task.number(one, row, scope) for one in placed[1:]]
-        angles = [
-            self.task.number(turns[axis], row, scope) if axis in turns else 0.0
-            for axis in ("rx", "ry", "rz")
-        ]
+        own = {(scope.file, at + x.slot)} if isinstance(x, said.Num) else set()
+        holds = base.holds | own
         if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
             pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
             return FoundGoal(
-                Meaning.UNKNOWN, NOTHING, base.file, follows=_from(base),
-                name=base.name, why=base.why or AT_RUN_TIME, pins=pins, holds=held,
-                given=base.given,
+                Meaning.UNKNOWN, NOTHING, base.file, follows=base.origin,
+                name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
+                stays=base.stays, holds=holds,
             )  # fmt: skip
-        values = _move_point(np.array(base.values), name, shift, angles)
+        values = shift_point(np.array(base.values), name, shift, angles)
         turned = any(angles)
+        if base.stays:
+            return replace(base, values=values, holds=holds)
         kind = ShiftKind.AXES if name == "offs" else ShiftKind.OWN
         found = self._place_shift(
             Shift(kind, (*shift, *angles), base.values), base, [*placed[1:], *(
@@ -453,9 +505,8 @@ class Goals:
         fixed = found.slots[0] < 0
         pins = base.pins or (f"{name} turns it" if turned and fixed else "")
         return FoundGoal(
-            Meaning.POSE, values, base.file, NO_SLOTS, _from(base), base.name, base.aux,
-            base.why, pins, shift=found, holds=held if fixed else (-1, -1),
-            given=base.given,
+            Meaning.POSE, values, base.file, NO_SLOTS, base.origin, base.name, base.aux,
+            base.why, pins, shift=found, holds=holds if fixed else base.holds,
         )  # fmt: skip
 
     def _place_shift(
@@ -474,7 +525,7 @@ class Goals:
         # x, y, z, and all angles that are there, must be written as numbers.
         written = all(isinstance(one, said.Num) for one in numbers[:3])
         written &= all(one is None or isinstance(one, said.Num) for one in numbers)
-        if base.why or _from(base)[0] < 0 or not written:
+        if base.why or base.origin[0] < 0 or not written:
             return FoundShift(shift)
         rest = (-1,) * (WIDTH - len(slots))
         pins = _SYSTEM if self.task.files[scope.file].is_system else ""
@@ -514,11 +565,6 @@ class Goals:
             why = self._explain_unknown(name, arguments.scope)
             return FrameOfMove((), kind == "tool", why)
         return replace(read, taught=self.task.is_taught(name, found))
-
-
-def _from(base: FoundGoal) -> tuple[int, ...]:
-    """Return where the numbers stand that a shifted point moves along with."""
-    return base.follows if base.slots[0] < 0 <= base.follows[0] else base.slots
 
 
 WORLD = FrameOfMove(IDENTITY, False)
@@ -703,23 +749,6 @@ def _places(numbers: Sequence[WrittenNumber]) -> tuple[int, tuple[int, ...]]:
         return -1, NO_SLOTS
     slots = [one.slot for one in numbers]
     return files.pop(), tuple(slots + [-1] * (WIDTH - len(slots)))
-
-
-def _move_point(
-    base: np.ndarray, name: str, shift: Sequence[float], angles: Sequence[float]
-) -> tuple[float, ...]:
-    """Shift a point: Offs in its work object, RelTool along and about its own axes."""
-    out = np.array(base)
-    rotation = rotation_from_quaternion(base[3:7])
-    out[:3] += shift if name == "offs" else rotation @ np.array(shift)
-    if any(angles):
-        cos, sin = np.cos(np.deg2rad(angles)), np.sin(np.deg2rad(angles))
-        about_x = np.array([[1, 0, 0], [0, cos[0], -sin[0]], [0, sin[0], cos[0]]])
-        about_y = np.array([[cos[1], 0, sin[1]], [0, 1, 0], [-sin[1], 0, cos[1]]])
-        about_z = np.array([[cos[2], -sin[2], 0], [sin[2], cos[2], 0], [0, 0, 1]])
-        by = rotation @ about_x @ about_y @ about_z @ rotation.T
-        out = RAPID_DIALECT.rotate(out[None], by[None])[0]
-    return tuple(out.tolist())
 
 
 def _pose_numbers(found: Nested | None) -> list[float] | None:

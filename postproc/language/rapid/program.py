@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from postproc.diagnostics import Code
-from postproc.files import is_named_as_system
 from postproc.language.blocks import BlockWords, Outline
 from postproc.language.control_flow import HeadedRows
+from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import (
     MOTIONS,
     Signature,
@@ -103,7 +103,7 @@ class RapidFile:
         """
         heads = (scope.head for scope in self.modules)
         said = any(isinstance(h, ModuleHead) and _SYSTEM in h.attributes for h in heads)
-        return said or is_named_as_system(self.text.source.name)
+        return said or RapidFileName(self.text.source.name).is_named_as_system
 
 
 def read_rapid(source: Source) -> RapidFile:

@@ -8,11 +8,24 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from postproc.files import task_beside
+import numpy as np
+
+from postproc.language.assigned_points import (
+    AssignedPoint,
+    FunctionBody,
+    NamesUsed,
+    Place,
+    PointPart,
+    Scope,
+    TaskSymbols,
+    is_point,
+    source_of,
+)
 from postproc.language.control_flow import HeadedRows
-from postproc.language.interpreter import NamesUsed, Scope, TaskSymbols, source_of
+from postproc.language.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said
+from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import (
     ANSWERS,
     BUILT_IN_FUNCTIONS,
@@ -20,11 +33,12 @@ from postproc.language.rapid.instructions import (
     MOTIONS,
     READING,
 )
-from postproc.language.rapid.pose_encoding import COMMENTS
+from postproc.language.rapid.pose_encoding import COMMENTS, shift_point
 from postproc.language.rapid.program import Datum, RapidFile
-from postproc.language.rapid.targets import operands_of
+from postproc.language.rapid.targets import RECORDS, operands_of, spell_components
 
 TARGETS = ("robtarget", "jointtarget")
+FOLLOWED = (*TARGETS, "num")  # types of data whose assignments are followed
 SHIFTS = ("offs", "reltool")  # functions whose first argument is a target
 CONSTANTS = {"true": 1.0, "false": 0.0, "pi": 3.141592653589793}
 
@@ -63,6 +77,7 @@ class RapidTask(TaskSymbols):
     _local: dict[tuple[int, str, str], dict[str, Datum]] = field(default_factory=dict)
     _twice: set[tuple[int, str, str, str]] = field(default_factory=set)
     _global: dict[str, list[tuple[int, Datum]]] = field(default_factory=dict)
+    _names: dict[int, tuple[said.Operand, frozenset[str]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Index data by the scopes that declare them."""
@@ -226,19 +241,81 @@ class RapidTask(TaskSymbols):
         """Names of data that something but the destination of a move takes."""
         return frozenset(self.uses.read)
 
-    def place_of_point(
-        self, name: str, here: Scope
-    ) -> tuple[int, str, str, str] | None:
-        """Return the place of a point that only assignments change, None for others."""
+    def locate(self, data: said.DataObject, row: int, here: Scope) -> PointPart | None:
+        """Find the point that only assignments change, see `TaskSymbols.locate`."""
+        name, steps = data.name, data.steps
         found = self.datum(name, here)
-        if found is None or name in self.uses.changed or BY_STRING & self.find_calls:
+        if found is None or found[1].declared.type not in FOLLOWED:
+            return None
+        if name in self.uses.changed or BY_STRING & self.find_calls:
             return None
         file, datum = found
-        declared = datum.declared
-        plain = declared.type in TARGETS and not declared.dimensions
-        if not plain or declared.kind == "const" or self.is_used_beside(name, here):
+        if datum.declared.kind == "const" or self.is_used_beside(name, here):
             return None
-        return file, datum.module, datum.routine, name
+        index: tuple[int, ...] | None = ()
+        if datum.declared.dimensions:
+            index = self._find_element(file, datum, steps[:1], row, here)
+            steps = steps[1:]
+        component = ".".join(step for step in steps if isinstance(step, str))
+        if not spell_components(datum.declared.type, component):
+            index = None
+        place = file, datum.module, datum.routine, name
+        return PointPart(place, index, component)
+
+    def _find_element(
+        self, file: int, datum: Datum, steps: Sequence[str | said.ElementStep],
+        row: int, here: Scope,
+    ) -> tuple[int, ...] | None:  # fmt: skip
+        """Return the index of an element, None where it is not known, or no element."""
+        there = Scope(file, datum.module, datum.routine)
+        sizes = [
+            self.number(one, datum.row, there) for one in datum.declared.dimensions
+        ]
+        found = [at for step in steps for at in self._indices(step, row, here)]
+        if len(found) != len(sizes):
+            return None
+        inside = all(0 <= at < n for at, n in zip(found, sizes, strict=True))
+        return tuple(at + 1 for at in found) if inside else None
+
+    def evaluate_components(
+        self, part: PointPart, value: said.Operand, row: int, here: Scope
+    ) -> list[tuple[str, float | None]]:
+        """Return what an assignment gives to components, see `TaskSymbols`."""
+        file, module, routine, name = part.place
+        declared = self._local[file, module, routine][name].declared
+        names = spell_components(declared.type, part.component)
+        found = [*_leaves(self.record(value, row, here))]
+        if len(found) != len(names):
+            return [(one, None) for one in names]
+        return [(one, at.value) for one, at in zip(names, found, strict=True)]
+
+    def names_of(self, operand: said.Operand) -> frozenset[str]:
+        """Return the names in an operand, see `TaskSymbols.names_of`."""
+        key = id(operand)
+        if key not in self._names:
+            self._names[key] = operand, frozenset(_names_in([operand]))
+        return self._names[key][1]
+
+    def calls_routine(self, operand: said.Operand) -> bool:
+        """Return True if an operand calls a function of the files."""
+        return not self.names_of(operand).isdisjoint(self.routines)
+
+    def open_function(
+        self, call: said.FunctionCall, row: int, here: Scope
+    ) -> FunctionBody | None:
+        """Return the statements of a function, see `TaskSymbols.open_function`."""
+        found = self.routine(call.name, here)
+        if found is None or getattr(found[2].head, "kind", "") != "func":
+            return None
+        file, module, routine = found
+        scope = self.bind(
+            self.scope_of(file, module, routine), routine, call, row, here
+        )
+        text = self.files[file].text
+        rows = range(routine.first + 1, routine.last)
+        every = ((k, text.statement(k)) for k in rows)
+        body = [(k, o) for k, o in every if not isinstance(o, said.DataDeclaration)]
+        return FunctionBody(scope, body)
 
     @cached_property
     def declared(self) -> frozenset[str]:
@@ -285,8 +362,8 @@ class RapidTask(TaskSymbols):
     # What routines are called with.
 
     def bind(
-        self, scope: Scope, routine: HeadedRows, call: said.Instruction,
-        row: int, there: Scope,
+        self, scope: Scope, routine: HeadedRows,
+        call: said.Instruction | said.FunctionCall, row: int, there: Scope,
     ) -> Scope:  # fmt: skip
         """Add what a routine is called with to where its statements stand.
 
@@ -312,9 +389,19 @@ class RapidTask(TaskSymbols):
     def behind(
         self, operand: said.Operand | None, row: int, here: Scope
     ) -> tuple[said.Operand | None, int, Scope]:
-        """Return what stands behind a parameter, where that is known, and its place."""
-        for _, given, at, there in self.find_given(operand, here):
-            operand, row, here = given, at, there
+        """Return what stands behind a parameter or a call of a function, and its place.
+
+        That is the operand itself where it is neither, or not known.
+        """
+        for _ in range(DEEPEST):
+            for _, given, at, there in self.find_given(operand, here):
+                operand, row, here = given, at, there
+            if not isinstance(operand, said.FunctionCall):
+                break
+            returned = self.find_returned(operand, row, here)
+            if returned is None:
+                break
+            operand, row, here = returned
         return operand, row, here
 
     def find_given(
@@ -349,12 +436,30 @@ class RapidTask(TaskSymbols):
                 other, at, there = self.behind(operand, row, here)
                 if other is not operand:
                     return self.number(other, at, there)
+                held = self.find_held(operand, row, here)
+                if held is not None:
+                    return _number_in(self.evaluate_held(held))
                 found = self.constant(name, here)
                 if found is None:
                     return CONSTANTS.get(name, float("nan"))
                 return self._number_of_declaration(*found)
+            case said.DataObject():
+                return _number_in(self._data_object(operand, row, here, 0))
+            case said.FunctionCall(name=name, arguments=arguments):
+                other, at, there = self.behind(operand, row, here)
+                if other is not operand:
+                    return self.number(other, at, there)
+                return self._compute(name, arguments, row, here)
             case _:
                 return float("nan")
+
+    def _compute(
+        self, name: str, arguments: Sequence[said.Argument], row: int, here: Scope
+    ) -> float:
+        """Return what a built-in function of one number gives, else NaN."""
+        if name in self.routines or name not in ALIKE or len(arguments) != 1:
+            return math.nan
+        return apply_function(name, self.number(arguments[0].value, row, here))
 
     def _number_of_declaration(self, file: int, datum: Datum) -> float:
         if datum.declared.dimensions:
@@ -369,7 +474,8 @@ class RapidTask(TaskSymbols):
         self, operand: said.Operand | None, row: int, here: Scope, depth: int = 0
     ) -> Nested | None:
         """Evaluate a record or array, None where it is not known."""
-        operand, row, here = self.behind(operand, row, here)
+        if isinstance(operand, said.DataObject | said.FunctionCall):
+            operand, row, here = self.behind(operand, row, here)
         match operand:
             case said.Composite(items=items):
                 parts = [self.record(one, row, here, depth) for one in items]
@@ -382,48 +488,134 @@ class RapidTask(TaskSymbols):
                 at = int(file.first[row]) + slot
                 value = _finite(float(file.value[at]))
                 return WrittenNumber(value, here.file, at) if value == value else None
-            case said.DataObject(name=name, steps=steps) if name not in CONSTANTS:
-                return self._data_object(name, steps, row, here, depth)
+            case said.DataObject(name=name) if name not in CONSTANTS:
+                return self._data_object(operand, row, here, depth)
+            case said.FunctionCall(name=name, arguments=arguments) if (
+                name in SHIFTS and name not in self.routines
+            ):
+                return self._evaluate_shift(name, arguments, row, here, depth)
             case _:
                 value = self.number(operand, row, here)
                 return None if value != value else WrittenNumber(value)
 
     def _data_object(
-        self,
-        name: str,
-        steps: Sequence[str | said.ElementStep],
-        row: int,
-        here: Scope,
-        depth: int,
+        self, data: said.DataObject, row: int, here: Scope, depth: int
     ) -> Nested | None:
-        loops = dict(here.loops)
-        if name in loops and not steps:
+        """Evaluate data, or a part of them."""
+        loops, name = dict(here.loops), data.name
+        if name in loops and not data.steps:
             return WrittenNumber(loops[name])
-        found = self.constant(name, here)
-        if found is None or depth > DEEPEST:
+        if depth > DEEPEST:
             return None
-        file, datum = found
-        there = Scope(file, datum.module, datum.routine)
-        value = self.record(datum.declared.value, datum.row, there, depth + 1)
+        value, steps, type_ = self._whole(data, row, here, depth + 1)
         for step in steps:
-            indices = self._indices(step, row, here)
+            indices = self._indices(step, row, here, type_)
             for index in indices or [-1]:
                 if not isinstance(value, tuple) or not 0 <= index < len(value):
                     return None
                 value = value[index]
         return value
 
+    def _whole(
+        self, data: said.DataObject, row: int, here: Scope, depth: int
+    ) -> tuple[Nested | None, Sequence[str | said.ElementStep], str]:
+        """Return what data, or an element, hold; then further steps, and their type."""
+        count = next((k for k, s in enumerate(data.steps) if isinstance(s, str)), None)
+        whole = data if count is None else replace(data, steps=data.steps[:count])
+        held = self.find_held(whole, row, here)
+        if held is not None:
+            return self.evaluate_held(held, depth), data.steps[len(whole.steps) :], (
+                self._type_of(held.place))  # fmt: skip
+        found = self.constant(data.name, here)
+        if found is None:
+            return None, (), ""
+        file, datum = found
+        there = Scope(file, datum.module, datum.routine)
+        value = self.record(datum.declared.value, datum.row, there, depth)
+        return value, data.steps, datum.declared.type
+
+    def _type_of(self, place: Place) -> str:
+        """Return the type of data by their place."""
+        return self._local[place[:3]][place[3]].declared.type
+
+    def evaluate_held(self, held: AssignedPoint, depth: int = 0) -> Nested | None:
+        """Evaluate what assignments gave to a point, None where it is not known."""
+        base = None
+        if held.operand is not None:
+            base = self.record(held.operand, held.row, held.scope, depth)
+        if not held.components:
+            return base
+        names = spell_components(type_ := self._type_of(held.place), "")
+        own = [*_leaves(base)]
+        found = dict(zip(names, own, strict=True)) if len(own) == len(names) else {}
+        for one in held.components:
+            found.pop(one.name, None)
+            if one.value is not None:
+                found[one.name] = WrittenNumber(one.value)
+        if len(found) < len(names):
+            return None
+        if type_ not in RECORDS:
+            return found[""]
+        return tuple(
+            tuple(found[f"{part}.{name}"] for name in inside)
+            for part, inside in RECORDS[type_].items()
+        )
+
+    def read_shift(
+        self, arguments: Sequence[said.Argument], row: int, here: Scope
+    ) -> tuple[list[float], list[float]] | None:
+        """Return how far Offs or RelTool shift [mm], and turn about x, y, z [deg].
+
+        None where the arguments are others; NaN where numbers are not known.
+        """
+        placed = [one.value for one in arguments if not one.name]
+        turns = {one.name: one.value for one in arguments if one.name}
+        if len(placed) != 4:
+            return None
+        angles = [
+            self.number(turns[axis], row, here) if axis in turns else 0.0
+            for axis in ("rx", "ry", "rz")
+        ]
+        return [self.number(one, row, here) for one in placed[1:]], angles
+
+    def _evaluate_shift(
+        self, name: str, arguments: Sequence[said.Argument], row: int, here: Scope,
+        depth: int,
+    ) -> Nested | None:  # fmt: skip
+        """Evaluate Offs or RelTool."""
+        by = self.read_shift(arguments, row, here)
+        if by is None or depth > DEEPEST or any(map(math.isnan, [*by[0], *by[1]])):
+            return None
+        base = self.record(arguments[0].value, row, here, depth + 1)
+        own = [one.value for one in _leaves(base)]
+        if not isinstance(base, tuple) or len(base) != 4 or len(own) != 17:
+            return None
+        new = shift_point(np.array(own[:11]), name, *by)
+        place, turn = (tuple(map(WrittenNumber, new[k])) for k in _PLACE_AND_TURN)
+        return (place, turn, *base[2:])
+
     def _indices(
-        self, step: str | said.ElementStep, row: int, here: Scope
+        self, step: str | said.ElementStep, row: int, here: Scope, type_: str = ""
     ) -> list[int]:
         """Return the indices from 0 of a step, nothing where they are not known."""
         if isinstance(step, str):
-            return []  # what a record holds where is for its type to say
+            at = _FIELDS.get(type_, {}).get(step)
+            return [] if at is None else [at]
         values = [self.number(one, row, here) for one in step.subscripts]
         whole = [v for v in values if v == v and v == int(v)]
         return [int(v) - 1 for v in whole] if len(whole) == len(values) else []
 
 
+_PLACE_AND_TURN = slice(3), slice(3, 7)
+_FIELDS = {
+    type_: {
+        name: at
+        for fields in (parts, *parts.values())
+        for at, name in enumerate(fields)
+    }
+    for type_, parts in RECORDS.items()
+}
+"""Where components stand in what they are of, by type."""
 DEEPEST = 20  # names that stand for names
 
 
@@ -431,7 +623,8 @@ def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
     """Group the files of tasks that run beside a program, by the names of files."""
     tasks: dict[str, list[RapidFile]] = {}
     for file in files:
-        tasks.setdefault(task_beside(file.text.source.name), []).append(file)
+        task = RapidFileName(file.text.source.name).task_beside
+        tasks.setdefault(task, []).append(file)
     return [RapidTask(own) for own in tasks.values()]
 
 
@@ -566,9 +759,12 @@ class _NamesUsed(NamesUsed):
     def _note_assignment(self, target: said.DataObject, value: said.Operand) -> None:
         """Note what an assignment takes: a point that moves go to by another name."""
         source = source_of(value)
-        if source is None or target.steps or source.steps:
+        self._steps(target.steps)
+        if source is None or not (is_point(target) and is_point(source)):
             self._operand(value)
-        elif value is source:
+            return
+        self._steps(source.steps)
+        if value is source:
             self.copies.add((target.name, source.name))
         elif isinstance(value, said.FunctionCall) and self._shifts(value):
             self.copies.add((target.name, source.name))
@@ -708,14 +904,43 @@ def functions_in(one: said.RapidStatement) -> Iterator[str]:
             operands = (target, value)
         case _:
             operands = operands_of(one)
+    for part in _parts_of(operands):
+        if isinstance(part, said.FunctionCall):
+            yield part.name
+
+
+def _names_in(operands: Sequence[said.Operand | None]) -> Iterator[str]:
+    """Yield the names of all data and functions in operands."""
+    for part in _parts_of(operands):
+        if isinstance(part, said.FunctionCall | said.DataObject):
+            yield part.name
+
+
+def _parts_of(operands: Sequence[said.Operand | None]) -> Iterator[said.Operand]:
+    """Yield functions and data with all that is in them."""
     waiting = list(operands)
     while waiting:
-        match waiting.pop():
-            case said.FunctionCall(name=name, arguments=arguments):
-                yield name
+        match one := waiting.pop():
+            case said.FunctionCall(arguments=arguments):
+                yield one
                 waiting += [argument.value for argument in arguments]
             case said.DataObject(steps=steps):
+                yield one
                 for at in steps:
                     waiting += at.subscripts if isinstance(at, said.ElementStep) else ()
             case said.Composite(items=items) | said.Operation(operands=items):
                 waiting += items
+
+
+def _number_in(found: Nested | None) -> float:
+    """Return a number, NaN where there is none."""
+    return found.value if isinstance(found, WrittenNumber) else math.nan
+
+
+def _leaves(found: Nested | None) -> Iterator[WrittenNumber]:
+    """Yield the numbers of a record in their order."""
+    if isinstance(found, tuple):
+        for one in found:
+            yield from _leaves(one)
+    elif isinstance(found, WrittenNumber):
+        yield found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import TypeVar
@@ -33,6 +33,33 @@ class RecordKind(IntEnum):
     ROBTARGET = 0  # [[x,y,z],[q1,q2,q3,q4],[cf1,cf4,cf6,cfx],[e1..e6]]
     JOINTTARGET = 1  # [[a1..a6],[e1..e6]]
     POSE = 2  # [[x,y,z],[q1,q2,q3,q4]], also in tools and work objects
+
+
+_AXES = tuple(f"eax_{axis}" for axis in "abcdef")
+_POSE = {"trans": ("x", "y", "z"), "rot": ("q1", "q2", "q3", "q4")}
+RECORDS: Mapping[str, Mapping[str, Sequence[str]]] = {
+    "robtarget": {**_POSE, "robconf": ("cf1", "cf4", "cf6", "cfx"), "extax": _AXES},
+    "jointtarget": {"robax": [f"rax_{k}" for k in range(1, 7)], "extax": _AXES},
+    "pose": _POSE,
+}
+"""Parts of data by type, and the components of these, in their order."""
+
+
+def spell_components(type_: str, component: str) -> list[str]:
+    """Return the numbers of data, or of a part of them, as they are spelt.
+
+    That of data that are a number is "".
+
+    >>> spell_components("robtarget", "trans"), spell_components("pose", "rot.q1")
+    (['trans.x', 'trans.y', 'trans.z'], ['rot.q1'])
+    >>> len(spell_components("robtarget", "")), spell_components("pose", "z")
+    (17, [])
+    """
+    parts = RECORDS.get(type_, {})
+    every = [f"{part}.{name}" for part, names in parts.items() for name in names]
+    if not component:
+        return every or [""]
+    return [one for one in every if f"{one}.".startswith(f"{component}.")]
 
 
 COUNTS = {

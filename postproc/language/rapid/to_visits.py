@@ -41,7 +41,8 @@ def visits_of(machine: RapidMachine) -> Visits:
     """Put the arrivals into the order of the program, as columns."""
     base = cell_pose(machine.start.base)
     placed: dict[tuple[FrameOfMove, Pose], Pose] = {}
-    paused = {id(machine.visits[k]) for k in machine.paused if k >= 0}
+    stops = machine.find_unsure_stops()
+    paused = {id(machine.visits[k]) for k in stops if k >= 0}
 
     def conditions(v: RapidVisit) -> Conditions:
         key = v.wobj, v.modes.shift

@@ -42,7 +42,9 @@ from tests.generated.neutral.tree import (
     Return,
     Routine,
     SetBase,
+    SetElement,
     SetLoad,
+    SetPart,
     SetPoint,
     SetSpeed,
     SetTool,
@@ -64,10 +66,11 @@ DEPTH = 2
 FEATURES = (
     "arc", "call", "displace", "element", "fail", "frames", "given", "handler",
     "forms", "inline", "interrupt", "late", "lift", "load", "loop", "made", "meddle",
-    "modal", "modules", "note", "offset", "poll", "repair", "shared", "shift", "step",
-    "tool", "trigger", "variable", "zone",
+    "modal", "modules", "note", "offset", "parts", "poll", "repair", "rows", "shared",
+    "shift", "step", "tool", "trigger", "variable", "zone",
 )  # fmt: skip
 TOOLS, BASES, LOADS = 2, 3, 2
+ROW = 3  # points of a variable array
 ENTRY = "job"
 
 
@@ -142,6 +145,7 @@ class Draw:
         made.points["j1"] = (self._literal(in_joints=True), 0)
         made.arrays["row"] = [self._literal() for _ in range(3)]
         made.variables = ["v1", "v2"]
+        made.rows = {"s": ROW} if self.has("rows") else {}
         made.numbers = {name: rng.randint(0, 3) for name in ("n1", "n2", "n3")}
 
     def _literal(self, in_joints: bool = False) -> int:
@@ -245,7 +249,7 @@ class Draw:
 
     def _point(self) -> Point:
         rng = self.rng
-        more = ("element", "offset", "tool", "variable", "given", "made")
+        more = ("element", "offset", "tool", "variable", "given", "made", "rows")
         kinds = ["named"] * 3 + ["fresh"] * 6 + ["inline"] * 4 * self.has("inline")
         kind = rng.choice([*kinds, *(name for name in more if self.has(name))])
         match kind:
@@ -253,6 +257,8 @@ class Draw:
                 return Inline(self._literal())
             case "element" if self.loops:
                 return Element("row", Var(f"i{self.loops}"))
+            case "rows":
+                return Element("s", self._row_index())
             case "offset" | "tool":
                 by = self._offset()
                 self.shifts += 1
@@ -298,14 +304,18 @@ class Draw:
         frames: list[Statement] = [SetTool(1, 1), SetBase(1, way=1), SetSpeed(200)]
         given = [SetPoint(name, self._fixed()) for name in self.made.variables[:2]]
         counts = [Assign("m1", 0)]
-        return (*frames, *given, *counts, *first)
+        return (*frames, *given, *counts, *first, *self._fill())
 
     def _body(self, count: int, depth: int) -> Body:
         found: list[Statement] = []
         for _ in range(count):
             found.append(one := self._statement(depth))
             if isinstance(one, SetPoint) and self.rng.random() < 0.7:
+                found += self._parts(Named(one.name), 0.3)
                 found.append(self._move("line", Named(one.name), 0))
+            elif isinstance(one, SetElement) and self.rng.random() < 0.7:
+                to = Element(one.name, one.index)
+                found += [*self._parts(to, 0.3), self._move("line", to, 0)]
             elif self.has("variable") and self.rng.random() < 0.1:
                 found += self._own_variable()
         return tuple(found)
@@ -317,8 +327,53 @@ class Draw:
         found: list[Statement] = []
         for _ in range(self.rng.randint(1, 2)):
             value = Inline(self._literal())
-            found += [SetPoint(name, value), self._move("line", Named(name), 0)]
+            found += [SetPoint(name, value), *self._parts(Named(name), 0.3)]
+            found.append(self._move("line", Named(name), 0))
+            if parts := self._parts(Named(name), 0.3):
+                found += [*parts, self._move("line", Named(name), 0)]
         return tuple(found)
+
+    def _parts(self, point: Named | Element, share: float) -> Body:
+        """Set numbers of a variable point by themselves, in some programs."""
+        if not self.has("parts") or self.rng.random() > share:
+            return ()
+        return tuple(self._part(point) for _ in range(self.rng.randint(1, 2)))
+
+    def _part(self, point: Named | Element) -> Statement:
+        """Set one number: written there, or that of a point with something added."""
+        rng = self.rng
+        axis = rng.randrange(3)
+        if rng.random() < 0.4:
+            self.shifts += 1
+            literal = Inline(self._literal())
+            return SetPart(point, axis, literal, mark=SHIFTS + self.shifts)
+        of = rng.choice([point, point, self._fixed()])
+        by = (
+            Var(rng.choice(self._names())) if rng.random() < 0.3 else rng.randint(-9, 9)
+        )
+        return SetPart(point, axis, of, by)
+
+    def _row_index(self) -> Expr:
+        """Draw which point of a variable array is meant."""
+        if self.loops and self.rng.random() < 0.6:
+            return Var(f"i{self.loops}")
+        return self.rng.randint(1, ROW)
+
+    def _fill(self) -> Body:
+        """Fill a variable array in a loop, and go to its points in another."""
+        if not self.has("rows"):
+            return ()
+        self.loops += 1
+        i = Var(f"i{self.loops}")
+        value: Point = self._fixed()
+        if self.rng.random() < 0.5:
+            value = Shifted(value, (0, self.rng.randint(-9, 9), i))
+        to = Element("s", i)
+        fill: Body = (SetElement("s", i, value), *self._parts(to, 0.5))
+        loop = For(i.name, 1, ROW, 1, fill)
+        go = For(i.name, 1, ROW, 1, (self._move("line", to, 0),))
+        self.loops -= 1
+        return (loop, go) if self.rng.random() < 0.5 else (loop,)
 
     def _statement(self, depth: int) -> Statement:
         kinds: dict[str, int] = {"motion": 12, "assign": 2, "frames": 2, "other": 2}
@@ -378,8 +433,15 @@ class Draw:
     def _assignment(self) -> Statement:
         rng = self.rng
         kinds = ["number", "number", *["point"] * 3 * self.has("variable")]
-        kinds += ["lift"] * self.has("lift")
+        kinds += ["lift"] * self.has("lift") + ["row"] * 3 * self.has("rows")
+        kinds += ["part"] * 2 * self.has("parts")
         match rng.choice(kinds):
+            case "row":
+                return SetElement("s", self._row_index(), self._value())
+            case "part" if self.has("rows") and rng.random() < 0.5:
+                return self._part(Element("s", self._row_index()))
+            case "part":
+                return self._part(Named(rng.choice(self.made.variables[:2])))
             case "point":
                 return SetPoint(rng.choice(self.made.variables[:2]), self._value())
             case "lift":

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from postproc.robot.cell import Cell
 from tests.generated.neutral.in_rapid import counters
 from tests.generated.neutral.run import HEAVY, moved
-from tests.generated.neutral.text import Page, Printed, literal, printed
+from tests.generated.neutral.text import Page, Printed, bare_numbers, literal, printed
 from tests.generated.neutral.tree import (
     Ask,
     Assign,
@@ -41,7 +41,9 @@ from tests.generated.neutral.tree import (
     Return,
     Routine,
     SetBase,
+    SetElement,
     SetLoad,
+    SetPart,
     SetPoint,
     SetSpeed,
     SetTool,
@@ -54,6 +56,8 @@ from tests.generated.neutral.tree import (
     Switch,
     Var,
     Wait,
+    bodies_of,
+    own_points,
 )
 from tests.language.neutral_job import NeutralJob, status
 
@@ -173,7 +177,10 @@ class Writer:
                 page.emit(f"{scope} {kind} {point}={self._literal(number)}")
         if not file:
             for point in made.variables:
-                page.emit(f"{scope} E6POS {point}")
+                if not point.startswith("w"):  # others are declared in their routine
+                    page.emit(f"{scope} E6POS {point}")
+            for row, count in made.rows.items():
+                page.emit(f"{scope} E6POS {row}[{count}]")
             self._forms(page, scope)
             for number_name, value in made.numbers.items():
                 page.emit(f"{scope} INT {number_name}={value}")
@@ -236,6 +243,8 @@ class Writer:
         own = [*routine.own, *counters(routine.body), *loops(routine.body)]
         for name in dict.fromkeys(own):
             self._emit(f"DECL INT {name}")
+        for name in own_points(routine.body):
+            self._emit(f"DECL E6POS {name}")
         self._emit("DECL FRAME SH")
         self._emit("SIGNAL GI_PART $IN[10] TO $IN[11]")
         if main and self.made.interrupts:
@@ -312,6 +321,15 @@ class Writer:
                 emit(f"{name}={number_text(value)}")
             case SetPoint(name, value):
                 emit(f"{name}={self._point(value)}")
+            case SetElement(name, index, value):
+                emit(f"{name}[{number_text(index)}]={self._point(value)}")
+            case SetPart(point, axis, Inline(number), _, mark):
+                at = literal(mark, bare_numbers(self._literal(number))[axis])
+                emit(f"{self._point(point)}.{'XYZ'[axis]}={at}")
+            case SetPart(point, axis, of, by):
+                part = f".{'XYZ'[axis]}"
+                value = f"{self._point(of)}{part}+({number_text(by)})"
+                emit(f"{self._point(point)}{part}={value}")
             case Lift(name, by):
                 emit(f"{name}.Z={name}.Z+({number_text(by)})")
             case Wait(way):
@@ -521,19 +539,7 @@ def loops(body: Sequence[Statement]) -> list[str]:
     """Return the variables of FOR loops, in all blocks."""
     found: list[str] = []
     for one in body:
-        match one:
-            case For(name, _, _, _, inner):
-                found += [name, *loops(inner)]
-            case Count(_, _, inner, _) | Skip(_, _, inner) | Poll(_, inner):
-                found += loops(inner)
-            case Loop(_, before, _, after):
-                found += [*loops(before), *loops(after)]
-            case If(branches, otherwise):
-                for _, inner in branches:
-                    found += loops(inner)
-                found += loops(otherwise)
-            case Switch(_, cases, otherwise):
-                for _, inner in cases:
-                    found += loops(inner)
-                found += loops(otherwise)
+        found += [one.name] if isinstance(one, For) else []
+        for inner in bodies_of(one):
+            found += loops(inner)
     return found

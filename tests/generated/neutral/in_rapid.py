@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from postproc.robot.cell import Cell
-from tests.generated.neutral.text import Page, Printed, literal, printed
+from tests.generated.neutral.text import Page, Printed, bare_numbers, literal, printed
 from tests.generated.neutral.tree import (
     Ask,
     Assign,
@@ -41,7 +41,9 @@ from tests.generated.neutral.tree import (
     Return,
     Routine,
     SetBase,
+    SetElement,
     SetLoad,
+    SetPart,
     SetPoint,
     SetSpeed,
     SetTool,
@@ -151,6 +153,8 @@ class Writer:
             emit(f"VAR num {name}:={value};")
         for name in made.variables:
             emit(f"VAR robtarget {name};")
+        for name, count in made.rows.items():
+            emit(f"VAR robtarget {name}{{{count}}};")
         for name, row in made.arrays.items():
             text = ",".join(self._literal(k) for k in row)
             scope = "CONST" if made.fixed else "PERS"
@@ -278,6 +282,15 @@ class Writer:
                 emit(f"{name}:={number_text(value)};")
             case SetPoint(name, value):
                 emit(f"{name}:={self._point(value)};")
+            case SetElement(name, index, value):
+                emit(f"{name}{{{number_text(index)}}}:={self._point(value)};")
+            case SetPart(point, axis, Inline(number), _, mark):
+                at = literal(mark, bare_numbers(self._literal(number))[axis])
+                emit(f"{self._point(point)}.trans.{'xyz'[axis]}:={at};")
+            case SetPart(point, axis, of, by):
+                part = f".trans.{'xyz'[axis]}"
+                value = f"{self._point(of)}{part}+({number_text(by)})"
+                emit(f"{self._point(point)}{part}:={value};")
             case Lift(name, by):
                 emit(f"{name}.trans.z:={name}.trans.z+({number_text(by)});")
             case Wait(way):

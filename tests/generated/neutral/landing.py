@@ -24,7 +24,18 @@ from postproc.simulation import virtual_arm
 from postproc.simulation.program import ProgramRun, run_program
 from tests.conftest import SEED
 from tests.fuzz.case import check_bytes, records_of, without_stamp
-from tests.generated.found import ALONG, FIRST, KNOWN, LOADED, ROUNDED, UNSURE, Found
+from tests.generated.found import (
+    ALONG,
+    AVERAGED,
+    FIRST,
+    KNOWN,
+    LOADED,
+    ROUNDED,
+    UNSURE,
+    Found,
+    is_averaged,
+)
+from tests.generated.landing import WORSE
 from tests.generated.neutral import in_krl, in_rapid
 from tests.generated.neutral.draw import Draw
 from tests.generated.neutral.follow import follow
@@ -151,7 +162,10 @@ def count(
         size = np.linalg.norm(d.std_error[mine], axis=1).max() / MM
         if not safe:
             found.error_mm[ALONG].append(pair)
-            if not old.target.computed:
+            if old.target.parted:
+                text = "moves along, though a number of it is set by itself"
+                found.wrong.append((seed, line, text))
+            elif not old.target.computed:
                 why = {d.reasons[d.why[row]].text for row in mine}
                 text = f"went to new numbers, though: {' / '.join(why)}"
                 found.wrong.append((seed, line, text))
@@ -163,6 +177,10 @@ def count(
             )
         elif (visits.fly & ~visits.via)[mine].any() or old.fly:
             found.error_mm[ROUNDED].append(pair)
+        elif is_averaged(d, mine):
+            found.error_mm[AVERAGED].append(pair)
+            if not unsure and now[k] > before[k] + MOST_MM:
+                found.wrong.append((seed, line, WORSE))
         elif unsure:
             found.error_mm[UNSURE].append(pair)
             found.z.append(now[k] / size)

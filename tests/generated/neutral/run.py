@@ -39,7 +39,9 @@ from tests.generated.neutral.tree import (
     Return,
     Routine,
     SetBase,
+    SetElement,
     SetLoad,
+    SetPart,
     SetPoint,
     SetSpeed,
     SetTool,
@@ -72,11 +74,13 @@ class Target:
     Attributes:
         literals: Whose numbers are in it.
         computed: It is not what a literal says.
+        parted: A number of it has been set by itself: nothing else of it may change.
     """
 
     value: np.ndarray
     literals: frozenset[int]
     computed: bool = False
+    parted: bool = False
 
 
 @dataclass(frozen=True)
@@ -256,10 +260,15 @@ class Run:
                 self._box(name).value = self._number(value)
             case SetPoint(name, value):
                 self.all[name] = Box(self._place(value))
+            case SetElement(name, index, value):
+                self.all[f"{name}[{self._number(index)}]"] = Box(self._place(value))
+            case SetPart():
+                self._set_part(one)
             case Lift(name, by):
                 old = self._target(name)
                 value = shifted(old.value, (0, 0, self._number(by)), False)
-                self.all[name] = Box(replace(old, value=value, computed=True))
+                lifted = replace(old, value=value, computed=True, parted=True)
+                self.all[name] = Box(lifted)
             case Wait():
                 self._stop()
             case Output(_, ahead):
@@ -279,6 +288,23 @@ class Run:
                     raise LeaveError
             case _:
                 self._block(one)
+
+    def _set_part(self, one: SetPart) -> None:
+        """Set one number of the place of a point."""
+        old = self._place(one.point)
+        if one.mark in self.shifts:
+            number = self.shifts[one.mark][0] * MM
+        else:
+            by = self._number(one.by) * MM
+            number = float(self._place(one.of).value[one.axis, 3]) + by
+        value = old.value.copy()
+        value[one.axis, 3] = number
+        new = replace(old, value=value, computed=True, parted=True)
+        match one.point:
+            case Named(name):
+                self.all[name] = Box(new)
+            case Element(name, index):
+                self.all[f"{name}[{self._number(index)}]"] = Box(new)
 
     def _interrupt(self) -> None:
         """Let an interrupt come, now and then: it knows the program's data alone."""
@@ -397,6 +423,8 @@ class Run:
         match point:
             case Named(name):
                 return self._target(name)
+            case Element(name, index) if name in self.made.rows:
+                return self._target(f"{name}[{self._number(index)}]")
             case Element(name, index):
                 return self._literal(self.made.arrays[name][self._number(index) - 1])
             case Inline(number):

@@ -40,6 +40,11 @@ def literal(number: int, text: str) -> str:
     return f"\x01{number}\x02{text}\x03"
 
 
+def bare_numbers(text: str) -> list[str]:
+    """Return the numbers of a literal without its marks."""
+    return NUMBER.findall(_MARKS.sub("", text))
+
+
 @dataclass(frozen=True)
 class Printed:
     """A program in a language.

@@ -210,6 +210,33 @@ class SetPoint:
 
 
 @dataclass(frozen=True)
+class SetElement:
+    """A point of a variable array gets a value; the first has index 1."""
+
+    name: str
+    index: Expr
+    value: Point
+
+
+@dataclass(frozen=True)
+class SetPart:
+    """One number of the place of a variable point is set.
+
+    Attributes:
+        point: The point, or an element of a variable array.
+        axis: 0 to 2: x, y or z.
+        of: The point whose number it gets, with `by` [mm] added; or the literal whose
+            number stands there, `mark` tells it apart.
+    """
+
+    point: Named | Element
+    axis: int
+    of: Named | Element | Inline
+    by: Expr = 0
+    mark: int = 0
+
+
+@dataclass(frozen=True)
 class Lift:
     """A variable point goes up [mm]."""
 
@@ -333,8 +360,8 @@ class Return:
 
 Statement = (
     Move | SetTool | SetBase | Displace | SetLoad | SetSpeed | SetZone | Assign
-    | SetPoint | Lift | Wait | Output | Note | MayFail | If | Switch | For | Count
-    | Poll | Loop | Skip | Call | Return
+    | SetPoint | SetElement | SetPart | Lift | Wait | Output | Note | MayFail | If
+    | Switch | For | Count | Poll | Loop | Skip | Call | Return
 )  # fmt: skip
 Body = tuple[Statement, ...]
 
@@ -391,6 +418,7 @@ class Program:
         points: Literal of each point with a name, and its file.
         arrays: Literals of arrays.
         variables: Points that the program sets.
+        rows: Arrays of points that the program sets, and how many each has.
         numbers: Of the program, with their first values.
         tools, bases: Poses by number from 1, (4, 4) [m].
         loads: Mass [kg] and centre in the flange frame [mm], by number from 1.
@@ -408,6 +436,7 @@ class Program:
     points: dict[str, tuple[int, int]] = field(default_factory=dict)
     arrays: dict[str, list[int]] = field(default_factory=dict)
     variables: list[str] = field(default_factory=list)
+    rows: dict[str, int] = field(default_factory=dict)
     numbers: dict[str, int] = field(default_factory=dict)
     tools: list[np.ndarray] = field(default_factory=list)
     bases: list[np.ndarray] = field(default_factory=list)
@@ -429,3 +458,30 @@ class Program:
     def function(self, name: str) -> Function:
         """Return a function by its name."""
         return next(one for one in self.functions if one.name == name)
+
+
+def bodies_of(one: Statement) -> list[Body]:
+    """Return the blocks in a statement."""
+    match one:
+        case Count(_, _, inner, _) | Skip(_, _, inner) | Poll(_, inner):
+            return [inner]
+        case For(_, _, _, _, inner):
+            return [inner]
+        case Loop(_, before, _, after):
+            return [before, after]
+        case If(branches, otherwise):
+            return [*(inner for _, inner in branches), otherwise]
+        case Switch(_, cases, otherwise):
+            return [*(inner for _, inner in cases), otherwise]
+    return []
+
+
+def own_points(body: Body) -> list[str]:
+    """Return the variable points that a routine sets and uses alone."""
+    found: list[str] = []
+    for one in body:
+        if isinstance(one, SetPoint) and one.name.startswith("w"):
+            found.append(one.name)
+        for inner in bodies_of(one):
+            found += own_points(inner)
+    return [*dict.fromkeys(found)]

@@ -191,6 +191,42 @@ def test_entries_that_the_program_sets_are_known_from_there_on():
 @pytest.mark.parametrize(
     "lines",
     [
+        [f"BASE_DATA[2]={TURN}", "BASE_DATA[2].Z=7", "$BASE=BASE_DATA[2]"],
+        ["BASE_DATA[20]=BASE_DATA[2]", "BASE_DATA[20].X=100", "BASE_DATA[20].Y=0",
+         "BASE_DATA[20].Z=7", "BASE_DATA[20].A=90", "BAS(#BASE,20)"],
+        [*(f"BASE_DATA[2].{one}" for one in ("X=100", "Y=0", "Z=7", "A=90", "B=0",
+                                            "C=0")), "$BASE=BASE_DATA[2]"],
+        [f"$BASE={TURN}", "$BASE.Z=9-2"],
+    ],
+)  # fmt: skip
+def test_components_of_frames_are_set_one_by_one(lines):
+    found = job(*lines, "LIN XP1")
+    whole = job("$BASE={X 100,Y 0,Z 7,A 90,B 0,C 0}", "LIN XP1")
+    assert reasons(found) == [""]
+    poses = [one.visits.frames[one.visits.uframe[0]] for one in (found, whole)]
+    np.testing.assert_allclose(*poses, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["BASE_DATA[2].Z=7", "$BASE=BASE_DATA[2]"],
+        [f"BASE_DATA[2]={TURN}", "BASE_DATA[N2].Z=7", "$BASE=BASE_DATA[2]"],
+        [f"BASE_DATA[2]={TURN}", "IF $IN[1] THEN", "BASE_DATA[2].Z=7", "ENDIF",
+         "$BASE=BASE_DATA[2]"],
+        [f"BASE_DATA[2]={TURN}", "BASE_DATA[2].Z=N2", "$BASE=BASE_DATA[2]"],
+        ["BASE_DATA[2]={X 1,Y 2,Z 3,A 40,B 90,C 0}", "BASE_DATA[2].A=7",
+         "$BASE=BASE_DATA[2]"],
+        ["IF $IN[1] THEN", "$BASE.X=3", "ENDIF"],
+    ],
+)  # fmt: skip
+def test_components_that_are_not_certain_leave_targets(lines):
+    assert reasons(job(*lines, "LIN XP1", "N2=1"))[0]
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
         ["$BASE=BASE_DATA[20]", "BASE_DATA[20]={X 5,Y 6,Z 7,A 0,B 0,C 0}"],
         ["BASE_DATA[2].X=N2", "$BASE=BASE_DATA[2]"],
         ["BASE_DATA[N2]={X 5,Y 6,Z 7,A 0,B 0,C 0}", "$BASE=BASE_DATA[2]"],

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from postproc.exceptions import ProgramError
-from postproc.files import FolderListing, find_shared, is_system_source
+from postproc.files import FolderListing
+from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.language import Krl
 from postproc.language.language import Start
 from postproc.language.source import Source
@@ -151,15 +152,20 @@ def test_routines_of_submit_programs_are_not_called():
     assert "motion-unknown" in codes(found)
 
 
+def find_shared(program, *given):
+    return KrlFileName(str(program)).find_shared(*given)
+
+
 BAS = b"&ACCESS R\r\nDEF  BAS (COMMAND :IN,REAL_PAR :IN )\r\nEND\r\n"
 BAS += b"DEF  INITMOV ( )\r\nEND\r\nDEF  FRAMES ( )\r\nEND\r\n"
 
 
 def test_sources_of_the_controller_are_told_by_name_and_content():
-    assert is_system_source("R1/System/bas.src", BAS)
-    assert not is_system_source("mybas.src", BAS)
-    assert not is_system_source("bas.src", BAS.replace(b"INITMOV", b"OTHER"))
-    assert not is_system_source("bas.dat", BAS)
+    assert KrlFileName("R1/System/bas.src").is_system_source(BAS)
+    assert not KrlFileName("mybas.src").is_system_source(BAS)
+    other = BAS.replace(b"INITMOV", b"OTHER")
+    assert not KrlFileName("bas.src").is_system_source(other)
+    assert not KrlFileName("bas.dat").is_system_source(BAS)
 
 
 def test_shared_files_of_an_archive_are_found(tmp_path):
@@ -203,4 +209,4 @@ def test_a_program_is_found_in_its_archive_from_its_own_folder(tmp_path, monkeyp
         path.parent.mkdir(parents=True)
         path.write_bytes(b"")
     monkeypatch.chdir(program.parent)
-    assert find_shared(Path("job.src")) == find_shared(program) != ()
+    assert find_shared("job.src") == find_shared(program) != ()

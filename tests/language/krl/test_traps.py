@@ -254,11 +254,14 @@ def test_a_point_that_a_move_need_not_reach_keeps_its_numbers(lines):
 # Home positions.
 
 
-@pytest.mark.parametrize("line", ["XHOME.A1=30", "sub(XHOME)"])
-def test_a_home_position_that_the_program_sets_is_not_known(line):
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [("XHOME.A1=30", "a1 set in line"), ("sub(XHOME)", "changed by the program")],
+)
+def test_a_home_position_that_the_program_sets_is_not_known(line, why):
     more = "DEF sub(a:OUT)\nE6AXIS a\na.A1=5\nEND\n"
     found = job(line, "PTP XHOME", "LIN XP1", more=more)
-    assert "changed by the program" in reasons(found)[0]
+    assert why in reasons(found)[0]
 
 
 @pytest.mark.parametrize("name", ["XHOME3", "$AXIS_HOME[2]"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.language.krl.language import Krl
+from postproc.language.krl.user_sources import acting_sources
 from tests.language.krl.test_visits import job, names, reasons
 
 FRAMES = ["BAS(#TOOL,1)", "BAS(#BASE,2)", "PTP XP1"]
@@ -37,11 +37,11 @@ def test_what_moves_or_sets_is_read(tmp_path, place):
     program, own = tmp_path / "P/job.src", tmp_path / place
     for line in ACTING.values():
         own.write_text(written(line))
-        assert [p.name for p in Krl().reads(program)] == [own.name], line
+        assert [p.name for p in acting_sources(program)] == [own.name], line
     own.write_text(QUIET)
-    assert Krl().reads(program) == ()
+    assert acting_sources(program) == ()
     own.write_text("DEF other( )\nLIN XP1\nEND\n")
-    assert Krl().reads(program) == () == Krl().reads(own)
+    assert acting_sources(program) == () == acting_sources(own)
 
 
 COLUMNS = {"base": "uframe", "frames": "uframe", "load": "load"}

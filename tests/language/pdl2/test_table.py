@@ -20,6 +20,7 @@ from tests.language.pdl2.test_external_routines import (
 PAGE = Path(__file__).parents[3] / "docs" / "pdl2.md"
 AHEAD = "MOVE LINEAR TO POS(110, 400, 150, 0, 175, 0, '') ADVANCE"
 LAST = "MOVE LINEAR TO POS(300, 300, 200, 0, 175, 0, '')"
+RAISED, SAVED = "$UFRAME := POS(0, 0, n, 0, 0, 0, '')", ["VAR n : INTEGER (10)"]
 VARS = ["VAR n : INTEGER", "VAR p : POSITION EXPORTED FROM other"]
 
 
@@ -47,6 +48,14 @@ CHECKS = {
         ZoneRule.UNKNOWN in
         followed(FIRST, LAST.replace("MOVE", "MOVEFLY"), line, FIRST).visits.zone_rule
         for line in ("WAIT FOR $DIN[1]", "DELAY 10", "PAUSE", "READ (n)")),
+    "what may move the arm (a routine in no file, a statement that is not understood) "
+    "behind a fly point": lambda: all(
+        ZoneRule.UNKNOWN in
+        followed(FIRST, LAST.replace("MOVE", "MOVEFLY"), line, FIRST).visits.zone_rule
+        for line in ("dock", "CALL other", "FROBNICATE it WITH 3")),
+    "a value that the program changes": lambda: (
+        left(RAISED, "n := n + 1", LAST, head=SAVED)
+        and not left(RAISED, "n := 10", LAST, head=SAVED)),
     "`CANCEL CURRENT`, `CANCEL ALL`": lambda: all(
         anywhere(FIRST, AHEAD, f"CANCEL {word}", LAST) for word in ("CURRENT", "ALL")),
     "`CANCEL .. FOR ARM[n]`": lambda: (

@@ -13,7 +13,7 @@ from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.compensation.sidecar import restore
-from postproc.files import name_read
+from postproc.language.rapid.files import RapidFileName
 from postproc.report.simulation import setup_of
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
@@ -173,7 +173,7 @@ def test_several_moves_on_a_line_keep_their_point(bench_cell, bench_model):
 def test_a_point_of_a_system_module(bench_cell, bench_model):
     source = moves(bench_cell, *twice(), declared=P)
     old = next(x for x in source.decode().splitlines() if "robtarget pShared:" in x)
-    system = name_read(PurePosixPath("T/SYSMOD/user.sys"), PurePosixPath("T/P/a.mod"))
+    system = RapidFileName("T/SYSMOD/user.sys").name_for(PurePosixPath("T/P/a.mod"))
     pages = {system: f"MODULE user(SYSMODULE)\n{old}\nENDMODULE\n".encode()}
     source = source.replace(old.encode() + b"\n", b"")
     found = run(source, bench_cell, bench_model, pages=pages)
@@ -191,7 +191,7 @@ def test_a_point_of_a_system_module(bench_cell, bench_model):
 def test_data_stand_behind_types(bench_cell, bench_model, first):
     source = moves(bench_cell, *twice(), declared=P)
     old = next(x for x in source.decode().splitlines() if "robtarget pShared:" in x)
-    system = name_read(PurePosixPath("T/SYSMOD/user.sys"), PurePosixPath("T/P/a.mod"))
+    system = RapidFileName("T/SYSMOD/user.sys").name_for(PurePosixPath("T/P/a.mod"))
     pages = {system: f"MODULE user(SYSMODULE)\n{old}\nENDMODULE\n".encode()}
     source = source.replace(old.encode() + b"\n", b"")
     source = source.replace(b"MODULE job\n", b"MODULE job\n" + first.encode())

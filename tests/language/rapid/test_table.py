@@ -95,6 +95,10 @@ CHECKS = {
         task(P1.replace("fine", "z10"), f"{line};", P2).visits.zone_rule[0]
         == ZoneRule.UNKNOWN
         for line in ("WaitDI di1,1", "WaitTime 1", "Stop", 'TPReadNum n,"?"')),
+    "`StopMove`, `StorePath`, a statement that may move the arm, behind a zone": lambda:
+        all(task(P1.replace("fine", "z10"), line, P2, more=MORE).visits.zone_rule[0]
+            == ZoneRule.UNKNOWN
+            for line in ("StopMove;", "StorePath;", "weld 3;", "?? n;")),
     "`MoveLSync`, `MoveJSync`, `MoveCSync`": lambda: left(
         SHIFT, r'MoveLSync p1,v200,z10,t\WObj:=w,"away";'),
     '`%"name"%`, `CallByVar`': lambda: (

@@ -103,7 +103,7 @@ def test_frames_zone_and_speed_of_a_move():
         (["MoveL p1,v200,fine,t\\WObj:=w\\TLoad:=part;"], "TLoad"),
         (["ArcL p1,v200,sm,wd,fine,t\\WObj:=w\\Track:=tr;"], "sensor"),
         ([L.format("nobody")], "nobody"),
-        (["p3.trans.x:=5;", L.format("p3")], "may be changed"),
+        (["p3.trans.x:=5;", L.format("p3")], "trans.x set in line"),
         ([L.format("list{n}")], "run"),
         (["MoveL Offs(p1,n,0,0),v200,fine,t\\WObj:=w;"], "run"),
         (["MoveL CRobT(),v200,fine,t\\WObj:=w;"], "run"),

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from postproc.exceptions import PostprocError
-from postproc.files import MODULES
 from postproc.language.language import Start
+from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.language import Rapid
 from postproc.language.rapid.moves import RUN_TIME
 from postproc.language.source import source_from_bytes
@@ -25,7 +25,7 @@ BESIDE = (RUN_TIME, "external axes")  # reasons of lines that do not count
 
 def tasks(root: Path) -> Iterator[list[Path]]:
     """Yield the files of every task below a folder, the one with main first."""
-    files = [p for p in sorted(root.rglob("*")) if p.suffix.lower() in MODULES]
+    files = [p for p in sorted(root.rglob("*")) if RapidFileName(p.name).is_program]
     for folder in sorted({path.parent for path in files}):
         own = [path for path in files if path.parent == folder]
         mains = [path for path in own if b"proc main" in path.read_bytes().lower()]

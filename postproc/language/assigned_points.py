@@ -1,0 +1,393 @@
+"""Points that a program assigns: what they hold on the ways to a statement."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from postproc.language import ir as said
+
+MOST_POINTS = 5_000  # held at once; those that were given first are forgotten
+Place = tuple[int, str, str, str]
+"""File, module and routine that declare data, "" for none, and their name."""
+Key = tuple[Place, tuple[int, ...]]
+"""The place of a point, and its index in an array, () for none."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """A component of a point that the program has set.
+
+    Attributes:
+        name: As it is spelt behind the point: ``trans.z``, ``x``.
+        value: Its number [mm, deg], None where only the run tells it.
+        file, row: The statement that sets it.
+    """
+
+    name: str
+    value: float | None
+    file: int
+    row: int
+
+
+@dataclass(frozen=True)
+class AssignedPoint:
+    """What assignments give to a point, or to an element of an array.
+
+    Attributes:
+        place: File, module and routine that declare the point, and its name.
+        operand, row, scope: What it is given whole, None where that is not known, and
+            where that stands.
+        index: Of the element, () for a point.
+        components: What is set in it by itself since then, by name.
+        copied: Points that it is a copy of, by their places.
+        names: Of all data that its value depends on.
+    """
+
+    place: Place
+    operand: said.Operand | None
+    row: int
+    scope: Scope
+    index: tuple[int, ...] = ()
+    components: tuple[Component, ...] = ()
+    copied: frozenset[Place] = frozenset()
+    names: frozenset[str] = frozenset()
+
+    @property
+    def name(self) -> str:
+        """The name of the point, or of its array."""
+        return self.place[-1]
+
+    @property
+    def key(self) -> Key:
+        """What tells it apart."""
+        return self.place, self.index
+
+    @property
+    def chain(self) -> list[Place]:
+        """Its place, and the places of what it is a copy of."""
+        return [self.place, *sorted(self.copied - {self.place})]
+
+    def with_components(
+        self, found: Iterable[Component], names: frozenset[str]
+    ) -> AssignedPoint:
+        """Return it with other components.
+
+        Args:
+            found: What is set.
+            names: Of data that their values depend on.
+        """
+        known = {one.name: one for one in (*self.components, *found)}
+        components = tuple(known[name] for name in sorted(known))
+        return replace(self, components=components, names=self.names | names)
+
+
+@dataclass(frozen=True)
+class Points:
+    """What points hold on every way to a statement.
+
+    Attributes:
+        held: What they are given, by key.
+        used: What of it has been asked for, by everybody who wants to know that.
+        places: Places of all points in it, and maybe of others.
+    """
+
+    held: Mapping[Key, AssignedPoint] = field(default_factory=dict, hash=False)
+    used: tuple[set[Key], ...] = field(default=(), compare=False)
+    places: frozenset[Place] = field(default=frozenset(), compare=False)
+
+    def watch(self) -> Points:
+        """Return the same, which notes what is asked for from now on."""
+        return replace(self, used=(*self.used, set())) if self.held else self
+
+    @property
+    def given(self) -> frozenset[AssignedPoint]:
+        """What has been asked for since it is watched."""
+        used = self.used[-1] if self.used else ()
+        return frozenset(self.held[key] for key in used if key in self.held)
+
+    def find(self, key: Key) -> AssignedPoint | None:
+        """Return what a point holds, None where that is not known."""
+        for used in self.used:
+            used.add(key)
+        return self.held.get(key)
+
+    def give(self, point: AssignedPoint) -> Points:
+        """Return it with what an assignment gives to a point."""
+        held = {**self.held}
+        held.pop(point.key, None)
+        if len(held) >= MOST_POINTS:
+            del held[next(iter(held))]
+        held[point.key] = point
+        return Points(held, self.used, self.places | {point.place})
+
+    def forget(self, place: Place) -> Points:
+        """Return it without any element of an array, or without a point."""
+        return self._without(lambda key: key[0] == place)
+
+    def leave(self, routine: tuple[int, str, str]) -> Points:
+        """Return it without the points that a routine declares, by its place."""
+        return self._without(lambda key: key[0][:3] == routine)
+
+    def join(self, other: Points) -> Points:
+        """Keep what is the same on another way here."""
+        if self.held is other.held or self.held == other.held:
+            return self
+        theirs = other.held
+        same = {
+            key: point for key, point in self.held.items()
+            if (found := theirs.get(key)) is point or found == point
+        }  # fmt: skip
+        return Points(same, self.used, self.places)
+
+    def agree(self, given: Iterable[AssignedPoint]) -> bool:
+        """Return True if points hold what is given."""
+        return all(self.held.get(point.key) == point for point in given)
+
+    def _without(self, lost: Callable[[Key], bool]) -> Points:
+        rest = {key: point for key, point in self.held.items() if not lost(key)}
+        return self if len(rest) == len(self.held) else replace(self, held=rest)
+
+
+NO_POINTS = Points()
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Where a statement stands, and what loop variables hold there.
+
+    Attributes:
+        file: Index of its file.
+        module, routine: Names, "" outside of all.
+        parameters: Of the routine.
+        loops: Values of loop variables that are known.
+        given: What the routine is called with, by parameter: the operand, its row and
+            where that stands. Parameters without an entry are not known.
+        points: What points hold that assignments have changed, where a move is read.
+    """
+
+    file: int
+    module: str
+    routine: str
+    parameters: frozenset[str] = frozenset()
+    loops: tuple[tuple[str, float], ...] = ()
+    given: tuple[tuple[str, said.Operand, int, Scope], ...] = ()
+    points: Points = NO_POINTS
+
+
+@dataclass(frozen=True)
+class PointPart:
+    """A point that a statement names, or a part of it.
+
+    Attributes:
+        place: Where it is declared.
+        index: Of an element, () for a point; None where only the run tells it, and for
+            whole arrays.
+        component: As it is spelt behind the point, "" for all of it.
+    """
+
+    place: Place
+    index: tuple[int, ...] | None
+    component: str = ""
+
+
+@dataclass(frozen=True)
+class FunctionBody:
+    """What a function does.
+
+    Attributes:
+        scope: Where its statements stand, with what it is called with.
+        statements: Rows and statements, without declarations.
+    """
+
+    scope: Scope
+    statements: Sequence[tuple[int, said.SourceStatement]]
+
+
+def source_of(operand: said.Operand | None) -> said.DataObject | None:
+    """Return the point that an operand names, or shifts, None where it does neither."""
+    while isinstance(operand, said.FunctionCall) and operand.arguments:
+        operand = operand.arguments[0].value
+    return operand if isinstance(operand, said.DataObject) else None
+
+
+def is_point(data: said.DataObject) -> bool:
+    """Return True if data are named whole, or an element of them is."""
+    return all(isinstance(step, said.ElementStep) for step in data.steps)
+
+
+@dataclass
+class NamesUsed:
+    """Names that the statements of a task change and take.
+
+    Attributes:
+        written: Those that assignments change; what takes a value does not read them.
+        changed: Those that may be changed otherwise.
+        read: Those that something but the destination of a move takes.
+        copies: Points that are assigned, and those that they are made from.
+    """
+
+    written: set[str] = field(default_factory=set)
+    changed: set[str] = field(default_factory=set)
+    read: set[str] = field(default_factory=set)
+    copies: set[tuple[str, str]] = field(default_factory=set)
+
+    def pass_on(self) -> None:
+        """Note of points what is noted of those that are made from them."""
+        before = -1
+        while before != len(self.read):
+            before = len(self.read)
+            self.read |= {one for target, one in self.copies if target in self.read}
+
+
+class TaskSymbols(ABC):
+    """What the names of a task mean, as far as ways through it ask."""
+
+    @property
+    @abstractmethod
+    def uses(self) -> NamesUsed:
+        """The names that statements change and take."""
+
+    @abstractmethod
+    def locate(self, data: said.DataObject, row: int, here: Scope) -> PointPart | None:
+        """Find the point that only assignments change, None for all other data."""
+
+    @abstractmethod
+    def evaluate_components(
+        self, part: PointPart, value: said.Operand, row: int, here: Scope
+    ) -> Sequence[tuple[str, float | None]]:
+        """Return the components that an assignment sets, and what it gives to them.
+
+        Args:
+            part: What is set.
+            value: What it is given.
+            row: The assignment.
+            here: Where it stands.
+        """
+
+    @abstractmethod
+    def names_of(self, operand: said.Operand) -> frozenset[str]:
+        """Return the names of all data and functions in an operand."""
+
+    @abstractmethod
+    def calls_routine(self, operand: said.Operand) -> bool:
+        """Return True if an operand calls a function of the task."""
+
+    def find_held(
+        self, operand: said.Operand | None, row: int, here: Scope
+    ) -> AssignedPoint | None:
+        """Return what assignments gave to the point that an operand names."""
+        if not (here.points.held and isinstance(operand, said.DataObject)):
+            return None
+        part = self.locate(operand, row, here)
+        if part is None or part.index is None or part.component:
+            return None
+        return here.points.find((part.place, part.index))
+
+    def assign(
+        self, points: Points, one: said.Assignment, row: int, here: Scope
+    ) -> Points:
+        """Return what points hold behind an assignment.
+
+        Args:
+            points: What they hold before it.
+            one: The assignment.
+            row: Its row.
+            here: Where it stands.
+        """
+        part = self.locate(one.target, row, here)
+        if part is None:
+            return points
+        if part.index is None:
+            return points.forget(part.place)
+        there = replace(here, points=points.watch())
+        return points.give(self._give_value(part, part.index, one.value, row, there))
+
+    def _give_value(
+        self, part: PointPart, index: tuple[int, ...], value: said.Operand, row: int,
+        here: Scope,
+    ) -> AssignedPoint:  # fmt: skip
+        """Return what a point holds that is given a value, or a component of it."""
+        place, points, own = part.place, here.points, frozenset([part.place[-1]])
+        plain = replace(here, points=NO_POINTS)
+        known = self.find_held(value, row, here)
+        if known is not None and not part.component:
+            copied = known.copied | {known.place}
+            return replace(
+                known, place=place, index=index, copied=copied, names=known.names | own
+            )
+        names = self.names_of(value)
+        if not (part.component or self._takes_held(value, row, here)):
+            return AssignedPoint(place, value, row, plain, index, names=own | names)
+        numbers = self._read_components(part, value, row, here)
+        names = names.union(own, *(point.names for point in points.given))
+        if part.component:
+            before = points.held.get((place, index))
+            point = before or AssignedPoint(place, None, row, plain, index)
+            return point.with_components(numbers, names | own)
+        if not points.given:  # what it is given never changes
+            return AssignedPoint(place, value, row, plain, index, names=names)
+        source = source_of(value)
+        base = self.find_held(source, row, here)
+        if base is None:
+            point = AssignedPoint(place, source, row, plain, index)
+        else:
+            copied = base.copied | {base.place}
+            point = replace(base, place=place, index=index, copied=copied)
+        return point.with_components(numbers, names)
+
+    @abstractmethod
+    def open_function(
+        self, call: said.FunctionCall, row: int, here: Scope
+    ) -> FunctionBody | None:
+        """Return the statements of the function that a call means, None if unknown."""
+
+    def find_returned(
+        self, call: said.FunctionCall, row: int, here: Scope
+    ) -> tuple[said.Operand, int, Scope] | None:
+        """Return what a function returns, its row and where that stands.
+
+        None for functions that do more than to set points of their own, or call others.
+
+        Args:
+            call: The call.
+            row: Its row.
+            here: Where it stands.
+        """
+        body = self.open_function(call, row, here)
+        if body is None:
+            return None
+        scope, points = body.scope, here.points
+        own = scope.file, scope.module, scope.routine
+        for at, one in body.statements:
+            scope = replace(scope, points=points)
+            if not isinstance(one, said.Assignment | said.Leave) or one.value is None:
+                return None
+            if self.calls_routine(one.value):
+                return None
+            if isinstance(one, said.Leave):
+                return (one.value, at, scope) if one.word == "return" else None
+            part = self.locate(one.target, at, scope)
+            if part is None or part.place[:3] != own:
+                return None
+            points = self.assign(points, one, at, scope)
+        return None
+
+    def _takes_held(self, value: said.Operand, row: int, here: Scope) -> bool:
+        """Return True if a value may be made from what assigned points hold."""
+        if not here.points.held:
+            return False
+        if self.calls_routine(value):
+            return True
+        parts = (
+            self.locate(said.DataObject(name), row, here)
+            for name in self.names_of(value)
+        )
+        return any(part and part.place in here.points.places for part in parts)
+
+    def _read_components(
+        self, part: PointPart, value: said.Operand, row: int, here: Scope
+    ) -> list[Component]:
+        found = self.evaluate_components(part, value, row, here)
+        return [Component(name, number, here.file, row) for name, number in found]

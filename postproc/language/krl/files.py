@@ -1,0 +1,175 @@
+"""Files of KRL: sources, their data lists, submit programs, files of a controller."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from pathlib import Path
+from typing import ClassVar
+
+from postproc.files import FolderListing, base_name, find_beside, read_if_readable
+from postproc.language.file_name import FileName, Named, Skip
+
+SHARED_LIST, ARCHIVE_DEPTH = "$config.dat", 4
+# Sources of a controller and its packages, and routines that tell them from others.
+_SYSTEM_SOURCES = {
+    "bas": ("bas", "initmov", "frames"),
+    "ir_stopm": ("ir_stopm",),
+    "msglib": ("msgnotify",),
+    "p00": ("p00",),
+    "h50": ("h50",),
+    "user_grp": ("user_grp",),
+    "userspot": ("userspot",),
+}
+_CALLED = re.compile(  # a routine, alone on its line or by an interrupt
+    rb"(?:^|\bDO)[ \t]*(?:GLOBAL[ \t]+)?(?:EXT[ \t]+)?(\w+)[ \t]*\(",
+    re.IGNORECASE | re.MULTILINE,
+)
+_WORD = re.compile(rb"[A-Za-z_$]\w*")
+_SHARED_POINT = re.compile(  # in a public list, declared for all programs
+    rb"^[ \t]*(?:DECL[ \t]+)?GLOBAL[ \t]+(?:DECL[ \t]+)?"
+    rb"(?:E6POS|POS|FRAME|E6AXIS|AXIS)[ \t]+(\w+)",
+    re.IGNORECASE | re.MULTILINE,
+)
+_PUBLIC = re.compile(rb"^[ \t]*DEFDAT[ \t]+\w+[ \t]+PUBLIC\b", re.I | re.M)
+_MOVE = re.compile(rb"^[ \t]*(?:S?(?:PTP|LIN|CIRC)|SPL|(?:PTP_)?SPLINE)\b", re.I | re.M)
+
+
+class KrlFileName(FileName):
+    """A file by its name, as KRL takes it."""
+
+    programs: ClassVar = (".src",)
+    data_lists: ClassVar = ".dat"
+    background: ClassVar = (".sub",)
+
+    @property
+    def is_submit(self) -> bool:
+        """Tell whether it is a program that runs beside the one that moves the arm."""
+        return self.suffix in self.background
+
+    @property
+    def is_shared(self) -> bool:
+        """Tell whether it is a list or a submit program of all programs.
+
+        >>> [KrlFileName(f"R1/{name}").is_shared for name in ("$config.dat", "a.dat")]
+        [True, False]
+        """
+        of_system = self.is_data_list and base_name(self.place).startswith("$")
+        return of_system or self.is_submit
+
+    def is_system(self) -> bool:
+        """Tell by its name, and by the routines that it holds."""
+        if base_name(self.name) not in _SYSTEM_SOURCES:
+            return False
+        return self.is_system_source(read_if_readable(Path(self.place)))
+
+    def is_system_source(self, text: bytes) -> bool:
+        """Tell whether it is a source of the controller or of its packages.
+
+        >>> KrlFileName("IR_STOPM.src").is_system_source(b"DEF  IR_STOPM ( )")
+        True
+        >>> KrlFileName("bas.src").is_system_source(b"DEF bas( )")
+        False
+        """
+        names = _SYSTEM_SOURCES.get(base_name(self.place), ())
+        if not names or not self.is_program:
+            return False
+        begin = rb"(?im)^[ \t]*(?:GLOBAL[ \t]+)?DEF[ \t]+"
+        own = (begin + name.encode() + rb"\b" for name in names)
+        return all(re.search(pattern, text) for pattern in own)
+
+    def find_named(self, text: bytes, skip: Skip) -> tuple[Named, Named]:
+        """Name the data list of a source, and those sources that it may call."""
+        if not self.is_program:
+            return {}, {}
+        found = {KrlFileName(self.data_list).key: 1}
+        for call in _CALLED.finditer(text):
+            called = f"{call[1].decode('latin-1').lower()}{self.programs[0]}"
+            if called not in found:
+                found[called] = text.count(b"\n", 0, call.start()) + 1
+        return found | _name_lists(Path(self.place), text), {}
+
+    def find_shared(
+        self, within: Path | None = None, listing: FolderListing | None = None
+    ) -> tuple[Path, ...]:
+        """Find what a source shares with others: ``$config.dat``, and submit programs.
+
+        Submit programs stand beside either, or anywhere in the archive that the list
+        belongs to; they may change what programs read.
+
+        Args:
+            within: A folder that nothing outside of is looked at.
+            listing: What folders hold; default: they are read.
+        """
+        folder, listing = Path(self.place).absolute().parent, listing or FolderListing()
+        if not self.is_program or not folder.is_dir():
+            return ()
+        found = _find_shared_list(folder, within, listing)
+        submits: list[Path] = []
+        if found is not None and found.parent.name.lower() == "system":
+            submits += listing.ending(found.parent.parent, self.background, below=True)
+        for place in dict.fromkeys(
+            [folder] if found is None else [found.parent, folder]
+        ):
+            submits += listing.ending(place, self.background)
+        names = {path.name.lower(): path for path in submits}
+        return (*(() if found is None else (found,)), *names.values())
+
+
+FILES = KrlFileName
+
+
+def _find_shared_list(
+    folder: Path, within: Path | None, listing: FolderListing
+) -> Path | None:
+    """Find ``$config.dat``: beside a source, or where a controller keeps it.
+
+    In an archive programs stand in ``R1/Program``, at any depth, and the list in
+    ``R1/System``.
+    """
+    found = listing.named(folder, SHARED_LIST)
+    for above in list(folder.parents)[:ARCHIVE_DEPTH]:
+        outside = within is not None and within not in (above, *above.parents)
+        if found is not None or outside:
+            break
+        found = listing.named(above / "System", SHARED_LIST)
+    return found
+
+
+def _name_lists(path: Path, text: bytes) -> Named:
+    """Name sources without moves whose lists declare points that a source goes to."""
+    lists = [(KrlFileName(str(other)), other.stat())
+             for other in sorted(path.parent.iterdir())
+             if KrlFileName(other.name).is_data_list
+             and other.stem.lower() != path.stem.lower()
+             and other.is_file() and not other.is_symlink()]  # fmt: skip
+    public = [(list_.program, _points_for_all(list_, at.st_mtime_ns, at.st_size))
+              for list_, at in lists]  # fmt: skip
+    if not any(points for _, points in public):
+        return {}
+    found: Named = {}
+    lines = {
+        word[0].lower(): word.start() for word in reversed([*_WORD.finditer(text)])
+    }
+    for other, points in public:
+        places = [lines[name] for name in points & lines.keys()]
+        if places:
+            line = text.count(b"\n", 0, min(places)) + 1
+            found[KrlFileName(other).key] = line
+    return found
+
+
+@lru_cache(maxsize=8192)
+def _points_for_all(file: KrlFileName, changed: int, size: int) -> frozenset[bytes]:
+    """Return the points that a list declares for all programs, in lower case.
+
+    A list whose source moves belongs to that source, whoever else names its points.
+    """
+    place = Path(file.place)
+    text = read_if_readable(place)
+    if not _PUBLIC.search(text):
+        return frozenset()
+    names = frozenset(name.lower() for name in _SHARED_POINT.findall(text))
+    own = find_beside(place, Path(file.program).name) if names else None
+    moves = own is None or _MOVE.search(read_if_readable(own)) is not None
+    return frozenset() if moves else names

@@ -1,0 +1,68 @@
+"""Write a measuring program in KRL."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from postproc.language.krl.symbols import AXES
+from postproc.language.measuring_program import (
+    GENTLY,
+    SHARE,
+    MeasuringMove,
+    MeasuringProgram,
+    MountedProbe,
+)
+
+# What the inline form INI of every program says, then speed and acceleration.
+_INI = (
+    ";FOLD INI",
+    "GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM ( )",
+    "INTERRUPT ON 3",
+    "BAS (#INITMOV,0 )",
+    ";ENDFOLD (INI)",
+    f"BAS (#VEL_PTP,{SHARE} )",
+    f"BAS (#ACC_PTP,{GENTLY} )",
+)
+
+
+def write_krl(program: MeasuringProgram) -> str:
+    """Write a source: its points stand in the moves, so it needs no data list."""
+    lines = [
+        "&ACCESS RVP",
+        "&REL 1",
+        f"DEF {program.name} ( )",
+        *(f"; {text}" for text in program.heading),
+        *_INI,
+        *_write_load(program),
+    ]
+    for step in program.steps:
+        lines += _write_step(step, program)
+    return "\r\n".join([*lines, "END", ""])
+
+
+def _write_load(program: MeasuringProgram) -> Iterator[str]:
+    """Write the load that the arm carries, nothing where it is not known."""
+    if program.mass_kg > 0.0:
+        centre = _frame(program.centre_mm)
+        inertia = "{X 0.0,Y 0.0,Z 0.0}"
+        yield f"$LOAD={{M {program.mass_kg:.3f},CM {centre},J {inertia}}}"
+
+
+def _frame(xyz_mm: tuple[float, ...]) -> str:
+    x, y, z = xyz_mm
+    return f"{{X {x:.3f},Y {y:.3f},Z {z:.3f},A 0.0,B 0.0,C 0.0}}"
+
+
+def _write_step(
+    step: MountedProbe | MeasuringMove, program: MeasuringProgram
+) -> Iterator[str]:
+    if isinstance(step, MountedProbe):
+        yield f"; probe point {step.number}"
+        yield f"$TOOL={_frame(step.xyz_mm)}"
+        return
+    if step.measured:
+        yield f"; MEASURE {step.measured}"
+    named = zip(AXES, step.joints_deg, strict=True)
+    yield f"PTP {{{','.join(f'{name.upper()} {v:.5f}' for name, v in named)}}}"
+    if step.measured:
+        yield f"WAIT SEC {program.settle_s:.1f}"

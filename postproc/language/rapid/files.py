@@ -1,0 +1,117 @@
+"""Files of RAPID: modules of a task, and what a backup holds beside it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path, PurePath
+from stat import S_ISREG
+from typing import ClassVar
+
+from postproc.files import read_if_readable
+from postproc.language.file_name import FileName, Named, Skip
+from postproc.language.measuring_program import is_measuring_program
+
+SYSTEM_MODULES, SYSTEM_SUFFIXES = "SYSMOD/", (".sys", ".sysx")
+OTHER_TASKS = "TASKS/"
+_MAIN = re.compile(
+    rb"^[ \t]*(?:LOCAL[ \t]+)?PROC[ \t]+main[ \t]*\(", re.IGNORECASE | re.MULTILINE
+)
+
+
+class RapidFileName(FileName):
+    """A file by its name, as RAPID takes it: every module belongs to those beside it.
+
+    Files that a job has from other folders of a backup have names with a folder: of
+    its system modules, or of another task.
+    """
+
+    programs: ClassVar = (".mod", ".modx", ".prg", *SYSTEM_SUFFIXES)
+
+    @property
+    def is_from_elsewhere(self) -> bool:
+        """Tell by the folder that its name begins with."""
+        return self.place.startswith((SYSTEM_MODULES, OTHER_TASKS))
+
+    @property
+    def is_named_as_system(self) -> bool:
+        """Tell whether it is a system module by its place or its suffix.
+
+        >>> RapidFileName("SYSMOD/a.mod").is_named_as_system
+        True
+        >>> RapidFileName("BASE.SYS").is_named_as_system
+        True
+        >>> RapidFileName("job.mod").is_named_as_system
+        False
+        """
+        return self.place.startswith(SYSTEM_MODULES) or self.suffix in SYSTEM_SUFFIXES
+
+    @property
+    def task_beside(self) -> str:
+        """Return the other task that a file of a job belongs to, "" for its own.
+
+        >>> RapidFileName("TASKS/TASK2/PROGMOD/plc.mod").task_beside
+        'TASK2'
+        >>> RapidFileName("SYSMOD/user.sys").task_beside
+        ''
+        """
+        other = self.place.startswith(OTHER_TASKS)
+        return self.place.split("/")[1] if other else ""
+
+    @property
+    def job(self) -> str:
+        """Return its folder: the modules of a task are one job."""
+        return self.place.rpartition("/")[0]
+
+    def find_named(self, text: bytes, skip: Skip) -> tuple[Named, Named]:
+        """Name all modules beside the one with the main routine of a task.
+
+        A survey is a task by itself, wherever it stands.
+        """
+        found = _MAIN.search(text)
+        if found is None or is_measuring_program(text):
+            return {}, {}
+        line = text.count(b"\n", 0, found.start()) + 1
+        beside = _modules_beside(Path(self.place), skip)
+        return {RapidFileName(other.name).key: line for other in beside}, {}
+
+    def name_for(self, program: PurePath) -> str:
+        """Return its name in a job, with the folder of a backup that it is from.
+
+        >>> job = PurePath("RAPID/TASK1/PROGMOD/job.mod")
+        >>> RapidFileName("RAPID/TASK1/SYSMOD/user.sys").name_for(job)
+        'SYSMOD/user.sys'
+        >>> RapidFileName("RAPID/TASK2/PROGMOD/plc.mod").name_for(job)
+        'TASKS/TASK2/PROGMOD/plc.mod'
+        """
+        path = PurePath(self.place)
+        if self.runs_beside(program):
+            return OTHER_TASKS + "/".join(path.parts[-3:])
+        return f"{SYSTEM_MODULES}{path.name}"
+
+    def runs_beside(self, program: PurePath) -> bool:
+        """Tell by the folders of tasks."""
+        return PurePath(self.place).parent.parent != program.parent.parent
+
+
+FILES = RapidFileName
+
+
+def _modules_beside(path: Path, skip: Skip) -> Iterator[Path]:
+    """Yield the other modules of a folder, but for main ones and those to skip."""
+    for other in sorted(path.parent.iterdir()):
+        ours = RapidFileName(other.name).is_program and other.name != path.name
+        if not ours or other.is_symlink():
+            continue
+        status = other.stat()
+        if S_ISREG(status.st_mode) and not (
+            _has_main(other, status.st_mtime_ns, status.st_size) or skip(other)
+        ):
+            yield other
+
+
+@lru_cache(maxsize=8192)
+def _has_main(path: Path, changed: int, size: int) -> bool:
+    """Tell whether a module, as it is at a time, has the main routine of its task."""
+    return _MAIN.search(read_if_readable(path)) is not None
