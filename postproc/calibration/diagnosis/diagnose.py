@@ -83,6 +83,10 @@ if TYPE_CHECKING:
 # are then errors on rows that no fit has seen and that chose nothing.
 
 CLEARLY_ABOVE = 1.2  # times the noise floor
+KEPT = (
+    "a refit to these rows predicts held-out ones no better: the model is written as "
+    "it was given"
+)
 WORSE = 0.025  # probability of calling a model worse that is not
 PARTS = 5
 RUN = 8  # consecutive rows that are held out together
@@ -297,12 +301,20 @@ def extend_model(
         given = survey.position - nominal - model.error(arm, survey.states)
     held_out = hold_out(traced.search, sides, seed, progress, given)
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
+    if given is not None and _tells_nothing(diagnosis):
+        diagnosis = replace(diagnosis, notes=(*diagnosis.notes, KEPT))
     extended = _extend_model(model, survey, traced.search, diagnosis)
     widths = newer_widths(model.flank_widths, extended, arm, reversals)
     extended = replace(extended, flank_widths=widths)
     if reversals is not None:
         diagnosis = replace(diagnosis, flanks=tell_widths(widths))
     return Extension(diagnosis, extended, traced.search, held_out)
+
+
+def _tells_nothing(found: Diagnosis) -> bool:
+    """Return True if fresh rows add nothing, and a refit predicts others no better."""
+    small = found.verdict == "noise" and not found.findings
+    return small and found.after.mean_mm >= found.before.mean_mm
 
 
 def _with_mended_directions(
@@ -439,6 +451,8 @@ def _extend_model(
         "before": statistics(diagnosis.before),
         "after": statistics(diagnosis.after),
     }  # fmt: skip
+    if KEPT in diagnosis.notes:
+        return replace(model, parent=model.id, history=(*model.history, record))
     fitted = fold_back(model_of(no_surer(found.fit), survey))
     if is_fresh(survey, model):
         fitted = replace(
