@@ -13,7 +13,12 @@ import numpy as np
 
 from postproc.arrays import Floats, data_frame
 from postproc.calibration.measurements import Measurements
-from postproc.calibration.readings import Readings, read_setup, rows_of
+from postproc.calibration.readings import (
+    Readings,
+    describe_missing_setup,
+    read_setup,
+    rows_of,
+)
 from postproc.calibration.report import FreeForms
 from postproc.calibration.residuals import beside_all
 from postproc.calibration.survey_checks import check_against
@@ -208,6 +213,7 @@ def predict(
         rows, read, placed = rows_of(table, cell, positions=False), None, ""
         if measured:
             check_against(rows, cell.arm, model)
+            placed = describe_missing_setup(model)
     else:
         found = read_setup(table, cell, model, asked)
         rows, read, placed = found.rows, found.read, found.note

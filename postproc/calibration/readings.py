@@ -237,6 +237,22 @@ def at_moments(
     return rows.with_states(states), frozenset(known)
 
 
+def describe_missing_setup(model: Model) -> str:
+    """Say what residuals hold besides, where the arm alone is predicted."""
+    passing = [
+        e.name
+        for e in model.effects.effects
+        if e.belongs_to() == "setup" and e.refers_to() and e.driven_by == "time"
+    ]
+    if not passing:
+        return ""
+    names = ", ".join(dict.fromkeys(passing))
+    return (
+        f"\nresiduals are those of the arm alone and hold {names} of these readings: "
+        "--set measurements.frame=base (or tracker) predicts it, too"
+    )
+
+
 def clock_missing(
     model: Model, known: frozenset[str], cell: Cell, states: States
 ) -> str:

@@ -184,6 +184,7 @@ def mark_stranded(
     """Leave alone what comes from targets that the arm does not reach.
 
     There the controller stops with an error, and who goes on comes from anywhere.
+    Behind a stop because of flags only that is left which does not say where it is.
 
     Args:
         visits: What the program says.
@@ -197,14 +198,15 @@ def mark_stranded(
         BEHIND_STOP, (n,).
     """
     found = np.zeros(len(visits), dtype=np.int64)
-    for why, rows, reason in (
-        (BEYOND_REACH, STRANDS[plan.reason], STRANDED),
-        (BEHIND_STOP, np.array(targets.stops), STOPPED),
+    placed = _find_placed(targets)
+    for why, rows, reason, sure in (
+        (BEYOND_REACH, STRANDS[plan.reason], STRANDED, np.zeros_like(placed)),
+        (BEHIND_STOP, np.array(targets.stops), STOPPED, placed),
     ):
         rows[:1] |= bool(begun & why)
         if rows.any():
-            reached, on = _followers(visits, rows, _find_placed(targets))
-            reasons.mark(reached, reason)
+            reached, on = _followers(visits, rows, placed)
+            reasons.mark(reached & ~sure, reason)
             found[on] |= why
     return found
 

@@ -48,7 +48,7 @@ ONLY_SHIFTED = Reason(
     "it is shifted from a point that no move goes to: what to correct?",
 )
 _NO_FRAME = -1
-MOST_NAMED = 3  # lines, or data, in a reason
+MOST_NAMED, MOST_PARTS = 3, 6  # lines or data, components, in a reason
 NO_LOAD: tuple[float, ...] = (math.nan,) * 4  # one object: NaN differs from itself
 Pose = tuple[float, ...]
 """The rows of a pose (4, 4) [m] one after the other, empty where it is not known."""
@@ -229,7 +229,9 @@ def explain_components(
         f"of {files[at].text.source.name}"
         for at, own in sorted(lines.items())
     ]
-    parts = ", ".join(one.name for one in meant)
+    parts = ", ".join(one.name for one in meant[:MOST_PARTS])
+    more = len(meant) - MOST_PARTS
+    parts += f" and {more} more" if more > 0 else ""
     text = f"{name}: {parts} set in {', '.join(places)}"
     if late:
         text = f"{text} to what is known only when the program runs"

@@ -109,6 +109,8 @@ def test_rows_without_a_clock_have_an_unknown_moment(tmp_path, clock) -> None:  
     )
     assert f"no {clock} in the file: tracker_drift at the mean" in mean.stderr
     assert "after_survey of [measurements]" in mean.stderr
+    alone = "residuals are those of the arm alone and hold tracker_drift"
+    assert alone in c.predict(timed).stderr and alone not in mean.stderr
     assert "after_survey" not in end.stderr
     assert 0.10 < left(mean) < 0.18  # half of the drift
     assert left(end) < 0.07

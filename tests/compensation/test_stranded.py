@@ -106,7 +106,16 @@ def test_behind_a_stop_because_of_flags_no_side_is_known(cell, pos, care):
     behind = f"MOVE JOINT TO {pos(NEAR)}", f"MOVE LINEAR TO {pos(FAR)}"
     found = planned(cell, f"$CNFG_CARE := {care}", named, *behind)
     assert found.reasons[1].text.startswith("$CNFG_CARE is")
-    assert found.reasons[2] == STOPPED and not found.reasons[3]
+    assert not found.reasons[2] and not found.reasons[3]
     assert not found.plan.direction[2].any()
     unchecked = planned(cell, "$CNFG_CARE := FALSE", named, *behind)
-    assert unchecked.reasons[2] != STOPPED and unchecked.plan.direction[2].all()
+    assert unchecked.plan.direction[2].all()
+
+
+def test_behind_such_a_stop_a_target_without_a_string_is_left(cell, pos):
+    named = f"MOVE LINEAR TO {pos(THERE)}".replace("''", "'W'")
+    bare = f"MOVE LINEAR TO {pos(NEAR)}".replace(", '')", ")")
+    found = planned(cell, "$CNFG_CARE := TRUE", named, bare, bare, START, bare)
+    assert [found.reasons[k] == STOPPED for k in range(6)] == [
+        False, False, True, True, False, False
+    ]  # fmt: skip

@@ -1,0 +1,84 @@
+"""What assigned points hold: budgets, joins, and what else depends on them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.language import assigned_points
+from postproc.language.assigned_points import (
+    NO_POINTS,
+    AssignedPoint,
+    Component,
+    Scope,
+)
+from postproc.language.visits import Meaning
+from tests.language.krl.test_visits import DATA, job
+from tests.language.rapid.test_visits import L, reasons, task
+
+HERE = Scope(0, "m", "main")
+
+
+def point(name, index=(), row=0):
+    return AssignedPoint((0, "m", "", name), None, row, HERE, index)
+
+
+def test_an_element_is_forgotten_alone_or_with_its_array():
+    held = NO_POINTS.give(point("s", (1,))).give(point("s", (2,))).give(point("q"))
+    assert held.find(point("s", (2,)).key) == point("s", (2,))
+    assert [*held.forget((0, "m", "", "s")).held] == [point("q").key]
+    assert held.leave((0, "m", "main")) is held
+
+
+def test_ways_that_differ_keep_what_they_share():
+    one = NO_POINTS.give(point("q")).give(point("r"))
+    other = one.give(point("q", row=4))
+    assert [*one.join(other).held] == [*other.join(one).held] == [point("r").key]
+    assert one.join(one) is one
+
+
+def test_a_component_is_set_again_and_others_stay():
+    first = Component("z", 1.0, 0, 3), Component("x", 2.0, 0, 4)
+    held = point("q").with_components(first, frozenset({"h"}))
+    held = held.with_components([Component("z", None, 0, 5)], frozenset({"k"}))
+    assert [(one.name, one.value, one.row) for one in held.components] == [
+        ("x", 2.0, 4), ("z", None, 5),
+    ]  # fmt: skip
+    assert held.names == {"h", "k"}
+
+
+def test_who_asks_knows_what_the_answer_depends_on():
+    held = NO_POINTS.give(point("q")).give(point("r"))
+    outer = held.watch()
+    inner = outer.watch()
+    inner.find(point("q").key)
+    outer.find(point("r").key)
+    assert {one.name for one in inner.given} == {"q"}
+    assert {one.name for one in outer.given} == {"q", "r"}
+
+
+def test_the_first_of_too_many_points_is_forgotten(monkeypatch):
+    monkeypatch.setattr(assigned_points, "MOST_POINTS", 3)
+    lines = ["FOR i FROM 1 TO 4 DO", "big{i}:=Offs(p1,0,0,i);", "ENDFOR"]
+    moves = [L.format(f"big{{{k}}}") for k in range(1, 5)]
+    found = task(*lines, *moves, more="VAR robtarget big{4};")
+    known = [Meaning.POSE] * 3
+    assert found.visits.target.tolist() == [Meaning.UNKNOWN, *known]
+    assert reasons(found)[0]
+
+
+@pytest.mark.parametrize("rounds", [3, 3000])
+def test_copies_of_copies_are_as_deep_as_a_loop_is_long(rounds):
+    lines = [f"FOR i FROM 1 TO {rounds} DO", "b:=a;", "a:=b;", "a.trans.z:=i;"]
+    more = "VAR robtarget a;\nVAR robtarget b;"
+    found = task("a:=p1;", *lines, "ENDFOR", L.format("a"), more=more)
+    assert found.visits.target.tolist() == [Meaning.POSE]
+    assert found.visits.values[0, 2] == rounds
+
+
+def test_a_point_may_be_shifted_as_often_as_a_loop_runs():
+    lines = ["FOR I=1 TO 2000", "Q={X 0,Y 0,Z 0.5,A 0,B 0,C 0}:Q", "ENDFOR", "LIN Q"]
+    found = job("Q=XP1", *lines, data=f"{DATA}DECL E6POS Q\nDECL INT I\n")
+    assert found.visits.target.tolist() == [Meaning.POSE]
+    start = job("LIN XP1").visits.values[0]
+    np.testing.assert_allclose(found.visits.values[0, 2], start[2] + 1000.0)
