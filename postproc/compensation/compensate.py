@@ -342,7 +342,7 @@ def _findings(
         *unknown_blends(visits, rows),
         *report_uncertain_sides(visits, rows, d.side, d.std_error, advice),
         *report_uncertain_frames(visits, rows, d.std_error, cell),
-        *report_averaged_points(visits, d),
+        *report_averaged_points(visits, d.why, d.reasons),
         *flank_steps(visits, rows, kept.position, d.side, setting.gap, cell.arm),
         *listing_cost(visits, rows, d.q, cell.arm),
         *(in_time.findings(visits) if in_time is not None else ()),

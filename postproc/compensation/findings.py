@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, any_in_rows, map_chunks
+from postproc.arrays import Bools, Floats, Indices, Ints, any_in_rows, map_chunks
 from postproc.compensation.continuity import on_path
-from postproc.compensation.outcome import Decisions
 from postproc.compensation.taught_frames import find_taught_records
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.language.languages import file_named, language_of
 from postproc.language.visits import Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
@@ -264,20 +263,23 @@ def report_uncertain_frames(
     return found
 
 
-def report_averaged_points(visits: Visits, decisions: Decisions) -> list[Diagnostic]:
+def report_averaged_points(
+    visits: Visits, why: Indices, reasons: Sequence[Reason]
+) -> list[Diagnostic]:
     """List the points that have one correction for arrivals that need different ones.
 
     Args:
         visits: Every arrival.
-        decisions: What was decided for it.
+        why: Index of the reason of each, (n,).
+        reasons: All reasons.
     """
     found = []
     for code in (Code.ARRIVALS_AVERAGED, Code.ARRIVALS_FAR_APART):
-        averaged = np.array([one.code is code for one in decisions.reasons])
-        rows = np.flatnonzero(averaged[decisions.why])
+        averaged = np.array([one.code is code for one in reasons])
+        rows = np.flatnonzero(averaged[why])
         _, first = np.unique(visits.literal[rows], return_index=True)
         for i in rows[np.sort(first)].tolist():
-            text = decisions.reasons[decisions.why[i]].text
+            text = reasons[why[i]].text
             if name := visits.names[visits.name[i]]:
                 text = f"{name}: {text}"
             place = visits.files[visits.file[i]], int(visits.line[i])
