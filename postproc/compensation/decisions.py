@@ -751,9 +751,10 @@ class Round:
         The args are those of `agree`. Fly points and points of arcs and curves are not
         averaged, nor points reached in several frames, or shifted.
         """
-        limits, options = self.setting.cell.limits, self.setting.options
-        apart = found.usable & found.find_apart(limits.conflict_mm)
-        if options.shared_points != "mean" or not apart.any():
+        limit, job = self.setting.cell.limits.conflict_mm, self.setting
+        apart = found.usable & found.find_apart(limit)
+        averages = job.averages and job.options.shared_points != "leave"
+        if not (averages and apart.any()):
             return found
         visits, via = self.reading.visits, self.reading.visits.via
         other = visits.fly | via | np.append(False, via[:-1]) | visits.curved

@@ -152,6 +152,8 @@ class Job:
         options: What the user asked for.
         clock: Times the stages.
         processes: How many may work at once; the result is the same.
+        averages: Give arrivals that do not agree one correction, if the options say so;
+            not while it is asked which of them need points of their own.
     """
 
     cell: Cell
@@ -159,6 +161,7 @@ class Job:
     options: Options
     clock: Clock
     processes: int = 1
+    averages: bool = True
 
     def __post_init__(self) -> None:
         """Take what is not given from the cell."""

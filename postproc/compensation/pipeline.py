@@ -46,6 +46,7 @@ from postproc.compensation.options import (
 from postproc.compensation.outcome import (
     SHARED,
     Decisions,
+    Status,
 )
 from postproc.compensation.program import (
     ParsedProgram,
@@ -291,10 +292,10 @@ def correct(reading: ParsedProgram, setting: Job) -> tuple[ParsedProgram, Window
     clock = setting.clock
     if setting.options.shared_points != "clone":
         return reading, _in_windows(reading, setting)
-    kept, proposal = _whole(reading, setting)
+    kept, proposal = _whole(reading, replace(setting, averages=False))
     with clock("clone"):
         reading = give_own_points(reading, proposal, setting.cell)
-    if reading.cloned:
+    if reading.cloned or kept.decisions.count(Status.CONFLICT):
         kept, _ = _whole(reading, setting)
     return reading, kept
 

@@ -273,7 +273,8 @@ class CompensationSection(Strict):
         shared_points: What is done with a point that several arrivals share: "mean"
             gives it the mean of corrections that agree within limits.conflict_mm, else
             the one whose worst arrival is best, where that helps every arrival;
-            "clone" gives moves whose arrivals do not agree points of their own;
+            "clone" gives moves whose arrivals do not agree points of their own, and the
+            same as "mean" to those that cannot have them;
             "leave" corrects no point that several moves go to.
         edit_exported: Edit variables that other programs may read.
         assume_motion: Assume that a routine that the cell does not name moves the arm,

