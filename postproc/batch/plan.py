@@ -50,6 +50,8 @@ class JobSetup:
         options["clone"] = shared == "clone"  # version 0.1.0 knew mean and clone
         if shared == "leave":
             options["shared_points"] = shared
+        if (most := self.cell.limits.averaged_mm) != LimitSection().averaged_mm:
+            options["averaged_mm"] = most
         parts = {
             "version": __version__,
             "cell": _in_first_words(self.cell.file.model_dump(mode="json")),
@@ -63,6 +65,7 @@ class JobSetup:
 
 NOT_DECIDING = DESIGN | {
     "verify", "compensation", "measurements", "serial_number", "simulation",
+    "averaged_mm",
 }  # fmt: skip
 FIRST_WORDS = {
     **{new: old for section in (LimitSection, FrameSection)

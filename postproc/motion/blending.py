@@ -20,6 +20,7 @@ from postproc.motion.joint_path import Trace
 from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly, Targets
 from postproc.robot.arm import Arm
+from postproc.robot.backlash_operator import Edges
 from postproc.robot.trajectory import Motion
 
 # Which fly points are rounded, and how much of the neighbouring moves that takes.
@@ -283,11 +284,7 @@ def blend(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Trac
     pieces = _pieces(traced, found)
     if not timed:
         pieces.count[:, _one_way(arm, traced, found)] = ONE_SAMPLE
-    touched = np.asarray((pieces.corner >= 0).any(axis=0))
-    start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])
-    path, share = _native.resampled(traced.edges, traced.share, traced.q, found, pieces)
-    uneven = _uneven(pieces, touched, start)
-    edges = replace(traced.edges, path=path, start=start, uneven=uneven)
+    edges, share = _resample(traced, found, pieces)
     pull = _pull(targets, traced, found)
     return replace(traced, q=q, aside=aside, edges=edges, share=share, pull=pull)
 
@@ -340,6 +337,15 @@ def _pieces(traced: Trace, found: Corners) -> _Pieces:
     inner = np.ceil(before * (end - begin) - EMPTY).astype(np.int64)
     count[1] = np.where(end - begin > EMPTY, np.minimum(inner, before), 0)
     return _Pieces(corner, begin, end, count)
+
+
+def _resample(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, Floats]:
+    """Sample all edges anew; return them and their samples' share of the way."""
+    touched = np.asarray((pieces.corner >= 0).any(axis=0))
+    start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])
+    path, share = _native.resampled(traced.edges, traced.share, traced.q, found, pieces)
+    uneven = _uneven(pieces, touched, start)
+    return replace(traced.edges, path=path, start=start, uneven=uneven), share
 
 
 def _uneven(pieces: _Pieces, touched: Bools, start: Ints) -> Ints:

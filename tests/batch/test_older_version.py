@@ -24,7 +24,11 @@ from tests.written import cli
 ARCHIVE = Path(__file__).parents[1] / "cases" / "tree-0.1.0.zip"
 STATUSES = ("safe", "unsafe", "display", "guarded", "unchanged")  # as it named them
 SUFFIX, LOG = ".postproc.json", "dst.batch.jsonl"
-CHANGED = ("abb/taught/job.mod",)  # whose comment TAUGHT holds for its statement since
+CHANGED = (
+    "abb/taught/job.mod",  # whose comment TAUGHT holds for its statement since
+    "abb/shared/job.mod",  # whose arrivals have one correction since
+    "pdl/line001/weld.pdl",
+)
 STAMP = re.compile(rb"(postproc )\S+(?= model=)")
 
 

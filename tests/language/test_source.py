@@ -76,7 +76,7 @@ def test_a_text_whose_places_cannot_be_told_is_refused(monkeypatch) -> None:
 
 
 def test_binary_files_are_refused_with_the_line() -> None:
-    with pytest.raises(ProgramError, match=r"x\.cod:2: .*binary.*\.pdl"):
+    with pytest.raises(ProgramError, match=r"x\.cod:2: .*binary.*text of the program"):
         source_from_bytes("x.cod", b"PROGRAM x\r\n\x00\x01")
 
 
