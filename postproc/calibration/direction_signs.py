@@ -46,7 +46,8 @@ class Sided:
         n = len(batch)
         flat = free.reshape(3 * n, -1)
         scale = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
-        rest = left.reshape(-1) - flat / scale @ _solve(flat / scale, left.reshape(-1))
+        solved = np.linalg.lstsq(flat / scale, left.reshape(-1), rcond=1e-6)[0]
+        rest = left.reshape(-1) - flat / scale @ solved
         weight = robust_weights(rest.reshape(-1, 3))
         root = np.sqrt(weight)[:, None]
         u, size, _ = np.linalg.svd(flat / scale * np.repeat(root, 3)[:, None], False)
@@ -100,11 +101,6 @@ class Sided:
         some = self.side[rows]
         rarer = np.minimum((some > 0).mean(axis=0), (some < 0).mean(axis=0))
         return np.asarray(rarer >= BOTH)
-
-
-def _solve(columns: Floats, target: Floats) -> Floats:
-    """Solve by least squares, (p,)."""
-    return np.asarray(np.linalg.lstsq(columns, target, rcond=1e-6)[0])
 
 
 def _with_change(values: Floats) -> Floats:

@@ -298,7 +298,9 @@ def _tie_files(parts: Sequence[Measurements]) -> list[Measurements]:
         names = sorted(set(seen) & set(known))
         there = np.array([known[n] for n in names]).reshape(-1, 3)
         here = np.array([seen[n] for n in names]).reshape(-1, 3)
-        if len(part.stations) > 1 or not _tell_a_frame(there):
+        spread = there - there.mean(axis=0) if len(there) >= TIES else np.zeros((3, 3))
+        flat = not np.linalg.svd(spread, compute_uv=False)[1] > APART
+        if len(part.stations) > 1 or flat:  # they do not fix shift and turn of a frame
             out.append(part)
             continue
         T = rigid_fit(here, there)
@@ -320,14 +322,6 @@ def _tie_files(parts: Sequence[Measurements]) -> list[Measurements]:
         out.append(replace(moved, warnings=(*part.warnings, note)))
         known = places_of_points(out[-1]) | known
     return out
-
-
-def _tell_a_frame(points: Floats) -> bool:
-    """Return True if fixed points (k, 3) tell shift and turn of a frame."""
-    if len(points) < TIES:
-        return False
-    size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(size[1] > APART)
 
 
 def places_of_points(rows: Measurements) -> dict[str, Floats]:

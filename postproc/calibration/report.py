@@ -210,10 +210,12 @@ def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
     jacobian = fit.batch.jacobian
     arrival = np.sqrt(model.noise.arrival_variance(jacobian).mean())
     tracker = fit.noise.tracker_std(survey.position).mean()
+    C, names = fit.covariance / np.outer(fit.std, fit.std), fit.combination.names
+    pairs = np.argwhere(np.triu(np.abs(C) > CORRELATED, 1))
     return FitReport(
         parameters=_table(fit, shares),
         shares=effects,
-        correlated=_list_correlated(fit),
+        correlated=tuple((names[i], names[j], float(C[i, j])) for i, j in pairs),
         dropped=survey.dropped + list_downweighted(fit, survey),
         spared=tuple(survey.ids[i] for i in np.flatnonzero(fit.rows.spared)),
         unseen=observe(fit.normal().root(), fit.combination.names, floor=1.0).unseen,
@@ -372,14 +374,6 @@ def _table(fit: Fit, shares: Floats) -> tuple[ParameterRow, ...]:
             )
         )  # fmt: skip
     return tuple(rows)
-
-
-def _list_correlated(fit: Fit) -> tuple[tuple[str, str, float], ...]:
-    """List pairs of parameters that the data cannot tell apart well."""
-    C = fit.covariance / np.outer(fit.std, fit.std)
-    pairs = np.argwhere(np.triu(np.abs(C) > CORRELATED, 1))
-    names = fit.combination.names
-    return tuple((names[i], names[j], float(C[i, j])) for i, j in pairs)
 
 
 def list_downweighted(fit: Fit, survey: Measurements) -> tuple[DroppedRow, ...]:

@@ -165,7 +165,8 @@ def mark_configuration_flags(
         Whether what comes from a visit is doubtful, (n,).
     """
     _mark_stops(visits, find_overruled(targets, plan), reasons)
-    _mark_misses(visits, targets, plan, reasons)
+    finer = Reason(Code.CONFIGURATION_CONTRADICTED, visits.dialect.terms.branch_stops)
+    reasons.mark(_find_misses(visits, targets, plan), finer)
     doubtful = _mark_either_way(visits, targets, plan, arm, reasons)
     doubtful[:1] |= begun
     if not doubtful.any():
@@ -228,15 +229,6 @@ def _mark_stops(visits: Visits, path: Overruled, reasons: Reasons) -> None:
         for switch, text in ((Switch.ON, stops), (Switch.UNKNOWN, may_stop)):
             reason = Reason(Code.CONFIGURATION_CONTRADICTED, text)
             reasons.mark(rows & (care == switch), reason)
-
-
-def _mark_misses(
-    visits: Visits, targets: Targets, plan: Plan, reasons: Reasons
-) -> None:
-    """Leave alone where finer flags than branch and turn are not those of the plan."""
-    text = visits.dialect.terms.branch_stops
-    reason = Reason(Code.CONFIGURATION_CONTRADICTED, text)
-    reasons.mark(_find_misses(visits, targets, plan), reason)
 
 
 def _find_misses(visits: Visits, targets: Targets, plan: Plan) -> Bools:

@@ -320,7 +320,8 @@ class TaskSymbols(ABC):
         names = self.names_of(value)
         if not (part.component or self._takes_held(value, row, here)):
             return AssignedPoint(place, value, row, plain, index, names=own | names)
-        numbers = self._read_components(part, value, row, here)
+        found = self.evaluate_components(part, value, row, here)
+        numbers = [Component(name, number, here.file, row) for name, number in found]
         names = names.union(own, *(point.names for point in points.given))
         if part.component:
             before = points.held.get((place, index))
@@ -385,9 +386,3 @@ class TaskSymbols(ABC):
             for name in self.names_of(value)
         )
         return any(part and part.place in here.points.places for part in parts)
-
-    def _read_components(
-        self, part: PointPart, value: said.Operand, row: int, here: Scope
-    ) -> list[Component]:
-        found = self.evaluate_components(part, value, row, here)
-        return [Component(name, number, here.file, row) for name, number in found]

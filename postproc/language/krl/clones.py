@@ -144,7 +144,10 @@ class KrlCloner(Cloner):
         points = [cast(KrlPoint, one) for one in named]
         first = points[0]
         data = [one for one in self._data(first).values() if one[1].value is not None]
-        file = self._list_of(data)
+        files = {file for file, _ in data}
+        file = self.task.files[files.pop()] if len(files) == 1 else None
+        if file is None or file.routines or file.is_system:
+            raise CloneError("it stands in no data list of the program")
         spans = [file.text.span(datum.row) for _, datum in data]
         for row in rows:
             starts = literals.places[row : row + 1].start[0].tolist()
@@ -159,14 +162,6 @@ class KrlCloner(Cloner):
             check_length(source, len(line) + len(name) - len(first.name))
             edits.append((point.file, Edit(point.span, name.encode("latin-1"))))
         return name.lower(), edits
-
-    def _list_of(self, data: Sequence[tuple[int, KrlDatum]]) -> KrlFile:
-        """Return the data list that declares a point, and nothing else does."""
-        files = {file for file, _ in data}
-        file = self.task.files[files.pop()] if len(files) == 1 else None
-        if file is None or file.routines or file.is_system:
-            raise CloneError("it stands in no data list of the program")
-        return file
 
     def _declaration(
         self,

@@ -301,7 +301,9 @@ class KrlMachine(TaskMachine):
                 self.run_beside(file, routine)
             return self.unknown(context, row, here, "names several routines")
         if name == "bas":
-            here = _halt(here, None) if _puts_out(one) else here
+            command = one.arguments[0].value if one.arguments else None
+            if isinstance(command, said.EnumValue) and command.name.startswith("#out_"):
+                here = _halt(here, None)  # outputs are switched, which may stop the arm
             modes = self._modes(context, row).bas(here.modes, one.arguments)
             return replace(here, modes=modes)
         if name == "pulse":
@@ -311,22 +313,16 @@ class KrlMachine(TaskMachine):
         if name in STILL or self.declares_motionless(name):
             return _halt(here, None)
         if name in package_routines() and not self._is_overruled(name):
-            return self._assume(context, row, name, here)
+            if package_routines()[name] == AHEAD:
+                return here
+            place = context.scope.file, row
+            self._assumed[name] = min(self._assumed.get(name, place), place)
+            return _halt(here, None)
         return self.outside(context, row, name, here)
 
     def _is_overruled(self, name: str) -> bool:
         """Return True if the cell says what a routine of a package does."""
         return self.start.assume_motion or name in self.start.routines
-
-    def _assume(
-        self, context: CallContext, row: int, name: str, here: Arrived
-    ) -> Arrived:
-        """Call a routine of a package, which is known to be still."""
-        if package_routines()[name] == AHEAD:
-            return here
-        place = context.scope.file, row
-        self._assumed[name] = min(self._assumed.get(name, place), place)
-        return _halt(here, None)
 
     def after_functions(
         self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
@@ -709,12 +705,6 @@ class KrlMachine(TaskMachine):
         known = name in STILL or name in FUNCTIONS or self.declares_motionless(name)
         listed = name in package_routines() and not self._is_overruled(name)
         return known or listed
-
-
-def _puts_out(one: said.Instruction) -> bool:
-    """Return True if a call of BAS switches outputs, which may stop the arm."""
-    command = one.arguments[0].value if one.arguments else None
-    return isinstance(command, said.EnumValue) and command.name.startswith("#out_")
 
 
 def _is_interrupt(one: said.SourceStatement) -> bool:

@@ -272,8 +272,10 @@ class ModeReader:
 
     def _assign(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
         """Carry an assignment out where nothing runs beside the program."""
-        own = self._own_function(one.value)
-        if own:
+        parts = parts_of([one.value])
+        called = [part.name for part in parts if isinstance(part, said.FunctionCall)]
+        own = next((name for name in called if name in self.task.routines), "")
+        if own:  # it gives a value, and is not followed
             one = replace(one, value=said.FunctionCall(f"{own} of the files", ()))
         name, value = one.target.name, one.value
         match name:
@@ -315,12 +317,6 @@ class ModeReader:
                 return replace(modes, store=self._correction(modes, one))
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
-
-    def _own_function(self, operand: said.Operand) -> str:
-        """Name a function of the files that gives a value; it is not followed."""
-        parts = parts_of([operand])
-        called = (one.name for one in parts if isinstance(one, said.FunctionCall))
-        return next((name for name in called if name in self.task.routines), "")
 
     def _frame(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
         """``$TOOL = ..``, ``$BASE = ..``, or a component of them."""

@@ -35,7 +35,6 @@ from postproc.language.krl.symbols import (
     KrlNumber,
     KrlRecord,
     KrlTask,
-    KrlValue,
 )
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.to_visits import (
@@ -348,7 +347,9 @@ class _Goal:
             found = self._read_record(record)
         partial = found.why.code is Code.PARTIAL_TARGET
         known = found.target != Meaning.UNKNOWN and not partial
-        known = known and not (held.operand is None and self._lacks_axis(record))
+        fields = dict(record.fields) if isinstance(record, KrlRecord) else {}
+        lacks_axis = any(OUTSIDE[axis - 1] not in fields for axis in self.goals.aux)
+        known = known and not (held.operand is None and lacks_axis)
         why = explain_components(held, name, self.task.files, known)
         if held.operand is not None and found.why.code not in _OF_NUMBERS:
             why = found.why
@@ -357,11 +358,6 @@ class _Goal:
         return hold_numbers(
             base, name, why, pins, found.target, found.values, found.aux
         )
-
-    def _lacks_axis(self, found: KrlValue | None) -> bool:
-        """Return True if an external axis of the cell has no value."""
-        fields = dict(found.fields) if isinstance(found, KrlRecord) else {}
-        return any(OUTSIDE[axis - 1] not in fields for axis in self.goals.aux)
 
     def _read_record(self, found: KrlRecord) -> FoundGoal:
         """Read joint angles or a position."""

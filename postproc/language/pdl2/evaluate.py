@@ -116,7 +116,8 @@ class ProgramPoint:
                 keys = frozenset(f"{key}.{step}" for key in keys)
                 continue
             array = False
-            if not plain and self._is_joints(keys):
+            held = None if plain else self.store.read(next(iter(keys)))
+            if isinstance(held, Position) and held.joints:
                 return Location(keys, exact, self._component(rest))
             index = [
                 None if isinstance(s, tuple) else self.integer(s)
@@ -127,10 +128,6 @@ class ProgramPoint:
             text = ",".join(map(str, index))
             keys = frozenset(f"{key}[{text}]" for key in keys)
         return Location(keys, exact and len(keys) == 1)
-
-    def _is_joints(self, keys: frozenset[str]) -> bool:
-        held = self.store.read(next(iter(keys)))
-        return isinstance(held, Position) and held.joints
 
     def _component(self, steps: tuple[str | ast.Index, ...]) -> tuple[str, int] | None:
         match steps:

@@ -56,7 +56,9 @@ def destination(here: Execution, reference: ast.Reference) -> Value:
     ]
     if not fields:
         return whole
-    if _has_unread(here, key):
+    file, name = here.world.variables, key.rpartition("/")[2]
+    unread = file.unread if file is not None else ()
+    if any(f"{name}.".startswith((f"{one}.", f"{one}[")) for one in unread):
         return add_unknown(
             Nothing("its values in the variable file are not read"), *fields
         )
@@ -75,13 +77,6 @@ def _list_declared(here: Execution, reference: ast.Reference) -> frozenset[str]:
         return frozenset()
     found = [one.nodes.get(type_.name) for one in here.world.programs()]
     return frozenset().union(*filter(None, found))
-
-
-def _has_unread(here: Execution, key: str) -> bool:
-    """Tell whether the variable file may say more of a node than what was read."""
-    file, name = here.world.variables, key.rpartition("/")[2]
-    unread = file.unread if file is not None else ()
-    return any(f"{name}.".startswith((f"{one}.", f"{one}[")) for one in unread)
 
 
 # What the destination of a move means: where the arm goes, as far as it is told.

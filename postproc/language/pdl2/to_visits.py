@@ -276,7 +276,9 @@ def collect(machine: Machine) -> Visits:
     literals, literal = find_literals(c, numbering, collector.names)
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     _mark_torn(collector, numbering, literal)
-    numbers = _number_visits(machine, ordered, offsets)
+    ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
+    numbers = np.full(machine.next_id, -1, dtype=np.int32)
+    numbers[spans(ids, np.diff(offsets))] = np.arange(offsets[-1], dtype=np.int32)
     pred_start, pred = _predecessors(machine, ordered, offsets, numbers)
     visits = Visits(
         files=tuple(world.files),
@@ -355,16 +357,6 @@ def _most_axes(runs: list[MoveRun], world: World) -> int:
         used: list[int] = np.unique(points.entries.layout[rows[rows >= 0]]).tolist()
         axes |= {axis for k in used for axis in points.entries.layouts[k].axes}
     return max([0, *(min(axis, MOST_AXES) for axis in axes)])
-
-
-def _number_visits(
-    machine: Machine, ordered: list[tuple[Key, MoveRun]], offsets: Ints
-) -> Indices:
-    """Return the visit of every id."""
-    ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
-    visit = np.full(machine.next_id, -1, dtype=np.int32)
-    visit[spans(ids, np.diff(offsets))] = np.arange(offsets[-1], dtype=np.int32)
-    return visit
 
 
 def _mark_pauses(visits: Visits, machine: Machine, visit: Indices) -> Visits:

@@ -293,7 +293,9 @@ class RapidTask(TaskSymbols):
         """Return the names in an operand, see `TaskSymbols.names_of`."""
         key = id(operand)
         if key not in self._names:
-            self._names[key] = operand, frozenset(_names_in([operand]))
+            kinds = said.FunctionCall | said.DataObject
+            parts = (part for part in _parts_of([operand]) if isinstance(part, kinds))
+            self._names[key] = operand, frozenset(part.name for part in parts)
         return self._names[key][1]
 
     def calls_routine(self, operand: said.Operand) -> bool:
@@ -906,13 +908,6 @@ def functions_in(one: said.RapidStatement) -> Iterator[str]:
             operands = operands_of(one)
     for part in _parts_of(operands):
         if isinstance(part, said.FunctionCall):
-            yield part.name
-
-
-def _names_in(operands: Sequence[said.Operand | None]) -> Iterator[str]:
-    """Yield the names of all data and functions in operands."""
-    for part in _parts_of(operands):
-        if isinstance(part, said.FunctionCall | said.DataObject):
             yield part.name
 
 
