@@ -10,7 +10,7 @@ import pytest
 
 from tests.any_controller import told
 from tests.conftest import CELL
-from tests.generated.found import KNOWN, LOADED, UNSURE, Found, within
+from tests.generated.found import AVERAGED, KNOWN, LOADED, UNSURE, Found, within
 from tests.generated.neutral import landing
 from tests.generated.neutral.draw import FEATURES, Draw
 from tests.generated.neutral.follow import follow
@@ -192,3 +192,11 @@ def test_inputs_decide_which_way_is_run(told_cell):
         runs = [Run(made, literals, {}, run, rapid=True).run() for run in range(3)]
         ways.add(len({tuple(s.move.mark for s in steps) for steps in runs}))
     assert max(ways) > 1
+
+
+def test_shifts_make_up_for_points_with_one_correction_for_several(
+    told_cell, job_model
+):
+    """A point is shifted, too, whose arrivals need different corrections."""
+    found = lands(300184, "rapid", told_cell, job_model)
+    assert found.error_mm[AVERAGED] and not found.wrong

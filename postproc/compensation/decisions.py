@@ -737,7 +737,8 @@ class Round:
             free = found.together(limit)
             free[points.group[shifts]] = False  # what is left are points
             own = absorb(visits, usable, numbers, both, points, free, limit)
-            found = Settled(own.agreement, stay | own.stay, own.change)
+            again = self._average(own.agreement, numbers, own.change)
+            found = Settled(again, stay | own.stay, own.change)
             failed = absorbing & ~found.together(limit)[points.group]
             if not failed.any():
                 return found

@@ -25,7 +25,7 @@ LIMIT = 2.0  # [s] of processor time, for files of up to
 SIZE = 100_000  # bytes
 BOM = b"\xef\xbb\xbf"
 SHIFT = (0.25, -1.75, 3.125)  # of a position, or of the first three joints
-_NUMBER = re.compile(rb"-?\d+(?:\.\d+)?")
+_NUMBER = re.compile(rb"[-+]?\d+(?:\.\d+)?")
 
 
 class HangError(Exception):
