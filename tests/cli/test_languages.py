@@ -131,7 +131,8 @@ def run(command, place, name):
             rows = place.folder / "rows.csv"
             cli("simulate", to, "--cell", place.cell, *ARM, "-o", rows)
             model = place.folder / "new.json"
-            return cli("fit", rows, "--program", to, "--cell", place.cell, "-o", model)
+            few = ("--effects", "geometry,backlash", "-o", model)
+            return cli("fit", rows, "--program", to, "--cell", place.cell, *few)
         case "report":
             place.compensate(given, "-o", to, *pair)
             return cli("report", pair[1], "-o", place.folder / "page.html")

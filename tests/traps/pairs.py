@@ -33,6 +33,7 @@ DECLARED = re.compile(
 )
 OUTSIDE = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 UNCERTAIN = re.compile(r"(.*?):(\d+): direction-uncertain: .*\(\+-([\d.]+) mm\)")
+SHARED = re.compile(r"(.*?):(\d+): arrivals-averaged: .* ([\d.]+) mm off each")
 MAYBE = re.compile(r"(.*?):(\d+): fly-unknown: ()")
 PASSED = "0.02"
 """How far a correction for a stop may be off where the point is passed [mm]."""
@@ -231,10 +232,11 @@ def _numbers(text: str) -> np.ndarray:
 
 
 def doubts(files: Files, found: Outcome) -> dict[str, float]:
-    """Return the stated errors of uncertain directions, by tag [mm]."""
+    """Return the stated errors of directions and shared points, by tag [mm]."""
     stated: dict[str, float] = {}
     for finding in found.diagnostics:
-        match = UNCERTAIN.match(str(finding)) or MAYBE.match(str(finding))
+        text = str(finding)
+        match = UNCERTAIN.match(text) or MAYBE.match(text) or SHARED.match(text)
         if match and match[1] in files:
             line = files[match[1]].splitlines()[int(match[2]) - 1]
             size = float(match[3] or PASSED)
