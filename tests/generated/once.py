@@ -26,7 +26,8 @@ ALLOWED = tuple(
         "would swing a joint", "on another branch",
         "other programs may read", "computes? with",
         "composes it", "is set to it", "is given it", "may move to it",
-        "a target computed from it", "a target is computed from", "a move whose target is uncertain",
+        "a target computed from it", "a target is computed from",
+        "a move whose target is uncertain",
         "another arm goes to it", "a number of the target belongs to another",
     )
 )  # fmt: skip
