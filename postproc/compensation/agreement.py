@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -117,7 +116,7 @@ def average(
     corrected: Floats,
     correction_mm: Floats,
     among: Bools,
-    std_mm: Callable[[Ints], Floats],
+    std_mm: Floats,
 ) -> Agreement:
     """Give arrivals that differ one correction, where it helps each of them.
 
@@ -130,7 +129,7 @@ def average(
         corrected: Numbers that every visit would write, (n, w).
         correction_mm: What must agree, (n, k) [mm].
         among: Literals whose arrivals may get one correction, (m,).
-        std_mm: Standard errors of the errors of visits [mm].
+        std_mm: Standard errors of the errors of visits, (n,) [mm], of these literals.
     """
     order = np.argsort(agreement.group, kind="stable")
     ends = np.searchsorted(agreement.group[order], np.arange(len(among)), "right")
@@ -141,7 +140,7 @@ def average(
         needed = correction_mm[rows]
         share = weigh_middle(needed)
         off = np.linalg.norm(needed - share @ needed, axis=1)
-        bound = off + BOUND * std_mm(rows)
+        bound = off + BOUND * std_mm[rows]
         if (bound < np.linalg.norm(needed, axis=1)).all():
             weights[rows], radius[k] = share, off.max()
             values[k], change[k] = share @ corrected[rows], share @ needed[:, :3]

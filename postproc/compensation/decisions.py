@@ -673,10 +673,13 @@ class Round:
     def _mark_averaged(self, reasons: Reasons, left_mm: Floats) -> None:
         """Say of arrivals that need different corrections what one leaves of them."""
         most = self.setting.cell.limits.averaged_mm
-        for size in np.unique(np.round(left_mm[left_mm > 0.0], 3)).tolist():
+        rows = np.flatnonzero(left_mm > 0.0)
+        sizes, first = np.unique(np.round(left_mm[rows], 3), return_inverse=True)
+        order = np.argsort(first, kind="stable")
+        ends = np.cumsum(np.bincount(first))[:-1]
+        for size, own in zip(sizes.tolist(), np.split(rows[order], ends), strict=False):
             code = Code.ARRIVALS_AVERAGED if size <= most else Code.ARRIVALS_FAR_APART
-            rows = np.isclose(left_mm, size, atol=5.1e-4)
-            reasons.mark(rows & (left_mm > 0.0), Reason(code, AVERAGED.format(size)))
+            reasons.mark_visits(own, Reason(code, AVERAGED.format(size)))
 
     def _guard(self, reasons: Reasons, strays: Bools, border: Bools) -> None:
         """Mark the visits whose corrections are not trusted."""
@@ -767,13 +770,11 @@ class Round:
             np.minimum.at(low, found.group[rows], frame[rows])
             np.maximum.at(high, found.group[rows], frame[rows])
             apart &= low == high
-        return average(found, numbers, change, apart, self._measure_doubt)
-
-    def _measure_doubt(self, rows: Ints) -> Floats:
-        """Measure how uncertain the errors at some visits are, (k,) [mm]."""
-        job = self.setting
-        states, solved = self.states, self.solved
-        return lengths(std_errors_at(job.model, job.cell, states, solved, rows)) / MM
+        mine = np.flatnonzero((found.group >= 0) & apart[found.group])
+        given = job.model, job.cell, self.states, self.solved, mine
+        std_mm = np.full(len(visits), np.nan)
+        std_mm[mine] = lengths(std_errors_at(*given)) / MM
+        return average(found, numbers, change, apart, std_mm)
 
     def _find_pinned(
         self, agreement: Agreement, change: Floats, absorbing: Bools

@@ -58,6 +58,12 @@ class Reasons:
         if rows.any() and (rows := rows & self.none).any():
             self.index[rows] = self._found[reason]
 
+    def mark_visits(self, visits: Ints, reason: Reason) -> None:
+        """Give a few visits a reason, by number, unless they have one already."""
+        free = visits[self.index[visits] == 0]
+        if len(free):
+            self.index[free] = self._found[reason]
+
     def adopt(self, index: Ints, reasons: tuple[Reason, ...]) -> None:
         """Take over reasons found elsewhere, (n,) indices into them."""
         for number in np.flatnonzero(np.bincount(index)).tolist():

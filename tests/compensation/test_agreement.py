@@ -66,7 +66,7 @@ def in_one_group(change, std=0.0):
     n = len(change)
     alone = agree(np.zeros(n, dtype=int), np.ones(n, dtype=bool), change, change)
     known = np.ones(1, dtype=bool)
-    return average(alone, change, change, known, lambda rows: np.full(len(rows), std))
+    return average(alone, change, change, known, np.full(n, std))
 
 
 @pytest.mark.parametrize("seed", range(20))
