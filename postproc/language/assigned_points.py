@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from postproc.language import ir as said
@@ -241,8 +241,18 @@ class NamesUsed:
             self.read |= {one for target, one in self.copies if target in self.read}
 
 
+@dataclass
 class TaskSymbols(ABC):
     """What the names of a task mean, as far as ways through it ask."""
+
+    _names: dict[int, tuple[said.Operand, frozenset[str]]] = field(
+        default_factory=dict, init=False
+    )
+
+    @property
+    @abstractmethod
+    def routines(self) -> Collection[str]:
+        """The names of the task's routines."""
 
     @property
     @abstractmethod
@@ -267,12 +277,21 @@ class TaskSymbols(ABC):
         """
 
     @abstractmethod
+    def parts_of(self, operand: said.Operand) -> Iterable[said.Operand]:
+        """Return all data and functions in an operand, and maybe more of it."""
+
     def names_of(self, operand: said.Operand) -> frozenset[str]:
         """Return the names of all data and functions in an operand."""
+        key = id(operand)
+        if key not in self._names:
+            named = said.DataObject | said.FunctionCall
+            parts = (x for x in self.parts_of(operand) if isinstance(x, named))
+            self._names[key] = operand, frozenset(one.name for one in parts)
+        return self._names[key][1]
 
-    @abstractmethod
     def calls_routine(self, operand: said.Operand) -> bool:
         """Return True if an operand calls a function of the task."""
+        return not self.names_of(operand).isdisjoint(self.routines)
 
     def find_held(
         self, operand: said.Operand | None, row: int, here: Scope

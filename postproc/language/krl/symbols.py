@@ -149,7 +149,6 @@ class KrlTask(TaskSymbols):
         field(default_factory=lambda: defaultdict(dict))
     )
     _shared: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
-    _names: dict[int, tuple[said.Operand, frozenset[str]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Index data by the scopes that declare them."""
@@ -279,18 +278,9 @@ class KrlTask(TaskSymbols):
         known = {key: one.value for key, one in fields if isinstance(one, KrlNumber)}
         return [(key, known.get(key)) for key in known or COMPONENTS[:6]]
 
-    def names_of(self, operand: said.Operand) -> frozenset[str]:
-        """Return the names in an operand, see `TaskSymbols.names_of`."""
-        key = id(operand)
-        if key not in self._names:
-            named = said.DataObject | said.FunctionCall
-            parts = (one for one in parts_of([operand]) if isinstance(one, named))
-            self._names[key] = operand, frozenset(one.name for one in parts)
-        return self._names[key][1]
-
-    def calls_routine(self, operand: said.Operand) -> bool:
-        """Return True if an operand calls a function of the files."""
-        return not self.names_of(operand).isdisjoint(self.routines)
+    def parts_of(self, operand: said.Operand) -> Iterator[said.Operand]:
+        """Yield what is in an operand, see `TaskSymbols.parts_of`."""
+        return parts_of([operand])
 
     def open_function(
         self, call: said.FunctionCall, row: int, here: Scope

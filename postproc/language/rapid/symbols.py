@@ -77,7 +77,6 @@ class RapidTask(TaskSymbols):
     _local: dict[tuple[int, str, str], dict[str, Datum]] = field(default_factory=dict)
     _twice: set[tuple[int, str, str, str]] = field(default_factory=set)
     _global: dict[str, list[tuple[int, Datum]]] = field(default_factory=dict)
-    _names: dict[int, tuple[said.Operand, frozenset[str]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Index data by the scopes that declare them."""
@@ -289,18 +288,9 @@ class RapidTask(TaskSymbols):
             return [(one, None) for one in names]
         return [(one, at.value) for one, at in zip(names, found, strict=True)]
 
-    def names_of(self, operand: said.Operand) -> frozenset[str]:
-        """Return the names in an operand, see `TaskSymbols.names_of`."""
-        key = id(operand)
-        if key not in self._names:
-            kinds = said.FunctionCall | said.DataObject
-            parts = (part for part in _parts_of([operand]) if isinstance(part, kinds))
-            self._names[key] = operand, frozenset(part.name for part in parts)
-        return self._names[key][1]
-
-    def calls_routine(self, operand: said.Operand) -> bool:
-        """Return True if an operand calls a function of the files."""
-        return not self.names_of(operand).isdisjoint(self.routines)
+    def parts_of(self, operand: said.Operand) -> Iterator[said.Operand]:
+        """Yield what is in an operand, see `TaskSymbols.parts_of`."""
+        return _parts_of([operand])
 
     def open_function(
         self, call: said.FunctionCall, row: int, here: Scope
