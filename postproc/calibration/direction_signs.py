@@ -24,7 +24,7 @@ LESS = 0.7  # of the median residual that may be left by a change
 
 @dataclass(frozen=True, eq=False)
 class Sided:
-    """Rows with what backlash does to them, everything else taken out.
+    """Rows with what backlash does to them, without everything else.
 
     Attributes:
         free: What else moves the rows, orthonormal columns, (n, 3, p).
@@ -67,18 +67,16 @@ class Sided:
         gram = np.einsum("nkj,nkl->jl", self.moved, self.moved)
         seen = np.einsum("nkp,nk->p", self.free, self.left)
         crossed, reached = (_with_change(v) for v in (overlap, along))
-        out = np.empty(len(crossed))
-        for k, (cross, reach) in enumerate(zip(crossed, reached, strict=True)):
-            target = reach - cross.T @ seen
-            inner = gram - cross.T @ cross
-            out[k] = target @ np.linalg.lstsq(inner, target, rcond=1e-9)[0]
-        return out
+        target = reached - np.einsum("npj,p->nj", crossed, seen)
+        inner = gram - np.swapaxes(crossed, 1, 2) @ crossed
+        inverse = np.linalg.pinv(inner, rcond=1e-9, hermitian=True)
+        return np.asarray(np.einsum("nj,njk,nk->n", target, inverse, target))
 
     def backlashes(self, parts: list[Bools]) -> tuple[Floats, Floats, Floats]:
         """Fit a backlash of every joint to each part of the rows.
 
         Returns:
-            Values [rad] and standard errors, (parts, 6), and what is left, (n,) [m].
+            Values [rad] and standard errors, (parts, 6), and the residual, (n,) [m].
         """
         columns = np.concatenate([self.moved * p[:, None, None] for p in parts], axis=2)
         columns = columns.reshape(3 * len(self.left), -1)
