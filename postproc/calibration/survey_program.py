@@ -121,13 +121,13 @@ def write_survey(cell: Cell | str | Path, output: Path, poses: int) -> str:
     program = plan_survey(cell, design.q, design.side, design.probe, name, turned)
     text = language.write_measuring(program, output)
     write_all({output: text.encode("ascii")})
-    told = f"{output}: {design.summary()}"
+    summary = f"{output}: {design.summary()}"
     if len(probes) < ANY_TOOL:
-        told += (
+        summary += (
             f"\n{len(probes)} of {ANY_TOOL} probe points: the model will hold only for "
             f"tools with the tip there. Give {ANY_TOOL} under [survey] points_mm"
         )
-    return told
+    return summary
 
 
 def _language_for(cell: Cell, output: Path) -> Language:

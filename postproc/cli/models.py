@@ -63,8 +63,8 @@ def survey(
         check_places([output], [cell])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
-            told = write_survey(loaded, output, poses)
-        say(told)
+            summary = write_survey(loaded, output, poses)
+        say(summary)
 
 
 @app.command()

@@ -270,8 +270,8 @@ def report_averaged_points(
 
     Args:
         visits: Every arrival.
-        why: What is said of each, an index into `reasons`, (n,).
-        reasons: All that is said.
+        why: Index of the reason of each, (n,).
+        reasons: All reasons.
     """
     found = []
     for code in (Code.ARRIVALS_AVERAGED, Code.ARRIVALS_FAR_APART):

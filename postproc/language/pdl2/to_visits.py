@@ -276,9 +276,7 @@ def collect(machine: Machine) -> Visits:
     literals, literal = find_literals(c, numbering, collector.names)
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     _mark_torn(collector, numbering, literal)
-    ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
-    numbers = np.full(machine.next_id, -1, dtype=np.int32)
-    numbers[spans(ids, np.diff(offsets))] = np.arange(offsets[-1], dtype=np.int32)
+    numbers = _number_visits(machine, ordered, offsets)
     pred_start, pred = _predecessors(machine, ordered, offsets, numbers)
     visits = Visits(
         files=tuple(world.files),
@@ -373,6 +371,16 @@ def _mark_pauses(visits: Visits, machine: Machine, visit: Indices) -> Visits:
     rules = np.array(visits.zone_rule)
     rules[rows] = ZoneRule.UNKNOWN
     return replace(visits, zone_rule=rules)
+
+
+def _number_visits(
+    machine: Machine, ordered: list[tuple[Key, MoveRun]], offsets: Ints
+) -> Indices:
+    """Return the visit of every id."""
+    ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
+    visit = np.full(machine.next_id, -1, dtype=np.int32)
+    visit[spans(ids, np.diff(offsets))] = np.arange(offsets[-1], dtype=np.int32)
+    return visit
 
 
 def _predecessors(
