@@ -13,12 +13,20 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from postproc.arrays import Floats, data_frame
+from postproc.calibration.cross_validation import (
+    HeldOutError,
+    HeldOutRows,
+    mean_error_mm,
+    predict_held_out_linearly,
+    summarise,
+)
 from postproc.calibration.diagnosis.held_out import (
     LENGTH,
     NoiseFloor,
     deal,
     multi_directional,
     noise_floor,
+    regions,
     whole_poses,
 )
 from postproc.calibration.diagnosis.investigate import (
@@ -102,6 +110,7 @@ class HeldOut:
         fitted: Rows that each of them was predicted from, typically.
         before, after: Errors that the given and the extended model leave, (m, 3) [m].
         pose: Number of the pose of each, (m,).
+        part: Part of every row of the fit, (n,).
     """
 
     rows: NDArray[np.int64]
@@ -109,6 +118,30 @@ class HeldOut:
     before: Floats
     after: Floats
     pose: NDArray[np.int64]
+    part: NDArray[np.int64]
+
+    def expect(self, fit: Fit, kept: Floats | None = None) -> HeldOutError:
+        """Put what a model leaves of new poses into figures.
+
+        How sure the extended model is of a row, and what it leaves of regions without
+        rows, follows from its fit without them, effects as they are.
+
+        Args:
+            fit: The fit of the extended model.
+            kept: Where the given model is kept, its standard deviations of all rows,
+                (n, 3) [m].
+        """
+        every = predict_held_out_linearly(fit, self.part)
+        region = whole_poses(regions(fit.batch.states.q), fit.pose)
+        std, error = every.std, self.after
+        if kept is not None:
+            std, error = kept, self.before
+        left = HeldOutRows(
+            error, std[self.rows], self.part[self.rows],
+            np.ones(len(self.rows), dtype=bool), self.pose, every.tracker[self.rows],
+        )  # fmt: skip
+        far = mean_error_mm(predict_held_out_linearly(fit, region))
+        return summarise(left, far, chosen=True)
 
     @property
     def worse(self) -> bool:
@@ -170,7 +203,7 @@ def hold_out(
     across = base.batch.states[which].across
     return HeldOut(
         which, fitted, across(np.concatenate(before)), across(np.concatenate(after)),
-        base.pose[which],
+        base.pose[which], part,
     )  # fmt: skip
 
 
@@ -223,6 +256,7 @@ class Extension:
         """Say in some lines what was found, and what it leaves of held-out rows."""
         found = self.diagnosis
         lines = [
+            *filter(None, [found.tell_expected()]),
             f"verdict: {found.verdict}",
             found.story(),
             f"before {found.before.tell()}",
@@ -302,7 +336,11 @@ def extend_model(
     held_out = hold_out(traced.search, sides, seed, progress, given)
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
     if given is not None and _tells_nothing(diagnosis):
-        diagnosis = replace(diagnosis, notes=(*diagnosis.notes, KEPT))
+        std = model.reading(arm, survey.states).std
+        diagnosis = replace(
+            diagnosis, notes=(*diagnosis.notes, KEPT),
+            expected=held_out.expect(traced.search.fit, std),
+        )  # fmt: skip
     extended = _extend_model(model, survey, traced.search, diagnosis)
     widths = newer_widths(model.flank_widths, extended, arm, reversals)
     extended = replace(extended, flank_widths=widths)
@@ -369,6 +407,7 @@ def _conclude(
         not_excluded=not_excluded(found.fit.batch),
         fixed_points=() if survey.motion is None else survey.motion.tell(),
         notes=tuple(w for w in survey.warnings if w.endswith(AVERAGED)),
+        expected=None if held_out.worse else held_out.expect(found.fit),
         set_anew=FrameShift.of(found.fit),
         explained=_measure_explained(held_out, floor) if traced.findings else None,
     )
