@@ -99,7 +99,8 @@ def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
     if wrong is not None:
         cure = (
             "Change the sign of the columns (lambda is 1 if the joint arrived in its "
-            "positive direction), or fit a new model if the survey had the same error"
+            "positive direction), or fit a new model if the survey had the same error "
+            "(--set measurements.lambda_sign=-1 turns all of them)"
         )
         raise MeasurementError(survey.path, wrong, cure)
     _check_change_of_sign(survey, arm, model)
@@ -172,15 +173,33 @@ def beside_geometry(
     return batch, free, left
 
 
-def ask_about_signs(survey: Measurements, arm: Arm) -> tuple[str, ...]:
-    """Ask about lambda columns by which links run ahead of their drives."""
+def check_signs(survey: Measurements, arm: Arm) -> None:
+    """Refuse lambda columns by which links run ahead of their drives.
+
+    Raises:
+        MeasurementError: With what to state of them.
+    """
     if survey.inferred.all() or not all_reversed(as_surveyed(survey, arm)):
+        return
+    raise MeasurementError(
+        survey.path,
+        "by the lambda columns the links of all joints run ahead of their drives: "
+        "backlash does not do that",
+        "lambda is 1 if the joint arrived in its positive direction. Where the columns "
+        "have the other sign, add --set measurements.lambda_sign=-1; else =1",
+    )
+
+
+def ask_about_steps(survey: Measurements, arm: Arm) -> tuple[str, ...]:
+    """Ask about a joint that is off by a little from one row on."""
+    found = find_joint_step(*beside_geometry(survey, arm))
+    if found is None:
         return ()
     return (
-        f"{survey.path.name}: by the lambda columns the links of all joints run ahead "
-        "of their drives, which backlash does not do. Do the columns have the other "
-        "sign (lambda is 1 if the joint arrived in its positive direction)? Then every "
-        "backlash is corrected in the wrong direction",
+        f"{survey.path.name}: rows from {survey.ids[found.first]} on look like joint "
+        f"{found.joint + 1} is off by {np.rad2deg(found.by):+.3f} deg: was it mastered "
+        "in between, or did it slip? No zero fits all rows: fit those before it, and "
+        "diagnose the others with that model",
     )
 
 

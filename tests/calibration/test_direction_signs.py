@@ -15,9 +15,10 @@ from postproc.calibration.direction_signs import (
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.survey_checks import (
     as_surveyed,
-    ask_about_signs,
+    ask_about_steps,
     beside_geometry,
     check_against,
+    check_signs,
     check_survey,
 )
 from postproc.exceptions import MeasurementError
@@ -128,7 +129,13 @@ def test_fresh_rows_are_refused_against_a_model() -> None:
         check_against(turned, NJ, Known())
 
 
-def test_the_other_sign_in_all_rows_is_asked_about() -> None:
-    assert ask_about_signs(measured(2), NJ) == ()
-    (asked,) = ask_about_signs(measured(2, turned=slice(None)), NJ)
-    assert "run ahead of their drives" in asked
+def test_the_other_sign_in_all_rows_is_refused() -> None:
+    check_signs(measured(2), NJ)
+    with pytest.raises(MeasurementError, match=r"run ahead .* lambda_sign=-1"):
+        check_signs(measured(2, turned=slice(None)), NJ)
+
+
+def test_a_small_step_of_a_joint_is_asked_about() -> None:
+    assert ask_about_steps(measured(2), NJ) == ()
+    (asked,) = ask_about_steps(measured(2, step=4e-3), NJ)
+    assert "joint 5 is off by -0.2" in asked
