@@ -251,10 +251,10 @@ def _check_arm(survey: Measurements, arm: Arm, error: Floats) -> None:
     n = len(survey)
     if n < ENOUGH_ROWS_OF_ARM:
         return
-    whole = _LeftOfArm.of(survey, arm, error)
+    whole = _Misfit.of(survey, arm, error)
     half = max(n // 2, ENOUGH_ROWS_OF_ARM)
     ends = np.arange(half), np.arange(n - half, n)
-    if whole.other and all(_LeftOfArm.of(survey[e], arm, error[e]).other for e in ends):
+    if whole.other and all(_Misfit.of(survey[e], arm, error[e]).other for e in ends):
         raise MeasurementError(
             survey.path,
             "the model does not fit these rows: its error is "
@@ -265,7 +265,7 @@ def _check_arm(survey: Measurements, arm: Arm, error: Floats) -> None:
 
 
 @dataclass(frozen=True)
-class _LeftOfArm:
+class _Misfit:
     """What a model and the nominal arm leave of rows, beside base, tool and zeros.
 
     Attributes:

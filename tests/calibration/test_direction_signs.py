@@ -131,7 +131,7 @@ def test_fresh_rows_are_refused_against_a_model() -> None:
 
 def test_the_other_sign_in_all_rows_is_refused() -> None:
     check_signs(measured(2), NJ)
-    with pytest.raises(MeasurementError, match=r"run ahead .* lambda_sign=-1"):
+    with pytest.raises(MeasurementError, match=r"run ahead .*lambda_sign=-1"):
         check_signs(measured(2, turned=slice(None)), NJ)
 
 
