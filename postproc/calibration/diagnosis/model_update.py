@@ -106,6 +106,10 @@ class Revision(Effect):
         )
         return closed.free_zeros(lacking - offsets)
 
+    def closed(self) -> Revision:
+        """Return the given model as it is, nothing of it to be fitted."""
+        return replace(self, factor=self.factor[:, :0], groups=())
+
     def free_zeros(self, joints: Collection[int]) -> Revision:
         """Return the revision with the zeros of joints to be fitted again."""
         names = self.model.effects.names
