@@ -187,7 +187,7 @@ def _kind(words: Sequence[str]) -> Kind:
 
 
 @dataclass(frozen=True)
-class NamedColumns:
+class HeaderColumns:
     """The columns of a table that headers name.
 
     Attributes:
@@ -201,7 +201,7 @@ class NamedColumns:
     unused: tuple[str, ...]
 
 
-def named_columns(headers: Iterable[str]) -> NamedColumns:
+def find_columns(headers: Iterable[str]) -> HeaderColumns:
     """Find our columns by the headers of a table.
 
     A position that is said to be measured counts where others are said to be nominal,
@@ -209,19 +209,19 @@ def named_columns(headers: Iterable[str]) -> NamedColumns:
     """
     headers = tuple(headers)
     found = {header: meaning_of(header) for header in headers}
-    found = _counted_from_one(found)
+    found = _count_from_one(found)
     sources, rivals = {}, {}
     for ours in dict.fromkeys(m.ours for m in found.values() if m is not None):
         claims = {h: m for h, m in found.items() if m is not None and m.ours == ours}
         best = _best(ours, claims)
         if len(best) == 1:
             sources[ours] = (best[0], claims[best[0]].unit)
-        elif best:
+        elif best and ours not in COVARIATES:
             rivals[ours] = tuple(best)
     taken = {source for source, _ in sources.values()}
     asked = {name for names in rivals.values() for name in names}
     unused = tuple(h for h in headers if h not in taken | asked)
-    return NamedColumns(_one_unit(sources), rivals, unused)
+    return HeaderColumns(_one_unit(sources), rivals, unused)
 
 
 def _best(ours: str, claims: dict[str, HeaderMeaning]) -> list[str]:
@@ -240,7 +240,7 @@ def _best(ours: str, claims: dict[str, HeaderMeaning]) -> list[str]:
     return list(claims)
 
 
-def _counted_from_one(
+def _count_from_one(
     found: dict[str, HeaderMeaning | None],
 ) -> dict[str, HeaderMeaning | None]:
     """Count joints from 1 where the file counts six of them from 0."""

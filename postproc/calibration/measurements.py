@@ -488,7 +488,7 @@ def read_points(
     if reading.columns is not None:
         table = read_foreign(path, reading)
         table.require("id", *POSITION)
-        return table
+        return point_names(table)
     table = read_headed(path, **reading.given)
     if table.has("id", *POSITION):
         return table
@@ -501,6 +501,12 @@ def read_points(
             "z_mm",
             line=table.top,
         )
+    return point_names(points)
+
+
+def point_names(points: TextTable) -> TextTable:
+    """Name points by their targets alone, without collection and group."""
+    points.require("id")
     cells, column = points.cells.copy(), points.columns.index("id")
     cells[:, column] = [target_of(text) for text in points.text("id")]
     return replace(points, cells=cells)

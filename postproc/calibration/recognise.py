@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.calibration.headers import ANGLES, LENGTHS, named_columns, units_in
+from postproc.calibration.headers import ANGLES, LENGTHS, find_columns, units_in
 from postproc.calibration.text_table import TextTable, number_of
 
 DEGREES = float(np.rad2deg(1.0))  # per radian
@@ -89,7 +89,7 @@ def recognise(
         choices: Columns of the file, by ours, that a user chose.
     """
     chosen = dict(choices or {})
-    found = named_columns(table.columns)
+    found = find_columns(table.columns)
     sources = {k: v for k, v in found.sources.items() if v[0] not in chosen.values()}
     sources |= {ours: (name, _unit_of(name)) for ours, name in chosen.items()}
     rivals = {k: v for k, v in found.rivals.items() if k not in chosen}
@@ -115,7 +115,7 @@ def recognise(
 
 def _unit_of(header: str) -> str:
     """Return the unit that a header states, whatever else it says."""
-    return next((u for _, u in named_columns([header]).sources.values()), "")
+    return next((u for _, u in find_columns([header]).sources.values()), "")
 
 
 def _factor(ours: str, stated: str, length: str, angle: str) -> float:
@@ -156,7 +156,7 @@ def _length(
     """Find the unit of places."""
     if not places:
         return UnitFound("", "")
-    if (known := _stated(places, notes, given)) is not None:
+    if (known := _find_statement(places, notes, given)) is not None:
         return known
     largest = _largest(table, [name for name, _ in places.values()])
     if not np.isfinite(largest) or largest >= LIKELY_MM:
@@ -172,7 +172,7 @@ def _angle(
     """Find the unit of joint angles."""
     if not joints:
         return UnitFound("", "")
-    if (known := _stated(joints, notes, given)) is not None:
+    if (known := _find_statement(joints, notes, given)) is not None:
         return known
     largest = _largest(table, [name for name, _ in joints.values()])
     if not np.isfinite(largest) or largest > TURNS:
@@ -181,7 +181,9 @@ def _angle(
     return UnitFound("deg", "", question)
 
 
-def _stated(sources: Sources, notes: set[str], given: str | None) -> UnitFound | None:
+def _find_statement(
+    sources: Sources, notes: set[str], given: str | None
+) -> UnitFound | None:
     """Return the unit that headers, comments or the user state."""
     units = {unit for _, unit in sources.values()}
     if len(units) == 1 and "" not in units:

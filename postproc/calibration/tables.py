@@ -658,21 +658,16 @@ def by_headers(table: TextTable, reading: TableFormat = DETECT) -> TextTable:
     if not table.headed:
         return table
     found = recognise(table, reading.unit, reading.angle_unit)
-    if not found.is_measured or _is_own(table, found):
+    if not found.is_measured:
         return table
     check_clear(table, found)
+    if all(terms == ((ours, 1.0),) for ours, terms in found.columns.items()):
+        return table
     ours = translate(table, Format(found.columns))
     rest = [name for name in found.unused if name not in ours.columns]
     cells = np.array([table.text(name) for name in rest], dtype=object)
     cells = np.hstack([ours.cells, cells.reshape(len(rest), len(table)).T])
     return replace(ours, columns=(*ours.columns, *rest), cells=cells)
-
-
-def _is_own(table: TextTable, found: Recognised) -> bool:
-    """Return True if a table has our names, whatever stands beside them."""
-    foreign = [n for n, t in found.columns.items() if t != ((n, 1.0),)]
-    joints = table.has(*JOINTS) or not set(JOINTS).intersection(found.columns)
-    return not (foreign or found.questions) or (table.has("id", *MEASURED) and joints)
 
 
 def check_clear(table: TextTable, found: Recognised) -> None:

@@ -99,9 +99,9 @@ def _cell(value: Any, comma: bool) -> str:
     if isinstance(value, float):
         text = repr(int(value) if value.is_integer() else value)
         return text.replace(".", ",") if comma else text
-    return _joined(str(value).split())
+    return _join(str(value).split())
 
 
-def _joined(words: Iterable[str]) -> str:
+def _join(words: Iterable[str]) -> str:
     """Join words by blanks, without quotation marks."""
     return " ".join(words).replace('"', "")

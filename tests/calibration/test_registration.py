@@ -81,7 +81,9 @@ def test_mistakes_are_named(spoil, match: str) -> None:  # type: ignore[no-untyp
 
 def test_other_tools_files_are_read(tmp_path: Path) -> None:
     sa = tmp_path / "sa.txt"
-    sa.write_text("// SpatialAnalyzer\n// Group: A\np1, 100.0, 200.0, 300.0\np2, 4, 5, 600\n")
+    sa.write_text(
+        "// SpatialAnalyzer\n// Group: A\np1, 100.0, 200.0, 300.0\np2, 4, 5, 600\n"
+    )
     points = read_points(sa)
     assert points.text("id") == ["p1", "p2"] and points.line.tolist() == [3, 4]
     xyz = ("x_mm", "y_mm", "z_mm")
