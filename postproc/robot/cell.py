@@ -309,7 +309,10 @@ class MeasurementSection(Strict):
         delimiter: Between cells: itself, or tab, space, comma, semicolon.
         decimal: "." or ",".
         encoding: Name of a Python codec.
-        unit: Of coordinates in files that do not state it; default: mm.
+        unit: Of coordinates in files that do not state it; default: mm, where they are
+            as large as those of an arm.
+        angle_unit: Of joint angles in files that do not state it.
+        sheet: Of a workbook: the sheet with the measurements.
         frame: Frame of the measured positions; default: the arm's base frame.
         instrument: What measured, kept with the models that are fitted.
         refit_registration: `predict` finds the place of the tracker from the rows.
@@ -322,7 +325,9 @@ class MeasurementSection(Strict):
     delimiter: str | None = None
     decimal: Literal[".", ","] | None = None
     encoding: str | None = None
-    unit: Literal["mm", "m", "inch"] | None = None
+    unit: Literal["mm", "m", "inch", "ft"] | None = None
+    angle_unit: Literal["deg", "rad"] | None = None
+    sheet: str | None = None
     frame: PointFrame | None = None
     instrument: str | None = None
     refit_registration: bool = False
