@@ -379,7 +379,7 @@ def _keep_given(
         return diagnosis
     given, kept = found.fit, replace(held_out, after=held_out.before)
     if setup:
-        effects = (first.closed(), *setup)
+        effects = (first.fix_model(), *setup)
         given = fit_effects(base.batch, base.position, effects, base.noise.origin)
         kept = held_out.keeping(given)
     pair = kept.with_std(given), held_out.with_std(found.fit)

@@ -106,7 +106,7 @@ class Revision(Effect):
         )
         return closed.free_zeros(lacking - offsets)
 
-    def closed(self) -> Revision:
+    def fix_model(self) -> Revision:
         """Return the given model as it is, nothing of it to be fitted."""
         return replace(self, factor=self.factor[:, :0], groups=())
 
