@@ -58,6 +58,7 @@ OTHER_ARM = (
     0.7  # of what the nominal arm leaves: a model that leaves more knows nothing
 )
 LEAST_OF_ARM = 2e-4  # [m] that such a model leaves
+MAY_BE = {1: " or the base or the tracker turned", 6: " or the tool turned"}
 TOOL_APART = 1e-3  # [m] tools that differ by less are told by the fit, not refused
 
 
@@ -134,11 +135,11 @@ def _check_joint_step(survey: Measurements, arm: Arm, model: Model | None) -> No
     if found is None or abs(found.by) < LEAST_OFFSET:
         return
     at, joint = found.first, found.joint + 1
-    or_else = {1: " or the base turned", 6: " or the tool turned"}.get(joint, "")
     raise MeasurementError(
         survey.path,
         f"{len(survey) - at} of {len(survey)} rows, from row {survey.ids[at]} on, look "
-        f"like joint {joint} is off by {np.rad2deg(found.by):+.2f} deg{or_else}",
+        f"like joint {joint} is off by {np.rad2deg(found.by):+.2f} deg"
+        f"{MAY_BE.get(joint, '')}",
         "Correct the joint's zero (mastering), or fit these rows by themselves",
         line=int(survey.line[at]),
     )
@@ -197,9 +198,10 @@ def ask_about_steps(survey: Measurements, arm: Arm) -> tuple[str, ...]:
         return ()
     return (
         f"{survey.path.name}: rows from {survey.ids[found.first]} on look like joint "
-        f"{found.joint + 1} is off by {np.rad2deg(found.by):+.3f} deg: was it mastered "
-        "in between, or did it slip? No zero fits all rows: fit those before it, and "
-        "diagnose the others with that model",
+        f"{found.joint + 1} is off by {np.rad2deg(found.by):+.3f} deg"
+        f"{MAY_BE.get(found.joint + 1, '')}: was it mastered in between, or did it "
+        "slip? No zero fits all rows: fit those before it, and diagnose the others "
+        "with that model",
     )
 
 
