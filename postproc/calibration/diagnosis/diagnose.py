@@ -249,6 +249,7 @@ def predict_residuals(
 # Close the loop: what a model leaves of fresh measurements, and why.
 
 PLACES = 5
+TELLING = 0.05  # nats that poses to tell two causes apart are worth at least
 BY_ANGLE = ("joint", "lambda", "before", "travel", "loop")  # what drives at an angle
 
 
@@ -498,6 +499,8 @@ def _next(traced: Investigation, seed: int) -> tuple[str, Floats]:
             nats, poses = poses_that_separate(
                 found.fit, found.place(number), rival, seed
             )
+            if nats < TELLING:
+                continue
             worth = (
                 f"a round is worth about {nats:.1f} nats, {NEAR:.0f} tell them apart"
             )
