@@ -13,6 +13,7 @@ import signal
 import sys
 from typing import Any
 
+from postproc.operating_system import print_any_text
 from postproc.threads import start_no_threads
 
 __all__ = ["app", "main"]
@@ -37,6 +38,7 @@ def main() -> None:
     _leave_signals_to_the_system()
     start_no_threads()
     _give_large_arrays_back()
+    print_any_text(sys.stdout, sys.stderr)
     # A command makes hardly any cycles: loading it takes a tenth less without a search.
     gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
     # pydantic would read what every installed package says of itself.

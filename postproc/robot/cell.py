@@ -21,6 +21,7 @@ from pydantic import (
 
 from postproc.arrays import Floats
 from postproc.exceptions import CellError
+from postproc.files import stated_path
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.arm_file import (
     Controller,
@@ -607,7 +608,9 @@ def _beside(folder: Path, section: MeasurementSection) -> MeasurementSection:
     """Return what is stated of measurement files, with the whole path of its map."""
     if section.columns is None:
         return section
-    return section.model_copy(update={"columns": str(folder / section.columns)})
+    return section.model_copy(
+        update={"columns": str(stated_path(folder, section.columns))}
+    )
 
 
 def _cell_of(path: Path, file: CellFile) -> Cell:
