@@ -210,7 +210,7 @@ def _place(rows: Measurements, arm: Arm) -> tuple[PointFrame | None, float, str]
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Attempt:
     """A reading of a table: columns of joints and places, and their units."""
 
     joints: tuple[str, ...]
@@ -289,7 +289,7 @@ def _by_arm(table: TextTable, cell: Cell) -> tuple[Format, tuple[str, ...]]:
     return form, ("columns", f"unit {best.length}", f"angle_unit {best.angle}")
 
 
-def _candidates(table: TextTable, cell: Cell) -> Iterator[Candidate]:
+def _candidates(table: TextTable, cell: Cell) -> Iterator[Attempt]:
     """Try all columns of numbers side by side as joints and as places."""
     numbers = numbers_in(table, table.columns)
     numeric = np.asarray(np.isfinite(numbers).all(axis=0))
@@ -307,7 +307,7 @@ def _candidates(table: TextTable, cell: Cell) -> Iterator[Candidate]:
                     )
 
 
-def _only_one(candidates: Iterator[Candidate]) -> Candidate | None:
+def _only_one(candidates: Iterator[Attempt]) -> Attempt | None:
     """Return the candidate that fits, None where none does or several do."""
     ranked = sorted(candidates, key=lambda one: one.misfit)
     if not ranked or not ranked[0].misfit <= ROUGH:
@@ -324,13 +324,13 @@ def _candidate(
     places: Sequence[str],
     angle: str,
     length: str,
-) -> Candidate:
+) -> Attempt:
     """Find by how much of their spread places miss the poses of the nominal arm."""
     rows = np.unique(np.linspace(0, len(table) - 1, SHOWN).astype(int))
     q = np.deg2rad(numbers_in(table, joints)[rows] * DEGREES_PER[angle])
     xyz = numbers_in(table, places)[rows] * MM_PER[length] * MM
     misfit = _misfit(cell, q, xyz) if len(rows) >= STOPS else np.inf
-    return Candidate(tuple(joints), tuple(places), angle, length, misfit)
+    return Attempt(tuple(joints), tuple(places), angle, length, misfit)
 
 
 def _misfit(cell: Cell, q: Floats, xyz: Floats) -> float:

@@ -317,6 +317,8 @@ class MeasurementSection(Strict):
         instrument: What measured, kept with the models that are fitted.
         refit_registration: `predict` finds the place of the tracker from the rows.
         after_survey: `predict` takes what passes with time as at the survey's end.
+        lambda_sign: Of the lambda columns: -1 turns all of them; 1 says that they are
+            right, though links seem to run ahead of their drives.
     """
 
     columns: str | None = None
@@ -330,6 +332,7 @@ class MeasurementSection(Strict):
     instrument: str | None = None
     refit_registration: bool = False
     after_survey: bool = False
+    lambda_sign: Literal[1, -1] | None = None
 
 
 AS_USUAL, DETECTED = CompensationSection(), MeasurementSection()
