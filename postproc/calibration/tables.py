@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -32,6 +31,7 @@ from postproc.calibration.text_table import (
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.files import NamedText
 from postproc.robot.arm import Arm
+from postproc.robot.arm_file import load_toml
 from postproc.robot.cell import Cell
 from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.pose import MM
@@ -711,15 +711,13 @@ def read_column_map(path: str | Path) -> Format:
     Raises:
         MeasurementError: It cannot be read, or a key or value is wrong.
     """
+    path = Path(path)
     try:
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except RecursionError:
-        problem = "is nested too deeply"
-        raise MeasurementError(path, problem, "Correct the column map") from None
-    except (OSError, ValueError) as exc:  # no UTF-8, no TOML, a number beyond all sizes
-        problem = f"cannot be read as TOML ({exc})"
-        raise MeasurementError(path, problem, "Correct the column map") from None
-    return column_map(path, data)
+        raw = path.read_bytes()
+    except OSError as exc:
+        problem = f"cannot be read ({exc.strerror})"
+        raise MeasurementError(path, problem, "Check the path") from None
+    return column_map(path, load_toml(path, raw, MeasurementError))
 
 
 def column_map(path: str | Path, data: Mapping[str, Any]) -> Format:

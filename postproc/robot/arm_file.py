@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 import pydantic
@@ -64,8 +64,17 @@ def parse_toml(
     Raises:
         FileError: Of the given type, naming the file and the first wrong place.
     """
+    return validate(path, load_toml(path, raw, error), schema, error)
+
+
+def load_toml(path: Path, raw: bytes, error: type[FileError]) -> dict[str, Any]:
+    """Read the bytes of a TOML file.
+
+    Raises:
+        FileError: Of the given type, naming the file and the place of the mistake.
+    """
     try:
-        data = tomllib.loads(raw.decode("utf-8-sig"))
+        return tomllib.loads(raw.decode("utf-8-sig"))
     except UnicodeDecodeError:
         raise error(path, "is not UTF-8 text", "Save it as UTF-8") from None
     except tomllib.TOMLDecodeError as exc:
@@ -79,7 +88,6 @@ def parse_toml(
     except ValueError:
         problem = "holds an integer of more digits than any number needs"
         raise error(path, problem, "Write it shorter") from None
-    return validate(path, data, schema, error)
 
 
 def validate(
