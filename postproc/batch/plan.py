@@ -14,7 +14,7 @@ from typing import Any
 from postproc import __version__
 from postproc.compensation.options import Options
 from postproc.exceptions import CellError, PostprocError
-from postproc.files import stated_path
+from postproc.files import path_from_text
 from postproc.model.model import Model, load_model
 from postproc.robot.arm_file import Strict, read_toml
 from postproc.robot.cell import (
@@ -208,7 +208,10 @@ def make_plan(
         here = plan.parent
         rules += [
             Rule(
-                r.pattern, r.arm, stated_path(here, r.cell), stated_path(here, r.model)
+                r.pattern,
+                r.arm,
+                path_from_text(here, r.cell),
+                path_from_text(here, r.model),
             )
             for r in file.rule
         ]

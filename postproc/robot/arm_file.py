@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validato
 
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError, FileError
-from postproc.files import stated_path
+from postproc.files import path_from_text
 
 # Reading TOML files with messages that name the place.
 
@@ -316,7 +316,7 @@ def arm_path(name: str, beside: Path | None = None) -> Path:
     shipped = ARMS / f"{name}.toml"
     if shipped.parent == ARMS and shipped.is_file():
         return shipped
-    path = Path(name) if beside is None else stated_path(beside, name)
+    path = Path(name) if beside is None else path_from_text(beside, name)
     if path.is_file():
         return path
     known = ", ".join(list_shipped_arms())

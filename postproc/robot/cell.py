@@ -21,7 +21,7 @@ from pydantic import (
 
 from postproc.arrays import Floats
 from postproc.exceptions import CellError
-from postproc.files import stated_path
+from postproc.files import path_from_text
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.arm_file import (
     Controller,
@@ -601,7 +601,7 @@ def _beside(folder: Path, section: MeasurementSection) -> MeasurementSection:
     if section.columns is None:
         return section
     return section.model_copy(
-        update={"columns": str(stated_path(folder, section.columns))}
+        update={"columns": str(path_from_text(folder, section.columns))}
     )
 
 
