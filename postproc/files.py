@@ -325,10 +325,10 @@ def base_name(place: str) -> str:
     return os.path.splitext(name)[0].lower()
 
 
-def path_from_text(folder: Path, text: str) -> Path:
+def path_in(folder: Path, text: str) -> Path:
     r"""Return the path that a file states, from a folder on; ``\`` separates as ``/``.
 
-    >>> path_from_text(Path("line"), r"cells\\r1.toml").as_posix()
+    >>> path_in(Path("line"), r"cells\\r1.toml").as_posix()
     'line/cells/r1.toml'
     """
     return folder / text.replace("\\", "/")

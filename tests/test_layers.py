@@ -80,7 +80,6 @@ KNOWING = {
     "calibration.weight_direction": {"compliance"},
     "calibration.doubt": {"compliance"},
     # The given model's zero of a joint holds the mean of what the model lacks.
-    "calibration.diagnosis.model_update": {"joint_offset"},
     "calibration.diagnosis.jumps": {"part_motion", "step"},
     # Where a load jumps depends on what the links weigh.
     "calibration.diagnosis.link_weights": {"compliance"},

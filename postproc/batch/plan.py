@@ -14,7 +14,7 @@ from typing import Any
 from postproc import __version__
 from postproc.compensation.options import Options
 from postproc.exceptions import CellError, PostprocError
-from postproc.files import path_from_text
+from postproc.files import path_in
 from postproc.model.model import Model, load_model
 from postproc.robot.arm_file import Strict, read_toml
 from postproc.robot.cell import (
@@ -208,10 +208,7 @@ def make_plan(
         here = plan.parent
         rules += [
             Rule(
-                r.pattern,
-                r.arm,
-                path_from_text(here, r.cell),
-                path_from_text(here, r.model),
+                r.pattern, r.arm, path_in(here, r.cell), path_in(here, r.model)
             )
             for r in file.rule
         ]

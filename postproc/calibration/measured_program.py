@@ -15,6 +15,7 @@ from postproc.calibration.measurements import (
 )
 from postproc.calibration.monuments import split_references
 from postproc.calibration.tables import DETECT, TableFormat
+from postproc.calibration.text_table import TextTable
 from postproc.compensation.program import (
     plan_visits,
     read_program,
@@ -50,7 +51,17 @@ def join_program(
         MeasurementError: An id that the program does not have, or has several times.
         ProgramError: The program cannot be read.
     """
-    table, references = split_references(read_points(data, reading))
+    return join_table(read_points(data, reading), program, cell)
+
+
+def join_table(points: TextTable, program: Path, cell: Cell) -> Measurements:
+    """Give the rows of a table, with our columns, the states of their visits.
+
+    Raises:
+        MeasurementError, ProgramError: See `join_program`.
+    """
+    points.require("id", *POSITION)
+    table, references = split_references(points)
     visits = read_program(read_files(program), cell).visits
     planned = plan_visits(visits, cell)
     places = _places(visits.measure_id, [visits.names[k] for k in visits.name])

@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 import pydantic
@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validato
 
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError, FileError
-from postproc.files import path_from_text
+from postproc.files import path_in
 
 # Reading TOML files with messages that name the place.
 
@@ -64,8 +64,17 @@ def parse_toml(
     Raises:
         FileError: Of the given type, naming the file and the first wrong place.
     """
+    return validate(path, load_toml(path, raw, error), schema, error)
+
+
+def load_toml(path: Path, raw: bytes, error: type[FileError]) -> dict[str, Any]:
+    """Read the bytes of a TOML file.
+
+    Raises:
+        FileError: Of the given type, naming the file and the place of the mistake.
+    """
     try:
-        data = tomllib.loads(raw.decode("utf-8-sig"))
+        return tomllib.loads(raw.decode("utf-8-sig"))
     except UnicodeDecodeError:
         raise error(path, "is not UTF-8 text", "Save it as UTF-8") from None
     except tomllib.TOMLDecodeError as exc:
@@ -79,7 +88,6 @@ def parse_toml(
     except ValueError:
         problem = "holds an integer of more digits than any number needs"
         raise error(path, problem, "Write it shorter") from None
-    return validate(path, data, schema, error)
 
 
 def validate(
@@ -316,7 +324,7 @@ def arm_path(name: str, beside: Path | None = None) -> Path:
     shipped = ARMS / f"{name}.toml"
     if shipped.parent == ARMS and shipped.is_file():
         return shipped
-    path = Path(name) if beside is None else path_from_text(beside, name)
+    path = Path(name) if beside is None else path_in(beside, name)
     if path.is_file():
         return path
     known = ", ".join(list_shipped_arms())
