@@ -5,16 +5,16 @@ No other module asks which system this is, or uses what only one of them has.
 
 from __future__ import annotations
 
-import ctypes
-import multiprocessing
 import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from multiprocessing.context import BaseContext
 from pathlib import Path
-from typing import IO, TextIO
+from typing import IO, TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from multiprocessing.context import BaseContext
 
 
 def _signals(*names: str) -> tuple[signal.Signals, ...]:
@@ -61,6 +61,8 @@ def count_cores() -> int:
 def end_with_parent() -> None:
     """Let the system kill this process when its parent ends, on Linux."""
     if sys.platform == "linux":
+        import ctypes
+
         ctypes.CDLL(None).prctl(_SET_PDEATHSIG, signal.SIGKILL)
 
 
@@ -73,6 +75,8 @@ def start_worker_server(module: str) -> BaseContext:
     Args:
         module: Name of the module.
     """
+    import multiprocessing
+
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     from multiprocessing import forkserver, resource_tracker
