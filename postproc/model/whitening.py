@@ -287,6 +287,13 @@ class Whitener:
         total: Floats = self.own_variance(noise) + joint * self.joint + shift
         return total
 
+    def read_variance(self, noise: Noise) -> float:
+        """Return the mean variance of the components that are read [m^2].
+
+        Of rows that were read in motion the one along it is not.
+        """
+        return float(self.variance(noise)[self.unseen == 0.0].mean())
+
     def whitening(self, noise: Noise, weight: Floats) -> Whitening:
         """Make the noise of rows independent and of unit variance.
 

@@ -89,3 +89,7 @@ def test_what_was_read_in_motion_tells_nothing_along_it() -> None:
         states.with_(heading=heading).across(moved),
         states.with_(heading=heading).across(rows), atol=1e-18,
     )  # fmt: skip
+    # .. so that the noise of a reading is that of what was read.
+    read, usual = whitener.read_variance(noise), float(still.variance(noise).mean())
+    assert read == pytest.approx(usual, rel=0.3)
+    assert still.read_variance(noise) == pytest.approx(usual)

@@ -279,7 +279,7 @@ def noise_floor(fit: Fit, tracker_known: bool) -> NoiseFloor:
         size = LENGTH * float(np.sqrt(3 * (arrival**2 + (tracker**2).mean())))
         return NoiseFloor(size, "tracker and repeatability of the data sheets")
     of_stops = replace(fit.noise, pose_joint=0.0, pose=0.0)
-    variance = fit.whitener.variance(of_stops).sum(axis=1).mean()
+    variance = 3.0 * fit.whitener.read_variance(of_stops)
     return NoiseFloor(
         LENGTH * float(np.sqrt(variance)), "estimated from the rows", False
     )

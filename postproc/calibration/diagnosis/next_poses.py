@@ -45,7 +45,7 @@ def poses_that_separate(
     apart = fit.combination.error(batch, fit.values) - other.combination.error(
         batch, other.values
     )
-    noise = float(fit.whitener.variance(fit.noise).mean()) * np.eye(3)
+    noise = fit.whitener.read_variance(fit.noise) * np.eye(3)
     total, chosen = 0.0, list[int]()
     for _ in range(wanted):
         S = noise + X @ C @ np.swapaxes(X, 1, 2)
@@ -73,7 +73,7 @@ def poses_that_sharpen(fit: Fit, seed: int) -> tuple[str, Floats]:
     """
     batch = _tries(fit, seed)
     X, before = _uncertainty(fit, batch)
-    noise = float(fit.whitener.variance(fit.noise).mean())
+    noise = fit.whitener.read_variance(fit.noise)
     C = before
     chosen: list[int] = []
     for _ in range(WANTED):
