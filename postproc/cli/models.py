@@ -54,6 +54,10 @@ def survey(
         typer.Option("-o", "--output", help="SURVEY.pdl, .mod or .src: its language."),
     ],
     poses: Annotated[int, typer.Option("--poses", help="Number of poses.")] = 300,
+    job: Annotated[
+        Path | None,
+        typer.Option("--job", help="Program whose working volume is surveyed."),
+    ] = None,
     changes: SetSurvey = None,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
@@ -61,10 +65,10 @@ def survey(
     from postproc.robot.cell import load_cell
 
     with report_errors():
-        check_places([output], [cell])
+        check_places([output], [cell, job])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
-            summary = write_survey(loaded, output, poses)
+            summary = write_survey(loaded, output, poses, job)
         say(summary)
 
 
