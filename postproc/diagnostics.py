@@ -286,8 +286,8 @@ class Code(StrEnum):
     BACKLASH_PRELOAD_SKIPPED = (
         "backlash-preload-skipped",
         NOTE,
-        "The backlash is not preloaded before moves: no measurement confirms how the "
-        "joints change their flanks there.",
+        "The backlash is not preloaded before moves: it is open how the joints change "
+        "their flanks there, by more than half of the path tolerance.",
         "Measure it: survey.reversals, or diagnose --path.",
     )
     REAPPROACH_INSERTED = (
@@ -300,7 +300,7 @@ class Code(StrEnum):
         "path-tolerance-exceeded",
         WARNING,
         "The predicted path error of a move is larger than the path tolerance.",
-        "Program a lower speed, or start the approach so that no joint reverses.",
+        "The message names the joints, their shares in mm, and what helps the move.",
     )
 
     # What the corrected program does.

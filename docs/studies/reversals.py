@@ -17,8 +17,8 @@ from pathlib import Path
 import paths
 
 from postproc.calibration.fit import fit
-from postproc.model.backlash_width import verdicts_of_flanks
 from postproc.model.effects import BASE_EFFECTS
+from postproc.model.flank_hypotheses import verdict_of
 from postproc.robot.cell import load_cell
 from postproc.simulation.arm import GearKind
 
@@ -41,9 +41,8 @@ def verdicts(folder: Path, seed: int, gears: str, count: int) -> tuple[str, ...]
         rows,
     )
     cell = load_cell(place)
-    return verdicts_of_flanks(
-        fit(rows, cell=cell, effects=BASE_EFFECTS).model, cell.arm
-    )
+    model = fit(rows, cell=cell, effects=BASE_EFFECTS).model
+    return tuple(map(verdict_of, model.flank_widths))
 
 
 def main() -> None:
@@ -53,7 +52,7 @@ def main() -> None:
     parser.add_argument("--reversals", type=int, default=4)
     given = parser.parse_args()
     first, last = given.seeds
-    print("| gears | joint | sharp | elastic | not sure |\n|---|---|---|---|---|")
+    print("| gears | joint | sharp | elastic | uncertain |\n|---|---|---|---|---|")
     for kind in GearKind:
         said = []
         for seed in range(first, last + 1):
@@ -62,7 +61,8 @@ def main() -> None:
             said.append(found)
         for joint, own in enumerate(zip(*said, strict=True), start=1):
             count = Counter(own)
-            told = (count["confirmed"], count["elastic"], count["uncertain"])
+            told = (count["sharp"], count["elastic"])
+            told = (*told, len(own) - sum(told))
             print(
                 f"| {kind.value} | {joint} | {' | '.join(map(str, told))} |", flush=True
             )

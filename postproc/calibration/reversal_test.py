@@ -15,9 +15,10 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.calibration.measurements import Measurements
-from postproc.model.backlash_width import half_widths, on_the_way, verdict_at_stops
+from postproc.model.backlash_width import half_widths, on_the_way
+from postproc.model.flank_hypotheses import verdict_of
 from postproc.model.kinematics import ArmStates
-from postproc.model.model import CONFIRMED, UNTOLD, Model, Width
+from postproc.model.model import UNLIKE, UNTOLD, Model, Width
 from postproc.model.whitening import Whitener
 from postproc.robot.arm import Arm
 
@@ -104,8 +105,8 @@ def flank_widths(model: Model, arm: Arm, found: Reversals) -> tuple[Width, ...]:
 
     Returns:
         Of every joint the shortest and the longest way that its steps do not rule out
-        [gaps], 1 that of a sharp gap; 1 and infinity where they do not tell, or where
-        the joint does not do what the model says.
+        [gaps], 1 that of a sharp gap; `UNTOLD` where they do not tell, and `UNLIKE`
+        where the joint does not do what the model says.
     """
     return tuple(
         _width([_compare_widths(model, arm, found, int(i)) for i in own])
@@ -187,13 +188,18 @@ def _width(tried: list[_OneReversal]) -> Width:
     best = int(far.argmin())
     power = float((step[best] ** 2).sum())
     free = len(left) - 3 * len(tried)
-    if power * TELLS**2 < 1.0 or far[best] > free + EXCESS * np.sqrt(2.0 * free):
+    if power * TELLS**2 < 1.0:
         return UNTOLD
+    if far[best] > free + EXCESS * np.sqrt(2.0 * free):
+        return UNLIKE
     share = float(step[best] @ left) / power
     if abs(share - 1.0) > LIKE + 2.0 / np.sqrt(power):
-        return UNTOLD
+        return UNLIKE
     may_be = np.array(WIDTHS)[0.5 * (far - far[best]) < CLEAR]
     return float(may_be.min()), float(may_be.max())
+
+
+_WORDS = {"": "uncertain", "unlike": "not as the model says", "sharp": "sharp"}
 
 
 def tell_widths(widths: tuple[Width, ...]) -> str:
@@ -206,10 +212,7 @@ def tell_widths(widths: tuple[Width, ...]) -> str:
         return ""
     joints = dict[str, list[str]]()
     for joint, width in enumerate(widths, start=1):
-        word = (
-            "uncertain" if np.isinf(width[1]) else f"{width[0]:g} to {width[1]:g} gaps"
-        )
-        word = "sharp" if verdict_at_stops(width) == CONFIRMED else word
+        word = _WORDS.get(verdict_of(width), f"{width[0]:g} to {width[1]:g} gaps")
         joints.setdefault(word, []).append(str(joint))
     told = (f"joint {', '.join(own)} {word}" for word, own in joints.items())
     return f"flanks at stops: {'; '.join(told)}"

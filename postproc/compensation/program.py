@@ -33,6 +33,7 @@ from postproc.motion.planner import Plan, plan
 from postproc.motion.targets import Targets
 from postproc.robot.cell import Cell
 from postproc.robot.direction import UNLED, Arrivals
+from postproc.robot.pose import MM
 from postproc.robot.state import States, make_states
 
 
@@ -117,6 +118,7 @@ class PlannedProgram:
 
 def start_of(cell: Cell) -> Start:
     """Tell the language what holds at program start."""
+    speed = cell.file.motion.linear_mm_s
     tables = {
         routine: {
             arguments: {
@@ -140,6 +142,8 @@ def start_of(cell: Cell) -> Start:
         aux=dict(cell.aux),
         taught=cell.taught,
         arm=cell.arm_number,
+        linear_speed=None if speed is None else speed * MM,
+        override=cell.file.motion.override,
         source=str(cell.path),
     )
 

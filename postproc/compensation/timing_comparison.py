@@ -26,6 +26,7 @@ from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 
 MOST_SLOWER = 0.03  # of the cycle time
+SHARE, NO_SHARE = 0.1, 0.002  # of a deviation, and [mm]: joints that are named
 FEW = 5  # lines that a finding names
 _LIMITS = [CODE[one] for one in (*LIMITS, *PATH_LIMITS)]
 
@@ -77,11 +78,13 @@ class InTime:
         if not len(self.paths):
             return said
         before, after = self.paths.before.sizes / MM, self.paths.after.sizes / MM
+        worst = int(after.argmax())
+        line = int(visits.line[self.paths.visit[worst]])
+        most = f"{self._largest(worst)}, line {line} (before: {before.max():.3f} mm)"
         return (
-            f"{said}; predicted path accuracy AT_p (systematic part) mean "
-            f"{before.mean():.3f} -> {after.mean():.3f} mm, max {before.max():.3f} -> "
-            f"{after.max():.3f} mm over {len(before)} moves"
-            + _round_off(self.corners(visits))
+            f"predicted path accuracy AT_p (systematic part): at most {most}; mean "
+            f"{before.mean():.3f} -> {after.mean():.3f} mm over {len(before)} moves"
+            f"{_round_off(self.corners(visits))}; {said}"
         )
 
     @property
@@ -142,12 +145,13 @@ class InTime:
         """Say what was put on the ways, and which moves still leave their paths."""
         said = (
             (Code.PATH_POINTS, told.points, f"{told.count} points are inserted into "
-             f"{len(told.points)} moves; {describe_verification(self.in_motion)}"),
+             f"{len(told.points)} moves; {describe_verification(self.in_motion)}"
+             f"{_cell_speed(told)}"),
             (Code.BACKLASH_PRELOAD_SKIPPED, told.unconfirmed,
              "the backlash is not preloaded before "
              f"{len(told.unconfirmed)} moves: neither reversals (survey.reversals) "
-             "nor a measured path (diagnose --path) confirm how the joints change "
-             "their flanks there"),
+             "nor a measured path (diagnose --path) tell closely enough how the joints "
+             "change their flanks there"),
             (Code.REAPPROACH_INSERTED, told.approaches,
              f"{len(told.approaches)} targets are approached "
              "again, from an inserted stop on the path already travelled"),
@@ -159,11 +163,23 @@ class InTime:
                 yield Diagnostic(*place, code, text)
         for k in self._too_far.tolist():
             v = int(self.paths.visit[k])
-            far = self.paths.after.sizes[k] / MM
             why = told.left.get(v, "more points do not help")
-            text = f"the predicted path error of the move is {far:.3f} mm: {why}"
+            text = f"the predicted path error of the move is {self._largest(k)}: {why}"
+            text += f". {told.cures[v]}" if v in told.cures else ""
             place = visits.files[visits.file[v]], int(visits.line[v])
             yield Diagnostic(*place, Code.PATH_TOLERANCE_EXCEEDED, text)
+
+    def _largest(self, k: int) -> str:
+        """Say how far a path is left the most, where, and what each joint makes."""
+        after = self.paths.after
+        size, at = after.sizes[k] / MM, self.paths.way[after.largest[k]] / MM
+        shares = after.shares[k] / MM
+        told = ", ".join(
+            f"joint {j + 1} {shares[j]:.3f} mm"
+            for j in np.argsort(-shares, kind="stable").tolist()
+            if shares[j] > max(SHARE * size, NO_SHARE)
+        )
+        return f"{size:.3f} mm, {at:.0f} mm from its start" + (told and f" ({told})")
 
     def _other_sides(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where joints arrive otherwise in time than along the path."""
@@ -196,6 +212,16 @@ class InTime:
         )
         place = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
         yield Diagnostic(*place, Code.SPEED_NOT_REACHED, text)
+
+
+def _cell_speed(told: Insertions) -> str:
+    """Say at which speed moves are judged whose program sets none, "" if it does."""
+    if not told.cell_mm_s:
+        return ""
+    return (
+        f"; where the program sets no speed, {told.cell_mm_s:g} mm/s counts, [motion] "
+        "linear_mm_s of the cell"
+    )
 
 
 def _round_off(corners: RoundOff) -> str:

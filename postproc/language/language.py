@@ -37,6 +37,8 @@ class Start:
         aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
         taught: Names of points that were taught with the robot.
         arm: Number of our arm.
+        linear_speed: Of the TCP [m/s] where a program sets none, None where unknown.
+        override: Likewise, of all speeds [%].
         source: The cell file, for messages.
     """
 
@@ -53,6 +55,8 @@ class Start:
     aux: Mapping[int, str] = field(default_factory=dict)
     taught: Collection[str] = frozenset()
     arm: int = 1
+    linear_speed: float | None = None
+    override: float | None = None
     source: str = ""
 
     def __post_init__(self) -> None:

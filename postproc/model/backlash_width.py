@@ -13,7 +13,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats
 from postproc.model.kinematics import ArmStates
-from postproc.model.model import CONFIRMED, UNCERTAIN, UNTOLD, Model, Width
+from postproc.model.model import Model
 from postproc.robot.arm import Arm
 from postproc.robot.direction import WIDTH_IN_PLAYS, half_width
 from postproc.robot.state import make_states
@@ -21,7 +21,6 @@ from postproc.robot.state import make_states
 SAMPLES = 60  # angles over the surveyed range of every joint
 LEAST = np.deg2rad(1e-3)  # [rad] plays below this are jitter of the numbers
 SHARP = 1.5  # gaps: a flank that is no wider is that of a sharp gap
-ELASTIC = "elastic"  # what reversals say of a joint, see `verdict_at_stops`
 
 
 def half_gap(model: Model, arm: Arm) -> Floats:
@@ -54,42 +53,7 @@ def ahead(model: Model, arm: Arm) -> Bools:
     return np.asarray(_over_range(model, arm).mean(axis=0) > 0.0)
 
 
-def verdict_at_stops(width: Width) -> str:
-    """Say whether a joint changes its flank as one with a sharp gap does.
-
-    Args:
-        width: Over how many gaps it does at the least and at the most, by reversals.
-
-    Returns:
-        "confirmed", "elastic", or "uncertain".
-    """
-    least, most = width
-    if most <= SHARP:
-        return CONFIRMED
-    return ELASTIC if least > SHARP and np.isfinite(most) else UNCERTAIN
-
-
-def verdicts_of_flanks(model: Model, arm: Arm) -> tuple[str, ...]:
-    """Say what is known of how joints 1 to 6 change their flanks.
-
-    Returns:
-        "elastic" of what reversals say so of, whatever a measured path says; else what
-        that says in motion. Where it is not sure, or none was measured, "uncertain" of
-        links that are ahead of their drives, and what reversals say at stops of all
-        others, "" without any.
-    """
-    at_stops = [verdict_at_stops(width) for width in model.flank_widths] or [""] * 6
-    in_motion = (model.in_motion.get(str(joint), "") for joint in range(1, 7))
-    verdicts = []
-    each = zip(at_stops, in_motion, ahead(model, arm).tolist(), strict=True)
-    for stops, motion, leads in each:
-        verdict = UNCERTAIN if leads else stops or motion
-        verdict = verdict if motion in ("", UNCERTAIN) else motion
-        verdicts.append(ELASTIC if stops == ELASTIC else verdict)
-    return tuple(verdicts)
-
-
-def on_the_way(side: Floats, width: Floats | float) -> Floats:
+def on_the_way(side: Floats | float, width: Floats | float) -> Floats:
     """Say where links lie that are on their way from flank to flank.
 
     A link with a sharp gap rests until its drive has crossed it. An elastic flank gives
@@ -104,30 +68,6 @@ def on_the_way(side: Floats, width: Floats | float) -> Floats:
     """
     side = np.clip(side, -1.0, 1.0)
     return np.asarray(np.where(np.greater(width, 1.0), np.sin(np.pi / 2 * side), side))
-
-
-def widest(model: Model) -> Floats:
-    """Give the largest ways from flank to flank that reversals allow, (6,) [gaps]."""
-    return np.array(model.flank_widths or [UNTOLD] * 6)[:, 1]
-
-
-def narrowest(model: Model) -> Floats:
-    """Give the shortest ways from flank to flank that reversals allow, (6,) [gaps]."""
-    return np.array(model.flank_widths or [UNTOLD] * 6)[:, 0]
-
-
-def max_link_lag(model: Model, arm: Arm) -> Floats:
-    """Say what a link at the most still lacks of the way to its other flank.
-
-    That is behind the way that crosses a sharp gap, if its flank is as wide as
-    reversals allow.
-
-    Returns:
-        Shares of that way, (6,), 0 for a sharp gap; 1 where they say nothing.
-    """
-    most = widest(model)
-    lacks = (1.0 + on_the_way(1.0 - 2.0 / most, most)) / 2.0
-    return np.where(ahead(model, arm), 1.0, lacks)
 
 
 def half_widths(model: Model, arm: Arm, q: Floats) -> Floats:

@@ -120,6 +120,7 @@ Width = tuple[float, float]  # least and largest way from flank to flank [gaps]
 Direction = tuple[float, float, float]
 TILTED = 1.0  # [deg] by which a cell may say that weight pulls another way
 UNTOLD: Width = 1.0, np.inf
+UNLIKE: Width = 0.0, 0.0  # the steps are not those of the model's backlash
 CONFIRMED, UNCERTAIN = "confirmed", "uncertain"  # what a measured path says of a joint
 
 

@@ -14,7 +14,6 @@ from pydantic import (
     ConfigDict,
     Field,
     NonNegativeFloat,
-    PositiveFloat,
     PositiveInt,
 )
 
@@ -183,7 +182,7 @@ class ProvenanceSection(ModelSection):
     software: str
 
 
-WidthSection = tuple[PositiveFloat, PositiveFloat]
+WidthSection = tuple[NonNegativeFloat, NonNegativeFloat]
 
 
 class ModelFile(ModelSection):

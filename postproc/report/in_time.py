@@ -96,6 +96,7 @@ def _path(paths: PathAccuracy, k: int, visits: Visits) -> dict[str, object]:
         "along_mm": of(lambda told: float(np.abs(told.along[samples]).max())),
         "uncertainty_mm": of(lambda told: float(told.unsure[samples].max())),
         "joint": {key: int(told.joint[k]) for key, told in pair.items()},
+        "joints_mm": (paths.after.shares[k] / MM).round(5).tolist(),
     }
 
 
@@ -138,7 +139,7 @@ def _points(
     }
     for key, far in (
         ("without_mm", inserted.without),
-        ("worst_case_mm", inserted.otherwise),
+        ("promise_mm", inserted.promises),
     ):
         told[key] = round(far[visit] / MM, 5) if visit in far else None
     return told

@@ -152,6 +152,18 @@ class EnvironmentSection(Strict):
     temperature_c: Annotated[float, Field(ge=-30.0, le=80.0)]
 
 
+class MotionSection(Strict):
+    """The speeds that hold on the controller where a program sets none.
+
+    Attributes:
+        linear_mm_s: Of the TCP along lines and arcs.
+        override: Of all speeds, in percent.
+    """
+
+    linear_mm_s: PositiveFloat | None = None
+    override: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
+
+
 class TrackerSection(Strict):
     """Where the laser tracker stands, in the arm's base frame."""
 
@@ -364,6 +376,7 @@ class CellFile(Strict):
     calibration: JointPositionSection | None = None
     payload: PayloadSection | None = None
     environment: EnvironmentSection | None = None
+    motion: MotionSection = MotionSection()
     tracker: TrackerSection | None = None
     survey: SurveySection | None = None
     simulation: SimulationSection = SimulationSection()

@@ -18,9 +18,10 @@ from postproc.calibration.reversal_test import (
     tell_widths,
 )
 from postproc.calibration.survey_files import read_measurements
-from postproc.model.backlash_width import ELASTIC, SHARP, on_the_way, verdicts_of_flanks
+from postproc.model.backlash_width import SHARP, on_the_way
 from postproc.model.effects import BASE_EFFECTS
-from postproc.model.model import CONFIRMED, UNCERTAIN, UNTOLD, Model, load_model
+from postproc.model.flank_hypotheses import verdict_of
+from postproc.model.model import UNCERTAIN, UNLIKE, UNTOLD, Model, load_model
 from postproc.robot.cell import load_cell
 from tests.compensation.paths.test_path_error import CELL, SEED, done
 from tests.written import cli
@@ -72,10 +73,10 @@ def test_widths_hold_what_the_gears_do(
 @pytest.mark.parametrize("gears", ["gravity", "inertia"])
 def test_other_gears_are_not_taken_for_sharp_ones(folder: Path, gears: str) -> None:
     model = fitted(surveyed(folder, gears))
-    verdicts = verdicts_of_flanks(model, load_cell(CELL).arm)
+    verdicts = [*map(verdict_of, model.flank_widths)]
     # About a vertical axis weight pushes nothing: that gear is as a sharp one.
     loaded = verdicts if gears == "inertia" else verdicts[1:]
-    assert CONFIRMED not in loaded and UNCERTAIN in loaded
+    assert "sharp" not in loaded and "unlike" in loaded
 
 
 def test_reversals_are_no_rows_of_the_fit(sharp: Path) -> None:
@@ -118,11 +119,11 @@ def test_a_joint_that_steps_otherwise_than_its_gap_is_not_known(sharp: Path) -> 
         [name.startswith("backlash.") for name in model.effects.names],
         2.0 * model.values, model.values,
     ))  # fmt: skip
-    assert flank_widths(wider, cell.arm, found)[:3] == (UNTOLD,) * 3
+    assert flank_widths(wider, cell.arm, found)[:3] == (UNLIKE,) * 3
     rng = np.random.default_rng(1)
     knocked = found.rows.position + 2e-4 * rng.normal(size=found.rows.position.shape)
     loose = Reversals(replace(found.rows, position=knocked), found.first, found.drive)
-    assert flank_widths(model, cell.arm, loose) == (UNTOLD,) * 6
+    assert flank_widths(model, cell.arm, loose) == (UNLIKE,) * 6
 
 
 def test_the_model_keeps_what_they_tell(sharp: Path, tmp_path: Path) -> None:
@@ -131,22 +132,16 @@ def test_the_model_keeps_what_they_tell(sharp: Path, tmp_path: Path) -> None:
     assert "flanks at stops: joint 1, 2, 3" in " ".join(told.stdout.split())
     model = load_model(tmp_path / "m.json")
     assert len(model.flank_widths) == 6
-    other = replace(model, flank_widths=((2.0, 6.0), UNTOLD, *model.flank_widths[2:]))
+    widths = ((2.0, 6.0), UNTOLD, *model.flank_widths[2:5], UNLIKE)
+    other = replace(model, flank_widths=widths)
     other.save(tmp_path / "again.json")
     again = load_model(tmp_path / "again.json")
     assert again.flank_widths == other.flank_widths and again.id == other.id
-    said = verdicts_of_flanks(again, load_cell(CELL).arm)
-    assert said[:3] == (ELASTIC, UNCERTAIN, CONFIRMED)
+    said = [*map(verdict_of, again.flank_widths)]
+    assert said[:3] == ["elastic", "", "sharp"]
     asked = {str(joint): UNCERTAIN for joint in range(1, 7)}
-    unclear = replace(again, history=({"in_motion": asked},))
-    assert verdicts_of_flanks(unclear, load_cell(CELL).arm) == said
     older = replace(again, history=({"in_motion": dict.fromkeys(asked, "not sure")},))
     assert older.in_motion == asked
-    refuted = replace(again, history=({"in_motion": {"1": "refuted", "3": "refuted"}},))
-    then = verdicts_of_flanks(refuted, load_cell(CELL).arm)
-    assert then[:3] == (ELASTIC, UNCERTAIN, "refuted")
-    silent = replace(model, flank_widths=())
-    assert not any(verdicts_of_flanks(silent, load_cell(CELL).arm))
 
 
 def test_joints_without_new_reversals_stay_as_they_were_known(sharp: Path) -> None:

@@ -18,6 +18,7 @@ from postproc.compensation.options import Job
 from postproc.compensation.paths.path_error import sides_on_move
 from postproc.language.visits import OrientationLaw, Visits
 from postproc.model.backlash_width import half_widths
+from postproc.model.flank_hypotheses import flanks_of, nominal_widths
 from postproc.motion.cycle_time import ProgramCycle
 from postproc.robot.pose import rotation_vector
 
@@ -102,6 +103,7 @@ def take_up(
     at = min(int(np.searchsorted(way, LEAVING)), len(way) - 1)
     came, leaves = sides[0], cross_at_once(sides)[at]
     crosses = (np.abs(leaves - came) > CROSSES) & (np.abs(leaves) > WHOLE)
+    crosses &= nominal_widths(flanks_of(setting.model, cell.arm)) == 1.0
     crossing = tuple((np.flatnonzero(crosses) + 1).tolist())
     side = np.where(crosses, np.sign(leaves), came)
     q = cycle.path.q[int(cycle.ways[1][v])]

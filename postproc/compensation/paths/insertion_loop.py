@@ -28,7 +28,8 @@ from postproc.compensation.paths.arcs import Cut, halves, point_on_way
 from postproc.compensation.paths.insertion_plan import InsertionPlan, Write, of_source
 from postproc.compensation.paths.insertion_report import Insertions
 from postproc.compensation.paths.path_error import sizes_of
-from postproc.compensation.paths.prune import judge, largest_on_moves
+from postproc.compensation.paths.plan_outcomes import BEGINS, compare
+from postproc.compensation.paths.prune import judge
 from postproc.compensation.paths.reapproach import (
     find_reapproaches,
     insert_reapproaches,
@@ -38,9 +39,16 @@ from postproc.compensation.pipeline import CompensatedProgram
 from postproc.compensation.timing_comparison import InTime
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
+from postproc.robot.pose import MM
 
 ROUNDS = 16  # of points put on the ways
 BETTER = 1e-6  # [m] less is no matter
+PRELOAD = "Preload the backlash: compensation.preload_backlash"
+MEASURE_STARTS = (
+    "Measure how the joints change their flanks: survey.reversals, or diagnose --path"
+)
+MORE_ROOM = "Allow more points: --max-inserted"
+SHORTER = "A lower speed, or a smaller [limits] segment_ms, allows shorter pieces"
 TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
 LATEST = 0.9  # of a way: the last place of it for a stop
 
@@ -238,10 +246,6 @@ def _report_insertions(work: InsertionPlan, told: InTime) -> Insertions:
     for v in sorted(too_far):  # what is known of one half of an arc is so of both
         halved = (work.left[h] for h in halves(visits, v) if h in work.left)
         left[v] = work.left.get(v) or next(halved, why)
-    otherwise = {}
-    if work.latest is not work.source:
-        far = largest_on_moves(told.paths, told.paths.otherwise)
-        otherwise = {v: size for v, (size, _) in far.items()}
     return Insertions(
         work.own,
         work.tolerance,
@@ -249,10 +253,45 @@ def _report_insertions(work: InsertionPlan, told: InTime) -> Insertions:
         work.stops & work.points.keys(),
         left,
         sizes_of(work.first.paths),
-        otherwise,
+        _promises(work, told),
         find_reapproaches(work, told),
         frozenset(work.unconfirmed),
+        _cures(work, told),
+        _cell_speed(work),
     )
+
+
+def _cell_speed(work: InsertionPlan) -> float:
+    """Return the speed of the cell if moves with points are judged at it [mm/s]."""
+    speed = work.setting.cell.file.motion.linear_mm_s or 0.0
+    own = work.first.before.targets.linear_speed[sorted(work.points)] / MM
+    return speed if np.isclose(own, speed).any() else 0.0
+
+
+def _cures(work: InsertionPlan, told: InTime) -> dict[int, str]:
+    """Say what helps the moves that are left too far, by visit."""
+    visits, found = work.source.reading.visits, {}
+    for k in work.too_far.tolist():
+        v, largest = int(told.paths.visit[k]), told.paths.after.largest[k]
+        known = [work.cures[h] for h in halves(visits, v) if work.cures.get(h)]
+        if known:
+            found[v] = known[0]
+        elif told.paths.way[largest] < BEGINS and v not in work.stops:
+            found[v] = MEASURE_STARTS if v in work.unconfirmed else PRELOAD
+        else:
+            found[v] = MORE_ROOM if work.crowded else SHORTER
+    return found
+
+
+def _promises(work: InsertionPlan, told: InTime) -> dict[int, float]:
+    """Return what 95 % of every move stays within by all open hypotheses [m]."""
+    visits = work.source.reading.visits
+    moves = {halves(visits, v) for v in told.paths.visit.tolist()}
+    return {
+        v: compare((told.paths,), rows, work.tolerance).choose()[1]
+        for rows in moves
+        for v in rows
+    }
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ from postproc.compensation.rewrite import Output
 from postproc.compensation.timing_comparison import InTime, run_in_time
 from postproc.diagnostics import Code
 from postproc.language.language import Splitter
-from postproc.model.backlash_width import max_link_lag, verdicts_of_flanks
+from postproc.model.flank_hypotheses import FlankOfJoint, flanks_of
 from postproc.robot.pose import MM
 
 AIM = 0.4  # of the tolerance: what points are to reach
@@ -60,13 +60,15 @@ class InsertionPlan:
         points: What is on their ways.
         stops: Moves whose first point is a stop, where play is taken up.
         idle: Moves that may have one, and how.
-        unconfirmed: Moves that may not, as no measured path confirms their flanks.
+        unconfirmed: Moves that may not, as too much is open of their flanks.
+        halved: Moves whose points correct half of what flanks change by.
         tried: How far such a move began off, and where it stopped, try by try.
         chords: Pieces of arcs that are chords whatever they bend.
         shut: Where no points may lie any more: corrections changed too fast there.
         crowded: More points were wanted than there was room for.
         approaches: Stops from which targets are approached anew, by visit, (w,) each.
         left: Why moves that leave their path too far are not split.
+        cures: What would help those among them that something else hinders than room.
         latest: The program with these points; at first the source.
         own: The visits of it that the source makes, (n,).
     """
@@ -82,12 +84,14 @@ class InsertionPlan:
     stops: set[int] = field(default_factory=set)
     idle: dict[int, BacklashPreload] = field(default_factory=dict)
     unconfirmed: set[int] = field(default_factory=set)
+    halved: set[int] = field(default_factory=set)
     tried: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
     chords: set[Cut] = field(default_factory=set)
     shut: dict[int, set[float]] = field(default_factory=dict)
     crowded: bool = False
     approaches: dict[int, Floats] = field(default_factory=dict)
     left: dict[int, str] = field(default_factory=dict)
+    cures: dict[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Begin without points."""
@@ -100,14 +104,9 @@ class InsertionPlan:
         return lines_in_files(self.source.reading, self.setting.cell)
 
     @cached_property
-    def verdicts(self) -> tuple[str, ...]:
-        """Say what is known of how joints 1 to 6 change their flanks."""
-        return verdicts_of_flanks(self.setting.model, self.setting.cell.arm)
-
-    @cached_property
-    def max_lag(self) -> Floats:
-        """Say what links may lack of their ways to the other flanks, (6,)."""
-        return max_link_lag(self.setting.model, self.setting.cell.arm)
+    def flanks(self) -> tuple[FlankOfJoint, ...]:
+        """Return what is known of how joints 1 to 6 change their flanks."""
+        return flanks_of(self.setting.model, self.setting.cell.arm)
 
     @cached_property
     def _hindrances(self) -> dict[int, str]:
@@ -192,9 +191,13 @@ class InsertionPlan:
         """
         paths, found = self.first.paths, {}
         visits = self.source.reading.visits
+        sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
         for move in {halves(visits, v) for v in self.points}:
             own = [paths.samples_to(v) for v in move]
-            side = cross_at_once(paths.side[own[0].start : own[-1].stop])
+            side = np.array(paths.side[own[0].start : own[-1].stop])
+            side[:, sharp] = cross_at_once(side[:, sharp])
+            if self.halved.intersection(move):
+                side = (side + _evenly(side, [paths.way[rows] for rows in own])) / 2
             for v, rows in zip(move, own, strict=True):
                 if v not in self.points:
                     continue
@@ -263,6 +266,19 @@ class InsertionPlan:
         rows = np.append(self._on_way(v), self.own[v])
         ends: list[int] = rows[~self.latest.reading.visits.via[rows]].tolist()
         return ends
+
+
+def _evenly(side: Floats, ways: list[Floats]) -> Floats:
+    """Let joints go evenly from where they lie first to where they lie last, (s, 6).
+
+    Args:
+        side: Where they lie along a move, (s, 6).
+        ways: Path length at the samples of its parts [m].
+    """
+    ends = np.cumsum([0.0, *(way[-1] for way in ways)])
+    along = np.concatenate([way + end for way, end in zip(ways, ends, strict=False)])
+    u = (along / max(ends[-1], 1e-12))[:, None]
+    return np.asarray((1 - u) * side[0] + u * side[-1])
 
 
 def of_source(kept: WindowResult, own: Ints) -> WindowResult:

@@ -20,8 +20,11 @@ class Insertions:
         points: The points.
         stops: Moves whose first point is a stop, where play is taken up.
         left: Why moves that leave their path too far got none, by visit.
+        cures: What helps moves that leave their path too far, by visit.
+        cell_mm_s: Speed of the cell at which moves with points are judged, as the
+            program sets none; 0 where it does.
         without: How far each move leaves its path without points, by visit [m].
-        otherwise: .. with them, if a joint's flank does not change as predicted [m].
+        promises: What 95 % of each move stays within by all open hypotheses [m].
         tolerance: Asked for [m]; infinite where nobody did.
         approaches: Share of the way at which targets are approached anew, by visit: to
             a stop, and on to the target.
@@ -35,9 +38,11 @@ class Insertions:
     stops: Collection[int] = ()
     left: Mapping[int, str] = field(default_factory=dict)
     without: Mapping[int, float] = field(default_factory=dict)
-    otherwise: Mapping[int, float] = field(default_factory=dict)
+    promises: Mapping[int, float] = field(default_factory=dict)
     approaches: Mapping[int, float] = field(default_factory=dict)
     unconfirmed: Collection[int] = ()
+    cures: Mapping[int, str] = field(default_factory=dict)
+    cell_mm_s: float = 0.0
 
     @property
     def count(self) -> int:

@@ -16,23 +16,20 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
 from postproc.compensation.paths.arcs import NO_ARCS, WantedArcs
+from postproc.compensation.paths.flank_cases import UNSURE, FlankCases
 from postproc.compensation.paths.path_samples import PathSamples, measure_along, ways_of
 from postproc.compensation.paths.path_states import (
-    CHANGED,
     AlongWays,
     ErrorAlong,
     refine_at_reversals,
 )
-from postproc.model.backlash_width import SHARP, narrowest, on_the_way, widest
-from postproc.model.model import CONFIRMED, Model
+from postproc.model.model import Model
 from postproc.motion.cycle_time import ProgramCycle
 from postproc.robot.cell import Cell
 from postproc.robot.pose import lengths
 from postproc.robot.trajectory import Motion
 
-UNSURE = 1e-3  # likewise: a side that is known
 NO_FLANK = 1e-6  # [m] no joint's flank makes so little a difference
-GIVES = 4.0  # gaps over which a flank goes that gives way before it carries
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,7 @@ class Deviations:
         along: How far the TCP is ahead along it, (s,) [m].
         unsure: How much farther it may be where a joint's flank is not known, (s,) [m].
         largest: Sample of the largest distance of each path, (m,).
-        joint: Joint (1 to 6) whose flank makes most of it there, (m,), 0: none.
+        shares: What the flank of every joint makes of it there, (m, 6) [m].
     """
 
     off: Floats
@@ -53,7 +50,14 @@ class Deviations:
     along: Floats
     unsure: Floats
     largest: Ints
-    joint: Ints
+    shares: Floats
+
+    @property
+    def joint(self) -> Ints:
+        """Return the joints (1 to 6) whose flanks make most of it, (m,), 0: none."""
+        largest = self.shares.max(axis=1, initial=0.0)
+        most = self.shares.argmax(axis=1) if len(self.shares) else self.largest
+        return np.where(largest > NO_FLANK, most + 1, 0)
 
     @property
     def sizes(self) -> Floats:
@@ -73,13 +77,10 @@ class PathAccuracy:
         before, after: Deviations of the program as it was written and compensated.
         unknown: Cartesian moves that nothing is predicted for.
         crossing: Where joints of the compensated program change their flanks, (s, 6).
-        otherwise: Distance of the compensated program's path if such a joint had stayed
-            on one of its flanks, (s,) [m]; empty where nobody asked.
-        doubtful: The same of those joints alone that no measured path confirms, (s,).
-        giving: Distance of that path if these joints' flanks gave way, (s,) [m]; empty
-            where all are confirmed.
         q, side: Joint angles [rad] of the program as it was written, and where each
             joint lies in its play, (s, 6) each.
+        cases: Where the compensated program's paths are if joints change their flanks
+            otherwise; None unless points may be inserted.
     """
 
     visit: Ints
@@ -90,11 +91,9 @@ class PathAccuracy:
     after: Deviations
     unknown: int
     crossing: Bools
-    otherwise: Floats
-    doubtful: Floats
-    giving: Floats
     q: Floats
     side: Floats
+    cases: FlankCases | None = None
 
     def __len__(self) -> int:
         """Return the number of paths."""
@@ -125,7 +124,7 @@ class PathAccuracy:
 
         def whole(told: Deviations) -> Deviations:
             part = _largest_in(told.sizes, group, lead)
-            return replace(told, largest=told.largest[part], joint=told.joint[part])
+            return replace(told, largest=told.largest[part], shares=told.shares[part])
 
         return replace(
             self,
@@ -189,14 +188,14 @@ def predict_paths(
         rows, pair[0].first, way, tangent,
         _deviations(runs[0], error, -off, tangent, way),
         _deviations(runs[1], error, moved, tangent, way),
-        int((cartesian & ~known).sum()), runs[1].changes(), np.empty(0),
-        np.empty(0), np.empty(0), pair[0].q, runs[0].side,
+        int((cartesian & ~known).sum()), runs[1].changes(), pair[0].q, runs[0].side,
     )  # fmt: skip
     if owner is None or not len(rows):
         return found
-    lead, _ = _groups(owner[rows])
-    starts = pair[0].first[lead]
-    return _in_doubt(found, runs[1], error, moved, tangent, starts).join(owner)
+    found = found.join(owner)
+    off = found.after.off
+    cases = FlankCases(runs[1], error, off, tangent, found.way, found.first)
+    return replace(found, cases=cases)
 
 
 def _ways(
@@ -215,39 +214,6 @@ def _ways(
     return refine_at_reversals(cell, model, cycles, pair)
 
 
-def _in_doubt(
-    found: PathAccuracy,
-    run: AlongWays,
-    error: ErrorAlong,
-    moved: Floats,
-    tangent: Floats,
-    starts: Ints,
-) -> PathAccuracy:
-    """Add what the path would be if flanks were not as predicted.
-
-    Args:
-        found: What is predicted.
-        run: The compensated program.
-        error: The arm's error.
-        moved: From the wanted to the commanded places, (s, 3) [m].
-        tangent: Directions of the wanted path, (s, 3).
-        starts: The first sample of every move, (g,).
-    """
-    by_joint = _otherwise(run, error, moved, tangent, starts)
-    told = error.model.in_motion
-    open_ = np.array([told.get(str(joint)) != CONFIRMED for joint in range(1, 7)])
-    open_ |= narrowest(error.model) > SHARP
-    giving = found.after.across if open_.any() else np.empty(0)
-    gives = open_ & (widest(error.model) > SHARP)
-    if gives.any():
-        width = np.where(gives, np.minimum(widest(error.model), GIVES), 1.0)
-        soft = AlongWays.of(error.cell, error.model, run.cycle, run.ways, width)
-        lying = on_the_way(soft.side, width)
-        giving, _ = apart(moved + error(soft, slice(None), lying), tangent)
-    far, doubtful = by_joint.max(axis=1), (by_joint * open_).max(axis=1)
-    return replace(found, otherwise=far, doubtful=doubtful, giving=giving)
-
-
 def _groups(owner: Ints) -> tuple[Ints, Ints]:
     """Find where groups of equal neighbours begin, (g,), and each one's group, (m,)."""
     begins = np.diff(owner, prepend=-1) != 0
@@ -261,36 +227,6 @@ def _largest_in(sizes: Floats, group: Ints, starts: Ints) -> Ints:
     top = np.maximum.reduceat(sizes, starts)[group]
     hit = np.flatnonzero(sizes == top)
     return np.asarray(hit[np.searchsorted(group[hit], np.arange(len(starts)))])
-
-
-def _otherwise(
-    run: AlongWays, error: ErrorAlong, moved: Floats, tangent: Floats, starts: Ints
-) -> Floats:
-    """Tell how far the path is if a joint that changes its flank did not, (s, 6) [m].
-
-    Whatever moment it changes at, it stands on one of its two flanks before and behind.
-
-    Args:
-        run: The program.
-        error: The arm's error.
-        moved: From the wanted to the commanded places, (s, 3) [m].
-        tangent: Directions of the wanted path, (s, 3).
-        starts: The first sample of every move, (g,).
-    """
-    count = np.diff(np.append(starts, len(moved)))
-    low, high = (
-        np.repeat(f.reduceat(sides, starts, axis=0), count, axis=0)
-        for f, sides in ((np.minimum, run.least), (np.maximum, run.most))
-    )
-    side, out = run.side, np.zeros((len(moved), 6))
-    for joint in range(6):
-        rows = np.flatnonzero(high[:, joint] - low[:, joint] > CHANGED)
-        for flank in (low, high):
-            other = np.array(side[rows])
-            other[:, joint] = flank[rows, joint]
-            far, _ = apart(moved[rows] + error(run, rows, other), tangent[rows])
-            out[rows, joint] = np.maximum(out[rows, joint], far)
-    return out
 
 
 def _shift(shift: Floats, ways: PathSamples, way: Floats) -> Floats:
@@ -318,10 +254,10 @@ def _deviations(
     across, along = apart(off, tangent)
     unsure, starts = _uncertain_share(run, error), run.ways.first[:-1]
     if not len(starts):
-        return Deviations(off, across, along, unsure, starts, starts)
+        return Deviations(off, across, along, unsure, starts, np.empty((0, 6)))
     largest = _largest_in(across, run.ways.way, starts)
-    joints = _joints(run, error, largest, way)
-    return Deviations(off, across, along, unsure, largest, joints)
+    shares = _shares(run, error, largest, way)
+    return Deviations(off, across, along, unsure, largest, shares)
 
 
 def apart(off: Floats, tangent: Floats) -> tuple[Floats, Floats]:
@@ -344,8 +280,8 @@ def _uncertain_share(run: AlongWays, error: ErrorAlong) -> Floats:
     return out
 
 
-def _joints(run: AlongWays, error: ErrorAlong, rows: Ints, way: Floats) -> Ints:
-    """Name the joint whose flank makes the most of what stands at samples (m,).
+def _shares(run: AlongWays, error: ErrorAlong, rows: Ints, way: Floats) -> Floats:
+    """Return what every joint's flank makes of what stands at samples, (m, 6) [m].
 
     That is how much the error changes if the joint went from the side on which it
     arrived at the place before to that on which it arrives evenly, as the corrections
@@ -360,8 +296,7 @@ def _joints(run: AlongWays, error: ErrorAlong, rows: Ints, way: Floats) -> Ints:
         other = np.array(side)
         other[:, joint] = even[:, joint]
         size[:, joint] = lengths(here - error(run, rows, other))
-    told = size.argmax(axis=1)
-    return np.where(size.max(axis=1) > NO_FLANK, told + 1, 0)
+    return size
 
 
 def sides_on_move(

@@ -8,7 +8,8 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows
 from postproc.compensation.paths.path_samples import PathSamples
-from postproc.model.backlash_width import half_widths
+from postproc.model.backlash_width import half_widths, on_the_way
+from postproc.model.flank_hypotheses import flanks_of, nominal_widths
 from postproc.model.model import Model
 from postproc.motion.cycle_time import ProgramCycle
 from postproc.robot.cell import Cell
@@ -37,7 +38,7 @@ class AlongWays:
     @classmethod
     def of(
         cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples,
-        width: Floats | float = 1.0,
+        width: Floats | None = None,
     ) -> AlongWays:  # fmt: skip
         """Follow the joints' plays along the ways, each as wide as its gap there.
 
@@ -49,14 +50,18 @@ class AlongWays:
             model: The arm's error.
             cycle: The program.
             ways: Its ways.
-            width: Gaps over which each joint goes from flank to flank, (6,).
+            width: Gaps over which each joint goes from flank to flank, (6,); default
+                what the model says.
         """
         begins, alone = ways.begins, np.ones(len(ways.visit), dtype=bool)
         alone[1:] = ways.source[1:] != ways.visit[:-1]
         begins[ways.first[:-1]] = alone
         play = cycle.arrived.past.play[ways.source[alone]]
+        if width is None:
+            width = nominal_widths(flanks_of(model, cell.arm))
         half = width * half_widths(model, cell.arm, ways.q)
-        return cls(cycle, ways, *sides_along(cell.arm, ways.q, begins, play, half))
+        least, most = sides_along(cell.arm, ways.q, begins, play, half)
+        return cls(cycle, ways, on_the_way(least, width), on_the_way(most, width))
 
     @property
     def side(self) -> Floats:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, any_in_rows
 from postproc.compensation.paths.arc_splitting import bending, may_be_chord
 from postproc.compensation.paths.arcs import (
+    Cut,
     halves,
     is_arc,
     largest_zones,
@@ -19,31 +21,28 @@ from postproc.compensation.paths.arcs import (
 )
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.path_error import PathAccuracy, apart, sizes_of
+from postproc.compensation.paths.plan_outcomes import Objection, compare
 from postproc.compensation.paths.reapproach import WORSE, bad_approaches
 from postproc.compensation.timing_comparison import InTime
 from postproc.robot.pose import lengths
 
 JUDGED = 8  # rounds in which points are taken back
 NEAR = 4  # visits behind a move that may be worse for its points
-HARM = 3e-5  # [m] that any place of it may be worse where flanks give way
-SLIGHT = 1e-6  # [m] a difference that is none
-NOT_AS_PREDICTED = (
-    "it would be worse if a flank is not as predicted: measure a path (diagnose --path)"
-)
 MOVED = 5e-6  # [m] that a rounded corner may move
 
 
 def judge(work: InsertionPlan) -> None:
     """Take back points that make moves no better for certain."""
+    choose_plans(work)
     without = _of_moves(work, sizes_of(work.first.paths))
     for k in range(JUDGED):
         bad = dict([*_harmful(work, without), *_bad(work, without)])
         anew = bad_approaches(work)
         if not bad and not anew:
             return
-        for v, (why, share) in bad.items():
+        for v, (why, share, cure) in bad.items():
             if share is None or k >= JUDGED / 2 or not _thin_out(work, v, share):
-                work.left[v] = why
+                work.left[v], work.cures[v] = why, cure
                 _take_back(work, v)
         for v in anew:
             work.left[v] = "a stop before its target is no help"
@@ -53,6 +52,87 @@ def judge(work: InsertionPlan) -> None:
     work.points.clear()
     work.approaches.clear()
     work.make()
+
+
+def choose_plans(work: InsertionPlan) -> None:
+    """Choose for every move with points how much of them it gets.
+
+    See `choose_plan`: all points, those without the stop that preloads, points that
+    correct half of what flanks change by, or none. What a hypothesis speaks against
+    is thinned out first.
+    """
+    if not work.points:
+        return
+    full = _Inserted.of(work)
+    variants = [full, *_variants(work, full)]
+    made = [work.paths]
+    for variant in variants[1:]:
+        variant.insert(work)
+        work.make()
+        made.append(work.paths)
+    full.insert(work)
+    chosen: dict[int, _Inserted] = {}
+    for rows in _moves_with_points(work):
+        compared = compare((work.first.paths, *made), rows, work.tolerance)
+        best, _ = compared.choose()
+        if best:
+            chosen |= dict.fromkeys(rows, variants[best - 1])
+        elif compared.objection(1) is None:
+            for v in work.points.keys() & {*rows}:
+                work.left[v] = "inserted points make it no better"
+                _take_back(work, v)
+    for v, variant in chosen.items():
+        variant.insert_into(work, v)
+    work.make()
+
+
+def _variants(work: InsertionPlan, full: _Inserted) -> Iterator[_Inserted]:
+    """Yield the points without stops, and those that correct half; work is changed."""
+    plain = full
+    if work.stops:
+        for v in sorted(work.stops):
+            work.stops.discard(v)
+            work.drop(v, {work.points[v][0]})
+        plain = _Inserted.of(work)
+        yield plain
+    if any(flank.open_kinds for flank in work.flanks):
+        yield replace(plain, halved=frozenset(plain.points))
+
+
+@dataclass(frozen=True)
+class _Inserted:
+    """What a plan inserts, as in `InsertionPlan`."""
+
+    points: Mapping[int, tuple[float, ...]]
+    stops: frozenset[int]
+    chords: frozenset[Cut]
+    halved: frozenset[int] = frozenset()
+
+    @classmethod
+    def of(cls, work: InsertionPlan) -> _Inserted:
+        """Take what a program has now."""
+        return cls({**work.points}, frozenset(work.stops), frozenset(work.chords))
+
+    def insert(self, work: InsertionPlan) -> None:
+        """Give all moves what they have here."""
+        for v in [*(work.points.keys() | self.points.keys())]:
+            self.insert_into(work, v)
+
+    def insert_into(self, work: InsertionPlan, v: int) -> None:
+        """Give one visit what it has here."""
+        work.points.pop(v, None)
+        if v in self.points:
+            work.points[v] = self.points[v]
+        work.stops = work.stops - {v} | (self.stops & {v})
+        work.halved = work.halved - {v} | (self.halved & {v})
+        others = {cut for cut in work.chords if cut[0] != v}
+        work.chords = others | {cut for cut in self.chords if cut[0] == v}
+
+
+def _moves_with_points(work: InsertionPlan) -> list[tuple[int, ...]]:
+    """Return the visits of every move with points, of arcs both."""
+    visits = work.source.reading.visits
+    return sorted({halves(visits, v) for v in work.points})
 
 
 def _thin_out(work: InsertionPlan, v: int, share: float) -> bool:
@@ -71,6 +151,7 @@ def _take_back(work: InsertionPlan, v: int) -> None:
     """Take back the points of a move; an arc that is cut no more stays whole."""
     own = work.points.pop(v, ())
     work.stops.discard(v)
+    work.halved.discard(v)
     work.approaches.pop(v, None)
     visits = work.source.reading.visits
     if not is_arc(visits, v):
@@ -85,7 +166,12 @@ def _take_back(work: InsertionPlan, v: int) -> None:
         del work.points[via]
 
 
-Reason = tuple[str, float | None]  # why points must go, and where if not all of them
+class Reason(NamedTuple):
+    """Why points must go, at what share of the way if not all of them, and the cure."""
+
+    why: str
+    share: float | None = None
+    cure: str = ""
 
 
 def _bad(
@@ -102,7 +188,7 @@ def _bad(
     there[work.cut_arcs()] = False  # judged as the points that they are
     before = work.source.reading.visits.before
     judged = _Judged(
-        work, without, _worst(work, told), _if_otherwise(work, told, without),
+        work, without, _worst(work, told), _objections(work, told),
         there | (there[before] & (before >= 0)), bent,
     )  # fmt: skip
     for v in sorted(_with_points(work)):
@@ -118,7 +204,7 @@ class _Judged:
         work: The points.
         without: How far each move leaves its path without points [m].
         worst: .. and with them at the most, however they are rounded, and where.
-        otherwise: Where moves are worse if flanks are not as predicted.
+        objections: Which hypotheses make moves worse, and where.
         corner: Moves with a rounded corner at an end that is passed otherwise, (n,).
         bent: Arcs with pieces that bend too little.
     """
@@ -126,25 +212,26 @@ class _Judged:
     work: InsertionPlan
     without: dict[int, float]
     worst: dict[int, tuple[float, float]]
-    otherwise: dict[int, float]
+    objections: dict[int, Objection]
     corner: Bools
     bent: set[int]
 
     def why_not(self, v: int) -> Reason | None:
         """Say why the points of a move must go, None where they may stay."""
         if v not in self.worst:
-            return "with inserted points its path is not predicted", None
+            return Reason("with inserted points its path is not predicted")
         if v in self.bent:
-            return "its pieces would be too straight for arcs", None
+            return Reason("its pieces would be too straight for arcs")
         if refused := self.work.refusal(v):
-            return refused, None
+            return Reason(refused)
         far, share = self.worst[v]
         if far > self.without[v]:
-            return "inserted points make it no better", share
-        if v in self.otherwise:
-            return NOT_AS_PREDICTED, self.otherwise[v]
+            return Reason("inserted points make it no better", share)
+        if v in self.objections:
+            objection = self.objections[v]
+            return Reason(str(objection), objection.place % 1.0, objection.cure)
         if self.corner[v]:
-            return "a rounded corner at one of its ends would move", None
+            return Reason("a rounded corner at one of its ends would move")
         return None
 
 
@@ -166,32 +253,17 @@ def _harmful(
         last = int(np.searchsorted(cut, v)) - 1
         near = last >= 0 and v - cut[last] <= NEAR
         if near and now[v] > without.get(v, np.inf) + WORSE:
-            yield int(cut[last]), ("a later move would be worse", None)
+            yield int(cut[last]), Reason("a later move would be worse")
 
 
-def _if_otherwise(
-    work: InsertionPlan, told: InTime, without: dict[int, float]
-) -> dict[int, float]:
-    """Say which moves are worse where flanks are not as predicted, and at what share.
-
-    A flank that no measured path confirms may change later or never: what the move is
-    off at the most counts. Or it gives way before it carries: any place counts where
-    that makes a difference, as the points around it are right for a sharp gap alone.
-    """
-    first, paths, found = work.first.paths, told.paths, dict[int, float]()
-    far_off = largest_on_moves(first, first.doubtful).items()
-    usual = _of_moves(work, {v: max(far, without[v]) for v, (far, _) in far_off})
-    for v, (far, share) in largest_on_moves(paths, paths.doubtful).items():
-        if far > usual[v] + WORSE:
-            found[v] = share
-    for k, v in enumerate(paths.visit.tolist() if len(paths.giving) else ()):
-        new, old = paths.samples(k), first.samples_to(v)
-        way, giving = paths.way[new], paths.giving[new]
-        given_way = np.abs(giving - paths.after.across[new]) > SLIGHT
-        usual_there = np.interp(way, first.way[old], first.giving[old])
-        excess, share = _largest_on(way, given_way * (giving - usual_there))
-        if excess > HARM:
-            found.setdefault(v, share)
+def _objections(work: InsertionPlan, told: InTime) -> dict[int, Objection]:
+    """Say which hypotheses make moves with points worse, and at what share."""
+    found = {}
+    for rows in _moves_with_points(work):
+        compared = compare((work.first.paths, told.paths), rows, work.tolerance)
+        objection = compared.objection(1)
+        if objection is not None:
+            found[rows[int(objection.place)]] = objection
     return found
 
 

@@ -638,6 +638,10 @@ def _start(machine: Machine) -> None:
         base=frame_value(start.base, why),
         uframe=frame_value(start.uframe, why),
     )
+    if start.linear_speed is not None:
+        store.set(lin_spd=start.linear_speed)
+    if start.override is not None:
+        store.set(gen_ovr=start.override)
     machine.given, machine.lost = store.given, store.lost
     _handlers(machine, store)
     if program.main is not None:

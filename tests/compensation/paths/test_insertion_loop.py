@@ -8,18 +8,19 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
-from unittest.mock import MagicMock, Mock
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.paths import insertion_loop, prune, split_selection
+from postproc.compensation.paths import insertion_loop, prune
 from postproc.compensation.paths.arc_splitting import bending
 from postproc.compensation.paths.arcs import is_arc
 from postproc.compensation.paths.insertion_loop import TAKEN, BestPoints
 from postproc.compensation.paths.insertion_plan import AIM, InsertionPlan
 from postproc.compensation.paths.path_error import sizes_of
+from postproc.compensation.paths.plan_outcomes import BEGINS
 from postproc.model.backlash_width import ahead
 from postproc.model.model import load_model
 from postproc.report.simulation import _read, setup_of, simulate_file
@@ -162,46 +163,28 @@ def test_points_that_did_better_are_put_back(
         assert new["points"] == old["points"]
 
 
-def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
+def test_flanks_that_a_measured_path_refutes_get_fewer_points(shop: Path) -> None:
     known(shop, "refuted")
     asked = ("--path-tolerance", TOLERANCE)
     paths = lines_of(compensated(shop, "job.pdl", "known", *asked, model="refuted"))
-    why = [p["insertion_skipped"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
-    assert sum("which in motion is refuted" in (text or "") for text in why) > 5
-    assert sum(p["inserted"] for p in paths) < 5
+    confirmed = lines_of(told(shop, "points"))
+    why = [path["insertion_skipped"] or "" for path in paths]
+    assert sum("it would be worse by" in text and "if joint" in text for text in why)
+    assert not any("if joint" in (p["insertion_skipped"] or "") for p in confirmed)
+    many, few = (sum(p["inserted"] > 0 for p in own) for own in (confirmed, paths))
+    assert few < 0.8 * many
+    for refuted, usual in zip(paths, confirmed, strict=True):
+        assert refuted["promise_mm"] >= usual["promise_mm"]
 
 
-def test_flanks_that_a_measured_path_confirms_are_no_reason_for_doubt(
-    shop: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    known(shop, "confirmed")
-    monkeypatch.setattr(prune, "WORSE", -0.04 * MM)
-    doubted = []
-    for name in ("model", "confirmed"):
-        asked = ("--path-tolerance", TOLERANCE)
-        found = compensated(shop, "job.pdl", "doubted", *asked, model=name)["path"]
-        why = [
-            "if a flank is not" in (path["insertion_skipped"] or "") for path in found
-        ]
-        doubted.append(sum(why))
-        assert all(p["worst_case_mm"] > 0.0 for p in found if p["inserted"])
-    assert doubted[0] > 5 and doubted[1] == 0
-
-
-@pytest.mark.parametrize("small_mm", [0.0, 10.0])
-def test_a_joint_that_is_not_sure_in_motion_matters_where_its_step_does(
-    shop: Path, small_mm: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_measured_path_that_does_not_tell_changes_nothing(shop: Path) -> None:
     known(shop, "uncertain")
-    monkeypatch.setattr(split_selection, "SMALL", small_mm * MM)
-    monkeypatch.setattr(prune, "HARM", small_mm * MM)
-    asked, name = ("--path-tolerance", TOLERANCE), f"small{small_mm}"
-    paths = lines_of(compensated(shop, "job.pdl", name, *asked, model="uncertain"))
-    hindered = [
-        "which in motion is uncertain" in (p["insertion_skipped"] or "") for p in paths
-    ]
-    assert sum(hindered) == 0 if small_mm else sum(hindered) > 5
-    assert (sum(path["inserted"] for path in paths) > 10) == (small_mm > 0)
+    asked = ("--path-tolerance", TOLERANCE)
+    for name in ("uncertain", "model"):
+        compensated(shop, "job.pdl", f"by_{name}", *asked, model=name)
+    texts = [(shop / f"by_{n}.pdl").read_bytes().split(b"\n", 1)[1]
+             for n in ("uncertain", "model")]  # fmt: skip
+    assert texts[0] == texts[1]
 
 
 def test_points_are_kept_beside_a_start_that_nothing_mends(shop: Path) -> None:
@@ -236,8 +219,9 @@ def test_points_do_no_harm_where_no_measured_path_says_how_flanks_change(
             for one, i in ((new, k), (old, before))
         )
         usual = np.interp(new.way[here], old.way[there], old.across[there])
-        worse = (new.across[here] - usual).max() / MM
-        assert worse < (0.1 if gears == "elastic" else 0.3)
+        far = new.way[here] > BEGINS  # where a move begins drives cross their gaps
+        worse = (new.across[here] - usual)[far].max() / MM
+        assert worse < 0.1
         assert new.across[here].max() < old.across[there].max() + 0.05 * MM
 
 
@@ -256,8 +240,8 @@ def test_a_link_ahead_of_its_drive_at_stops_is_not_sure_in_motion(shop: Path) ->
             shop, "job.pdl", "slowed", "--path-tolerance", TOLERANCE, model="braked"
         )
     )
-    why = [p["insertion_skipped"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
-    assert sum("which in motion is uncertain" in (text or "") for text in why) > 5
+    why = [path["insertion_skipped"] or "" for path in paths]
+    assert sum("it would be worse by" in text for text in why) > 3
 
 
 def test_pieces_are_as_short_as_the_cell_says(shop: Path) -> None:
@@ -274,15 +258,16 @@ def test_pieces_are_as_short_as_the_cell_says(shop: Path) -> None:
     assert SHORTEST_MS / 2e3 * SPEED - 1e-3 <= min(pieces) < SHORTEST_MS / 1e3 * SPEED
 
 
-def test_play_is_taken_up_only_where_a_measured_path_confirms_flanks(
-    shop: Path,
-) -> None:
+def test_play_is_taken_up_only_where_little_is_open(shop: Path) -> None:
     asked = ("--path-tolerance", TOLERANCE)
-    compensated(shop, "job.pdl", "cautious", *asked, model="model")
     report = compensated(
         shop, "job.pdl", "asked", *asked, "--set", STOPS, model="model"
     )
-    assert (shop / "asked.pdl").read_bytes() == (shop / "cautious.pdl").read_bytes()
+    few, many = (
+        sum(bool(p["points"]) and p["points"][0]["at_mm"] < 1.0 for p in lines_of(own))
+        for own in (report, told(shop, "stops"))
+    )
+    assert few < many / 2
     (found,) = [
         d for d in report["diagnostics"] if d["code"] == "backlash-preload-skipped"
     ]
@@ -323,27 +308,17 @@ def test_reversals_that_say_sharp_gaps_let_play_be_taken_up(shop: Path) -> None:
     assert mean < 0.5 * np.mean([plain[path["visit"]]["max_mm"] for path in paths])
 
 
-def test_elastic_flanks_are_so_whatever_a_measured_path_says(shop: Path) -> None:
-    paths, _ = with_reversals(shop, 2.0, 6.0, in_motion="confirmed")
-    assert (
-        sum(
-            "at stops is elastic" in (path["insertion_skipped"] or "") for path in paths
-        )
-        > 5
-    )
-
-
-@pytest.mark.parametrize(
-    ("width", "verdict"), [((2.0, 6.0), "elastic"), ((1.0, 4.0), "uncertain")]
-)
-def test_moves_with_flanks_that_reversals_do_not_call_sharp_are_left(
-    shop: Path, width: tuple[float, float], verdict: str
-) -> None:
-    paths, said = with_reversals(shop, *width)
-    why = [path["insertion_skipped"] or "" for path in paths]
-    assert sum(f"which at stops is {verdict}" in text for text in why) > 5
+def test_elastic_flanks_are_corrected_at_their_width(shop: Path) -> None:
+    paths, _ = with_reversals(shop, 2.5, 6.0, in_motion="confirmed")
     assert not [p for p in paths if p["points"] and p["points"][0]["at_mm"] < 1.0]
-    assert "path-tolerance-exceeded" in said
+    scores = []
+    for name in ("reversed", "plain"):
+        run = simulate_file(shop / f"{name}.pdl", CELL, SEED, path=True,
+                            gears="elastic", reference=shop / "job.pdl")  # fmt: skip
+        true = {m["visit"]: m["p95_mm"] for m in json.loads(run.to_json())["path"]}
+        scores.append(np.array([true[path["visit"]] for path in paths]))
+    assert scores[0].mean() < 0.5 * scores[1].mean()
+    assert (scores[0] < scores[1] + 0.05).all()
 
 
 def test_the_virtual_arm_keeps_closer_to_its_arcs(shop: Path) -> None:
@@ -723,7 +698,7 @@ def test_points_behind_which_a_move_would_be_worse_are_taken_back() -> None:
     work.source.reading.visits.motion = [Motion.LINEAR] * 10
     without = sizes_of(paths(0.3, 0.01, 0.01))
     work.paths = paths(0.02, 0.07, 0.09)
-    ((v, (why, _)),) = prune._harmful(work, without)  # 9 is too far behind
+    ((v, (why, *_)),) = prune._harmful(work, without)  # 9 is too far behind
     assert v == 3 and "a later move would be worse" in why
     work.paths = paths(0.02, 0.05, 0.09)
     assert not [*prune._harmful(work, without)]
@@ -739,20 +714,3 @@ def test_a_rounded_point_is_judged_by_the_worst_of_all_its_zones() -> None:
     tried = [off + u * bend * moved for u in np.linspace(-done, 1.0 - done, 21)]
     worst = np.max([np.hypot(one[:, 1], one[:, 2]) for one in tried], axis=0)
     np.testing.assert_allclose(found, np.where(aside <= half, worst, 0.0), atol=1e-12)
-
-
-def test_flanks_that_make_no_difference_are_no_reason_to_take_points_back() -> None:
-    way, near = np.linspace(0.0, 0.1, 5), np.full(5, 3.5e-5)
-    paths = MagicMock(visit=np.array([3]), way=way, giving=near, doubtful=near)
-    paths.after.across, paths.samples = near, Mock(return_value=slice(0, 5))
-    paths.__len__.return_value = 1
-    first = MagicMock(visit=paths.visit, way=way, giving=np.zeros(5), doubtful=near)
-    first.samples = first.samples_to = Mock(return_value=slice(0, 5))
-    first.__len__.return_value = 1
-    work = Mock()
-    work.first.paths = first
-    work.source.reading.visits.motion = [Motion.LINEAR] * 4
-    told = Mock(paths=paths)
-    assert not prune._if_otherwise(work, told, {3: 1e-4})
-    paths.giving = near + 1e-5  # it does make one, and the place is worse by 0.045 mm
-    assert 3 in prune._if_otherwise(work, told, {3: 1e-4})

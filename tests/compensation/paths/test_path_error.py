@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 from postproc.compensation.options import DEFAULT_OPTIONS, Clock, Job, no_progress
+from postproc.compensation.paths.path_error import apart
 from postproc.compensation.program import plan_visits, prepare_cell, read_program
 from postproc.compensation.timing_comparison import InTime, run_in_time
 from postproc.language.visits import Visits
+from postproc.model.flank_hypotheses import FlankKind
 from postproc.model.model import load_model
 from postproc.report.simulation import setup_of, visits_of
 from postproc.robot.cell import load_cell
@@ -255,3 +257,35 @@ def test_sides_that_nobody_knows_widen_it(shop: Path, ran) -> None:
     assert paths.before.unsure[first].max() > 1e-5
     assert paths.before.unsure[paths.samples(len(paths) - 1)].max() < 1e-9
     np.testing.assert_allclose(paths.after.across, paths.before.across, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", [FlankKind.ELASTIC, FlankKind.START])
+def test_a_case_is_where_the_error_is_with_a_joint_on_that_side(
+    shop: Path, ran: tuple[InTime, Job], kind: FlankKind
+) -> None:
+    _, setting = ran
+    lines = [line for line in job().split("\r\n")
+             if kind is FlankKind.ELASTIC or line not in START]  # fmt: skip
+    reading = read_program({"job.pdl": "\r\n".join(lines).encode()}, setting.cell)
+    n = len(reading.visits)
+    paths = run_in_time(
+        reading, reading, np.full((n, 3), np.nan), setting, np.arange(n)
+    ).paths
+    cases = paths.cases
+    assert cases is not None
+    own = [case for case in cases.cases if case.kind is kind]
+    assert own and all((np.diff(case.rows) > 0).all() for case in own)
+    for case in own:
+        joint, rows = case.joint - 1, case.rows
+        side = np.array(cases.run.side[rows])
+        sides = [s for found, _, s in cases._sides(joint, cases._flanks[joint])
+                 if found is kind]  # fmt: skip
+        far = []
+        for one in sides:
+            side[:, joint] = one[rows]
+            moved = cases.error(cases.run, rows, side)
+            usual = cases.error(cases.run, rows, cases.run.side[rows])
+            off = cases.off[rows] + moved - usual
+            far.append(apart(off, cases.tangent[rows])[0])
+        least = min(np.abs(one - case.across).max() for one in far)
+        assert least < 1e-7  # linear in the side, nearly

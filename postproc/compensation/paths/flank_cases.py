@@ -1,0 +1,159 @@
+"""Where a program's paths lie if one joint changes its flank otherwise.
+
+Every open hypothesis of every joint is a case. The error of the arm is linear in the
+side on which a link lies in its gap: a case moves the path by the difference of the
+sides times what the TCP moves as that joint goes from the middle to its upper flank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+from postproc.compensation.paths.path_states import CHANGED, AlongWays, ErrorAlong
+from postproc.model.flank_hypotheses import FlankKind, FlankOfJoint, flanks_of
+from postproc.robot.pose import lengths
+
+LATE = 0.01  # [m] of the way by which a flank changes later
+AT_ONCE = 0.02  # gaps over which a flank goes that changes as its drive turns back
+UNSURE = 1e-3  # of half the play: a side that is known
+
+
+@dataclass(frozen=True)
+class FlankCase:
+    """What one hypothesis of one joint makes of the paths.
+
+    Attributes:
+        joint: 1 to 6.
+        kind: What the joint does.
+        weight: Of the hypothesis; 1 where a flank is not known.
+        rows: The samples at which it makes a difference, (k,), ascending.
+        across: Distance from the path there, (k,) [m].
+        moved: How far the TCP is from where it is predicted there, (k,) [m].
+    """
+
+    joint: int
+    kind: FlankKind
+    weight: float
+    rows: Ints
+    across: Floats
+    moved: Floats
+
+    def within(self, samples: slice) -> slice:
+        """Return which of its rows lie on a path."""
+        begin, end = np.searchsorted(self.rows, (samples.start, samples.stop))
+        return slice(int(begin), int(end))
+
+
+@dataclass(frozen=True, eq=False)
+class FlankCases:
+    """The cases of a program's paths, s samples in all.
+
+    Attributes:
+        run: The compensated program.
+        error: The arm's error.
+        off: From the paths to the TCP as predicted, (s, 3) [m].
+        tangent: Directions of the paths, (s, 3).
+        way: Path length since the move began, (s,) [m].
+        first: Samples of move k are first[k] .. first[k + 1] - 1.
+    """
+
+    run: AlongWays
+    error: ErrorAlong
+    off: Floats
+    tangent: Floats
+    way: Floats
+    first: Ints
+
+    @cached_property
+    def cases(self) -> tuple[FlankCase, ...]:
+        """Return the cases that make any difference."""
+        found = []
+        for joint, flank in enumerate(self._flanks):
+            sides = [*self._sides(joint, flank)]
+            rows = [np.flatnonzero(np.abs(own - self.run.side[:, joint]) > CHANGED)
+                    for _, _, own in sides]  # fmt: skip
+            every = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *rows]))
+            moves = np.empty((len(self.off), 3))
+            moves[every] = self._moves_of(joint, every)
+            for (kind, weight, own), at in zip(sides, rows, strict=True):
+                if not len(at):
+                    continue
+                by = (own - self.run.side[:, joint])[at, None] * moves[at]
+                there = self.off[at] + by
+                along = np.einsum("si,si->s", there, self.tangent[at])
+                across = lengths(there - along[:, None] * self.tangent[at])
+                found.append(
+                    FlankCase(joint + 1, kind, weight, at, across, lengths(by))
+                )
+        return tuple(found)
+
+    @property
+    def usually(self) -> Floats:
+        """Return the weight of what is predicted of every joint, (6,)."""
+        return np.array([flank.usually for flank in self._flanks])
+
+    @cached_property
+    def _flanks(self) -> tuple[FlankOfJoint, ...]:
+        return flanks_of(self.error.model, self.error.cell.arm)
+
+    def _moves_of(self, joint: int, rows: Ints) -> Floats:
+        """Return what the TCP moves from the middle to the upper flank, (k, 3) [m]."""
+        ends = np.array([self.run.side[rows]] * 2)
+        ends[0, :, joint], ends[1, :, joint] = -1.0, 1.0
+        low, high = (self.error(self.run, rows, side) for side in ends)
+        return np.asarray((high - low) / 2)
+
+    def _sides(
+        self, joint: int, flank: FlankOfJoint
+    ) -> Iterator[tuple[FlankKind, float, Floats]]:
+        """Yield the sides (s,) of a joint by its open hypotheses, and their weights."""
+        usual = self.run.side[:, joint]
+        for kind in flank.open_kinds:
+            weight = flank.weight[kind]
+            if kind is FlankKind.SHARP:
+                yield kind, weight, self._over(1.0)[:, joint]
+            elif kind is FlankKind.ELASTIC:
+                ends = {flank.widths[1], *flank.widths[flank.nominal == 1.0 :]}
+                for width in sorted(ends):
+                    yield kind, weight, self._over(width)[:, joint]
+            elif kind is FlankKind.EARLIER:
+                yield kind, weight, self._over(AT_ONCE)[:, joint]
+            elif kind is FlankKind.LATER:
+                yield kind, weight, usual[self._behind]
+            else:
+                yield kind, weight, usual[self.first[:-1]][self._move]
+        least, most = self.run.least[:, joint], self.run.most[:, joint]
+        if (most - least > UNSURE).any():
+            yield FlankKind.START, 1.0, least
+            yield FlankKind.START, 1.0, most
+
+    @cached_property
+    def _known(self) -> dict[float, Floats]:
+        return {}
+
+    def _over(self, width: float) -> Floats:
+        """Return the sides if all joints go over so many gaps, (s, 6)."""
+        if width not in self._known:
+            model, cell = self.error.model, self.error.cell
+            widths = np.full(6, width)
+            own = AlongWays.of(cell, model, self.run.cycle, self.run.ways, widths)
+            self._known[width] = own.side
+        return self._known[width]
+
+    @cached_property
+    def _move(self) -> Ints:
+        """The move that every sample belongs to, (s,)."""
+        return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+
+    @cached_property
+    def _behind(self) -> Ints:
+        """The sample `LATE` behind every sample on its move, (s,)."""
+        apart = float(self.way.max(initial=0.0)) + 2 * LATE
+        there = self.way + apart * self._move
+        back = np.searchsorted(there, there - LATE, side="right") - 1
+        return np.maximum(back, self.first[:-1][self._move])

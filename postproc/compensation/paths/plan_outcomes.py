@@ -1,0 +1,219 @@
+"""How far a move leaves its path with each plan, under each open hypothesis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.compensation.paths.flank_cases import FlankCase
+from postproc.compensation.paths.path_error import PathAccuracy
+from postproc.compensation.paths.plan_rule import (
+    PlanOutcome,
+    choose_plan,
+    negligible,
+    resolution,
+)
+from postproc.model.flank_hypotheses import OPEN, FlankKind
+from postproc.robot.pose import MM
+
+ALONG = 0.95  # of a way: what the deviation of a plan is taken of
+BEGINS = 5e-3  # [m] in which drives cross their gaps, where a move begins
+
+LAST = 1.0 - 1e-9  # share of a way that is still on it
+
+Key = tuple[int, FlankKind, int]
+"""A joint (from 1), what it does, and which of its cases of that kind it is."""
+
+
+@dataclass(frozen=True)
+class Objection:
+    """What speaks against a plan.
+
+    Attributes:
+        worse: How much farther the path is than without points [m].
+        place: Where: a part of the move, from 0, and a share of its way.
+        key: The hypothesis, None if all joints do as predicted.
+    """
+
+    worse: float
+    place: float
+    key: Key | None
+
+    def __str__(self) -> str:
+        """Say it in words."""
+        what = "somewhere, even if all joints do as predicted"
+        if self.key is not None:
+            what = f"if joint {self.key[0]} {self.key[1].value}"
+        return f"it would be worse by {self.worse / MM:.2f} mm {what}"
+
+    @property
+    def cure(self) -> str:
+        """Return what would tell, "" where nothing is open."""
+        if self.key is None:
+            return ""
+        return MEASURE.format(joint=self.key[0])
+
+
+MEASURE = (
+    "Measure how joint {joint} changes its flank: survey.reversals, or diagnose --path"
+)
+
+
+@dataclass(frozen=True)
+class MoveOutcomes:
+    """The plans of one move, and the h hypotheses that they are compared under.
+
+    Attributes:
+        plans: The outcome of each; the first one is that without points.
+        share: Where each is worse than without points the most, (p, h): a part of the
+            move, from 0, and a share of its way.
+        keys: The hypotheses behind the first one, that all joints do as predicted.
+        weight: (h,).
+        tolerance: Of paths [m].
+    """
+
+    plans: tuple[PlanOutcome, ...]
+    share: Floats
+    keys: tuple[Key, ...]
+    weight: Floats
+    tolerance: float
+
+    def choose(self) -> tuple[int, float]:
+        """Choose a plan, see `choose_plan`; return it and its promise [m]."""
+        return choose_plan(self.plans, self.weight, self.tolerance)
+
+    def objection(self, plan: int) -> Objection | None:
+        """Return which hypothesis makes a plan worse than no points.
+
+        None where none does by more than may be.
+        """
+        worse = np.where(self.weight > OPEN, self.plans[plan].worse, 0.0)
+        k = int(worse.argmax())
+        if worse[k] <= resolution(self.tolerance):
+            return None
+        key = None if k == 0 else self.keys[k - 1]
+        return Objection(float(worse[k]), float(self.share[plan, k]), key)
+
+
+def compare(
+    plans: Sequence[PathAccuracy], rows: Sequence[int], tolerance: float
+) -> MoveOutcomes:
+    """Compare the plans of a move.
+
+    Args:
+        plans: The program with each; the first one is without points.
+        rows: The visits of the move; of an arc both.
+        tolerance: Of paths [m].
+    """
+    found = [_Move.of(paths, rows) for paths in plans]
+    usual = found[0]
+    steps = np.max([move.steps for move in found], axis=0)
+    small = negligible(steps, tolerance)
+    every = dict.fromkeys(key for move in found for key in move.cases)
+    keys = tuple(key for key in every if not small[key[0] - 1])
+    weights = {key: w for move in found for key, w in move.weights.items()}
+    usually = min((usual.usually[key[0] - 1] for key in keys), default=1.0)
+    weight = np.array([usually, *(weights[key] for key in keys)])
+    outcomes, shares = [], []
+    for move in found:
+        off, worse, share = np.array(
+            [move.compare(usual, key) for key in (None, *keys)]
+        ).T
+        outcomes.append(PlanOutcome(off, worse))
+        shares.append(share)
+    if usually <= OPEN:  # it is what corrections are made for, and counts
+        weight[0] = np.nextafter(OPEN, 1.0)
+    return MoveOutcomes(tuple(outcomes), np.array(shares), keys, weight, tolerance)
+
+
+@dataclass(frozen=True)
+class _Move:
+    """One move with one plan.
+
+    Attributes:
+        paths: The program.
+        parts: The samples of the move; of an arc of both halves.
+        cases: The cases that make a difference on it.
+        usually: Weight of what is predicted, of every joint, (6,).
+    """
+
+    paths: PathAccuracy
+    parts: tuple[slice, ...]
+    cases: dict[Key, FlankCase]
+    usually: Floats
+
+    @classmethod
+    def of(cls, paths: PathAccuracy, rows: Sequence[int]) -> _Move:
+        parts = tuple(map(paths.samples_to, rows))
+        cases: dict[Key, FlankCase] = {}
+        usually = np.ones(6)
+        if paths.cases is not None:
+            usually = paths.cases.usually
+            kinds = groupby(paths.cases.cases, key=lambda case: (case.joint, case.kind))
+            for kind, own in kinds:
+                for number, case in enumerate(own):
+                    if any(_length(case.within(part)) for part in parts):
+                        cases[*kind, number] = case
+        return cls(paths, parts, cases, usually)
+
+    @property
+    def weights(self) -> dict[Key, float]:
+        return {key: case.weight for key, case in self.cases.items()}
+
+    @property
+    def steps(self) -> Floats:
+        """How far each joint moves the TCP under its worst hypothesis, (6,) [m]."""
+        found = np.zeros(6)
+        for (joint, _, _), case in self.cases.items():
+            for part in self.parts:
+                moved = case.moved[case.within(part)].max(initial=0.0)
+                found[joint - 1] = max(found[joint - 1], moved)
+        return found
+
+    def across(self, key: Key | None) -> Iterator[tuple[Floats, Floats]]:
+        """Yield way and distance from the path of its parts under a hypothesis."""
+        case = None if key is None else self.cases.get(key)
+        for part in self.parts:
+            far = np.array(self.paths.after.across[part])
+            if case is not None:
+                own = case.within(part)
+                far[case.rows[own] - part.start] = case.across[own]
+            yield self.paths.way[part], far
+
+    def compare(self, usual: _Move, key: Key | None) -> tuple[float, float, float]:
+        """Return what 95 % stays within, how much worse it is [m], and where.
+
+        Where a move begins, what the whole of it is off without points counts there.
+        """
+        ways: list[Floats] = []
+        sizes: list[Floats] = []
+        worst, at = 0.0, 0.0
+        for (way, far), (old, before) in zip(
+            self.across(key), usual.across(key), strict=True
+        ):
+            usually = np.interp(way, old, before)
+            if not ways:
+                usually[way < BEGINS] = before.max()
+            more = far - usually
+            top = int(more.argmax())
+            if self is not usual and more[top] > worst:
+                share = float(way[top] / max(way[-1], 1e-12))
+                worst, at = float(more[top]), len(ways) + min(share, LAST)
+            ways.append(np.diff(way, prepend=0.0))
+            sizes.append(far)
+        return _within(np.concatenate(sizes), np.concatenate(ways)), worst, at
+
+
+def _length(part: slice) -> int:
+    return int(part.stop - part.start)
+
+
+def _within(far: Floats, length: Floats) -> float:
+    """Return the distance that 95 % of a way stays within, of samples (s,)."""
+    order = np.argsort(far)
+    done = np.cumsum(length[order])
+    return float(far[order[np.searchsorted(done, ALONG * done[-1])]])

@@ -1,0 +1,93 @@
+"""The rule by which a plan is chosen for a move: points, fewer of them, or none.
+
+The data leave hypotheses open of how every joint changes its flank. Each plan leaves
+its path by some distance under each of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.model.flank_hypotheses import OPEN
+from postproc.robot.pose import MM
+
+LEAST_STEP = 0.05 * MM  # [m] the finest promise, and harm that counts at the least
+NEGLIGIBLE = 0.2  # of the tolerance: steps that together never count against a plan
+
+
+@dataclass(frozen=True)
+class PlanOutcome:
+    """How far a move leaves its path with a plan, under each of h hypotheses.
+
+    Attributes:
+        off: What 95 % of its way stays within, (h,) [m].
+        worse: How much farther it is than without points, anywhere, (h,) [m].
+    """
+
+    off: Floats
+    worse: Floats
+
+
+def resolution(tolerance: float) -> float:
+    """Return the steps of a promise, which is also the harm that counts [m].
+
+    Args:
+        tolerance: Of paths [m].
+    """
+    return max(LEAST_STEP, tolerance / 2)
+
+
+def choose_plan(
+    plans: Sequence[PlanOutcome], weight: Floats, tolerance: float
+) -> tuple[int, float]:
+    """Choose the plan of a move.
+
+    Of the plans that no open hypothesis makes worse anywhere than without points by
+    more than `resolution`, those with the least promise, and of these the one that is
+    expected to leave the path least. A promise is what 95 % of the way stays within
+    under the worst open hypothesis, in whole steps of `resolution`. It is the least of
+    largest values over sets that grow and shrink: to exclude a hypothesis never raises
+    it.
+
+    Args:
+        plans: The first one is that without points.
+        weight: Of each hypothesis, (h,); those above `OPEN` are open.
+        tolerance: Of paths [m].
+
+    Returns:
+        Which plan, and its promise [m].
+    """
+    step, open_ = resolution(tolerance), weight > OPEN
+    promise = [_promise(plan, open_, step) for plan in plans]
+    expected = [float(plan.off @ weight) for plan in plans]
+    fit = [k for k, plan in enumerate(plans) if not _harms(plan, open_, step)]
+    best = min(fit, key=lambda k: (promise[k], expected[k]))
+    return best, promise[best]
+
+
+def _harms(plan: PlanOutcome, open_: Bools, step: float) -> bool:
+    return bool((plan.worse[open_] > step).any())
+
+
+def _promise(plan: PlanOutcome, open_: Bools, step: float) -> float:
+    worst = float(plan.off[open_].max(initial=0.0))
+    return float(np.ceil(np.round(worst / step, 6))) * step
+
+
+def negligible(steps: Floats, tolerance: float) -> Bools:
+    """Return which joints' steps together are too small to count against a plan, (6,).
+
+    The smallest first, as long as their sum stays below a fifth of the tolerance.
+
+    Args:
+        steps: How far each joint moves the TCP under its worst hypothesis, (6,) [m].
+        tolerance: Of paths [m].
+    """
+    order = np.argsort(steps, kind="stable")
+    small = np.zeros(len(steps), dtype=bool)
+    small[order] = np.cumsum(steps[order]) < NEGLIGIBLE * tolerance
+    return small

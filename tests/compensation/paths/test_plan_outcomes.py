@@ -1,0 +1,71 @@
+"""Plans of a move under hypotheses: by place, by length, by joints that matter."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from postproc.compensation.paths.flank_cases import FlankCase
+from postproc.compensation.paths.plan_outcomes import BEGINS, compare
+from postproc.model.flank_hypotheses import FlankKind
+from postproc.robot.pose import MM
+
+TOLERANCE = 0.1 * MM
+WAY = np.linspace(0.0, 0.1, 101)  # [m], a sample a millimetre
+
+
+def program(off: float, *cases: FlankCase) -> Any:
+    """A program of one move, as far off everywhere."""
+    known = SimpleNamespace(cases=cases, usually=np.full(6, 0.55))
+    return SimpleNamespace(
+        way=WAY, cases=known, samples_to=lambda v: slice(0, len(WAY)),
+        after=SimpleNamespace(across=np.full(len(WAY), off * MM)),
+    )  # fmt: skip
+
+
+def case(joint: int, first: int, last: int, off: float, moved: float) -> FlankCase:
+    rows = np.arange(first, last)
+    far = np.full(len(rows), off * MM)
+    return FlankCase(joint, FlankKind.ELASTIC, 0.25, rows, far,
+                     np.full(len(rows), moved * MM))  # fmt: skip
+
+
+def test_harm_is_counted_place_by_place_and_named() -> None:
+    found = compare(
+        (program(0.1), program(0.02, case(3, 60, 63, 0.2, 0.2))), (7,), TOLERANCE
+    )
+    objection = found.objection(1)
+    assert objection is not None and objection.place == pytest.approx(0.6)
+    assert str(objection) == (
+        "it would be worse by 0.10 mm if joint 3 gives way elastically"
+    )
+    assert "how joint 3 changes its flank" in objection.cure
+    assert found.choose() == (0, pytest.approx(0.1 * MM))
+    assert found.objection(0) is None
+
+
+def test_the_deviation_is_that_of_95_percent_of_the_way() -> None:
+    for samples, off in ((3, 0.02), (9, 0.12)):
+        points = program(0.02, case(3, 60, 60 + samples, 0.12, 0.2))
+        found = compare((program(0.1), points), (7,), TOLERANCE)
+        assert found.plans[1].off[1] == pytest.approx(off * MM)
+        assert found.objection(1) is None
+
+
+def test_where_a_move_begins_its_largest_deviation_counts() -> None:
+    usual = program(0.0)
+    usual.after.across[80] = 0.2 * MM
+    for first, harm in ((2, False), (2 + round(BEGINS / MM), True)):
+        points = program(0.0, case(1, first, first + 2, 0.19, 0.2))
+        found = compare((usual, points), (7,), TOLERANCE).objection(1)
+        assert (found is not None) == harm
+
+
+def test_joints_with_small_steps_never_speak_against_a_plan() -> None:
+    for moved, counts in ((0.014, False), (0.03, True)):
+        points = program(0.02, case(5, 60, 63, 0.2, moved))
+        found = compare((program(0.1), points), (7,), TOLERANCE)
+        assert bool(found.keys) == counts

@@ -1,0 +1,197 @@
+"""Points on the ways of arms whose gaps are drawn more widely than shipped ones.
+
+    python -m tests.studies.wide_gaps [--seeds 100 105] [--lines 12] [--folder PLACE]
+        [--half 0.01 0.1] [--gears sharp] [--repeats 6] [--states plain reversals ..]
+
+Every joint's half gap is drawn log-uniformly between the bounds [mrad], and what the
+joints scatter by is set [urad]. The job is lines of 300 to 900 mm with stops at
+50 mm/s. One row a state of knowledge: a plain survey (`plain`), one with reversals
+(`reversals`), that and a measured path (`track`); `+stops` preloads the backlash. A row
+says what 95 % of all the way stays within, the largest deviation, how much farther a
+place is than the same program without points [mm], the share of the way that is within
+0.05 mm and that is nearer than without, the share of moves whose promise holds, the
+moves with points, and the points a move has in the middle.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from docs.studies import paths as study
+from postproc.report.simulation import simulate_file
+from postproc.robot.cell import load_cell
+from postproc.simulation import draw
+from postproc.simulation.laws import Draw, Law, backlash
+from postproc.simulation.path import PathScores
+from tests.written import cli
+
+NEARER = 1e-5  # [m]
+NEAR = 5e-5  # [m]
+BEGINS = 5e-3  # [m] behind a stop, told apart
+STATES = ("plain", "reversals+stops", "track+stops")
+STOPS = ("--set", "compensation.preload_backlash=true")
+
+
+def done(*arguments: object) -> None:
+    """Run a command of the command line, in this process."""
+    found = cli(*arguments)
+    if found.exit_code not in (0, 1):
+        raise RuntimeError(found.stderr)
+
+
+def gaps_between(low: float, high: float) -> Any:
+    """Draw a backlash law of half gaps [mrad] that are log-uniform between bounds."""
+
+    def drawn(given: Draw) -> Law:
+        half = np.exp(given.rng.uniform(np.log(low), np.log(high), 6)) * 1e-3
+        usual = backlash(given)
+        own = np.array([-usual.parameters[f"b_{j}"] for j in range(1, 7)])
+        told = {f"b_{j + 1}": -float(half[j]) for j in range(6)}
+        return replace(usual, parameters=told,
+                       shape=lambda at: usual.shape(at) * half / own)  # fmt: skip
+
+    return drawn
+
+
+class Bench:
+    """One virtual arm, its surveys, and its job."""
+
+    def __init__(self, seed: int, folder: Path, lines: int, gears: str) -> None:
+        """Draw the job of an arm."""
+        self.seed, self.folder, self.gears = seed, folder, gears
+        kind = f"simulation.backlash_model={gears}"
+        self.arm = ("--set", f"simulation.seed={seed}", "--set", kind)
+        folder.mkdir(parents=True, exist_ok=True)
+        self.cell = folder / "cell.toml"
+        self.cell.write_text(study.CELL)
+        with patch.multiple(study, LINES=lines, ARCS=0):
+            (folder / "job.pdl").write_text(study.job(seed, load_cell(self.cell)))
+
+    def model(self, state: str) -> Path:
+        """Survey and fit what a state of knowledge takes, once."""
+        at, place = ("--cell", self.cell), self.folder / f"{state}.model.json"
+        if place.exists():
+            return place
+        if state == "track":
+            self.compensate("reversals", ())
+            ran, track = self.folder / "reversals.out.pdl", self.folder / "track.csv"
+            done("simulate", ran, *at, *self.arm, "--track", track)
+            done("diagnose", "--path", track, "--program", ran, *at, "--model",
+                 self.model("reversals"), "-o", place)  # fmt: skip
+            return place
+        many = f"survey.reversals={4 if state == 'reversals' else 0}"
+        survey = self.folder / f"{state}.pdl"
+        done("survey", *at, "--poses", 300, "--set", many, "-o", survey)
+        done("simulate", survey, *at, *self.arm, "-o", survey.with_suffix(".csv"))
+        done("fit", survey.with_suffix(".csv"), *at, "-o", place)
+        return place
+
+    def compensate(self, state: str, options: tuple[object, ...]) -> dict[str, Any]:
+        """Compensate the job, and return the report."""
+        name, report = f"{state}.out.pdl", self.folder / f"{state}.report.json"
+        done("compensate", self.folder / "job.pdl", "--cell", self.cell, "--model",
+             self.model(state.partition("+")[0]), "-o", self.folder / name,
+             "--report", report, *options)  # fmt: skip
+        told: dict[str, Any] = json.loads(report.read_bytes())
+        return told
+
+    def run(self, state: str) -> PathScores:
+        """Run what was compensated."""
+        run = simulate_file(
+            self.folder / f"{state}.out.pdl", self.cell, self.seed,
+            reference=self.folder / "job.pdl", path=True, gears=self.gears,
+        )  # fmt: skip
+        assert run.paths is not None
+        return run.paths
+
+
+def even(found: PathScores, visit: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the way of a move and how far it is off there, [m] each."""
+    k = int(np.searchsorted(found.visit, visit))
+    rows = slice(found.first[k], found.first[k + 1])
+    return found.way[rows], found.across[rows]
+
+
+def compared(
+    new: PathScores, old: PathScores, told: list[dict[str, Any]]
+) -> dict[str, float]:
+    """Compare the ways of a program with those of the one without points."""
+    every, usual, kept, ways = [], [], [], []
+    for path in told:
+        (way, off), (old_way, before) = (even(one, path["visit"]) for one in (new, old))
+        at = np.arange(way[0], way[-1], 1e-3)
+        here = np.interp(at, way, off)
+        every.append(here)
+        usual.append(np.interp(at, old_way, before))
+        ways.append(at)
+        promise = path.get("promise_mm")
+        if promise is not None:
+            kept.append(np.percentile(here, 95) <= 1e-3 * promise + 5e-6)
+    off, before, far = map(np.concatenate, (every, usual, ways))
+    far = far >= BEGINS
+    return {
+        "95 %": 1e3 * np.percentile(off, 95),
+        "max": 1e3 * off.max(),
+        "worse": 1e3 * (off - before)[far].max(),
+        "at starts": 1e3 * (off - before)[~far].max(),
+        "within": (off < NEAR).mean(),
+        "nearer": (off < before - NEARER).mean(),
+        "kept": np.mean(kept) if kept else np.nan,
+    }
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, nargs=2, default=(100, 105))
+    parser.add_argument("--lines", type=int, default=12)
+    parser.add_argument("--half", type=float, nargs=2, default=(0.01, 0.1))
+    parser.add_argument("--repeats", type=float, default=6.0)
+    parser.add_argument("--gears", default="sharp")
+    parser.add_argument("--states", nargs="+", default=STATES)
+    parser.add_argument("--tolerance", default="0.1")
+    parser.add_argument("--folder", type=Path)
+    given = parser.parse_args()
+    scatter = np.full(6, given.repeats * 1e-6)
+    with (
+        tempfile.TemporaryDirectory() as temporary,
+        patch.object(draw, "backlash", gaps_between(*given.half)),
+        patch.object(draw._Planter, "joint_noise", lambda *_: scatter),
+    ):
+        for seed in range(given.seeds[0], given.seeds[1] + 1):
+            place = (given.folder or Path(temporary)) / f"{given.gears}{seed}"
+            bench = Bench(seed, place, given.lines, given.gears)
+            for state in given.states:
+                row(bench, state, given.tolerance)
+
+
+def row(bench: Bench, state: str, tolerance: str) -> None:
+    """Print one state of knowledge of one arm."""
+    knows, _, stops = state.partition("+")
+    bench.compensate(knows, ())
+    without = bench.run(knows)
+    asked = ("--path-tolerance", tolerance, *(STOPS if stops else ()))
+    report = bench.compensate(f"{knows}+{stops}", asked)
+    told = report["path"]
+    found = compared(bench.run(f"{knows}+{stops}"), without, told)
+    usual = compared(without, without, told)
+    points = [path["inserted"] for path in told]
+    print(
+        f"{bench.seed:4d} {state:16} without {usual['95 %']:.3f} {usual['max']:.3f}  "
+        + "  ".join(f"{key} {value:.3f}" for key, value in found.items())
+        + f"  moves {sum(map(bool, points))}/{len(told)} points {np.median(points):.0f}"
+        + f"  {report['path_accuracy']['after']['max_mm']:.3f} predicted",
+        flush=True,
+    )
+
+
+if __name__ == "__main__":
+    main()
