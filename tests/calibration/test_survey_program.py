@@ -122,7 +122,7 @@ def test_the_volume_of_a_job_is_surveyed(desk):
     options = ("--cell", desk.cell, "--poses", 12, "-o", out)
     found = cli("survey", *options, "--job", job)
     assert found.exit_code == 0, found.stderr
-    assert "12 poses (round the program's arrivals)" in found.stdout
+    assert "12 poses (round the program's arrivals)" in found.stderr
     assert out.read_text("latin-1").count("MEASURE ") == 25
     empty = desk.put("empty.pdl", "PROGRAM empty\nBEGIN\nEND empty\n")
     refused = cli("survey", *options, "--job", empty)
