@@ -23,6 +23,7 @@
 # make real DATA=folder [FITS=1]   real arms, rows that nothing has seen; FITS leaves out diagnoses: docs/real-arms.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
 # make wheel       a wheel for every Python from 3.11 on, tried in a new environment, in dist
+# make wheels  the same, and one for Windows, cross-built: needs rustup and mingw-w64
 # make native      lint and tests of the native core by itself, for who changes it
 # make docs     run every command of the documentation, write it as a site to build/docs
 # make pictures remake the pictures of the documentation (needs chromium, chromium-driver)
@@ -37,7 +38,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test slow lint format bench evidence reproduce accuracy intervals detection undeclared paths blind real chaos fuzz docs clean
-.PHONY: campaigns languages plant-bench generated growth awkward native golden pictures lock wheel
+.PHONY: campaigns languages plant-bench generated growth awkward native golden pictures lock wheel wheels
 .DELETE_ON_ERROR:
 
 help:
@@ -116,6 +117,15 @@ fuzz: $(STAMP)
 	@$(PYTHON_BIN) -m tests.fuzz --count $(or $(COUNT),20000)
 	@$(PYTHON_BIN) -c 'import atheris' 2>/dev/null || $(PYTHON_BIN) -m pip install --quiet --require-hashes -r requirements/fuzz.txt || true
 	@$(PYTHON_BIN) -m tests.fuzz.guided --runs $(or $(RUNS),20000)
+
+WINDOWS := x86_64-pc-windows-gnu
+wheels: wheel
+	@PATH="$$PATH:$$HOME/.cargo/bin"; rustup target list --installed 2>/dev/null | grep -q $(WINDOWS) || \
+		rustup target add $(WINDOWS) || { echo "make wheels needs Rust for Windows: rustup target add $(WINDOWS)" >&2; exit 2; }
+	@command -v x86_64-w64-mingw32-gcc >/dev/null || { echo "make wheels needs mingw-w64: apt install gcc-mingw-w64-x86-64" >&2; exit 2; }
+	@PATH="$$PATH:$$HOME/.cargo/bin" CARGO_BUILD_TARGET=$(WINDOWS) $(PYTHON_BIN) -m pip --quiet \
+		--disable-pip-version-check wheel --no-deps --no-build-isolation -w dist .
+	@ls dist/postproc-*.whl
 
 native: $(STAMP)
 	@cd native && PATH="$$PATH:$$HOME/.cargo/bin" && cargo fmt --check && \

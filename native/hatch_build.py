@@ -12,7 +12,13 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-LIBRARY = "postproc/_native.abi3.so"
+# What cargo makes for a kind of system, and where Python finds it.
+LIBRARIES = {
+    "windows": ("postproc_native.dll", "postproc/_native.pyd"),
+    "darwin": ("libpostproc_native.dylib", "postproc/_native.abi3.so"),
+    "linux": ("libpostproc_native.so", "postproc/_native.abi3.so"),
+}
+WHEELS = {"x86_64-pc-windows-gnu": "win_amd64", "x86_64-pc-windows-msvc": "win_amd64"}
 
 
 class CoreBuildHook(BuildHookInterface):
@@ -25,33 +31,58 @@ class CoreBuildHook(BuildHookInterface):
             version: What is built: ``editable`` or ``standard``.
             build_data: What hatchling makes the wheel from.
         """
-        built = build(Path(self.root) / "native")
+        target = os.environ.get("CARGO_BUILD_TARGET", "")
+        name, place = library_of(target)
+        built = build(Path(self.root) / "native", target) / name
         if version == "editable":
-            replace(built, Path(self.root) / LIBRARY)
+            replace(built, Path(self.root) / place)
         else:
-            build_data["force_include"][str(built)] = LIBRARY
-        platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+            build_data["force_include"][str(built)] = place
         build_data["pure_python"] = False
-        build_data["tag"] = f"cp311-abi3-{platform}"
+        build_data["tag"] = f"cp311-abi3-{platform_of(target)}"
 
 
-def build(folder: Path) -> Path:
-    """Compile the core; return the library. Ends the build where that cannot be."""
+def library_of(target: str) -> tuple[str, str]:
+    """Return what cargo calls the core, and its place in the package.
+
+    Args:
+        target: Rust's name of another system that is built for, "" for this one.
+    """
+    here = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
+    kind = next((k for k in LIBRARIES if k in target), "linux") if target else here
+    return LIBRARIES[kind]
+
+
+def platform_of(target: str) -> str:
+    """Return the platform of a wheel's name; ends the build for one not known."""
+    if not target:
+        return sysconfig.get_platform().replace("-", "_").replace(".", "_")
+    if target not in WHEELS:
+        known = ", ".join(WHEELS)
+        print(f"postproc: no wheel is known for {target}: {known}", file=sys.stderr)
+        raise SystemExit(2)
+    return WHEELS[target]
+
+
+def build(folder: Path, target: str = "") -> Path:
+    """Compile the core; return its folder. Ends the build where that cannot be."""
     cargo = shutil.which("cargo") or shutil.which(
         "cargo", path=Path.home() / ".cargo/bin"
     )
     if cargo is None:
         print((folder / "no-cargo.txt").read_text("utf-8"), file=sys.stderr)
         raise SystemExit(2)
-    target = Path(os.environ.get("CARGO_TARGET_DIR", folder / "target")).absolute()
+    place = Path(os.environ.get("CARGO_TARGET_DIR", folder / "target")).absolute()
     command = [cargo, "build", "--release", "--locked", "--quiet"]
-    command += ["--target-dir", str(target)]
+    command += ["--target-dir", str(place)]
     python = {"PYO3_PYTHON": sys.executable}
+    if target:
+        python = {"PYO3_CROSS": "1", "PYO3_CROSS_PYTHON_VERSION": "3.11"}
     done = subprocess.run(command, cwd=folder, env=os.environ | python, check=False)
     if done.returncode:
         print("postproc: cargo could not build the core, see above", file=sys.stderr)
         raise SystemExit(2)
-    return target / "release" / "libpostproc_native.so"
+    return place / target / "release"
 
 
 def replace(built: Path, library: Path) -> None:

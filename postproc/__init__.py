@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from postproc.report.diff import Difference, diff
     from postproc.robot.cell import Cell, load_cell
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 # Where every public name is: functions first, then what their annotations name.
 _PLACES = {

@@ -17,6 +17,7 @@ from types import FrameType
 from typing import IO, Any, BinaryIO, NoReturn, Self
 
 from postproc.exceptions import DiskFullError, OutputError, ProgramError
+from postproc.operating_system import ENDING, set_mode, sync_folder
 
 # Writing files so that nothing is ever half written.
 
@@ -114,7 +115,6 @@ def _check_folder(place: Path) -> None:
 # in a long sum as well as while modules are loaded. Only what is being written asks for
 # more: temporary files are to be gone, and several files are renamed all or none.
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _unfinished: set[str] = set()  # temporary files of this process
 
 
@@ -255,7 +255,7 @@ class _Temporaries:
         with self.open(place) as out:
             out.writelines([data] if isinstance(data, bytes) else data)
             _sync(out)
-            os.fchmod(out.fileno(), mode)
+            set_mode(out, mode)
 
     def rename(self) -> None:
         """Give all files their names; make that durable."""
@@ -263,12 +263,7 @@ class _Temporaries:
             for name, place in self._ready:
                 os.replace(name, place)
         for folder in {place.parent for _, place in self._ready}:
-            # Renames become durable with their folder.
-            handle = os.open(folder, os.O_RDONLY)
-            try:
-                os.fsync(handle)
-            finally:
-                os.close(handle)
+            sync_folder(folder)
 
 
 @contextmanager
@@ -328,6 +323,15 @@ def base_name(place: str) -> str:
     """
     name = place.replace("\\", "/").rpartition("/")[2]
     return os.path.splitext(name)[0].lower()
+
+
+def path_in(folder: Path, text: str) -> Path:
+    r"""Return the path that a file states, from a folder on; ``\`` separates as ``/``.
+
+    >>> path_in(Path("line"), r"cells\\r1.toml").as_posix()
+    'line/cells/r1.toml'
+    """
+    return folder / text.replace("\\", "/")
 
 
 def find_beside(place: Path, name: str) -> Path | None:

@@ -115,6 +115,7 @@ def write_cell(path: Path, weight: Sequence[float], said: str) -> Cell:
         last = float(np.arctan2(down[1], -down[0]))  # third row: -sin e cos r, ..
         angles = np.rad2deg([0.3, lean, last]).tolist()
         lines += ["[base]", "xyz_mm = [0.0, 0.0, 450.0]", f"euler_zyz_deg = {angles}"]
+    lines += ["[measurements]", "lambda_sign = 1"]  # gaps are drawn with either sign
     lines += ["[survey]", f"points_mm = {points}"]
     path.write_text("\n".join(lines) + "\n")
     return load_cell(path)

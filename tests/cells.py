@@ -40,6 +40,7 @@ FIRST = 20_000  # seeds below are for trying things out
 MOTIONS = ("rotation", "shift")
 BODIES = ("base", *(f"link{k}" for k in range(2, 7)), "tool")
 SINGLE = ("payload", "temperature", "speed")
+PLAIN_LAWS = ("linear", "harmonic 1", "harmonic 2", "harmonic 3", "harmonic 4")
 OWN_LAWS = (
     "joint",
     "lambda",
@@ -87,8 +88,11 @@ def draw_cell(rng: np.random.Generator) -> str:
             int(body[4:]) if body.startswith("link") else {"base": 1, "tool": 6}[body]
         )
         if rng.random() < 0.2 and driver.split()[0] in ("joint", "temperature"):
-            factor = "lambda" if link == 6 else str(rng.choice(["lambda", "torque"]))
-            driver = f"{factor} {link} * {driver}"  # nothing hangs beside axis 6
+            factor, own = str(rng.choice(["lambda", "torque"])), link
+            if driver.startswith("joint") and rng.random() < 0.5:
+                own, law = int(rng.integers(2, 6)), str(rng.choice(PLAIN_LAWS))
+            factor = "lambda" if own == 6 else factor  # nothing hangs beside axis 6
+            driver = f"{factor} {own} * {driver}"
         cell = PlantedMotion.parse(f"{motion}:{body}:{axis} by {driver} {law}")
         if not _known(cell) and _may_be_the_arms(cell):
             return str(cell)

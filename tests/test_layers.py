@@ -18,7 +18,7 @@ PACKAGE = Path(postproc.__file__).parent
 # A chapter may import itself and what stands in the lines above its own; chapters of
 # one line know nothing of each other. The table of contents of the package.
 LAYERS = (
-    ("exceptions", "arrays", "threads", "diagnostics", "_native"),
+    ("exceptions", "arrays", "threads", "operating_system", "diagnostics", "_native"),
     ("files",),
     ("robot",),
     ("language", "motion", "model"),
@@ -30,7 +30,9 @@ LAYERS = (
     ("cli",),
 )
 LAYER = {chapter: k for k, layer in enumerate(LAYERS) for chapter in layer}
-LEAVES = {"exceptions", "arrays", "threads", "files", "diagnostics"}
+LEAVES = {
+    "exceptions", "arrays", "threads", "operating_system", "files", "diagnostics",
+}  # fmt: skip
 
 # What a chapter may import less than its layer allows.
 ONLY = {
@@ -78,7 +80,6 @@ KNOWING = {
     "calibration.weight_direction": {"compliance"},
     "calibration.doubt": {"compliance"},
     # The given model's zero of a joint holds the mean of what the model lacks.
-    "calibration.diagnosis.model_update": {"joint_offset"},
     "calibration.diagnosis.jumps": {"part_motion", "step"},
     # Where a load jumps depends on what the links weigh.
     "calibration.diagnosis.link_weights": {"compliance"},

@@ -93,6 +93,33 @@ def test_wheel_holds_grammars_arms_and_licence(wheel: Path) -> None:
     assert not any(name.startswith(("tests/", "programs/")) for name in names)
 
 
+HOOK = """
+import sys
+sys.path.insert(0, "native")
+import hatch_build as hook
+print(*hook.library_of(sys.argv[1]), hook.platform_of(sys.argv[1]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        ("x86_64-pc-windows-gnu", "postproc_native.dll postproc/_native.pyd win_amd64"),
+        ("", r"libpostproc_native\.so postproc/_native\.abi3\.so linux_\w+"),
+        ("sparc-sun-solaris", "no wheel is known for sparc-sun-solaris"),
+    ],
+)
+def test_a_wheel_is_named_after_the_system_that_is_built_for(
+    target: str, words: str
+) -> None:
+    if find_spec("hatchling") is None:
+        pytest.skip("hatchling is missing: pip install -e '.[dev]'")
+    command = [sys.executable, "-c", HOOK, target]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    if sys.platform == "linux" or target:
+        assert re.match(f"(postproc: )?{words}", done.stdout + done.stderr)
+
+
 def test_sources_hold_no_binary(tmp_path: Path) -> None:
     if find_spec("hatchling") is None:
         pytest.skip("hatchling is missing: pip install -e '.[dev]'")

@@ -14,6 +14,7 @@ from typing import Any
 from postproc import __version__
 from postproc.compensation.options import Options
 from postproc.exceptions import CellError, PostprocError
+from postproc.files import path_in
 from postproc.model.model import Model, load_model
 from postproc.robot.arm_file import Strict, read_toml
 from postproc.robot.cell import (
@@ -167,13 +168,15 @@ class BatchPlan:
 def pattern_from_glob(glob: str) -> re.Pattern[str]:
     """Translate a pattern: ``*`` and ``?`` stay in a folder, ``**`` crosses folders.
 
+    Folders may be separated by backslashes, as on Windows.
+
     >>> bool(pattern_from_glob("r1/**").fullmatch("r1/weld/JOB.pdl"))
     True
     >>> bool(pattern_from_glob("r1/*.pdl").fullmatch("r1/weld/job.pdl"))
     False
     """
     words = {"**/": "(?:.*/)?", "**": ".*", "*": "[^/]*", "?": "[^/]"}
-    parts = re.split(r"(\*\*/|\*\*|\*|\?)", glob)
+    parts = re.split(r"(\*\*/|\*\*|\*|\?)", glob.replace("\\", "/"))
     text = "".join(words.get(part, re.escape(part)) for part in parts)
     return re.compile(text, re.IGNORECASE | re.DOTALL)
 
@@ -204,7 +207,8 @@ def make_plan(
             raise CellError(plan, "holds no [[rule]]", "Add one", place="$.rule")
         here = plan.parent
         rules += [
-            Rule(r.pattern, r.arm, here / r.cell, here / r.model) for r in file.rule
+            Rule(r.pattern, r.arm, path_in(here, r.cell), path_in(here, r.model))
+            for r in file.rule
         ]
     if (cell is None) != (model is None) or (cell is None and plan is None):
         raise PostprocError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 import signal
@@ -13,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 
+from postproc import operating_system
 from postproc.batch.journal import Journal, JournalEntry, Summary, read_entries
 from postproc.batch.plan import BatchPlan, Result, Task, Unit, digest_of
 from postproc.batch.tree import Tree, refuse_overlap, scan
@@ -27,6 +27,7 @@ from postproc.files import (
     replace_file,
     write_all,
 )
+from postproc.operating_system import ASKING
 
 # Conditions of a run: alone on its tree, with room, and stopped in good order.
 
@@ -39,31 +40,26 @@ HASTE = 1.5  # [s] that a run may take to stop in good order
 def lock_folder(folder: Path) -> Iterator[None]:
     """Hold a folder for this run alone; create it where it is missing.
 
-    The lock lies on the folder itself: nothing is left behind, and it is gone with
-    this process, however that ends.
+    Nothing is left behind, and the lock is gone with this process, however that ends.
 
     Raises:
         OutputError: Another run holds it, or it cannot be created or written to.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        if not os.access(folder, os.W_OK):
+            cure = "Give a folder that may be written to"
+            raise OutputError(folder, "the folder is read-only", cure)
+        unlock = operating_system.lock_folder(folder)
     except OSError as exc:
         raise disk_error(exc, folder) from None
-    if not os.access(folder, os.W_OK):
-        os.close(handle)
-        cure = "Give a folder that may be written to"
-        raise OutputError(folder, "the folder is read-only", cure)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(handle)
+    if unlock is None:
         problem = "another run is writing to it"
-        raise OutputError(folder, problem, "Wait for its end, or stop it") from None
+        raise OutputError(folder, problem, "Wait for its end, or stop it")
     try:
         yield
     finally:
-        os.close(handle)
+        unlock()
 
 
 def sweep(folder: Path) -> int:
@@ -136,14 +132,13 @@ class StopRequest:
 def stoppable() -> Iterator[StopRequest]:
     """Listen to Ctrl-C and SIGTERM while the block runs."""
     stop = StopRequest()
-    signals = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, stop._ask) for number in signals]
+    before = [signal.signal(number, stop._ask) for number in ASKING]
     try:
         yield stop
     finally:
         if stop._end is not None:
             stop._end.cancel()
-        for number, handler in zip(signals, before, strict=True):
+        for number, handler in zip(ASKING, before, strict=True):
             signal.signal(number, handler)
 
 

@@ -16,8 +16,8 @@ from concurrent.futures import (
 )
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, replace
-from multiprocessing import forkserver, resource_tracker
-from multiprocessing.context import ForkServerContext
+from importlib import import_module
+from multiprocessing.context import BaseContext
 from pathlib import PurePosixPath
 from time import perf_counter
 from typing import Any, Protocol
@@ -29,9 +29,9 @@ from postproc.batch.plan import JobSetup, Result, Task, Unit, make_failure
 from postproc.compensation.micro_batch import Given, compensate_batch
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.sidecar import SUFFIX
-from postproc.compensation.workers import end_with_parent
 from postproc.exceptions import PostprocError
 from postproc.language.languages import file_named
+from postproc.operating_system import end_with_parent, start_worker_server
 from postproc.robot.pose import MM
 from postproc.threads import start_no_threads
 
@@ -192,7 +192,7 @@ def _one_by_one(
             yield make_failure(task.unit, _LOST)
 
 
-# The process that workers are forked from.
+# The process that workers are forked from, where there is a fork.
 #
 # It loads the package by itself: started first, it does so while this process loads
 # what it needs on its own.
@@ -200,20 +200,10 @@ def _one_by_one(
 READY = "postproc.batch.ready"
 
 
-def start_server() -> ForkServerContext:
+def start_server() -> BaseContext:
     """Start the process unless it runs already, and do not wait for it."""
     start_no_threads()
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([READY])
-    # Ctrl-C goes to the whole group, and is for us to answer. The tracker comes first:
-    # starting it ends all blocking of that signal.
-    resource_tracker.ensure_running()
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-    try:
-        forkserver.ensure_running()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-    return context
+    return start_worker_server(READY)
 
 
 # What a worker does with a task: the same on this machine and on a cluster.
@@ -350,8 +340,9 @@ _setups: Sequence[JobSetup] = ()
 class LocalPool:
     """Worker processes of this machine.
 
-    They are forked from a clean server process that has loaded the package already:
-    no lock or thread of this process is copied, and a new worker is there at once.
+    Where there is a fork they come from a clean server process that has loaded the
+    package already: no lock or thread of this process is copied, and a new worker is
+    there at once. Elsewhere they are new processes.
     """
 
     losses: tuple[type[BaseException], ...] = (BrokenProcessPool,)
@@ -406,6 +397,7 @@ def _begin(setups: Sequence[JobSetup]) -> None:
     """Make a new process a worker."""
     global _setups
     _setups = setups
+    import_module(READY)  # a worker that was not forked has not loaded it
     # Ctrl-C goes to the whole group: the parent decides what becomes of us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -1,7 +1,7 @@
-"""Whether lambda changes its sign within a file, or has the other one throughout.
+"""What changes at one row of a file: the sign of lambda, or the zero of a joint.
 
-The backlash that the rows show tells: its sign is that of the lambda columns. Geometry
-is free beside it.
+The backlash that the rows show tells the first: its sign is that of the lambda columns,
+in all rows too. Geometry is free beside both.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ CLEAR = 6.0  # standard errors of a backlash that tells
 JOINTS = 2  # that tell, at least, of a change within the file
 MOST_JOINTS = 4  # that tell, at least, of all rows: physics alone speaks for these
 LESS = 0.7  # of the median residual that may be left by a change
+ALONE = 0.2  # of the change of one joint that others may have
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +42,17 @@ class Sided:
     side: Floats
 
     @classmethod
-    def of(cls, batch: ArmStates, free: Floats, left: Floats) -> Sided:
-        """Take rows of errors `left` (n, 3) [m], beside free columns (n, 3, p)."""
+    def of(
+        cls, batch: ArmStates, free: Floats, left: Floats, side: Floats | None = None
+    ) -> Sided:
+        """Take rows and what else may move them.
+
+        Args:
+            batch: n rows.
+            free: Columns that are free, (n, 3, p).
+            left: What the rows are off by, (n, 3) [m].
+            side: Other directions than those of the file, (n, 6).
+        """
         n = len(batch)
         flat = free.reshape(3 * n, -1)
         scale = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
@@ -52,7 +62,7 @@ class Sided:
         root = np.sqrt(weight)[:, None]
         u, size, _ = np.linalg.svd(flat / scale * np.repeat(root, 3)[:, None], False)
         basis = u[:, size > 1e-6 * size[0]].reshape(n, 3, -1)
-        side = batch.states.direction
+        side = batch.states.direction if side is None else side
         moved = batch.jacobian * side[:, None, :] * root[:, :, None]
         return cls(basis, moved, left * root, weight, side)
 
@@ -71,6 +81,12 @@ class Sided:
         inner = gram - np.swapaxes(crossed, 1, 2) @ crossed
         inverse = np.linalg.pinv(inner, rcond=1e-9, hermitian=True)
         return np.asarray(np.einsum("nj,njk,nk->n", target, inverse, target))
+
+    def most_telling_row(self) -> int:
+        """Return the row from which on another sign explains most."""
+        gained = self.score_changes()
+        inside = np.arange(FEWEST, len(self.left) - FEWEST + 1)
+        return int(inside[np.argmax(gained[inside])])
 
     def backlashes(self, parts: list[Bools]) -> tuple[Floats, Floats, Floats]:
         """Fit a backlash of every joint to each part of the rows.
@@ -93,6 +109,12 @@ class Sided:
         size = np.linalg.norm(rest.reshape(-1, 3), axis=1)
         shape = (len(parts), -1)
         return value.reshape(shape), error.reshape(shape), size
+
+    def beside_free(self) -> Floats:
+        """Return what the free columns leave of the rows, (n,) [m]."""
+        free, y = self.free.reshape(3 * len(self.left), -1), self.left.reshape(-1)
+        rest = (y - free @ (free.T @ y)).reshape(-1, 3)
+        return np.asarray(np.linalg.norm(rest, axis=1))
 
     def telling(self, rows: Bools) -> Bools:
         """Return the joints that some rows reach from both directions, (6,)."""
@@ -118,10 +140,7 @@ def find_change_of_sign(sided: Sided) -> tuple[Bools, str] | None:
     n = len(sided.left)
     if n < 2 * FEWEST:
         return None
-    gained = sided.score_changes()
-    inside = np.arange(n + 1)
-    inside = inside[(inside >= FEWEST) & (inside <= n - FEWEST)]
-    first = int(inside[np.argmax(gained[inside])])
+    first = sided.most_telling_row()
     parts = [np.arange(n) < first, np.arange(n) >= first]
     value, error, after = sided.backlashes(parts)
     before = sided.backlashes([np.ones(n, dtype=bool)])[2]
@@ -141,3 +160,41 @@ def all_reversed(sided: Sided) -> bool:
     value, error, _ = sided.backlashes([every])
     clear = (np.abs(value[0]) > CLEAR * error[0]) & sided.telling(every)
     return bool(clear.sum() >= MOST_JOINTS and (value[0][clear] > 0.0).all())
+
+
+def find_joint_step(batch: ArmStates, free: Floats, left: Floats) -> JointChange | None:
+    """Find the row from which on one joint is off by another angle, or None.
+
+    Args:
+        batch: n rows.
+        free: What else moves them, the zeros of the joints too, (n, 3, p).
+        left: What they are off by, (n, 3) [m].
+    """
+    n = len(left)
+    if n < 2 * FEWEST:
+        return None
+    sided = Sided.of(batch, free, left, np.ones((n, 6)))
+    first = sided.most_telling_row()
+    value, error, after = sided.backlashes([np.arange(n) >= first])
+    joint = int(np.argmax(np.abs(value[0]) / np.maximum(error[0], 1e-12)))
+    by = float(value[0, joint])
+    others = np.delete(np.abs(value[0]) - CLEAR * error[0], joint)
+    clear = abs(by) > CLEAR * error[0, joint] and others.max() < ALONE * abs(by)
+    if not clear or np.median(after) > LESS * np.median(sided.beside_free()):
+        return None
+    return JointChange(joint, by, first)
+
+
+@dataclass(frozen=True)
+class JointChange:
+    """A joint that is off by another angle from one row on.
+
+    Attributes:
+        joint: The joint, from 0.
+        by: What its angles lack from there on [rad].
+        first: Number of the row.
+    """
+
+    joint: int
+    by: float
+    first: int

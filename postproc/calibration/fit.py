@@ -33,9 +33,10 @@ from postproc.calibration.reversal_test import (
 )
 from postproc.calibration.stops import pool_readings
 from postproc.calibration.survey_checks import (
-    ask_about_signs,
+    ask_about_steps,
     check_orientations,
     check_registered,
+    check_signs,
     check_stops,
     check_survey,
     list_losses,
@@ -313,13 +314,15 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
         monuments = in_base_frame(monuments, placed)
     survey, reversals = split_reversals(survey, cell.arm)
     check_survey(survey, cell.arm)
+    if cell.measurements.lambda_sign is None:
+        check_signs(survey, cell.arm)
     if frame == "base":
         setup = (*setup, *file_shifts(survey, cell.arm, cell.tracker))
     survey = check_orientations(survey, cell.arm)
     notes = (
         *survey.warnings,
         *list_losses(cell.arm, survey),
-        *ask_about_signs(survey, cell.arm),
+        *ask_about_steps(survey, cell.arm),
     )
     survey = replace(survey, warnings=notes)
     mounted = cell.file.robot.mounting is not None

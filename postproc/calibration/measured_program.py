@@ -15,17 +15,19 @@ from postproc.calibration.measurements import (
 )
 from postproc.calibration.monuments import split_references
 from postproc.calibration.tables import DETECT, TableFormat
+from postproc.calibration.text_table import TextTable
 from postproc.compensation.program import (
     plan_visits,
     read_program,
     states_of,
 )
 from postproc.compensation.program_files import read_files
-from postproc.exceptions import MeasurementError
+from postproc.exceptions import MeasurementError, ProgramError
 from postproc.files import NamedText
 from postproc.language.languages import language_of
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
+from postproc.robot.state import States
 
 
 def join_program(
@@ -50,7 +52,33 @@ def join_program(
         MeasurementError: An id that the program does not have, or has several times.
         ProgramError: The program cannot be read.
     """
-    table, references = split_references(read_points(data, reading))
+    return join_table(read_points(data, reading), program, cell)
+
+
+def plan_arrivals(program: Path, cell: Cell) -> States:
+    """Plan a program, and return its arrivals as far as they are known.
+
+    Raises:
+        ProgramError: It cannot be read, or none of them is.
+    """
+    visits = read_program(read_files(program), cell).visits
+    planned = plan_visits(visits, cell)
+    states = states_of(planned.plan, cell, cell.temperature, visits)
+    known = np.flatnonzero(~np.isnan(states.q).any(axis=1))
+    if len(known) == 0:
+        cure = "See `postproc explain` for what is known of its targets"
+        raise ProgramError(program, "has no arrival that can be planned", cure)
+    return states[known]
+
+
+def join_table(points: TextTable, program: Path, cell: Cell) -> Measurements:
+    """Give the rows of a table, with our columns, the states of their visits.
+
+    Raises:
+        MeasurementError, ProgramError: See `join_program`.
+    """
+    points.require("id", *POSITION)
+    table, references = split_references(points)
     visits = read_program(read_files(program), cell).visits
     planned = plan_visits(visits, cell)
     places = _places(visits.measure_id, [visits.names[k] for k in visits.name])

@@ -20,25 +20,26 @@ from postproc.calibration.monuments import (
     split_references,
     tracker_motion,
 )
+from postproc.calibration.recognise import recognise
 from postproc.calibration.tables import (
     DETECT,
     JOINTS,
-    NUMBER,
     Format,
     Nests,
     TableFormat,
-    TextTable,
+    by_headers,
     check_axes,
+    check_clear,
     in_visit_order,
     read_directions,
     read_foreign,
-    read_headed,
     read_rotation,
     read_tools,
     read_visits,
     row_names,
     translate,
 )
+from postproc.calibration.text_table import NUMBER, TextTable, read_headed
 from postproc.exceptions import MeasurementError
 from postproc.files import NamedText
 from postproc.model.registration import rigid_fit
@@ -471,9 +472,7 @@ def _offsets(parts: Sequence[Measurements]) -> list[float]:
 # software writes Latin-1 text, times with apostrophes, and any order of columns. They
 # are joined with the program that was measured.
 
-NAMES = ("id", "name", "point", "point name", "point id", "target")
 WHOLE = re.compile(r"^\d+$")
-AXIS = {a: re.compile(rf"^{a}(\s*[\[(]?\s*mm\s*[\])]?|_mm)?$", re.I) for a in "xyz"}
 
 
 def read_points(
@@ -489,17 +488,37 @@ def read_points(
     if reading.columns is not None:
         table = read_foreign(path, reading)
         table.require("id", *POSITION)
-        return table
+        return point_names(table)
     table = read_headed(path, **reading.given)
     if table.has("id", *POSITION):
         return table
-    name, axes = _columns(table)
-    scaled = {ours: ((axis, reading.mm_per_unit),)
-              for ours, axis in zip(POSITION, axes, strict=True)}  # fmt: skip
-    points = translate(table, Format({"id": ((name, 1.0),), **scaled}))
-    cells = points.cells.copy()
-    cells[:, 0] = [target_of(text) for text in points.text("id")]
+    points = by_headers(table, reading) if table.headed else _by_places(table, reading)
+    if not points.has("id", *POSITION):
+        raise MeasurementError(
+            table.path,
+            "no columns for a name and x, y, z",
+            f"The header has: {', '.join(table.columns)}. Name them id, x_mm, y_mm, "
+            "z_mm",
+            line=table.top,
+        )
+    return point_names(points)
+
+
+def point_names(points: TextTable) -> TextTable:
+    """Name points by their targets alone, without collection and group."""
+    points.require("id")
+    cells, column = points.cells.copy(), points.columns.index("id")
+    cells[:, column] = [target_of(text) for text in points.text("id")]
     return replace(points, cells=cells)
+
+
+def _by_places(table: TextTable, reading: TableFormat) -> TextTable:
+    """Turn a list without a header into ours."""
+    name, axes = places_of(table)
+    sources = {"id": name, **dict(zip(POSITION, axes, strict=True))}
+    found = recognise(table, reading.unit, choices=sources)
+    check_clear(table, found)
+    return translate(table, Format(found.columns))
 
 
 def target_of(name: str) -> str:
@@ -511,29 +530,7 @@ def target_of(name: str) -> str:
     return name.rpartition("::")[2].strip() or name
 
 
-def _columns(table: TextTable) -> tuple[str, tuple[str, str, str]]:
-    """Find the columns of name and coordinates.
-
-    Raises:
-        MeasurementError: They are not there.
-    """
-    if not table.headed:
-        return _places_of(table)
-    name = next((c for c in table.columns if c.lower() in NAMES), None)
-    axes = [next((c for c in table.columns if AXIS[a].match(c)), None) for a in "xyz"]
-    if name is None or None in axes:
-        raise MeasurementError(
-            table.path,
-            "no columns for a name and x, y, z",
-            f"The header has: {', '.join(table.columns)}. Name them id, x_mm, y_mm, "
-            "z_mm",
-            line=1,
-        )
-    x, y, z = (str(axis) for axis in axes)
-    return name, (x, y, z)
-
-
-def _places_of(table: TextTable) -> tuple[str, tuple[str, str, str]]:
+def places_of(table: TextTable) -> tuple[str, tuple[str, str, str]]:
     """Find name and coordinates by their cells, in a table without a header.
 
     The coordinates are the first three columns of numbers side by side; the name stands

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.evidence import Normal, maximise
-from postproc.calibration.tables import TextTable
+from postproc.calibration.text_table import TextTable
 from postproc.exceptions import MeasurementError
 from postproc.model.effects.base_shift import rigid_motions
 from postproc.model.effects.tracker_drift import TrackerDrift

@@ -157,6 +157,8 @@ def usable(arm: Arm, q: Floats, tool: Floats, tracker: Floats | None) -> Bools:
 MODES = ("lhs", "optimal", "d-optimal")
 POOL = 6  # candidate poses per wanted pose in an optimal design
 TYPICAL_NOISE = 3e-5  # [m] tracker and repeatability of one coordinate
+AROUND = np.deg2rad(15.0)  # round an arrival of a program
+MOST_ARRIVALS = 500  # of a program, by which poses are chosen
 ATTEMPTS = 12  # times the number of drawn poses doubles before giving up
 
 
@@ -196,6 +198,7 @@ def design_survey(
     mode: str = "lhs",
     tracker: Floats | None = None,
     seed: int = 0,
+    job: States | None = None,
 ) -> Design:
     """Choose the poses of a survey.
 
@@ -208,6 +211,8 @@ def design_survey(
             the parameters are.
         tracker: Tracker position in the base frame, (3,) [m], or None.
         seed: Of the random draws.
+        job: Arrivals of a program: poses are round these, and chosen so that the errors
+            there are known best, unless the mode is "d-optimal".
 
     Raises:
         PostprocError: A wrong mode or number, or too few poses can be measured.
@@ -217,18 +222,51 @@ def design_survey(
     if poses < 1:
         raise PostprocError(f"{poses} poses are no survey. Ask for 1 or more")
     rng = np.random.default_rng(seed)
-    wanted = poses * (1 if mode == "lhs" else POOL)
-    pool = _candidates(arm, np.atleast_2d(probes), wanted, tracker, rng)
+    spread = mode == "lhs" and job is None
+    wanted = poses * (1 if spread else POOL)
+    draw = _all_over(arm, rng) if job is None else _round_job(arm, job.q, rng)
+    pool = _candidates(arm, np.atleast_2d(probes), wanted, tracker, rng, draw)
     # Columns of the base model per pose, three rows from either side.
     base = Combination(propose(BASE_EFFECTS, arm, pool))
     back = pool.with_(direction=-pool.direction)
     both = [base.columns(ArmStates(arm, s)) for s in (pool, back)]
     X = np.concatenate(both, axis=1) * base.scales / TYPICAL_NOISE
-    if mode != "lhs":
-        kept = choose(X, poses, gain_i(X) if mode == "optimal" else gain_d)
+    if not spread:
+        there = X if job is None else _rows_of_job(arm, base, job, rng)
+        kept = choose(X, poses, gain_d if mode == "d-optimal" else gain_i(there))
         pool, X = pool[kept], X[kept]
     seen = observe(X.reshape(-1, X.shape[2]), base.names, floor=1.0)
-    return Design(pool.q, pool.direction, pool.tool_id, mode, seen)
+    name = mode if job is None else "round the program's arrivals"
+    return Design(pool.q, pool.direction, pool.tool_id, name, seen)
+
+
+Draw = Callable[[int], Floats]
+
+
+def _all_over(arm: Arm, rng: np.random.Generator) -> Draw:
+    """Draw poses (n, 6) [rad] all over the joint ranges, from a Latin hypercube."""
+    low, high = joint_box(arm)
+    return lambda n: low + qmc.LatinHypercube(6, rng=rng).random(n) * (high - low)
+
+
+def _round_job(arm: Arm, q: Floats, rng: np.random.Generator) -> Draw:
+    """Draw poses (n, 6) [rad] some degrees round those of a program, (m, 6) [rad]."""
+    low, high = joint_box(arm)
+
+    def draw(n: int) -> Floats:
+        at = q[rng.integers(len(q), size=n)]
+        return np.clip(at + rng.uniform(-AROUND, AROUND, (n, 6)), low, high)
+
+    return draw
+
+
+def _rows_of_job(
+    arm: Arm, base: Combination, job: States, rng: np.random.Generator
+) -> Floats:
+    """Return rows of the base model at arrivals of a program, (n, 3, p), scaled."""
+    some = rng.permutation(len(job))[:MOST_ARRIVALS]
+    columns = base.columns(ArmStates(arm, job[some]))
+    return np.asarray(columns * base.scales / TYPICAL_NOISE)
 
 
 def _candidates(
@@ -237,17 +275,16 @@ def _candidates(
     count: int,
     tracker: Floats | None,
     rng: np.random.Generator,
+    draw: Draw,
 ) -> States:
-    """Draw poses that can be measured from a Latin hypercube.
+    """Draw poses that can be measured.
 
     Raises:
         PostprocError: Hardly any pose can be measured.
     """
-    low, high = joint_box(arm)
     drawn = count
     for _ in range(ATTEMPTS):
-        cube = qmc.LatinHypercube(6, rng=rng).random(drawn)
-        q = low + cube * (high - low)
+        q = draw(drawn)
         probe = np.arange(drawn) % len(probes)
         good = usable(arm, q, probes[probe], tracker)
         turns = [np.flatnonzero(good & (probe == k)) for k in range(len(probes))]

@@ -23,7 +23,8 @@ from postproc.calibration.report import FreeForms
 from postproc.calibration.residuals import beside_all
 from postproc.calibration.survey_checks import check_against
 from postproc.calibration.survey_files import MeasuredFrame, survey_frame
-from postproc.calibration.tables import DETECT, TableFormat, TextTable, read_foreign
+from postproc.calibration.tables import DETECT, TableFormat, read_foreign
+from postproc.calibration.text_table import TextTable
 from postproc.files import open_text, spreadsheet_text
 from postproc.model.model import (
     FreePart,

@@ -19,7 +19,7 @@ from postproc.calibration.survey_checks import (
     check_stops,
 )
 from postproc.calibration.survey_files import MeasuredFrame, carrying_load
-from postproc.calibration.tables import TextTable
+from postproc.calibration.text_table import TextTable
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.model.effects.effect import Effect
 from postproc.model.kinematics import ArmStates

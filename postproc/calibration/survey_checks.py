@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from postproc.calibration.direction_signs import (
     Sided,
     all_reversed,
     find_change_of_sign,
+    find_joint_step,
 )
 from postproc.calibration.likely_causes import (
     CLOSE,
+    LEAST_OFFSET,
     UNKNOWN,
     Cause,
     cause_in_any_frame,
@@ -55,6 +58,7 @@ OTHER_ARM = (
     0.7  # of what the nominal arm leaves: a model that leaves more knows nothing
 )
 LEAST_OF_ARM = 2e-4  # [m] that such a model leaves
+MAY_BE = {1: " or the base or the tracker turned", 6: " or the tool turned"}
 TOOL_APART = 1e-3  # [m] tools that differ by less are told by the fit, not refused
 
 
@@ -72,6 +76,7 @@ def check_survey(survey: Measurements, arm: Arm) -> None:
     check_tools(survey, arm)
     _check_kinds(survey, gap)
     _check_change_of_sign(survey, arm, None)
+    _check_joint_step(survey, arm, None)
 
 
 def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
@@ -95,10 +100,12 @@ def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
     if wrong is not None:
         cure = (
             "Change the sign of the columns (lambda is 1 if the joint arrived in its "
-            "positive direction), or fit a new model if the survey had the same error"
+            "positive direction), or fit a new model if the survey had the same error "
+            "(--set measurements.lambda_sign=-1 turns all of them)"
         )
         raise MeasurementError(survey.path, wrong, cure)
     _check_change_of_sign(survey, arm, model)
+    _check_joint_step(survey, arm, model)
     _check_arm(survey, arm, error(survey.states))
 
 
@@ -122,6 +129,22 @@ def _check_change_of_sign(survey: Measurements, arm: Arm, model: Model | None) -
     )
 
 
+def _check_joint_step(survey: Measurements, arm: Arm, model: Model | None) -> None:
+    """Refuse rows of which a joint is off by far from one row on."""
+    found = find_joint_step(*beside_geometry(survey, arm, model))
+    if found is None or abs(found.by) < LEAST_OFFSET:
+        return
+    at, joint = found.first, found.joint + 1
+    raise MeasurementError(
+        survey.path,
+        f"{len(survey) - at} of {len(survey)} rows, from row {survey.ids[at]} on, look "
+        f"like joint {joint} is off by {np.rad2deg(found.by):+.2f} deg"
+        f"{MAY_BE.get(joint, '')}",
+        "Correct the joint's zero (mastering), or fit these rows by themselves",
+        line=int(survey.line[at]),
+    )
+
+
 def as_surveyed(survey: Measurements, arm: Arm, model: Model | None = None) -> Sided:
     """Take the rows of a survey in the base frame, beside geometry.
 
@@ -131,6 +154,13 @@ def as_surveyed(survey: Measurements, arm: Arm, model: Model | None = None) -> S
         model: What is known of the arm, or None. Beside a model the base, the tool and
             the zeros of the joints are free.
     """
+    return Sided.of(*beside_geometry(survey, arm, model))
+
+
+def beside_geometry(
+    survey: Measurements, arm: Arm, model: Model | None = None
+) -> tuple[ArmStates, Floats, Floats]:
+    """Return rows, free columns, (n, 3, p), and what rows are off by, (n, 3) [m]."""
     batch = ArmStates(arm, survey.states)
     left = survey.position - batch.walk.tcp
     if model is not None:
@@ -141,18 +171,37 @@ def as_surveyed(survey: Measurements, arm: Arm, model: Model | None = None) -> S
     else:
         parts = [rigid_motions(batch.walk.tcp), batch.walk.flange, batch.jacobian]
         free = np.concatenate(parts, axis=2)
-    return Sided.of(batch, free, left)
+    return batch, free, left
 
 
-def ask_about_signs(survey: Measurements, arm: Arm) -> tuple[str, ...]:
-    """Ask about lambda columns by which links run ahead of their drives."""
+def check_signs(survey: Measurements, arm: Arm) -> None:
+    """Refuse lambda columns by which links run ahead of their drives.
+
+    Raises:
+        MeasurementError: With what to state of them.
+    """
     if survey.inferred.all() or not all_reversed(as_surveyed(survey, arm)):
+        return
+    raise MeasurementError(
+        survey.path,
+        "by the lambda columns the links of all joints run ahead of their drives: "
+        "backlash does not do that",
+        "lambda is 1 if the joint arrived in its positive direction. Where the columns "
+        "have the other sign, add --set measurements.lambda_sign=-1; else =1",
+    )
+
+
+def ask_about_steps(survey: Measurements, arm: Arm) -> tuple[str, ...]:
+    """Ask about a joint that is off by a little from one row on."""
+    found = find_joint_step(*beside_geometry(survey, arm))
+    if found is None:
         return ()
     return (
-        f"{survey.path.name}: by the lambda columns the links of all joints run ahead "
-        "of their drives, which backlash does not do. Do the columns have the other "
-        "sign (lambda is 1 if the joint arrived in its positive direction)? Then every "
-        "backlash is corrected in the wrong direction",
+        f"{survey.path.name}: rows from {survey.ids[found.first]} on look like joint "
+        f"{found.joint + 1} is off by {np.rad2deg(found.by):+.3f} deg"
+        f"{MAY_BE.get(found.joint + 1, '')}: was it mastered in between, or did it "
+        "slip? No zero fits all rows: fit those before it, and diagnose the others "
+        "with that model",
     )
 
 
@@ -198,29 +247,52 @@ def _check_kinds(survey: Measurements, gap: Floats) -> None:
 def _check_arm(survey: Measurements, arm: Arm, error: Floats) -> None:
     """Refuse rows of which a model explains nothing: they are another arm's.
 
-    Base, tool and zeros of the joints may differ from those of the model's survey: an
-    arm that was mastered or moved since is no other.
+    Base, tool and zeros of the joints may differ from those of the model's survey, and
+    change once within the rows: an arm that was mastered or moved since is no other.
     """
-    if len(survey) < ENOUGH_ROWS_OF_ARM:
+    n = len(survey)
+    if n < ENOUGH_ROWS_OF_ARM:
         return
-    batch = ArmStates(arm, survey.states)
-    free = np.concatenate(
-        [rigid_motions(batch.walk.tcp), batch.walk.flange, batch.jacobian], axis=2
-    ).reshape(-1, 15)
-    scale = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
-    read = survey.position - batch.walk.tcp
-    sizes = []
-    for left in (read - error, read):
-        sizes.append(_typical_beside(free / scale, left))
-    with_model, nominal = sizes
-    if with_model > OTHER_ARM * nominal and with_model > LEAST_OF_ARM:
+    whole = _Misfit.of(survey, arm, error)
+    half = max(n // 2, ENOUGH_ROWS_OF_ARM)
+    ends = np.arange(half), np.arange(n - half, n)
+    if whole.other and all(_Misfit.of(survey[e], arm, error[e]).other for e in ends):
         raise MeasurementError(
             survey.path,
             "the model does not fit these rows: its error is "
-            f"{with_model / MM:.2f} mm, that of the nominal arm {nominal / MM:.2f} mm "
-            "(base, tool and joint zeros fitted in both)",
+            f"{whole.by_model / MM:.2f} mm, that of the nominal arm "
+            f"{whole.nominal / MM:.2f} mm (base, tool and joint zeros fitted in both)",
             "Are they another arm's? After a crash or a repair, fit a new model",
         )
+
+
+@dataclass(frozen=True)
+class _Misfit:
+    """What a model and the nominal arm leave of rows, beside base, tool and zeros.
+
+    Attributes:
+        by_model, nominal: Typical errors [m].
+    """
+
+    by_model: float
+    nominal: float
+
+    @classmethod
+    def of(cls, survey: Measurements, arm: Arm, error: Floats) -> Self:
+        """Fit base, tool and zeros to rows whose errors are predicted, (n, 3) [m]."""
+        batch = ArmStates(arm, survey.states)
+        free = np.concatenate(
+            [rigid_motions(batch.walk.tcp), batch.walk.flange, batch.jacobian], axis=2
+        ).reshape(-1, 15)
+        free = free / np.maximum(np.linalg.norm(free, axis=0), 1e-300)
+        read = survey.position - batch.walk.tcp
+        return cls(_typical_beside(free, read - error), _typical_beside(free, read))
+
+    @property
+    def other(self) -> bool:
+        """Whether the model knows nothing of the rows."""
+        left = self.by_model
+        return left > OTHER_ARM * self.nominal and left > LEAST_OF_ARM
 
 
 def _typical_beside(columns: Floats, left: Floats) -> float:

@@ -54,7 +54,11 @@ def read_measurements(
         joined = [join_program(p, Path(program), cell, reading) for p in places]
         return concatenate(joined)
     parts = [read_survey_file(p, cell.arm, cell.nests, reading=reading) for p in places]
-    return carrying_load(replace(concatenate(parts), mounting=cell.mounting), cell)
+    rows = replace(concatenate(parts), mounting=cell.mounting)
+    if cell.measurements.lambda_sign == -1:
+        side = rows.states.direction * np.where(rows.inferred, 1.0, -1.0)[:, None]
+        rows = rows.with_states(rows.states.with_(direction=side))
+    return carrying_load(rows, cell)
 
 
 def frame_of(cell: Cell, frame: PointFrame | None) -> PointFrame:

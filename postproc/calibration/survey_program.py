@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats, Ints
+from postproc.calibration.measured_program import plan_arrivals
 from postproc.calibration.pose_design import design_survey, where_to_reverse
 from postproc.exceptions import ProgramError
 from postproc.files import write_all
@@ -91,19 +92,23 @@ def _move(q: Floats, measured: str = "") -> MeasuringMove:
     return MeasuringMove(tuple(np.rad2deg(q).tolist()), measured)
 
 
-def write_survey(cell: Cell | str | Path, output: Path, poses: int) -> str:
+def write_survey(
+    cell: Cell | str | Path, output: Path, poses: int, job: Path | None = None
+) -> str:
     """Design a survey as [survey] of the cell says, and write it as a program.
 
     Args:
         cell: The cell, or its file.
         output: The program to write; its suffix names the language.
         poses: Number of poses.
+        job: A program whose working volume is surveyed; None: all that the arm reaches.
 
     Returns:
         What was written, with the observability of the design, in words.
 
     Raises:
-        ProgramError: The arm has a controller of another language.
+        ProgramError: The arm has a controller of another language, or nothing that the
+            job does is known.
         PostprocError: A wrong number of poses.
         OutputError: The program cannot be written.
     """
@@ -111,7 +116,10 @@ def write_survey(cell: Cell | str | Path, output: Path, poses: int) -> str:
     language = _language_for(cell, output)
     asked = cell.file.survey or SurveySection()
     arm, probes = cell.arm, cell.probes
-    design = design_survey(arm, probes, poses, asked.mode, cell.tracker, asked.seed)
+    arrivals = None if job is None else plan_arrivals(job, cell)
+    design = design_survey(
+        arm, probes, poses, asked.mode, cell.tracker, asked.seed, arrivals
+    )
     turned = (
         where_to_reverse(arm, design, probes, asked.reversals)
         if asked.reversals

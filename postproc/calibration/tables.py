@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import hashlib
 import itertools
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,362 +14,27 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from postproc.arrays import Bools, Floats
+from postproc.calibration.recognise import (
+    DEGREES,
+    DEGREES_PER,
+    MM_PER,
+    UNSTATED,
+    Recognised,
+    recognise,
+)
+from postproc.calibration.text_table import (
+    BLANKS,
+    NUMBER,
+    TextTable,
+    read_headed,
+)
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.files import NamedText
 from postproc.robot.arm import Arm
+from postproc.robot.arm_file import load_toml
 from postproc.robot.cell import Cell
 from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.pose import MM
-
-# Reading a table of numbers as people export them.
-#
-# Comma, semicolon or tab; decimal point or comma; UTF-8, UTF-16 or Latin-1.
-
-MAX_BYTES = 500_000_000
-NUMBER = re.compile(r"^\s*[-+]?\d+([.,]\d+)?([eE][-+]?\d+)?\s*$")
-FEW_NUMBERS = 3  # a first line with as many numbers is no header
-BLANKS = r"\s+"  # the separator of tables in columns
-SEPARATOR = re.compile(r'^\s*"?sep=(.)"?[;,\t]*\s*$', re.I)  # Excel's first line
-COMMENTS = ("#", "//", "%")
-EMPTY_CURE = "Expected a header and one row per measurement"
-DECIMAL_COMMA = re.compile(r"^\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*$")
-
-
-@dataclass(frozen=True, eq=False)
-class TextTable:
-    """Text cells with their place in the file.
-
-    Attributes:
-        path: The file.
-        columns: Header names, stripped.
-        cells: Text of all cells, (n, k).
-        line: 1-based line of every row, (n,).
-        decimal: "." or ",".
-        sha256: Hash of the file's bytes.
-        headed: Whether the file names its columns; else they are 1, 2, ..
-    """
-
-    path: Path
-    columns: tuple[str, ...]
-    cells: NDArray[np.object_]
-    line: NDArray[np.int64]
-    decimal: str
-    sha256: str
-    headed: bool = True
-
-    def __len__(self) -> int:
-        """Return the number of rows."""
-        return len(self.line)
-
-    def has(self, *names: str) -> bool:
-        """Tell whether all columns are there."""
-        return all(name in self.columns for name in names)
-
-    def text(self, name: str) -> list[str]:
-        """Return a column as stripped text.
-
-        Raises:
-            MeasurementError: There is no such column.
-        """
-        self.require(name)
-        return [str(v).strip() for v in self.cells[:, self.columns.index(name)]]
-
-    def numbers(self, name: str, empty: bool = False) -> Floats:
-        """Return a column as numbers, (n,).
-
-        Args:
-            name: Header name.
-            empty: Whether an empty cell is allowed; it becomes NaN.
-
-        Raises:
-            MeasurementError: A cell is no finite number; line and column are named.
-        """
-        out = np.empty(len(self))
-        for i, text in enumerate(self.text(name)):
-            out[i] = self._number(i, name, text, empty)
-        return out
-
-    def block(self, names: tuple[str, ...]) -> Floats:
-        """Return several columns as numbers, (n, k)."""
-        return np.stack([self.numbers(name) for name in names], axis=1)
-
-    def require(self, *names: str) -> None:
-        """Check that columns are there.
-
-        Raises:
-            MeasurementError: Naming the missing columns and those that are there.
-        """
-        missing = [name for name in names if name not in self.columns]
-        if missing and not self.headed:
-            raise MeasurementError(
-                self.path,
-                f"has no header: its columns are 1 to {len(self.columns)}, column "
-                f"{', '.join(missing)} is missing",
-                "Write a header, or name the columns by number in a column map "
-                '(measurements.columns) with lines as q1_deg = "8"',
-                line=int(self.line[0]),
-            )
-        if missing:
-            raise MeasurementError(
-                self.path,
-                f"column {', '.join(missing)} is missing",
-                f"The header has: {', '.join(self.columns)}. Rename one of these, or "
-                "map it (measurements.columns)",
-                line=1,
-            )
-
-    def _number(self, row: int, name: str, text: str, empty: bool) -> float:
-        """Convert one cell."""
-        if empty and text == "":
-            return float("nan")
-        plain = text.replace(",", ".") if self.decimal == "," else text
-        try:
-            value = float(plain)
-        except ValueError:
-            value = float("nan")
-        if not np.isfinite(value):
-            raise MeasurementError(
-                self.path,
-                f"{text!r} in column {name} is not a number",
-                "Correct the cell or remove the row",
-                line=int(self.line[row]),
-            )
-        return value
-
-
-def read_table(
-    path: str | Path | NamedText,
-    encoding: str | None = None,
-    delimiter: str | None = None,
-    decimal: str | None = None,
-    comment: str | None = None,
-    header: bool | None = True,
-) -> TextTable:
-    """Read a table; what is not given is detected.
-
-    A line ``sep=;`` names the separator, as Excel writes it. Comment lines, a title
-    above the header, empty rows and empty cells at the ends of rows are no data.
-
-    Args:
-        path: The file, or its text.
-        encoding: Name of a Python codec.
-        delimiter: Between cells.
-        decimal: "." or ",".
-        comment: Lines that begin with it are no data; default: # and // and %.
-        header: Whether the first line names the columns; else they are 1, 2, ..; None:
-            it does unless it holds numbers.
-
-    Raises:
-        MeasurementError: The file cannot be read, is empty, or its lines differ.
-    """
-    path, raw = _read(path)
-    lines = [
-        (i + 1, text)
-        for i, text in enumerate(_decode(raw, encoding, path).splitlines())
-        if text.strip()
-    ]
-    separator = SEPARATOR.match(lines[0][1]) if lines else None
-    if separator is not None:
-        delimiter, lines = delimiter or separator.group(1), lines[1:]
-    lines, comments = _without_comments(lines, comment)
-    if not lines:
-        raise MeasurementError(path, "has no measurements", EMPTY_CURE)
-    split = delimiter or _delimiter([text for _, text in lines])
-    rows = _without_title(_cut(path, lines, split))
-    headed = _is_header(rows[0][1]) if header is None else header
-    names_of_columns = _header_in(comments, split, rows) if not headed else None
-    if header is not False and names_of_columns is not None:
-        rows, headed = [names_of_columns, *rows], True
-    if len(rows) < 1 + headed:
-        raise MeasurementError(path, "has no measurements", EMPTY_CURE)
-    body = rows[1:] if headed else rows
-    names = _strip_end(rows[0][1])
-    if not headed:
-        width = int(np.median([len(_strip_end(cells)) for _, cells in body]))
-        names = [str(k + 1) for k in range(max(width, len(names)))]
-    cells, names = _block(path, names, body, rows[0][0], headed)
-    line = np.array([i for i, _ in body], dtype=np.int64)
-    sign = decimal or _decimal(cells, split)
-    digest = hashlib.sha256(raw).hexdigest()
-    return TextTable(path, tuple(names), cells, line, sign, digest, headed)
-
-
-def read_headed(path: str | Path | NamedText, **options: Any) -> TextTable:
-    """Read a table that may have no header; its columns are then 1, 2, ..
-
-    Raises:
-        MeasurementError: See `read_table`.
-    """
-    return read_table(path, **{"header": None, **options})
-
-
-def _read(file: str | Path | NamedText) -> tuple[Path, bytes]:
-    """Read a file, unless its bytes are given; return its path and its bytes."""
-    path = Path(file.name if isinstance(file, NamedText) else file)
-    try:
-        raw = file.data if isinstance(file, NamedText) else path.read_bytes()
-    except OSError as exc:
-        problem = f"cannot be read ({exc.strerror})"
-        raise MeasurementError(path, problem, "Check the path") from None
-    if len(raw) > MAX_BYTES:
-        raise MeasurementError(path, "is too large for a survey", "Check the path")
-    return path, raw
-
-
-def _decode(raw: bytes, encoding: str | None, path: Path) -> str:
-    """Decode bytes: the given codec, UTF-16 by its mark, UTF-8, else Latin-1."""
-    marks = (b"\xff\xfe", b"\xfe\xff")
-    if encoding is None and b"\0" in raw and not raw.startswith(marks):
-        cure = "Export the measurements as CSV text"
-        raise MeasurementError(path, "is not a text file", cure)
-    for codec in [encoding or ("utf-16" if raw.startswith(marks) else "utf-8-sig")]:
-        try:
-            return raw.decode(codec)
-        except (UnicodeDecodeError, LookupError):
-            if encoding is not None:
-                problem = f"cannot be decoded as {encoding}"
-                raise MeasurementError(path, problem, "Try another") from None
-    return raw.decode("latin-1")
-
-
-Lines = list[tuple[int, str]]  # 1-based line and its text
-Row = tuple[int, list[str]]  # 1-based line and its cells
-
-
-def _without_comments(lines: Lines, comment: str | None) -> tuple[Lines, Lines]:
-    """Part the rows from comment lines; return both.
-
-    Where most lines begin with the sign, it belongs to the names of the points.
-    """
-    signs = (comment,) if comment else COMMENTS
-    noted = [text.lstrip(' "').startswith(signs) for _, text in lines]
-    if comment is None and 2 * sum(noted) > len(lines) + 4:
-        return lines, []
-    pairs = list(zip(lines, noted, strict=True))
-    return [t for t, is_note in pairs if not is_note], [t for t, note in pairs if note]
-
-
-def _header_in(comments: Lines, split: str, rows: list[Row]) -> Row | None:
-    """Find a header in the last comment above the rows, as numpy.savetxt writes it."""
-    above = [line for line in comments if line[0] < rows[0][0]]
-    if not above:
-        return None
-    number, text = above[-1]
-    cells = _strip_end(_cells_of(text.lstrip().lstrip("#/% "), split))
-    fits = len(cells) == len(_strip_end(rows[0][1])) and len(set(cells)) == len(cells)
-    return (number, cells) if fits and _is_header(cells) else None
-
-
-def _is_header(cells: list[str]) -> bool:
-    """Return True if cells name columns: few numbers, or the columns' own numbers."""
-    cells = _strip_end(cells)
-    numbers = sum(bool(NUMBER.match(cell)) for cell in cells)
-    counted = [[str(k + first) for k in range(len(cells))] for first in (0, 1)]
-    return numbers < FEW_NUMBERS or cells in counted
-
-
-def _without_title(rows: list[Row]) -> list[Row]:
-    """Leave out lines of text above the header, which have fewer cells than rows."""
-    widths = [sum(cell != "" for cell in cells) for _, cells in rows]
-    usual = float(np.median(widths))
-    for k, (_, cells) in enumerate(rows):
-        numbers = sum(bool(NUMBER.match(cell)) for cell in cells)
-        if 2 * widths[k] >= usual or numbers > 1:
-            return rows[k:]
-    return rows
-
-
-def _delimiter(lines: list[str]) -> str:
-    """Take the separator that cuts the first line into most cells."""
-    first = max(lines[:3], key=len)
-    best = max((";", "\t", ","), key=first.count)
-    if best == ",":  # or they are decimal commas between blanks
-        cells = lines[min(1, len(lines) - 1)].split()
-        if sum(bool(DECIMAL_COMMA.match(cell)) for cell in cells) >= FEW_NUMBERS:
-            return BLANKS
-    return best if first.count(best) else BLANKS
-
-
-def _cut(path: Path, lines: Lines, split: str) -> list[Row]:
-    """Cut lines into cells, stripped; rows of empty cells are left out."""
-    if split == BLANKS or len(split) > 1 or sum(t.count('"') for _, t in lines) % 2:
-        rows = [(number, _cells_of(text, split)) for number, text in lines]
-    else:  # a quoted cell may go over several lines
-        reader = csv.reader(
-            (text + "\n" for _, text in lines), delimiter=split, skipinitialspace=True
-        )
-        rows, before = [], 0
-        try:
-            for cells in reader:
-                number = lines[before][0]
-                rows.append((number, [" ".join(c.split()) for c in cells]))
-                before = reader.line_num
-        except csv.Error:
-            problem = "holds a cell of more than 100,000 characters"
-            cure = "Export the measurements as CSV text"
-            raise MeasurementError(path, problem, cure, line=lines[before][0]) from None
-    rows = [row for row in rows if any(row[1])]
-    if not rows:
-        raise MeasurementError(path, "has no measurements", EMPTY_CURE)
-    return rows
-
-
-def _cells_of(text: str, split: str) -> list[str]:
-    """Cut one line into cells."""
-    if split == BLANKS:
-        return [cell.strip('"') for cell in re.findall(r'"[^"]*"|\S+', text)]
-    if len(split) > 1:
-        return [cell.strip().strip('"') for cell in re.split(split, text.strip())]
-    return [cell.strip().strip('"').strip() for cell in text.split(split)]
-
-
-def _strip_end(cells: list[str]) -> list[str]:
-    """Leave out empty cells at the end."""
-    count = len(cells)
-    while count and cells[count - 1] == "":
-        count -= 1
-    return cells[:count]
-
-
-def _block(
-    path: Path, names: list[str], body: list[Row], top: int, headed: bool
-) -> tuple[NDArray[np.object_], list[str]]:
-    """Put rows under the names of their columns; columns without a name are left out.
-
-    Raises:
-        MeasurementError: A row has more cells than there are names, or a name is twice.
-    """
-    twice = next((n for n in names if n and names.count(n) > 1), None)
-    if twice is not None:
-        cure = "Give every column a name of its own"
-        problem = f"column {twice!r} appears twice"
-        raise MeasurementError(path, problem, cure, line=top)
-    width = len(names)
-    cells = np.full((len(body), width), "", dtype=object)
-    for k, (line, row) in enumerate(body):
-        used = _strip_end(row)
-        if len(used) > width:
-            what = "the header names" if headed else "the first row has"
-            raise MeasurementError(
-                path,
-                f"has {len(used)} cells, {what} {width}",
-                "Every row needs as many cells as the header. A decimal comma needs "
-                "another separator (measurements.delimiter), a separator in a cell "
-                "needs quotes",
-                line=line,
-            )
-        cells[k, : len(used)] = used
-    named = [k for k, name in enumerate(names) if name]
-    return cells[:, named], [names[k] for k in named]
-
-
-def _decimal(cells: NDArray[np.object_], split: str) -> str:
-    """Tell a decimal comma from a decimal point by the cells."""
-    if split == "," or len(cells) == 0:
-        return "."
-    comma = sum(bool(DECIMAL_COMMA.match(str(v))) for v in cells[:20].reshape(-1))
-    return "," if comma else "."
-
 
 # Single columns of a measurement file: ids, directions, probe points.
 
@@ -381,7 +43,6 @@ TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
 ROTATION = ("rx_deg", "ry_deg", "rz_deg")
 JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
 JOINT = re.compile(r"^q\d+_deg$")
-RADIANS = re.compile(r"^q(\d+)[ _]*[\[(]?rad[\])]?$", re.I)
 DETOURS = 0.05  # share of other sides from which rows do not follow straight ways
 MOST_RESTARTS = 4  # of a clock in one file: rows that step back more often are sorted
 OPPOSED = 60  # directions that are opposite to the rows by no accident
@@ -835,7 +496,7 @@ def from_robodk(table: TextTable) -> TextTable:
 
 # How to read a measurement file, where what is detected would be wrong.
 
-UNITS = {"mm": 1.0, "m": 1000.0, "inch": 25.4}  # mm per unit
+UNITS = {unit: MM_PER[unit] for unit in UNSTATED}  # mm per unit
 NAMED = {"tab": "\t", "space": BLANKS, "comma": ",", "semicolon": ";"}
 
 
@@ -848,7 +509,9 @@ class TableFormat:
         delimiter: Between cells, itself or by name (tab, space, comma, semicolon).
         decimal: "." or ",".
         encoding: Name of a Python codec.
-        unit: Of coordinates in files that do not state it: mm, m or inch.
+        unit: Of coordinates in files that do not state it: mm, m, inch or ft.
+        angle_unit: Of joint angles in files that do not state it: deg or rad.
+        sheet: Of a workbook: the sheet with the measurements.
     """
 
     columns: Path | Format | None = None
@@ -856,12 +519,16 @@ class TableFormat:
     decimal: str | None = None
     encoding: str | None = None
     unit: str | None = None
+    angle_unit: str | None = None
+    sheet: str | None = None
 
     def __post_init__(self) -> None:
         if self.decimal not in (None, ".", ","):
             raise PostprocError(f"decimal {self.decimal!r}: write . or ,")
         if self.unit not in (None, *UNITS):
             raise PostprocError(f"unit {self.unit!r}: write {', '.join(UNITS)}")
+        if self.angle_unit not in (None, *DEGREES_PER):
+            raise PostprocError(f"angle_unit {self.angle_unit!r}: write deg or rad")
 
     def within(self, cell: Cell) -> TableFormat:
         """Return it with what [measurements] of the cell says of all that is None."""
@@ -872,6 +539,8 @@ class TableFormat:
             decimal=self.decimal or own.decimal,
             encoding=self.encoding or own.encoding,
             unit=self.unit or own.unit,
+            angle_unit=self.angle_unit or own.angle_unit,
+            sheet=self.sheet or own.sheet,
         )
 
     @property
@@ -882,13 +551,9 @@ class TableFormat:
             "delimiter": delimiter,
             "decimal": self.decimal,
             "encoding": self.encoding,
+            "sheet": self.sheet,
         }
         return {name: value for name, value in options.items() if value}
-
-    @property
-    def mm_per_unit(self) -> float:
-        """Millimetres per unit of coordinates."""
-        return UNITS[self.unit or "mm"]
 
 
 DETECT = TableFormat()
@@ -909,11 +574,10 @@ DETECT = TableFormat()
 #     comment = "//"
 #     header = false                                # columns are "1", "2", ..
 
-DEGREES = float(np.rad2deg(1.0))  # per radian
 # Columns of ours that hold no numbers; tool_id may hold numbers or names.
 TEXTS = ("id", "reference", "station", "nest", "visit")
 MAP_KEYS = ("columns", "file")
-FILE_KEYS = ("delimiter", "decimal", "encoding", "comment", "header")
+FILE_KEYS = ("delimiter", "decimal", "encoding", "comment", "header", "sheet")
 
 
 @dataclass(frozen=True)
@@ -976,26 +640,44 @@ def read_foreign(
         table = read_headed(path, **{**form.reading, **reading.given})
         table.require(*form.sources)
         return translate(table, form)
-    table = in_degrees(read_headed(path, **reading.given))
+    table = read_headed(path, **reading.given)
     for form in KNOWN:
         if form.fits(table):
             return translate(table, form)
-    return from_robodk(table) if is_robodk(table) else table
+    if is_robodk(table):
+        return from_robodk(table)
+    return by_headers(table, reading)
 
 
-def in_degrees(table: TextTable) -> TextTable:
-    """Convert joint angles whose header says radians: `q1_rad`, `q1 [rad]`."""
-    found = {k: RADIANS.match(name) for k, name in enumerate(table.columns)}
-    columns, cells = list(table.columns), table.cells.copy()
-    for k, match in found.items():
-        name = f"q{match.group(1)}_deg" if match else ""
-        if not match or name in table.columns:
-            continue
-        degrees = table.numbers(table.columns[k]) * DEGREES
-        texts = [_plain(float(v)) for v in degrees]
-        cells[:, k] = [t.replace(".", table.decimal) for t in texts]
-        columns[k] = name
-    return replace(table, columns=tuple(columns), cells=cells)
+def by_headers(table: TextTable, reading: TableFormat = DETECT) -> TextTable:
+    """Turn a foreign table into ours by its headers; columns with other ones stay.
+
+    Raises:
+        MeasurementError: Two readings fit; both are named.
+    """
+    if not table.headed:
+        return table
+    found = recognise(table, reading.unit, reading.angle_unit)
+    if not found.is_measured:
+        return table
+    check_clear(table, found)
+    if all(terms == ((ours, 1.0),) for ours, terms in found.columns.items()):
+        return table
+    ours = translate(table, Format(found.columns))
+    rest = [name for name in found.unused if name not in ours.columns]
+    cells = np.array([table.text(name) for name in rest], dtype=object)
+    cells = np.hstack([ours.cells, cells.reshape(len(rest), len(table)).T])
+    return replace(ours, columns=(*ours.columns, *rest), cells=cells)
+
+
+def check_clear(table: TextTable, found: Recognised) -> None:
+    """Refuse a table of which two readings fit.
+
+    Raises:
+        MeasurementError: With both, and how to say which is meant.
+    """
+    for one in found.questions:
+        raise MeasurementError(table.path, one.problem, one.cure, line=table.top)
 
 
 def translate(table: TextTable, form: Format) -> TextTable:
@@ -1029,15 +711,13 @@ def read_column_map(path: str | Path) -> Format:
     Raises:
         MeasurementError: It cannot be read, or a key or value is wrong.
     """
+    path = Path(path)
     try:
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except RecursionError:
-        problem = "is nested too deeply"
-        raise MeasurementError(path, problem, "Correct the column map") from None
-    except (OSError, ValueError) as exc:  # no UTF-8, no TOML, a number beyond all sizes
-        problem = f"cannot be read as TOML ({exc})"
-        raise MeasurementError(path, problem, "Correct the column map") from None
-    return column_map(path, data)
+        raw = path.read_bytes()
+    except OSError as exc:
+        problem = f"cannot be read ({exc.strerror})"
+        raise MeasurementError(path, problem, "Check the path") from None
+    return column_map(path, load_toml(path, raw, MeasurementError))
 
 
 def column_map(path: str | Path, data: Mapping[str, Any]) -> Format:

@@ -6,13 +6,14 @@ interrupted on its way.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import os
 import signal
 import sys
 from typing import Any
 
+from postproc import __version__
+from postproc.operating_system import print_any_text
 from postproc.threads import start_no_threads
 
 __all__ = ["app", "main"]
@@ -35,8 +36,12 @@ def __getattr__(name: str) -> Any:
 def main() -> None:
     """Run the command line; a defect of ours ends with 2, like all that failed."""
     _leave_signals_to_the_system()
+    if sys.argv[1:] == ["--version"]:  # what takes long to load is not needed
+        print(f"postproc {__version__}")
+        return
     start_no_threads()
     _give_large_arrays_back()
+    print_any_text(sys.stdout, sys.stderr)
     # A command makes hardly any cycles: loading it takes a tenth less without a search.
     gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
     # pydantic would read what every installed package says of itself.
@@ -66,7 +71,11 @@ def _give_large_arrays_back() -> None:
     pages back and ask for them again is half of what the system does for a long
     program. Only glibc has the options.
     """
-    if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "mallopt"):
+    if sys.platform != "linux":
+        return
+    import ctypes
+
+    if hasattr(library := ctypes.CDLL(None), "mallopt"):
         library.mallopt(M_MMAP_THRESHOLD, LARGE)
         library.mallopt(M_TRIM_THRESHOLD, SPARE)
 

@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 GROUPS = {
-    "Calibrate": ("survey", "fit", "diagnose", "history", "compare", "predict"),
+    "Calibrate": ("survey", "read", "fit", "diagnose", "history", "compare", "predict"),
     "Compensate": ("compensate", "explain", "batch"),
     "Check": ("diff", "check", "restore", "report"),
     "Set up and try": ("arm", "simulate"),

@@ -253,6 +253,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc simulate out/job.pdl --cell cell.toml --reference job.pdl",
         "postproc simulate out/job.pdl --cell cell.toml --track track.csv",
     ),
+    "read": (
+        "postproc read measured.csv --cell cell.toml",
+        "postproc read targets.xlsx --program survey.mod --cell cell.toml -o map.toml",
+    ),
     "fit": (
         "postproc fit measured.csv --cell cell.toml -o model.json --report model.html",
         "postproc fit measured.csv --cell cell.toml -o model.json"

@@ -31,6 +31,7 @@ from postproc.cli.reports import (
     ReportOption,
     Reports,
 )
+from postproc.exceptions import PostprocError
 from postproc.files import check_places
 
 
@@ -53,6 +54,10 @@ def survey(
         typer.Option("-o", "--output", help="SURVEY.pdl, .mod or .src: its language."),
     ],
     poses: Annotated[int, typer.Option("--poses", help="Number of poses.")] = 300,
+    job: Annotated[
+        Path | None,
+        typer.Option("--job", help="Program whose working volume is surveyed."),
+    ] = None,
     changes: SetSurvey = None,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
@@ -60,10 +65,10 @@ def survey(
     from postproc.robot.cell import load_cell
 
     with report_errors():
-        check_places([output], [cell])
+        check_places([output], [cell, job])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
-            summary = write_survey(loaded, output, poses)
+            summary = write_survey(loaded, output, poses, job)
         say(summary)
 
 
@@ -111,6 +116,63 @@ def simulate(
             found.track.write(track)
         reports.write_json(found.to_json)
         say(found.summary())
+
+
+def _choices(given: list[str] | None) -> dict[str, str]:
+    """Split OURS=COLUMN.
+
+    Raises:
+        PostprocError: One has no equals sign.
+    """
+    pairs = [text.partition("=") for text in given or ()]
+    for ours, sign, name in pairs:
+        if not (ours and sign and name):
+            raise PostprocError(f"--column {ours}: write OURS=COLUMN, as x_mm=X actual")
+    return {ours.strip(): name.strip() for ours, _, name in pairs}
+
+
+@app.command()
+def read(
+    data: Annotated[list[Path], typer.Argument(help="Measurement files.")],
+    cell: CellOption,
+    program: Annotated[
+        Path | None,
+        typer.Option("--program", help="Survey program, for files of id, x, y, z."),
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--column",
+            metavar="OURS=COLUMN",
+            help="Column of the file for one of ours.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="MAP.toml: the column map to write."),
+    ] = None,
+    changes: SetMeasured = None,
+) -> None:
+    """Show what is understood of measurement files, and write their column map.
+
+    Exit 2: a file cannot be read, or two readings fit; both are named.
+    """
+    from postproc.calibration.table_reading import map_text, read_file
+    from postproc.calibration.tables import DETECT
+    from postproc.report.table_reading import print_reading
+    from postproc.robot.cell import load_cell
+
+    with report_errors():
+        check_places([output], [*data, cell, program])
+        loaded = load_cell(cell, changes=changes_of(changes))
+        choices = _choices(column)
+        with busy("read"):
+            found = [read_file(p, loaded, DETECT, program, choices) for p in data]
+        for one in found:
+            typer.echo(print_reading(one, loaded.measurements.frame, program))
+        if output is not None:
+            write_text(str(output), map_text(found))
+            say(f"written {output}: --set measurements.columns={output}")
 
 
 @app.command()

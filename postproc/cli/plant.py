@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.exceptions import PostprocError
 from postproc.files import check_places
+from postproc.operating_system import count_cores
 
 if TYPE_CHECKING:
     from postproc.batch.journal import Summary
@@ -124,7 +124,7 @@ def _count(jobs: str) -> int:
             f"--jobs {jobs}: give the number of processes, 0 for one for a core, or "
             "the address of a Dask scheduler, such as tls://host:8786"
         )
-    return int(jobs) or os.cpu_count() or 1
+    return int(jobs) or count_cores()
 
 
 def _is_address(jobs: str) -> bool:

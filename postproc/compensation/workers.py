@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import os
 import pickle
 import signal
-import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager, suppress
@@ -23,6 +21,13 @@ from postproc.arrays import release_memory
 from postproc.compensation.consensus import Step
 from postproc.compensation.options import Clock, no_progress
 from postproc.exceptions import PostprocError
+from postproc.operating_system import (
+    ASKING,
+    can_fork,
+    count_cores,
+    end_with_parent,
+    hold_signals,
+)
 
 # Work in a forked child: it sees all that was read before, and sends what it makes.
 #
@@ -33,16 +38,9 @@ T = TypeVar("T")
 K = TypeVar("K")
 
 AHEAD = 16  # items that a child makes before anybody takes them
-SET_PDEATHSIG = 1  # of prctl(2): the signal that the death of the parent sends
-ASKED = frozenset({signal.SIGINT, signal.SIGTERM})  # a child leaves them to its parent
 SIZE = 8  # bytes of the length before every message
 LARGE = 1 << 20  # bytes of a message whose memory is given back at once
 _ITEM, _RAISED, _END = range(3)
-
-
-def can_fork() -> bool:
-    """Tell whether this process may have forked children: on Linux."""
-    return sys.platform == "linux"
 
 
 def available() -> int:
@@ -53,7 +51,7 @@ def available() -> int:
     """
     if not can_fork() or parent_process() is not None:
         return 1
-    return len(os.sched_getaffinity(0))
+    return count_cores()
 
 
 @contextmanager
@@ -76,15 +74,14 @@ def in_worker(
     """
     parent = os.getpid()
     here, there = os.pipe()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ASKED)
     child: int | None = None
-    with suppress(OSError):  # where there is no room, the work is done here
-        child = os.fork()
-    if child == 0:
-        os.close(here)
-        _live(parent, work, there, ahead)
     try:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        with hold_signals(*ASKING):  # a child leaves them to its parent
+            with suppress(OSError):  # where there is no room, the work is done here
+                child = os.fork()
+            if child == 0:
+                os.close(here)
+                _live(parent, work, there, ahead)
         os.close(there)
         with open(here, "rb") as pipe:
             yield _receive(pipe) if child else iter(work())
@@ -105,12 +102,6 @@ def _live(
             _make(work, there, ahead)
     finally:
         os._exit(1)
-
-
-def end_with_parent() -> None:
-    """Let the system kill this process when its parent ends, on Linux."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _make(work: Callable[[], Iterable[T]], there: int, ahead: int) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 import lark
 
 from postproc.files import replace_file
+from postproc.operating_system import is_private
 
 # The grammars, and parsers of them.
 
@@ -57,7 +58,6 @@ def line_parser(name: str, start: str) -> lark.Lark:
 # Where a file cannot be read, written or trusted, tables are made anew and nothing is
 # said: a cache that fails costs time, never a program.
 
-OTHERS_WRITE = 0o022  # permission bits of group and others
 SIZE = hashlib.sha256().digest_size  # of the digest that a file begins with
 
 
@@ -88,11 +88,11 @@ def read_kept(key: str) -> bytes | None:
     if place is None:
         return None
     try:
-        if not _is_ours(place.stat()):
+        if not is_private(place.stat()):
             return None
         with open(place / key, "rb", opener=_open_file) as file:
             status = os.fstat(file.fileno())
-            if not stat.S_ISREG(status.st_mode) or not _is_ours(status):
+            if not stat.S_ISREG(status.st_mode) or not is_private(status):
                 return None
             digest, data = file.read(SIZE), file.read()
     except OSError:
@@ -104,13 +104,6 @@ def _open_file(path: str, flags: int) -> int:
     """Open what stands there itself, and never wait for it, as for a FIFO."""
     flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
     return os.open(path, flags)
-
-
-def _is_ours(status: os.stat_result) -> bool:
-    """Tell whether nobody but this user can write to a file or a folder."""
-    if not hasattr(os, "geteuid"):  # Windows: the folder is the user's own
-        return True
-    return status.st_uid == os.geteuid() and not status.st_mode & OTHERS_WRITE
 
 
 def keep(key: str, data: bytes) -> None:

@@ -564,13 +564,13 @@ def build_arm(file: ArmFile) -> Arm:
     """Convert an arm file to SI."""
     dh, joints = file.dh, file.joints
     mix = np.eye(6)
-    mix[2, 1] = dh.axis2_in_axis3
+    mix[2, 1] = dh.axis2_share
     sense = np.array(dh.sense)
     offset = np.deg2rad(dh.offset_deg) + sense * np.deg2rad(dh.shift_deg)
     a, d = np.array(dh.a_mm) * MM, np.array(dh.d_mm) * MM
     alpha = np.deg2rad(dh.alpha_deg)
     # A model fitted while the flag added axis 2 to every arm is of another chain.
-    kinematics = dh.model_dump_json() + ("-axis2" if dh.axis2_in_axis3 < 0 else "")
+    kinematics = dh.model_dump_json() + ("-axis2" if dh.axis2_share < 0 else "")
     digest = hashlib.sha256(kinematics.encode()).hexdigest()[:16]
     ratio = np.array(joints.gear_ratio or [0.0] * 6)
     coupling = joints.drive_coupling

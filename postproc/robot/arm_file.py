@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 import pydantic
@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validato
 
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError, FileError
+from postproc.files import path_in
 
 # Reading TOML files with messages that name the place.
 
@@ -63,8 +64,17 @@ def parse_toml(
     Raises:
         FileError: Of the given type, naming the file and the first wrong place.
     """
+    return validate(path, load_toml(path, raw, error), schema, error)
+
+
+def load_toml(path: Path, raw: bytes, error: type[FileError]) -> dict[str, Any]:
+    """Read the bytes of a TOML file.
+
+    Raises:
+        FileError: Of the given type, naming the file and the place of the mistake.
+    """
     try:
-        data = tomllib.loads(raw.decode("utf-8-sig"))
+        return tomllib.loads(raw.decode("utf-8-sig"))
     except UnicodeDecodeError:
         raise error(path, "is not UTF-8 text", "Save it as UTF-8") from None
     except tomllib.TOMLDecodeError as exc:
@@ -78,7 +88,6 @@ def parse_toml(
     except ValueError:
         problem = "holds an integer of more digits than any number needs"
         raise error(path, problem, "Write it shorter") from None
-    return validate(path, data, schema, error)
 
 
 def validate(
@@ -145,7 +154,9 @@ NEARLY_PARALLEL = 0.01  # sine of the angle between axes 2 and 3 of a parallelog
 class DhSection(Strict):
     """Standard Denavit-Hartenberg parameters and the controller's angle convention.
 
-    `axis3_adds_axis2`: a parallelogram keeps the forearm from following axis 2 alone.
+    `axis2_in_axis3`: what joint angle 2 adds to joint angle 3 in the chain: -1 or 1
+    where the forearm keeps its direction while joint 2 moves alone, else 0. Older
+    files state it without its sign, as `axis3_adds_axis2`.
     """
 
     a_mm: Sextuple
@@ -154,7 +165,18 @@ class DhSection(Strict):
     offset_deg: Sextuple = [0.0] * 6
     sense: Sextuple = [1.0] * 6
     shift_deg: Sextuple = [0.0] * 6
+    axis2_in_axis3: float | None = Field(default=None, exclude=True)
     axis3_adds_axis2: bool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_key(cls, data: object) -> object:
+        share = data.get("axis2_in_axis3") if isinstance(data, Mapping) else None
+        if not isinstance(data, Mapping) or not isinstance(share, (int, float)):
+            return data
+        if "axis3_adds_axis2" in data:
+            raise ValueError("axis2_in_axis3 replaces axis3_adds_axis2: leave one out")
+        return {**data, "axis3_adds_axis2": share != 0}
 
     @model_validator(mode="after")
     def _signs(self) -> DhSection:
@@ -164,31 +186,44 @@ class DhSection(Strict):
 
     @model_validator(mode="after")
     def _parallelogram(self) -> DhSection:
-        if self.axis3_adds_axis2 and abs(math.sin(math.radians(self.alpha_deg[1]))) > (
-            NEARLY_PARALLEL
-        ):
+        share = self.axis2_in_axis3
+        key = "axis3_adds_axis2" if share is None else "axis2_in_axis3"
+        tilt = abs(math.sin(math.radians(self.alpha_deg[1])))
+        if self.axis3_adds_axis2 and tilt > NEARLY_PARALLEL:
             raise ValueError(
-                "axis3_adds_axis2 needs axes 2 and 3 parallel: alpha_deg[2] of 0 or 180"
+                f"{key} needs axes 2 and 3 parallel: alpha_deg[2] of 0 or 180"
+            )
+        if share is not None and share != self.axis2_share:
+            raise ValueError(
+                f"axis2_in_axis3 = {share:g} makes the forearm turn with joint 2: for "
+                f"these senses and angles it is {self.axis2_share:g}, or 0"
             )
         return self
 
     @property
-    def axis2_in_axis3(self) -> float:
+    def axis2_share(self) -> float:
         """Share of joint angle 2 in the D-H angle of joint 3, before its sense.
 
-        The forearm turns by sense2 * q2 + cos(alpha2) * sense3 * (q3 + share * q2)
-        about axis 2. A parallelogram takes q2 out of this sum.
-
         >>> lengths = {"a_mm": [0.0] * 6, "d_mm": [0.0] * 6, "alpha_deg": [0.0] * 6}
-        >>> DhSection(**lengths, axis3_adds_axis2=True).axis2_in_axis3
+        >>> DhSection(**lengths, axis3_adds_axis2=True).axis2_share
         -1.0
         """
         if not self.axis3_adds_axis2:
             return 0.0
-        same_way = (
-            self.sense[1] * self.sense[2] * math.cos(math.radians(self.alpha_deg[1]))
-        )
-        return -1.0 if same_way > 0 else 1.0
+        return compensating_share(self.sense, math.radians(self.alpha_deg[1]))
+
+
+def compensating_share(sense: Sequence[float], alpha2: float) -> float:
+    """Compute the share of joint angle 2 that keeps the forearm's direction.
+
+    The forearm turns by sense2 * q2 + cos(alpha2) * sense3 * (q3 + share * q2)
+    about axis 2, and the share takes q2 out of this sum.
+
+    Args:
+        sense: Of the joints, +1 or -1, 6 numbers.
+        alpha2: D-H angle from axis 2 to axis 3, near 0 or pi [rad].
+    """
+    return -1.0 if sense[1] * sense[2] * math.cos(alpha2) > 0 else 1.0
 
 
 class ArmJointSection(Strict):
@@ -289,7 +324,7 @@ def arm_path(name: str, beside: Path | None = None) -> Path:
     shipped = ARMS / f"{name}.toml"
     if shipped.parent == ARMS and shipped.is_file():
         return shipped
-    path = Path(name) if beside is None else beside / name
+    path = Path(name) if beside is None else path_in(beside, name)
     if path.is_file():
         return path
     known = ", ".join(list_shipped_arms())

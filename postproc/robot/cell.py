@@ -21,6 +21,7 @@ from pydantic import (
 
 from postproc.arrays import Floats
 from postproc.exceptions import CellError
+from postproc.files import path_in
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.arm_file import (
     Controller,
@@ -321,22 +322,30 @@ class MeasurementSection(Strict):
         delimiter: Between cells: itself, or tab, space, comma, semicolon.
         decimal: "." or ",".
         encoding: Name of a Python codec.
-        unit: Of coordinates in files that do not state it; default: mm.
+        unit: Of coordinates in files that do not state it; default: mm, where they are
+            as large as those of an arm.
+        angle_unit: Of joint angles in files that do not state it.
+        sheet: Of a workbook: the sheet with the measurements.
         frame: Frame of the measured positions; default: the arm's base frame.
         instrument: What measured, kept with the models that are fitted.
         refit_registration: `predict` finds the place of the tracker from the rows.
         after_survey: `predict` takes what passes with time as at the survey's end.
+        lambda_sign: Of the lambda columns: -1 turns all of them; 1 says that they are
+            right, though links seem to run ahead of their drives.
     """
 
     columns: str | None = None
     delimiter: str | None = None
     decimal: Literal[".", ","] | None = None
     encoding: str | None = None
-    unit: Literal["mm", "m", "inch"] | None = None
+    unit: Literal["mm", "m", "inch", "ft"] | None = None
+    angle_unit: Literal["deg", "rad"] | None = None
+    sheet: str | None = None
     frame: PointFrame | None = None
     instrument: str | None = None
     refit_registration: bool = False
     after_survey: bool = False
+    lambda_sign: Literal[1, -1] | None = None
 
 
 AS_USUAL, DETECTED = CompensationSection(), MeasurementSection()
@@ -612,7 +621,7 @@ def _beside(folder: Path, section: MeasurementSection) -> MeasurementSection:
     """Return what is stated of measurement files, with the whole path of its map."""
     if section.columns is None:
         return section
-    return section.model_copy(update={"columns": str(folder / section.columns)})
+    return section.model_copy(update={"columns": str(path_in(folder, section.columns))})
 
 
 def _cell_of(path: Path, file: CellFile) -> Cell:

@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError
 from postproc.robot.arm import arm_of_text, check_flanges
-from postproc.robot.arm_file import list_text, number_text
+from postproc.robot.arm_file import compensating_share, list_text, number_text
 from postproc.robot.denavit_hartenberg import PARALLEL, DhParameters, dh_parameters
 from postproc.robot.pose import MM
 from postproc.robot.urdf import MOVING, UrdfChain, rotate_about
@@ -318,8 +318,9 @@ jerk_deg_s3 = {jerk}
 
 {closed_form}"""
 PARALLELOGRAM = """\
-axis3_adds_axis2 = false      # a URDF does not tell: true where a parallelogram keeps
-                              # the forearm's direction while joint 2 moves alone
+axis2_in_axis3 = 0.0          # a URDF does not state this: {share} where the forearm
+                              # keeps its direction while joint 2 moves alone, as with
+                              # a parallelogram
 """
 CLOSED_FORM = """\
 [opw]                         # ortho-parallel basis with spherical wrist
@@ -368,7 +369,7 @@ def _write_closed_form(shape: Shape) -> dict[str, str]:
         "alpha": "[-90.0, 0.0, -90.0, 90.0, -90.0, 0.0]",
         "offset": list_text(wrapped),
         "sense": str(sense),
-        "parallelogram": PARALLELOGRAM,
+        "parallelogram": _parallelogram_text(sense, 0.0),
         "closed_form": CLOSED_FORM.format(**_opw_parts(shape)),
     }
 
@@ -379,13 +380,20 @@ def _numeric_parts(dh: DhParameters) -> dict[str, str]:
         180.0 - (180.0 - _round_values(np.rad2deg(angles))) % 360.0
         for angles in (dh.alpha, dh.offset)
     )
+    sense = [round(float(s)) for s in dh.sense]
+    parallel = abs(np.sin(dh.alpha[1])) < NEARLY
     lists = {"a": dh.a / MM, "d": dh.d / MM, "alpha": alpha, "offset": offset}
     return {
         **{key: str((_round_values(v) + 0.0).tolist()) for key, v in lists.items()},
-        "sense": str([round(float(s)) for s in dh.sense]),
-        "parallelogram": PARALLELOGRAM if abs(np.sin(dh.alpha[1])) < NEARLY else "",
+        "sense": str(sense),
+        "parallelogram": _parallelogram_text(sense, dh.alpha[1]) if parallel else "",
         "closed_form": NUMERIC,
     }
+
+
+def _parallelogram_text(sense: list[int], alpha2: float) -> str:
+    """Write the key of a parallelogram, with the number that this arm would need."""
+    return PARALLELOGRAM.format(share=compensating_share(sense, alpha2))
 
 
 def _round_values(values: Floats) -> Floats:

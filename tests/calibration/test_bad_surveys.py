@@ -169,3 +169,18 @@ def test_options_say_how_a_file_is_to_be_read(desk, survey, fit):
     assert re.search(r"s\.csv:1: column c0, .* is missing", found.stderr)
     found = fit(survey, "--set", "measurements.decimal=x")
     assert found.exit_code == 2 and "'.' or ','" in found.stderr
+
+
+def test_lambda_by_which_links_run_ahead_is_refused_until_its_sign_is_stated(
+    survey, fit
+):
+    other = put(survey, SIDES, -block(survey, SIDES))
+    refused = fit(other)
+    assert refused.exit_code == 2 and "lambda_sign=-1" in refused.stderr
+    turned = fit(other, "--set", "measurements.lambda_sign=-1")
+    assert turned.exit_code == 0
+    parts = [
+        re.search(r"after fit mean [\d.]+", x.stdout) for x in (turned, fit(survey))
+    ]
+    assert parts[0] and parts[1] and parts[0][0] == parts[1][0]
+    assert fit(other, "--set", "measurements.lambda_sign=1").exit_code == 0

@@ -7,12 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.calibration.direction_signs import all_reversed, find_change_of_sign
+from postproc.calibration.direction_signs import (
+    all_reversed,
+    find_change_of_sign,
+    find_joint_step,
+)
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.survey_checks import (
     as_surveyed,
-    ask_about_signs,
+    ask_about_steps,
+    beside_geometry,
     check_against,
+    check_signs,
     check_survey,
 )
 from postproc.exceptions import MeasurementError
@@ -58,6 +64,23 @@ def test_good_rows_and_a_joint_that_stepped_are_not_called_so(
 ) -> None:
     sided = as_surveyed(measured(seed, step=step), NJ)
     assert find_change_of_sign(sided) is None and not all_reversed(sided)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("n", [40, 160])
+def test_the_row_from_which_a_joint_is_off_is_found(seed: int, n: int) -> None:
+    for step in (6e-3, -2e-2):
+        found = find_joint_step(*beside_geometry(measured(seed, n, step=step), NJ))
+        assert found is not None and (found.joint, found.first) == (4, n // 2)
+        assert found.by == pytest.approx(-step, abs=1e-3)
+    assert find_joint_step(*beside_geometry(measured(seed, n), NJ)) is None
+
+
+def test_a_joint_that_is_off_from_a_row_on_is_refused_by_row_and_line() -> None:
+    late = measured(4, step=np.deg2rad(0.6))
+    with pytest.raises(MeasurementError, match=r"from row .* joint 5 is off by -0\.60"):
+        check_survey(late, NJ)
+    check_survey(measured(4, step=np.deg2rad(0.1)), NJ)  # left to the fit
 
 
 def test_rows_of_one_side_after_the_other_are_good() -> None:
@@ -106,7 +129,13 @@ def test_fresh_rows_are_refused_against_a_model() -> None:
         check_against(turned, NJ, Known())
 
 
-def test_the_other_sign_in_all_rows_is_asked_about() -> None:
-    assert ask_about_signs(measured(2), NJ) == ()
-    (asked,) = ask_about_signs(measured(2, turned=slice(None)), NJ)
-    assert "run ahead of their drives" in asked
+def test_the_other_sign_in_all_rows_is_refused() -> None:
+    check_signs(measured(2), NJ)
+    with pytest.raises(MeasurementError, match=r"run ahead .*lambda_sign=-1"):
+        check_signs(measured(2, turned=slice(None)), NJ)
+
+
+def test_a_small_step_of_a_joint_is_asked_about() -> None:
+    assert ask_about_steps(measured(2), NJ) == ()
+    (asked,) = ask_about_steps(measured(2, step=4e-3), NJ)
+    assert "joint 5 is off by -0.2" in asked

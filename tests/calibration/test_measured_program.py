@@ -86,14 +86,14 @@ def test_fit_from_ids_and_positions_equals_fit_from_full_rows(desk, tmp_path):
 
 def test_lists_of_points_of_other_tools_are_joined(desk, job_cell):
     source = desk.put("job.pdl", program(*MARKED))
-    sa = desk.put("sa.txt", "// Group: A\nh2, 1.0, 2.0, 3.0\nh1, 4, 5, 6\n")
+    sa = desk.put("sa.txt", "// Group: A\nh2, 100.0, 200.0, 300.0\nh1, 4, 5, 600\n")
     leica = desk.put(
         "leica.txt", "Point Id;X [mm];Y [mm];Z [mm];Zeit\n'h1';1,5;2;3;'12:30'\n"
     )
     found = join_program(sa, source, job_cell)
     assert found.ids == ("h1", "h2")
-    np.testing.assert_allclose(found.position[0], [4e-3, 5e-3, 6e-3])
+    np.testing.assert_allclose(found.position[0], [4e-3, 5e-3, 0.6])
     found = join_program(leica, source, job_cell)
     np.testing.assert_allclose(found.position[0], [1.5e-3, 2e-3, 3e-3])
     metres = join_program(sa, source, job_cell, TableFormat(unit="m"))
-    np.testing.assert_allclose(metres.position[0], [4.0, 5.0, 6.0])
+    np.testing.assert_allclose(metres.position[0], [4.0, 5.0, 600.0])

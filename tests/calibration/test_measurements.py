@@ -137,7 +137,7 @@ def test_wrong_files_are_named(tmp_path: Path) -> None:
     refused("cannot be read", tmp_path / "none.csv")
     (tmp_path / "empty.csv").write_text("")
     refused("no measurements", tmp_path / "empty.csv")
-    (tmp_path / "b.csv").write_bytes(b"PK\x03\x04\0\0\0")
+    (tmp_path / "b.csv").write_bytes(b"\x01\x02\x03\0\0\0")
     refused("not a text file", tmp_path / "b.csv")
     header = HEADER + SIDES + ",x_mm,y_mm"
     refused("column z_mm is missing", write(tmp_path / "c.csv", ["1,2"], header))

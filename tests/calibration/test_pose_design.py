@@ -3,8 +3,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.calibration.pose_design import design_survey, joint_box, usable
+from postproc.calibration.pose_design import (
+    AROUND,
+    TYPICAL_NOISE,
+    Design,
+    design_survey,
+    joint_box,
+    usable,
+)
 from postproc.exceptions import PostprocError
+from postproc.model.effect_sum import Combination
+from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.kinematics import ArmStates
+from postproc.robot.state import States, make_states
 from tests.calibration.simulator import NJ, PLATE, TOOL
 
 
@@ -46,6 +57,37 @@ def test_optimal_poses_tell_more() -> None:
         assert best.rank >= lhs.rank
         assert best.o1 > lhs.o1
     assert "condition number" in design_survey(NJ, TOOL[None], 20).summary()
+
+
+def test_poses_of_a_job_are_round_its_arrivals_and_tell_most_there() -> None:
+    rng = np.random.default_rng(5)
+    q = np.deg2rad([10.0, 15.0, -110.0, 20.0, 60.0, -30.0]) + rng.normal(
+        0, 0.1, (40, 6)
+    )
+    job = make_states(q, np.sign(rng.normal(size=(40, 6))), TOOL)
+    near, far = (
+        design_survey(NJ, PLATE, 24, "optimal", seed=2, job=arrivals)
+        for arrivals in (job, None)
+    )
+    apart = np.abs(near.q[:, None] - q).max(axis=2).min(axis=1)
+    assert (apart <= AROUND + 1e-9).all()
+    assert expected_mm(near, job) < 0.8 * expected_mm(far, job)
+
+
+def expected_mm(design: Design, job: States) -> float:
+    """Compute what a design leaves unknown of the base model at a job's arrivals."""
+    states = make_states(
+        design.q, design.side, PLATE[design.probe], tool_id=design.probe
+    )
+    base = Combination(propose(BASE_EFFECTS, NJ, states))
+    sides = (states, states.with_(direction=-states.direction))
+    X, at = (
+        np.concatenate([base.columns(ArmStates(NJ, s)) for s in some]) * base.scales
+        for some in (sides, (job,))
+    )
+    flat, there = (x.reshape(-1, x.shape[2]) / TYPICAL_NOISE for x in (X, at))
+    covariance = np.linalg.inv(np.eye(flat.shape[1]) + flat.T @ flat)
+    return float(np.sqrt(((there @ covariance) * there).sum(axis=1).mean()))
 
 
 def test_wrong_wishes_are_refused() -> None:

@@ -81,13 +81,15 @@ def test_mistakes_are_named(spoil, match: str) -> None:  # type: ignore[no-untyp
 
 def test_other_tools_files_are_read(tmp_path: Path) -> None:
     sa = tmp_path / "sa.txt"
-    sa.write_text("// SpatialAnalyzer\n// Group: A\np1, 1.0, 2.0, 3.0\np2, 4, 5, 6\n")
+    sa.write_text(
+        "// SpatialAnalyzer\n// Group: A\np1, 100.0, 200.0, 300.0\np2, 4, 5, 600\n"
+    )
     points = read_points(sa)
     assert points.text("id") == ["p1", "p2"] and points.line.tolist() == [3, 4]
     xyz = ("x_mm", "y_mm", "z_mm")
-    assert points.block(xyz)[1].tolist() == [4.0, 5.0, 6.0]
+    assert points.block(xyz)[1].tolist() == [4.0, 5.0, 600.0]
     inches = read_points(sa, TableFormat(unit="inch"))
-    assert inches.block(xyz)[0].tolist() == [25.4, 50.8, pytest.approx(76.2)]
+    assert inches.block(xyz)[0].tolist() == [2540.0, 5080.0, 7620.0]
     leica = tmp_path / "leica.txt"
     text = "Point Id;X [mm];Y [mm];Z [mm];Time\n'a1';1,5;2;3;'12:30'\n"
     leica.write_bytes(text.replace("Time", "Zeit für").encode("latin-1"))

@@ -10,7 +10,7 @@ import pytest
 from postproc.calibration.survey_program import BACK, STEPS, write_survey
 from postproc.compensation.program import plan_visits, read_program
 from postproc.robot.cell import load_cell
-from tests.written import cli
+from tests.written import cli, program
 
 POSES = 24
 
@@ -114,3 +114,17 @@ def test_wrong_options(desk, options, said):
     found = cli("survey", "--cell", desk.cell, "-o", desk.folder / "s.pdl", *options)
     assert found.exit_code == 2 and said in found.stderr
     assert desk.names() == set()
+
+
+def test_the_volume_of_a_job_is_surveyed(desk):
+    moves = (f"MOVE JOINT TO {{{q}.0, 20.0, -85.0, 30.0, 60.0, 45.0}}" for q in (5, 25))
+    job, out = desk.put("job.pdl", program(*moves)), desk.folder / "near.pdl"
+    options = ("--cell", desk.cell, "--poses", 12, "-o", out)
+    found = cli("survey", *options, "--job", job)
+    assert found.exit_code == 0, found.stderr
+    assert "12 poses (round the program's arrivals)" in found.stdout
+    assert out.read_text("latin-1").count("MEASURE ") == 25
+    empty = desk.put("empty.pdl", "PROGRAM empty\nBEGIN\nEND empty\n")
+    refused = cli("survey", *options, "--job", empty)
+    assert refused.exit_code == 2
+    assert "empty.pdl: has no arrival that can be planned" in refused.stderr

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from postproc.calibration.measurements import POSITION, read_points
-from postproc.calibration.tables import TableFormat, read_foreign, read_table
+from postproc.calibration.tables import TableFormat, read_foreign
+from postproc.calibration.text_table import read_table
 from postproc.exceptions import MeasurementError
 
 HEADER = "id;q1_deg;q2_deg;x_mm;y_mm;z_mm"

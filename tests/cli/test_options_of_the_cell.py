@@ -77,7 +77,7 @@ def test_the_help_of_compensate_fits_on_a_screen():
         ("compensation.shared_points=all", "'mean', 'clone' or 'leave' @ $.shared_poi"),
         ("compensation.max_inserted=-1", "greater than or equal to 0 @ $.max_inserted"),
         ("compensation.path_tolerance_mm=nan", "$.path_tolerance_mm"),
-        ("measurements.unit=feet", "'mm', 'm' or 'inch' @ $.unit"),
+        ("measurements.unit=feet", "'mm', 'm', 'inch' or 'ft' @ $.unit"),
     ],
 )
 def test_a_change_is_checked_like_the_cell(desk, change, said):

@@ -251,7 +251,7 @@ def test_unknown_arm_lists_the_shipped_ones():
 
 def test_axis_3_measured_from_axis_2(tmp_path, arm):
     linked = load_arm(
-        _write_arm(tmp_path, arm, "axis3_adds_axis2 = false", "axis3_adds_axis2 = true")
+        _write_arm(tmp_path, arm, "axis2_in_axis3 = 0.0", "axis2_in_axis3 = 1.0")
     )
     q = np.deg2rad([[10, 20, -100, 30, 40, 50]])
     same = q - np.deg2rad([[0, 0, 20, 0, 0, 0]])

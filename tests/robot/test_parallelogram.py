@@ -6,7 +6,10 @@ pitches by joint 3, and neither carries the other.
 
 from __future__ import annotations
 
+import cmath
+import math
 import re
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -14,6 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from postproc.exceptions import ArmError
 from postproc.robot.arm import load_arm
+from postproc.robot.arm_file import list_shipped_arms
+from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.inverse import wrap
 from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.simulation.kinematics import (
@@ -28,6 +33,7 @@ from tests.written import cli
 
 LOW = np.deg2rad([-170.0, -60, -50, -170, -110, -170])
 HIGH = np.deg2rad([170.0, 70, 50, 170, 110, 170])
+OLD_KEY = "axis3_adds_axis2 = true"
 SENSES = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
 # Senses of axes 2 and 3, whether D-H axis 3 points against axis 2, a closed form.
 CASES = [(*s, False, closed) for s in SENSES for closed in (True, False)]
@@ -68,7 +74,7 @@ class Rod:
         ).as_matrix()
         return out
 
-    def text(self, facing_away: bool, closed: bool) -> str:
+    def text(self, facing_away: bool, closed: bool, key: str = OLD_KEY) -> str:
         """Write the arm file."""
         sense = self.sense.copy()
         alpha = [-90.0, 0.0, -90.0, 90.0, -90.0, 0.0]
@@ -86,7 +92,7 @@ d_mm = {[c1, 0.0, 0.0, c3, 0.0, c4]}
 alpha_deg = {alpha}
 offset_deg = [0.0, -90.0, 0.0, 0.0, 0.0, 180.0]
 sense = {sense.tolist()}
-axis3_adds_axis2 = true
+{key}
 [joints]
 lower_deg = [-180.0, -75.0, -75.0, -180.0, -120.0, -180.0]
 upper_deg = [180.0, 95.0, 75.0, 180.0, 120.0, 180.0]
@@ -262,8 +268,138 @@ def test_a_fit_leaves_the_noise_and_a_program_is_compensated(tmp_path, seed, sen
     assert np.linalg.norm(before, axis=1).min() > 2e-4
 
 
-def test_a_parallelogram_needs_parallel_axes(tmp_path):
-    text = Rod(0, 1, 1).text(False, False).replace("[-90.0, 0.0, -90", "[-90, 9, -90")
-    (tmp_path / "arm.toml").write_text(text)
-    with pytest.raises(ArmError, match=r"axis3_adds_axis2 needs axes 2 and 3 parallel"):
+@pytest.mark.parametrize("key", [OLD_KEY, "axis2_in_axis3 = -1.0"])
+def test_a_parallelogram_needs_parallel_axes(tmp_path, key):
+    text = Rod(0, 1, 1).text(False, False, key)
+    (tmp_path / "arm.toml").write_text(text.replace("[-90.0, 0.0, -90", "[-90, 9, -90"))
+    with pytest.raises(ArmError, match=r"axis\w+ needs axes 2 and 3 parallel"):
         load_arm(tmp_path / "arm.toml")
+
+
+@pytest.mark.parametrize("away", [False, True])
+@pytest.mark.parametrize("senses", SENSES)
+def test_a_number_states_the_coupling_and_a_wrong_sign_is_refused(
+    tmp_path, senses, away
+):
+    """Models know the arm again whichever key its file has."""
+    rod, path = Rod(3, *senses), tmp_path / "arm.toml"
+    path.write_text(rod.text(away, False))
+    old, right = load_arm(path), -1.0 if senses[0] == senses[1] else 1.0
+    path.write_text(rod.text(away, False, f"axis2_in_axis3 = {right}"))
+    arm, q = load_arm(path), drawn(rod)
+    np.testing.assert_allclose(arm.flange(q), rod.flange(q), atol=1e-12)
+    assert arm.id == old.id
+    assert arm.file.model_dump() == old.file.model_dump()
+    path.write_text(rod.text(away, False, f"axis2_in_axis3 = {-right}"))
+    with pytest.raises(ArmError, match=f"these senses and angles it is {right:g}, or"):
+        load_arm(path)
+    path.write_text(rod.text(away, False, f"{OLD_KEY}\naxis2_in_axis3 = {right}"))
+    with pytest.raises(ArmError, match="replaces axis3_adds_axis2"):
+        load_arm(path)
+    path.write_text(rod.text(away, False, "axis2_in_axis3 = 0.0"))
+    assert load_arm(path).id != arm.id
+
+
+def test_drives_are_coupled_apart_from_the_pose(tmp_path):
+    """With a rod motor 3 rests while joint 2 moves alone; in series it turns back."""
+    path, rod = tmp_path / "arm.toml", Rod(4, 1, 1)
+    text = rod.text(False, False, "axis2_in_axis3 = -1.0")
+    series = np.eye(6)
+    series[2, 1] = -1.0
+    q = np.deg2rad([[0.0, 0, 0, 0, 0, 0], [0, 20, 0, 0, 0, 0]])
+    found = []
+    for coupling in ("", f"drive_coupling = {series.tolist()}\n"):
+        path.write_text(text.replace("[joints]\n", f"[joints]\n{coupling}"))
+        arm = load_arm(path)
+        np.testing.assert_allclose(arm.flange(q), rod.flange(q), atol=1e-12)
+        found.append(arrivals_of_rows(arm, q).direction[1].tolist())
+    assert found == [[0, 1, 0, 0, 0, 0], [0, 1, -1, 0, 0, 0]]
+
+
+class FourBar(NamedTuple):
+    """A linkage as published: lengths [mm], and how the controller counts.
+
+    Attributes:
+        base_up, base_out: Axis 2 above the floor and in front of axis 1.
+        upper: Axis 2 to the elbow, as long as the rod beside it.
+        up, ahead: Axis 3 to the wrist, across and along a level forearm.
+        flange: Wrist to flange.
+        sense: Of the joints about z, y, y, x, y, x of the stretched-out arm.
+        level: Joint angle 3 of the level forearm [deg].
+        turned: About axis 6, where joint 6 is 0 [deg].
+    """
+
+    base_up: float
+    base_out: float
+    upper: float
+    up: float
+    ahead: float
+    flange: float
+    sense: tuple[int, ...]
+    level: float
+    turned: float
+
+    def place(self, q: list[float]) -> np.ndarray:
+        """Close the loop of the four bars, then go on to the flange, (4, 4) [m]."""
+        a = [s * angle for s, angle in zip(self.sense, q, strict=True)]
+        lean, pitch = a[1], a[2] - self.sense[2] * math.radians(self.level)
+        elbow = self.upper * cmath.exp(1j * (math.pi / 2 - lean))
+        crank = 300.0 * cmath.exp(1j * (math.pi - pitch))  # motor 3 turns this bar
+        tail = meet(crank, self.upper, elbow, 300.0)  # rod and forearm meet there
+        along = (elbow - tail) / 300.0
+        wrist = elbow + along * complex(self.ahead, self.up)
+        plane = [self.base_out + wrist.real, 0.0, self.base_up + wrist.imag]
+        out = np.eye(4)
+        fore = np.array(
+            [[along.real, 0, -along.imag], [0, 1, 0], [along.imag, 0, along.real]]
+        )
+        hand = fore @ about(0, a[3]) @ about(1, a[4]) @ about(0, a[5])
+        first = about(2, a[0])
+        out[:3, 3] = first @ (plane + hand @ [self.flange, 0, 0]) / 1e3
+        out[:3, :3] = first @ hand @ about(0, math.radians(self.turned))
+        out[:3, :3] = out[:3, :3] @ about(1, math.pi / 2)
+        return out
+
+
+def meet(a: complex, to_a: float, b: complex, to_b: float) -> complex:
+    """Find the corner that makes a parallelogram of 0, a, b: two circles meet there.
+
+    The other place where they meet makes the two bars cross.
+    """
+    gap = abs(b - a)
+    foot = (to_a**2 - to_b**2 + gap**2) / (2 * gap)
+    high = math.sqrt(max(to_a**2 - foot**2, 0.0))
+    both = [a + (b - a) / gap * complex(foot, side * high) for side in (1, -1)]
+    return max(both, key=abs)
+
+
+def about(axis: int, angle: float) -> np.ndarray:
+    """Turn about x, y or z, (3, 3)."""
+    c, s, out = math.cos(angle), math.sin(angle), np.eye(3)
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    out[j, j], out[j, k], out[k, j], out[k, k] = c, -s, s, c
+    return out
+
+
+# Every shipped arm with such a linkage; lengths of its file's sources.
+LINKAGES = {
+    "nj130-2.6": FourBar(
+        830.0, 350.0, 1160.0, 250.0, 145.0 + 960.58, 165.0,
+        (-1, 1, -1, -1, 1, -1), -90.0, 0.0,
+    ),
+}  # fmt: skip
+
+
+def test_every_shipped_arm_with_a_linkage_has_one_to_be_held_against():
+    shares = {n: load_arm(n).file.dh.axis2_share for n in list_shipped_arms()}
+    assert {name for name, share in shares.items() if share} == set(LINKAGES)
+
+
+@pytest.mark.parametrize("name", LINKAGES)
+def test_the_flange_is_where_the_four_bars_place_it(name):
+    arm, linkage = load_arm(name), LINKAGES[name]
+    low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
+    q = np.random.default_rng(8).uniform(low, high, (200, 6))
+    np.testing.assert_allclose(
+        arm.flange(q), [linkage.place(row) for row in q.tolist()], atol=1e-10
+    )

@@ -110,8 +110,10 @@ def test_a_parallelogram_is_compared_in_series(tmp_path: Path) -> None:
     """The URDF states joints in series, the controller keeps axis 2 out of axis 3."""
     made = read_chain(write(tmp_path, NJ130_SERIAL))
     text = arm_text(made, 0.1)
-    coupled = text.replace("axis3_adds_axis2 = false", "axis3_adds_axis2 = true")
-    assert coupled != text
+    # The number that the comment names is right for this arm.
+    stated = re.search(r"axis2_in_axis3 = 0.0 .*: (-?1\.0) where the forearm", text)
+    assert stated is not None
+    coupled = text.replace("axis2_in_axis3 = 0.0", f"axis2_in_axis3 = {stated[1]}")
     assert judged(made, arm_of_text(made.path, coupled)).agrees
 
 

@@ -12,13 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from postproc.arrays import Floats, data_frame
+from postproc.arrays import Bools, Floats, Ints, data_frame
+from postproc.calibration.cross_validation import (
+    HeldOutError,
+    HeldOutRows,
+    PairedErrors,
+    mean_error_mm,
+    predict_held_out_linearly,
+    summarise,
+)
 from postproc.calibration.diagnosis.held_out import (
     LENGTH,
     NoiseFloor,
     deal,
     multi_directional,
     noise_floor,
+    regions,
     whole_poses,
 )
 from postproc.calibration.diagnosis.investigate import (
@@ -84,8 +93,8 @@ if TYPE_CHECKING:
 
 CLEARLY_ABOVE = 1.2  # times the noise floor
 KEPT = (
-    "a refit to these rows predicts held-out ones no better: the model is written as "
-    "it was given"
+    "a refit to these rows predicts held-out ones no better, beyond what chance does: "
+    "the model is written as it was given"
 )
 WORSE = 0.025  # probability of calling a model worse that is not
 PARTS = 5
@@ -102,6 +111,7 @@ class HeldOut:
         fitted: Rows that each of them was predicted from, typically.
         before, after: Errors that the given and the extended model leave, (m, 3) [m].
         pose: Number of the pose of each, (m,).
+        part: Part of every row of the fit, (n,).
     """
 
     rows: NDArray[np.int64]
@@ -109,6 +119,31 @@ class HeldOut:
     before: Floats
     after: Floats
     pose: NDArray[np.int64]
+    part: NDArray[np.int64]
+
+    def expect(self, fit: Fit, std: Floats | None = None) -> HeldOutError:
+        """Put what a model leaves of new poses into figures.
+
+        How sure the extended model is of a row, and what it leaves of regions without
+        rows, follows from its fit without them, effects as they are.
+
+        Args:
+            fit: The fit of the model.
+            std: Its standard deviations of all rows, (n, 3) [m], where others than
+                those of the fit hold.
+        """
+        region = whole_poses(regions(fit.batch.states.q), fit.pose)
+        far = mean_error_mm(predict_held_out_linearly(fit, region))
+        return summarise(self.with_std(fit, std), far, chosen=True)
+
+    def with_std(self, fit: Fit, std: Floats | None = None) -> HeldOutRows:
+        """Return what the extended model leaves with how sure it is, see `expect`."""
+        every = predict_held_out_linearly(fit, self.part)
+        stated = every.std if std is None else std
+        return HeldOutRows(
+            self.after, stated[self.rows], self.part[self.rows],
+            np.ones(len(self.rows), dtype=bool), self.pose, every.tracker[self.rows],
+        )  # fmt: skip
 
     @property
     def worse(self) -> bool:
@@ -122,6 +157,25 @@ class HeldOut:
             return False
         limit = student.isf(WORSE, len(rise) - 1) * rise.std(ddof=1) / len(rise) ** 0.5
         return bool(rise.mean() > limit)
+
+    def keeping(self, given: Fit) -> HeldOut:
+        """Return it with what the given model leaves, its set-up fitted anew.
+
+        A probe point that the given model knows is where it has it, unless what the
+        rows say of it predicts others better.
+        """
+        states = given.batch.states
+        every = predict_held_out_linearly(given, self.part)
+        anew, point = states.across(every.error)[self.rows], states.tool_id[self.rows]
+        after = np.where(_is_less(anew, self.before, point)[:, None], anew, self.before)
+        return replace(self, after=after)
+
+
+def _is_less(one: Floats, other: Floats, group: Ints) -> Bools:
+    """Return True for rows of groups in which the first errors, (m, 3), are smaller."""
+    fall = np.linalg.norm(other, axis=1) - np.linalg.norm(one, axis=1)
+    _, label = np.unique(group, return_inverse=True)
+    return np.asarray((np.bincount(label, fall) > 0.0)[label])
 
 
 def hold_out(
@@ -170,7 +224,7 @@ def hold_out(
     across = base.batch.states[which].across
     return HeldOut(
         which, fitted, across(np.concatenate(before)), across(np.concatenate(after)),
-        base.pose[which],
+        base.pose[which], part,
     )  # fmt: skip
 
 
@@ -195,6 +249,7 @@ def predict_residuals(
 # Close the loop: what a model leaves of fresh measurements, and why.
 
 PLACES = 5
+TELLING = 0.05  # nats that poses to tell two causes apart are worth at least
 BY_ANGLE = ("joint", "lambda", "before", "travel", "loop")  # what drives at an angle
 
 
@@ -223,6 +278,7 @@ class Extension:
         """Say in some lines what was found, and what it leaves of held-out rows."""
         found = self.diagnosis
         lines = [
+            *filter(None, [found.tell_expected()]),
             f"verdict: {found.verdict}",
             found.story(),
             f"before {found.before.tell()}",
@@ -301,8 +357,8 @@ def extend_model(
         given = survey.position - nominal - model.error(arm, survey.states)
     held_out = hold_out(traced.search, sides, seed, progress, given)
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
-    if given is not None and _tells_nothing(diagnosis):
-        diagnosis = replace(diagnosis, notes=(*diagnosis.notes, KEPT))
+    if given is not None and diagnosis.verdict == "noise" and not traced.findings:
+        diagnosis = _keep_given(traced.search, held_out, model, diagnosis)
     extended = _extend_model(model, survey, traced.search, diagnosis)
     widths = newer_widths(model.flank_widths, extended, arm, reversals)
     extended = replace(extended, flank_widths=widths)
@@ -311,10 +367,29 @@ def extend_model(
     return Extension(diagnosis, extended, traced.search, held_out)
 
 
-def _tells_nothing(found: Diagnosis) -> bool:
-    """Return True if fresh rows add nothing, and a refit predicts others no better."""
-    small = found.verdict == "noise" and not found.findings
-    return small and found.after.mean_mm >= found.before.mean_mm
+def _keep_given(
+    found: Search, held_out: HeldOut, model: Model, diagnosis: Diagnosis
+) -> Diagnosis:
+    """Keep a given model that rows add nothing to, unless a refit is surely better.
+
+    Its set-up, such as where each probe point is, is found from the rows in any case.
+    """
+    base = found.base
+    first, *setup = base.combination.effects
+    if not isinstance(first, Revision):
+        return diagnosis
+    given, kept = found.fit, replace(held_out, after=held_out.before)
+    if setup:
+        effects = (first.fix_model(), *setup)
+        given = fit_effects(base.batch, base.position, effects, base.noise.origin)
+        kept = held_out.keeping(given)
+    pair = kept.with_std(given), held_out.with_std(found.fit)
+    if PairedErrors.of(*pair).better:
+        return diagnosis
+    std = model.reading(base.batch.arm, base.batch.states).std
+    expected = kept.expect(given, std)
+    notes = (*diagnosis.notes, KEPT)
+    return replace(diagnosis, notes=notes, expected=expected)
 
 
 def _with_mended_directions(
@@ -369,6 +444,7 @@ def _conclude(
         not_excluded=not_excluded(found.fit.batch),
         fixed_points=() if survey.motion is None else survey.motion.tell(),
         notes=tuple(w for w in survey.warnings if w.endswith(AVERAGED)),
+        expected=None if held_out.worse else held_out.expect(found.fit),
         set_anew=FrameShift.of(found.fit),
         explained=_measure_explained(held_out, floor) if traced.findings else None,
     )
@@ -423,6 +499,8 @@ def _next(traced: Investigation, seed: int) -> tuple[str, Floats]:
             nats, poses = poses_that_separate(
                 found.fit, found.place(number), rival, seed
             )
+            if nats < TELLING:
+                continue
             worth = (
                 f"a round is worth about {nats:.1f} nats, {NEAR:.0f} tell them apart"
             )

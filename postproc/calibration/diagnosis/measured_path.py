@@ -21,7 +21,6 @@ from postproc.calibration.tables import (
     DETECT,
     TableFormat,
     read_foreign,
-    read_table,
 )
 from postproc.compensation.paths.backlash_steps import (
     JointInMotion,
@@ -203,8 +202,7 @@ def read_track(path: Path, reading: TableFormat = DETECT) -> tuple[Track, str]:
     Raises:
         MeasurementError: Columns are missing, or the times are none.
     """
-    mapped = reading.columns is not None
-    table = read_foreign(path, reading) if mapped else read_table(path, **reading.given)
+    table = read_foreign(path, reading)
     table.require(*COLUMNS)
     time = table.numbers("time_s")
     cure = "Give readings of one run, in order, with their times in seconds"

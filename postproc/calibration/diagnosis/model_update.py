@@ -17,7 +17,6 @@ from postproc.exceptions import PostprocError
 from postproc.model.effect_sum import Combination
 from postproc.model.effects import propose
 from postproc.model.effects.effect import Effect, Parameter
-from postproc.model.effects.joint_offset import MASTERED
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.robot.arm import Arm
@@ -37,6 +36,7 @@ GIVEN = "model"  # group of the given model's own uncertainty
 TRACKER = "tracker"  # group of a set-up's parameters that place the base
 CLEARLY = 3.0  # standard errors
 ZERO = "zero"  # groups of zeros of joints that are open again
+OPEN = 3e-3  # [rad] by which the zero of a joint may differ beside what the model lacks
 SET_ANEW = ("base shift", "base turn", "tool")  # groups of what may be others since
 
 
@@ -106,6 +106,10 @@ class Revision(Effect):
         )
         return closed.free_zeros(lacking - offsets)
 
+    def fix_model(self) -> Revision:
+        """Return the given model as it is, nothing of it to be fitted."""
+        return replace(self, factor=self.factor[:, :0], groups=())
+
     def free_zeros(self, joints: Collection[int]) -> Revision:
         """Return the revision with the zeros of joints to be fitted again."""
         names = self.model.effects.names
@@ -117,7 +121,7 @@ class Revision(Effect):
         if not added:
             return self
         more = np.zeros((len(names), len(added)))
-        more[list(added.values()), range(len(added))] = MASTERED
+        more[list(added.values()), range(len(added))] = OPEN
         return replace(
             self,
             factor=np.concatenate([self.factor, more], axis=1),

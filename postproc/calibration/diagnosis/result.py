@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.calibration.cross_validation import HeldOutError
 from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.model_update import FrameShift
 from postproc.calibration.diagnosis.score import LENGTHS, ResidualTest
@@ -141,6 +142,8 @@ class Diagnosis:
         notes: How rows were read, in words.
         explained: Part of the squared held-out error above the noise floor that the
             additions explain; None where nothing was added.
+        expected: What the extended model is expected to leave of new poses; None where
+            it must not be used.
     """
 
     verdict: Verdict
@@ -164,6 +167,7 @@ class Diagnosis:
     set_anew: FrameShift | None = None
     explained: float | None = None
     notes: tuple[str, ...] = ()
+    expected: HeldOutError | None = None
 
     @property
     def named(self) -> float | None:
@@ -178,6 +182,10 @@ class Diagnosis:
     def times_floor(self) -> float:
         """How often the noise floor held-out rows are left."""
         return self.after.mean_mm / max(self.noise_floor_mm, 1e-12)
+
+    def tell_expected(self) -> str:
+        """Say what is expected of new poses; nothing where no model may be used."""
+        return "" if self.expected is None else self.expected.describe()
 
     def story(self) -> str:
         """Tell in a sentence what is named, and what remains."""
@@ -215,6 +223,7 @@ class Diagnosis:
             "noise_floor_source": self.noise_floor_source,
             "n_fit": self.n_fit,
             "n_held_out": self.n_held_out,
+            "expected": None if self.expected is None else asdict(self.expected),
             "before": statistics(self.before),
             "after": statistics(self.after),
             "vap_mm": vap,

@@ -64,6 +64,8 @@ NARROW = 60  # families that a search weighs once it has seen all
 TOLD = 10  # families whose scores are told
 NONE = np.zeros(0, dtype=np.int64)
 MANY = 6000  # rows: of more, products would take gigabytes and minutes
+OTHER = "other "  # before the name of a factor that is another joint's
+OTHER_ORDERS = 4  # waves per turn of an angle that such a factor multiplies
 LEAST_MOMENT = 1.0  # [N m] by which a load varies that may bend anything
 
 
@@ -125,11 +127,24 @@ class MotionLaws:
     widths: tuple[tuple[tuple[MotionLaw, ...], Floats, Ints], ...]
 
     @classmethod
-    def of(cls, batch: ArmStates, drivers: Sequence[str], factor: str) -> MotionLaws:
-        """Evaluate all laws of some drivers, multiplied by a factor if there is one."""
+    def of(
+        cls,
+        batch: ArmStates,
+        drivers: Sequence[str],
+        factor: str,
+        laws_of: LawsOf | None = None,
+    ) -> MotionLaws:
+        """Evaluate laws of some drivers, multiplied by a factor if there is one.
+
+        Args:
+            batch: The rows.
+            drivers: Names of the drivers.
+            factor: What multiplies them, or "".
+            laws_of: Lists the laws of one; all by default.
+        """
         alike: dict[int, list[tuple[MotionLaw, Floats, int]]] = defaultdict(list)
         for k, driver in enumerate(drivers):
-            for law in _laws_of(batch, driver, factor):
+            for law in (laws_of or _laws_of)(batch, driver, factor):
                 scale = np.array([p.scale for p in law.effect.parameters()])
                 values: Floats = (law.effect.turning(batch) * (scale / scale.max())).T
                 alike[values.shape[0]].append((law, values, k))
@@ -170,6 +185,9 @@ class MotionLaws:
         """Return them at some of the rows."""
         widths = tuple((law, v[:, :, rows], which) for law, v, which in self.widths)
         return replace(self, widths=widths)
+
+
+LawsOf = Callable[[ArmStates, str, str], list[MotionLaw]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +238,8 @@ class Table:
 
     Attributes:
         revised: Whether rows revise a given model, which may have means otherwise.
-        laws: Laws by the factor that multiplies them, "" without one.
+        laws: Laws by the factor that multiplies them, "" without one. Those of another
+            joint's direction and load are few, see `OTHER`.
         named: (driver, law) of cells that named effects are, by carrier.
         only: Numbers of the drivers that are tried, by carrier and factor; None: all.
     """
@@ -254,6 +273,8 @@ class Table:
                 kinds &= {"joint", "temperature", "way"}
             other = [d for d in drivers if d.partition(" ")[0] in kinds]
             laws[factor] = MotionLaws.of(batch, other, factor)
+            turns = [d for d in drivers if d.startswith("joint")]
+            laws[OTHER + factor] = MotionLaws.of(batch, turns, factor, _waves_of)
         named: dict[str, set[tuple[str, str]]] = defaultdict(set)
         for kind in EFFECTS:
             for carrier, *cell in kind.cells:
@@ -414,10 +435,12 @@ def free_carrier(projection: Projection, moved: Carrier) -> Projection:
     return projection.beside(projection.fit.whiten(moved.move(projection.at)))
 
 
-def _factors(carrier: Carrier) -> tuple[str, str, str]:
-    """Name what may multiply a cause at a carrier: what is its own joint's."""
+def _factors(carrier: Carrier) -> tuple[str, ...]:
+    """Name what may multiply a cause at a carrier: its own joint's, and others'."""
     own = min(carrier.link, len(JOINTS))
-    return "", f"lambda {own}", f"torque {own}"
+    kinds = ("lambda", "torque")
+    others = (f"{OTHER}{kind} {j}" for kind in kinds for j in JOINTS if j != own)
+    return ("", f"lambda {own}", f"torque {own}", *others)
 
 
 def _by_driver(laws: MotionLaws, each: Sequence[Floats]) -> Floats:
@@ -470,6 +493,25 @@ def _laws_of(batch: ArmStates, driver: str, factor: str) -> list[MotionLaw]:
         kinds.append([Curve.over(batch, "joint 1", (driver,), factor, whole=False)])
     if driver.startswith("joint"):
         kinds.append([cell(f"harmonic {n}") for n in range(1, ORDERS + 1)])
+    return _with_shares(kinds)
+
+
+def _waves_of(batch: ArmStates, joint: str, factor: str) -> list[MotionLaw]:
+    """List what an angle may do by another joint's direction or load: few laws."""
+    x = covariate(batch, joint)
+    middle, half = (float(x.min()) + float(x.max())) / 2, float(np.ptp(x)) / 2
+    size = float(np.abs(covariate(batch, factor)).max())
+    waves = [f"harmonic {n}" for n in range(1, OTHER_ORDERS + 1)]
+    return _with_shares(
+        [
+            [PartMotion("joint 1", joint, factor, law, middle, half, size) for law in k]
+            for k in (["linear"], waves)
+        ]
+    )
+
+
+def _with_shares(kinds: Sequence[Sequence[PartMotion | Curve]]) -> list[MotionLaw]:
+    """Give each kind of law the same share of a driver, and each of a kind."""
     return [
         MotionLaw(effect, -float(np.log(len(kinds) * len(kind))))
         for kind in kinds

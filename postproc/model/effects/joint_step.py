@@ -54,8 +54,8 @@ class JointStep(CampaignStep, JointEffect):
         ]
 
     def has_mean(self) -> bool:
-        """Return False: rows before the step alone tell of it."""
-        return False
+        """Return True: a zero that changed is another one than a given model has."""
+        return True
 
     def refers_to(self) -> str:
         """Name the state after the step."""

@@ -325,7 +325,7 @@ class PartMotion(CarriedEffect):
             )
         if self.law == "linear":
             per = self.half * self.size
-            shown += f"/{unit(self.source)}" if unit(self.source) != "1" else ""
+            shown += _per(self.factor, self.source)
             size, error = size / per, error / per
         return f"{told}, {_size(size, error, shown)}"
 
@@ -343,6 +343,13 @@ class PartMotion(CarriedEffect):
         if self.law in PLACED:
             return {f"{self.law} at": (self.middle, what)}
         return {"per": (self.half, what)} if self.law == "linear" else {}
+
+
+def _per(*drivers: str) -> str:
+    """Say per what a size is, "/(N m rad)" of two drivers, nothing of numbers."""
+    units = [unit(name) for name in drivers if name and unit(name) != "1"]
+    text = " ".join(units)
+    return f"/({text})" if len(units) > 1 else f"/{text}" if text else ""
 
 
 PLACED = {"step": "a step", "saturating": "a bend"}  # laws of one place

@@ -11,6 +11,7 @@ import pytest
 
 from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.diagnose import (
+    KEPT,
     Extension,
     dump_json,
     evidence_of,
@@ -31,6 +32,7 @@ from postproc.exceptions import ModelError, PostprocError
 from postproc.model.covariate import covariate, loops, unit
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.curve import Curve
+from postproc.model.effects.probe import Probe
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, load_model
 from postproc.report.diagnosis import tell
@@ -236,6 +238,28 @@ def test_a_given_model_of_other_data_is_judged_as_it_is() -> None:
     left = error - model.error(ARM, second.states)
     wanted = np.linalg.norm(left, axis=1).mean() * 1e3
     assert found.diagnosis.before.mean_mm == pytest.approx(wanted, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", [341, 342])
+def test_a_nest_that_is_new_leaves_an_unchanged_model_as_it_was(seed: int) -> None:
+    arm = virtual_arm(seed, BASE)
+    old, new = survey(arm, seed, 250), survey(arm, seed + 1, 60)
+    first, fresh = (
+        measurements(states_of(a), arm.measure(a, TRACKER, stream(seed, name)), name)
+        for a, name in ((old, "first"), (new, "second"))
+    )
+    model, second = base_model(first), np.arange(60) % 2
+    tool = fresh.states.tool + 2e-4 * second[:, None]  # stated 0.2 mm off per axis
+    states = fresh.states.with_(tool=tool, tool_id=fresh.states.tool_id + second)
+    with few_parts():
+        found = extend_model(
+            fresh.with_states(states), ARM, model, tracker=TRACKER, setup=(Probe.name,)
+        )
+    assert found.diagnosis.verdict == "noise" and KEPT in found.diagnosis.notes
+    assert np.array_equal(found.model.values, model.values)
+    expected = found.diagnosis.expected
+    assert expected is not None and expected.covered > 0.9
+    assert expected.error.mean_mm < found.diagnosis.before.mean_mm
 
 
 def repeated(sides_of: np.ndarray) -> ArmStates:
