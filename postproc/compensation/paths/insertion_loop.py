@@ -47,6 +47,7 @@ PRELOAD = "Preload the backlash: compensation.preload_backlash"
 MEASURE_STARTS = (
     "Measure how the joints change their flanks: survey.reversals, or diagnose --path"
 )
+BY_HAND = "Change what the reason names, or put targets on its way in the program"
 MORE_ROOM = "Allow more points: --max-inserted"
 SHORTER = "A lower speed, or a smaller [limits] segment_ms, allows shorter pieces"
 TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
@@ -271,11 +272,13 @@ def _cell_speed(work: InsertionPlan) -> float:
 def _cures(work: InsertionPlan, told: InTime) -> dict[int, str]:
     """Say what helps the moves that are left too far, by visit."""
     visits, found = work.source.reading.visits, {}
-    for k in work.too_far.tolist():
+    for k in work.too_far.tolist() if work.splitter is not None else ():
         v, largest = int(told.paths.visit[k]), told.paths.after.largest[k]
         known = [work.cures[h] for h in halves(visits, v) if work.cures.get(h)]
         if known:
             found[v] = known[0]
+        elif v not in work.open:
+            found[v] = BY_HAND
         elif told.paths.way[largest] < BEGINS and v not in work.stops:
             found[v] = MEASURE_STARTS if v in work.unconfirmed else PRELOAD
         else:

@@ -20,7 +20,7 @@ from postproc.compensation.paths.arcs import (
     zone_sizes,
 )
 from postproc.compensation.paths.insertion_plan import InsertionPlan
-from postproc.compensation.paths.path_error import PathAccuracy, apart, sizes_of
+from postproc.compensation.paths.path_error import apart, sizes_of
 from postproc.compensation.paths.plan_outcomes import Objection, compare
 from postproc.compensation.paths.reapproach import WORSE, bad_approaches
 from postproc.compensation.timing_comparison import InTime
@@ -363,14 +363,3 @@ def _largest_on(way: Floats, far: Floats) -> tuple[float, float]:
     """Return the largest distance on a way, and where, as a share of it."""
     top = int(far.argmax())
     return float(far[top]), float(way[top] / max(way[-1], 1e-12))
-
-
-def largest_on_moves(
-    paths: PathAccuracy, far: Floats
-) -> dict[int, tuple[float, float]]:
-    """Say how far off each move is at the most, of samples (s,) [m], and where."""
-    rows = map(paths.samples, range(len(paths)))
-    return {
-        v: _largest_on(paths.way[own], far[own])
-        for v, own in zip(paths.visit.tolist(), rows, strict=True)
-    }
