@@ -207,9 +207,7 @@ def make_plan(
             raise CellError(plan, "holds no [[rule]]", "Add one", place="$.rule")
         here = plan.parent
         rules += [
-            Rule(
-                r.pattern, r.arm, path_in(here, r.cell), path_in(here, r.model)
-            )
+            Rule(r.pattern, r.arm, path_in(here, r.cell), path_in(here, r.model))
             for r in file.rule
         ]
     if (cell is None) != (model is None) or (cell is None and plan is None):

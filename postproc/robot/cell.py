@@ -608,9 +608,7 @@ def _beside(folder: Path, section: MeasurementSection) -> MeasurementSection:
     """Return what is stated of measurement files, with the whole path of its map."""
     if section.columns is None:
         return section
-    return section.model_copy(
-        update={"columns": str(path_in(folder, section.columns))}
-    )
+    return section.model_copy(update={"columns": str(path_in(folder, section.columns))})
 
 
 def _cell_of(path: Path, file: CellFile) -> Cell:
