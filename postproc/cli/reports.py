@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -47,7 +48,8 @@ class Reports:
         """Sort files by their endings; what has no name that lasts is JSON.
 
         Raises:
-            PostprocError: A command writes no report of an ending.
+            PostprocError: A command writes no report of an ending, or matplotlib is
+                not installed.
         """
         sorted_: dict[str, list[Path]] = {kind: [] for kind in (JSON, *kinds)}
         for place in given or ():
@@ -60,6 +62,11 @@ class Reports:
                 )
             sorted_[kind].append(place)
         plots = [place for kind in PLOTS for place in sorted_.get(kind, ())]
+        if plots and find_spec("matplotlib") is None:
+            raise PostprocError(
+                f"--report {plots[0]}: pictures need matplotlib. Install it with "
+                "pip install 'postproc[plots]', or write a page (FILE.html)"
+            )
         return cls(tuple(sorted_[JSON]), tuple(sorted_.get(PAGE, ())), tuple(plots))
 
     @property

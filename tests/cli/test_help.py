@@ -6,12 +6,17 @@ import os
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import typer
 
+from postproc import __version__
+from postproc.cli import reports
 from postproc.cli.commands import app, application
 from postproc.cli.common import EXAMPLES
+from postproc.cli.reports import PLOTS, Reports
+from postproc.exceptions import PostprocError
 from tests.cli.test_cli import COMMANDS
 from tests.written import cli
 
@@ -124,3 +129,21 @@ def test_a_command_is_prepared_alone_and_all_where_none_is_named():
     for first in ("", "arm", "--help", "compensat"):
         assert application(first) is app
     assert len(app.registered_commands) > 10 and app.registered_groups
+
+
+def test_pictures_need_an_extra_and_that_is_reported_before_any_work(monkeypatch):
+    monkeypatch.setattr(reports, "find_spec", lambda name: None)
+    with pytest.raises(PostprocError, match=r"a\.svg: pictures need matplotlib.*plots"):
+        Reports.of([Path("a.svg")], *PLOTS)
+    assert Reports.of([Path("a.json")], *PLOTS).json == (Path("a.json"),)
+
+
+def test_the_version_is_printed_without_loading_the_command_line():
+    code = (
+        "import sys; sys.argv = ['postproc', '--version']\n"
+        "from postproc.cli import main; main()\n"
+        "slow = {'typer', 'numpy', 'pydantic', 'multiprocessing', 'ctypes'}\n"
+        "print(sorted(slow & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.splitlines() == [f"postproc {__version__}", "[]"], done.stderr

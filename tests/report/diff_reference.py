@@ -39,8 +39,9 @@ def row_of(file: str, line: int, old: str, new: str) -> DiffRow:
         return DiffRow(file, line, "", (), (), None, f"{old} -> {new}")
     change = None
     if len(numbers[0]) >= 3 and "{" not in old:
-        moved = [n - o for o, n in zip(*numbers, strict=True)]
-        change = math.sqrt(sum(m * m for m in moved[:3]))
+        x, y, z = (n - o for o, n in zip(*(own[:3] for own in numbers), strict=True))
+        # Not by sum(): from Python 3.12 on it rounds once, at the end.
+        change = math.sqrt(x * x + y * y + z * z)
     return DiffRow(file, line, name_of(a.mask, old), *numbers, change)
 
 

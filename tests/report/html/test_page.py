@@ -56,6 +56,14 @@ def test_no_script_of_ours_ends_its_element() -> None:
     assert "</script" not in page.plotly_js().lower()
 
 
+def test_plotly_stands_in_a_page_in_less_than_half_its_size() -> None:
+    """And comes out as it is: the policy has its digest."""
+    packed, whole = page.packed_plotly(), page.plotly_js()
+    assert gzip.decompress(base64.b64decode(packed)).decode("utf-8") == whole
+    assert len(packed) < 0.45 * len(whole)
+    assert whole.startswith("/**") and "\r" not in whole
+
+
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
