@@ -156,7 +156,7 @@ def compensate(
     raise typer.Exit(outcome.exit_code)
 
 
-def _fitted_model(program: Path) -> Path | None:
+def _model_of_project(program: Path) -> Path | None:
     """Return the model of the project, None where there is none yet."""
     project = find_project(program)
     model = None if project is None else project.model
@@ -285,7 +285,7 @@ def explain(
     from postproc.robot.cell import load_cell
 
     with report_errors(program):
-        cell, model = cell_file(cell, program), model or _fitted_model(program)
+        cell, model = cell_file(cell, program), model or _model_of_project(program)
         reports = Reports.of(report)
         check_places(reports.files, [program, cell, model])
         with busy("plan"):

@@ -18,15 +18,7 @@ from postproc.exceptions import OutputError, PostprocError
 from postproc.files import write_all
 
 CELL = "cell.toml"
-BRANDS = {"comau": "pdl2", "abb": "rapid", "kuka": "krl"}
-
-
-class ProgramLanguage(StrEnum):
-    """The language of programs."""
-
-    PDL2 = "pdl2"
-    RAPID = "rapid"
-    KRL = "krl"
+OTHER = "other"  # controller of arms of other makers
 
 
 class PlacesFrame(StrEnum):
@@ -48,7 +40,7 @@ class Answers:
     """What is known of a cell: see the options of `init`."""
 
     arm: str | None
-    language: ProgramLanguage | None
+    language: str | None
     tool: str | None
     nest: list[str] | None
     frame: PlacesFrame | None
@@ -63,7 +55,7 @@ def init(
         str | None, typer.Option("--arm", help="A shipped arm, or an arm file.")
     ] = None,
     language: Annotated[
-        ProgramLanguage | None,
+        str | None,
         typer.Option("--language", help="Of the programs. Default: the arm's."),
     ] = None,
     tool: Annotated[
@@ -175,11 +167,28 @@ def _controller_of(arm: str) -> object:
     return load_arm(arm).file.controller
 
 
+def _controller_running(language: str | None) -> str | None:
+    """Return whose controllers run a language, by its name.
+
+    Raises:
+        PostprocError: There is no such language.
+    """
+    from postproc.language.languages import languages
+
+    if language is None:
+        return None
+    known = {one.name.lower(): one.controller for one in languages()}
+    if language.lower() not in known:
+        listed = ", ".join(known)
+        raise PostprocError(f"--language {language}: give one of {listed}")
+    return known[language.lower()]
+
+
 def _robot_lines(given: Answers) -> list[str]:
     """Write [robot] but for the arm; the controller only where it is not the arm's."""
     lines = []
     own = _controller_of(given.arm or "")
-    wanted = {word: brand for brand, word in BRANDS.items()}.get(given.language or "")
+    wanted = _controller_running(given.language)
     if wanted is not None and wanted not in (own if isinstance(own, list) else [own]):
         lines.append(f"controller = {_quote(wanted)}")
     if given.accuracy is not None:
@@ -277,17 +286,20 @@ def _ask_arm() -> str:
     """Ask for the brand, then for one of its arms, or an arm file."""
     from postproc.robot.arm_file import list_shipped_arms
 
-    brand = _choose("Brand", (*BRANDS, "other"))
-    arms = [name for name in list_shipped_arms() if _controller_of(name) == brand]
+    brands = {name: str(_controller_of(name)) for name in list_shipped_arms()}
+    brand = _choose("Brand", sorted(set(brands.values()) - {OTHER}) + [OTHER])
+    arms = [name for name, own in brands.items() if own == brand]
     say(f"Shipped arms: {', '.join(arms)}. `postproc arm from-urdf` writes others.")
     return str(typer.prompt("Arm, or an arm file", default=arms[0], err=True))
 
 
-def _ask_language(arm: str) -> ProgramLanguage:
+def _ask_language(arm: str) -> str:
     """Ask for the language; that of the arm's controller is proposed."""
-    usual = BRANDS.get(str(_controller_of(arm)), "pdl2")
-    words = (usual, *(word for word in BRANDS.values() if word != usual))
-    return ProgramLanguage(_choose("Language of the programs", words))
+    from postproc.language.languages import languages
+
+    own = _controller_of(arm)
+    ranked = sorted(languages(), key=lambda one: one.controller != own)
+    return _choose("Language of the programs", [one.name.lower() for one in ranked])
 
 
 def _choose(text: str, words: Iterable[str]) -> str:

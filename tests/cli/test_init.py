@@ -70,6 +70,7 @@ def test_no_file_is_overwritten(tmp_path, name):
         ((), "no arm and no terminal to ask on: give --arm NAME"),
         (("--arm", "irb"), "irb"),
         ((*ARM, "--tool", "1,2"), "--tool 1,2: give 3 or 6 numbers between commas"),
+        ((*ARM, "--language", "fanuc"), "give one of pdl2, rapid, krl"),
         ((*ARM, "--nest", "1;2;3"), "--nest 1;2;3: give 3 numbers"),
         ((*ARM, "--tool", "1,2,90000"), "is it in mm?"),
     ],
