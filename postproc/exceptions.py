@@ -70,6 +70,10 @@ class CellError(FileError):
     """A cell file with a wrong key, unit or value."""
 
 
+class ProjectError(FileError):
+    """A project file with a wrong key or value, or one that names no file."""
+
+
 class ArmError(FileError):
     """An arm file with a wrong key, unit or value."""
 

@@ -11,7 +11,7 @@ GROUPS = {
     "Calibrate": ("survey", "read", "fit", "diagnose", "history", "compare", "predict"),
     "Compensate": ("compensate", "explain", "batch"),
     "Check": ("diff", "check", "restore", "report"),
-    "Set up and try": ("arm", "simulate"),
+    "Set up and try": ("init", "arm", "simulate"),
 }
 KEYS = {
     "--take-up": "compensation.preload_backlash=true",

@@ -31,8 +31,14 @@ app = typer.Typer(
     help="Compensate robot programs with a model learned from laser-tracker data.",
 )
 
-CellOption = Annotated[Path, typer.Option("--cell", help="Cell file (TOML).")]
-ModelOption = Annotated[Path, typer.Option("--model", help="Model file (JSON).")]
+CellOption = Annotated[
+    Path | None,
+    typer.Option("--cell", help="Cell file (TOML). Default: the project's."),
+]
+ModelOption = Annotated[
+    Path | None,
+    typer.Option("--model", help="Model file (JSON). Default: the project's."),
+]
 
 VariablesOption = Annotated[
     Path | None,
@@ -252,6 +258,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc simulate survey.pdl --cell cell.toml -o measured.csv",
         "postproc simulate out/job.pdl --cell cell.toml --reference job.pdl",
         "postproc simulate out/job.pdl --cell cell.toml --track track.csv",
+    ),
+    "init": (
+        "postproc init",
+        "postproc init cell7 --arm irb6640-185-2.8 --tool 0,0,250"
+        " --absolute-accuracy off",
     ),
     "read": (
         "postproc read measured.csv --cell cell.toml",

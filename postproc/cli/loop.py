@@ -16,6 +16,7 @@ from postproc.cli.common import (
     report_errors,
     say,
 )
+from postproc.cli.project import cell_file, model_file
 from postproc.cli.reports import PAGE, PLOTS, PlotOption, ReportOption, Reports
 from postproc.exceptions import PostprocError
 from postproc.files import check_places, schema
@@ -27,11 +28,11 @@ if TYPE_CHECKING:
 
 @app.command()
 def diagnose(
-    cell: CellOption,
-    model: ModelOption,
     data: Annotated[
         list[Path] | None, typer.Argument(help="Fresh measurements (CSV).")
     ] = None,
+    cell: CellOption = None,
+    model: ModelOption = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Default: MODEL.extended.json beside it."),
@@ -61,6 +62,8 @@ def diagnose(
 
     with report_errors():
         files = data or []
+        beside = program or path or next(iter(files), None)
+        cell, model = cell_file(cell, beside), model_file(model, beside)
         inputs = [*files, cell, model, program, path]
         reports = Reports.of(report, PAGE, *PLOTS)
         check_places([output, *reports.files], inputs)

@@ -23,6 +23,7 @@ from postproc.cli.common import (
     stages,
     write_text,
 )
+from postproc.cli.project import cell_file, model_file, model_to_write
 from postproc.cli.reports import (
     PAGE,
     PLOTS,
@@ -48,11 +49,11 @@ class Method(StrEnum):
 
 @app.command()
 def survey(
-    cell: CellOption,
     output: Annotated[
         Path,
         typer.Option("-o", "--output", help="SURVEY.pdl, .mod or .src: its language."),
     ],
+    cell: CellOption = None,
     poses: Annotated[int, typer.Option("--poses", help="Number of poses.")] = 300,
     job: Annotated[
         Path | None,
@@ -65,6 +66,7 @@ def survey(
     from postproc.robot.cell import load_cell
 
     with report_errors():
+        cell = cell_file(cell, output)
         check_places([output], [cell, job])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
@@ -77,7 +79,7 @@ def simulate(
     program: Annotated[
         Path, typer.Argument(help="Program, survey program or SURVEY.csv")
     ],
-    cell: CellOption,
+    cell: CellOption = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="MEASURED.csv")
     ] = None,
@@ -100,6 +102,7 @@ def simulate(
     from postproc.robot.cell import load_cell
 
     with report_errors():
+        cell = cell_file(cell, program)
         reports = Reports.of(report)
         check_places([output, track, *reports.files], [program, cell, reference])
         loaded = load_cell(cell, changes=changes_of(changes))
@@ -134,7 +137,7 @@ def _choices(given: list[str] | None) -> dict[str, str]:
 @app.command()
 def read(
     data: Annotated[list[Path], typer.Argument(help="Measurement files.")],
-    cell: CellOption,
+    cell: CellOption = None,
     program: Annotated[
         Path | None,
         typer.Option("--program", help="Survey program, for files of id, x, y, z."),
@@ -163,6 +166,7 @@ def read(
     from postproc.robot.cell import load_cell
 
     with report_errors():
+        cell = cell_file(cell, data[0])
         check_places([output], [*data, cell, program])
         loaded = load_cell(cell, changes=changes_of(changes))
         choices = _choices(column)
@@ -178,8 +182,13 @@ def read(
 @app.command()
 def fit(
     data: Annotated[list[Path], typer.Argument(help="Measurement files (CSV).")],
-    cell: CellOption,
-    output: Annotated[Path, typer.Option("-o", "--output", help="MODEL.json")],
+    cell: CellOption = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="MODEL.json. Default: the project's, see --force."
+        ),
+    ] = None,
     method: Annotated[Method, typer.Option("--method")] = Method.FULL,
     effects: Annotated[
         str | None,
@@ -194,6 +203,9 @@ def fit(
     ] = None,
     changes: SetMeasured = None,
     report: PageOption = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Overwrite the model of the project.")
+    ] = False,
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
     from postproc.calibration import fit as calibration
@@ -202,6 +214,8 @@ def fit(
 
     names = None if effects is None else split_names(effects)
     with report_errors():
+        cell = cell_file(cell, data[0])
+        output = model_to_write(output, force, data[0])
         reports = Reports.of(report, PAGE)
         check_places([output, *reports.files], [*data, cell, program])
         loaded = load_cell(cell, changes=changes_of(changes))
@@ -227,8 +241,8 @@ def fit(
 @app.command()
 def predict(
     states: Annotated[Path, typer.Argument(help="STATES.csv")],
-    cell: CellOption,
-    model: ModelOption,
+    cell: CellOption = None,
+    model: ModelOption = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="ERRORS.csv. Default: stdout."),
@@ -240,6 +254,8 @@ def predict(
     from postproc.robot.cell import load_cell
 
     with report_errors():
+        cell = cell_file(cell, states)
+        model = model_file(model, states)
         check_places([output], [states, cell, model])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("predict"):
@@ -251,7 +267,7 @@ def predict(
 @app.command()
 def compare(
     data: Annotated[list[Path], typer.Argument(help="Measurement files (CSV).")],
-    cell: CellOption,
+    cell: CellOption = None,
     report: PlotOption = None,
     test: Annotated[
         list[Path] | None,
@@ -268,6 +284,7 @@ def compare(
     from postproc.robot.cell import load_cell
 
     with report_errors():
+        cell = cell_file(cell, data[0])
         others = test or []
         reports = Reports.of(report, PAGE, *PLOTS)
         check_places(reports.files, [*data, *others, cell])

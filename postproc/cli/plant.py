@@ -16,6 +16,7 @@ from postproc.cli.common import (
     report_errors,
     say,
 )
+from postproc.cli.project import MAKE, cell_file, find_project, model_file
 from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.exceptions import PostprocError
@@ -48,8 +49,16 @@ PlanFile = Annotated[
 
 @app.command()
 def batch(
-    source: Annotated[Path, typer.Argument(metavar="SRC", help="Tree of programs.")],
-    target: Annotated[Path, typer.Argument(metavar="DST", help="Tree to write.")],
+    source: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[SRC]", help="Tree of programs. Default: the project's."
+        ),
+    ] = None,
+    target: Annotated[
+        Path | None,
+        typer.Argument(metavar="[DST]", help="Tree to write. Default: the project's."),
+    ] = None,
     cell: CellFile = None,
     model: ModelFile = None,
     plan: PlanFile = None,
@@ -73,6 +82,9 @@ def batch(
     Exit 0: every target that can be corrected is; 1: some are not; 2: a program failed.
     """
     with report_errors():
+        source, target = _trees(source, target)
+        if plan is None:
+            cell, model = cell_file(cell, source), model_file(model, source)
         if not _is_address(jobs):
             _count(jobs)
             from postproc.batch.workers import start_server
@@ -97,6 +109,21 @@ def batch(
         if summary.stopped:
             say("stopped; nothing is half written. Go on: same command with --resume")
     raise typer.Exit(summary.exit_code)
+
+
+def _trees(source: Path | None, target: Path | None) -> tuple[Path, Path]:
+    """Return the trees that are given, else those of the project.
+
+    Raises:
+        PostprocError: Nothing names one of them.
+    """
+    project = None if source and target else find_project(source)
+    if project is not None:
+        source, target = source or project.source, target or project.output
+    if source is None or target is None:
+        where = f"name source and output in {project.path}" if project else MAKE
+        raise PostprocError(f"batch: give SRC and DST, or {where}")
+    return source, target
 
 
 def _archive_lines(source: Path, plan: BatchPlan) -> list[str]:
@@ -171,7 +198,12 @@ def _write_reports(reports: Reports, title: str, log: Path) -> None:
 
 @app.command()
 def check(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Compensated tree.")],
+    folder: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[DIR]", help="Compensated tree. Default: the project's output."
+        ),
+    ] = None,
     model: Annotated[
         Path | None,
         typer.Option("--model", help="Current model (JSON). Default: any model."),
@@ -200,6 +232,14 @@ def check(
     from postproc.robot.cell import verify_section
 
     with report_errors():
+        if folder is None:
+            project = find_project()
+            if project is None or project.output is None:
+                raise PostprocError(f"check: give DIR, or {MAKE}")
+            folder, source = project.output, source or project.source
+            if plan is None:
+                cell = cell_file(cell, folder)
+                model = model_file(model, folder)
         reports = Reports.of(report)
         verify, asked = verify_section(changes_of(changes))
         insists = verify.second_opinion if verify.model_fields_set else None

@@ -26,6 +26,7 @@ from postproc.cli.common import (
     say,
     write_text,
 )
+from postproc.cli.project import cell_file, find_project, model_file
 from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
 from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places, is_stream
@@ -75,12 +76,14 @@ def compensate(
     program: Annotated[
         str, typer.Argument(help="PROGRAM.pdl, .mod or .src; - for stdin.")
     ],
-    cell: CellOption,
-    model: ModelOption,
+    cell: CellOption = None,
+    model: ModelOption = None,
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="Default: PROGRAM.compensated.pdl beside it."
+            "-o",
+            "--output",
+            help="Default: the project's folder, or PROGRAM.compensated.pdl beside it.",
         ),
     ] = None,
     variables: VariablesOption = None,
@@ -120,6 +123,8 @@ def compensate(
 
     given = None if is_stream(program) else Path(program)
     with report_errors(given, variables):
+        cell, model = cell_file(cell, program), model_file(model, program)
+        output = output or _project_place(given)
         reports = Reports.of(report, PAGE)
         if reports.on_stdout and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
@@ -149,6 +154,24 @@ def compensate(
         for path in written:
             say(f"written {path}")
     raise typer.Exit(outcome.exit_code)
+
+
+def _model_of_project(program: Path) -> Path | None:
+    """Return the model of the project, None where there is none yet."""
+    project = find_project(program)
+    model = None if project is None else project.model
+    return model if model is not None and model.exists() else None
+
+
+def _project_place(program: Path | None) -> Path | None:
+    """Return where a program of a project goes; its folder is made."""
+    project = None if program is None else find_project(program)
+    if program is None or project is None:
+        return None
+    place = project.output_of(program)
+    if place is not None:
+        place.parent.mkdir(parents=True, exist_ok=True)
+    return place
 
 
 def _why_nothing(outcome: Outcome) -> str:
@@ -236,10 +259,13 @@ def restore(
 @app.command()
 def explain(
     program: Path,
-    cell: CellOption,
+    cell: CellOption = None,
     model: Annotated[
         Path | None,
-        typer.Option("--model", help="Model file (JSON). Default: show the plan only."),
+        typer.Option(
+            "--model",
+            help="Model file (JSON). Default: the project's, or show the plan only.",
+        ),
     ] = None,
     line: Annotated[
         int | None,
@@ -259,6 +285,7 @@ def explain(
     from postproc.robot.cell import load_cell
 
     with report_errors(program):
+        cell, model = cell_file(cell, program), model or _model_of_project(program)
         reports = Reports.of(report)
         check_places(reports.files, [program, cell, model])
         with busy("plan"):
