@@ -287,7 +287,7 @@ def _ask_arm() -> str:
     from postproc.robot.arm_file import list_shipped_arms
 
     brands = {name: str(_controller_of(name)) for name in list_shipped_arms()}
-    brand = _choose("Brand", sorted(set(brands.values()) - {OTHER}) + [OTHER])
+    brand = _choose("Brand", [*sorted(set(brands.values()) - {OTHER}), OTHER])
     arms = [name for name, own in brands.items() if own == brand]
     say(f"Shipped arms: {', '.join(arms)}. `postproc arm from-urdf` writes others.")
     return str(typer.prompt("Arm, or an arm file", default=arms[0], err=True))
