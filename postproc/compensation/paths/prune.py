@@ -166,7 +166,7 @@ def _take_back(work: InsertionPlan, v: int) -> None:
         del work.points[via]
 
 
-class Reason(NamedTuple):
+class Removal(NamedTuple):
     """Why points must go, at what share of the way if not all of them, and the cure."""
 
     why: str
@@ -176,7 +176,7 @@ class Reason(NamedTuple):
 
 def _bad(
     work: InsertionPlan, without: dict[int, float]
-) -> Iterator[tuple[int, Reason]]:
+) -> Iterator[tuple[int, Removal]]:
     """Yield the moves with points that must go, and why."""
     told = work.latest.in_time
     if not work.points or told is None:
@@ -216,22 +216,22 @@ class _Judged:
     corner: Bools
     bent: set[int]
 
-    def why_not(self, v: int) -> Reason | None:
+    def why_not(self, v: int) -> Removal | None:
         """Say why the points of a move must go, None where they may stay."""
         if v not in self.worst:
-            return Reason("with inserted points its path is not predicted")
+            return Removal("with inserted points its path is not predicted")
         if v in self.bent:
-            return Reason("its pieces would be too straight for arcs")
+            return Removal("its pieces would be too straight for arcs")
         if refused := self.work.refusal(v):
-            return Reason(refused)
+            return Removal(refused)
         far, share = self.worst[v]
         if far > self.without[v]:
-            return Reason("inserted points make it no better", share)
+            return Removal("inserted points make it no better", share)
         if v in self.objections:
             objection = self.objections[v]
-            return Reason(str(objection), objection.place % 1.0, objection.cure)
+            return Removal(str(objection), objection.place % 1.0, objection.cure)
         if self.corner[v]:
-            return Reason("a rounded corner at one of its ends would move")
+            return Removal("a rounded corner at one of its ends would move")
         return None
 
 
@@ -242,7 +242,7 @@ def _with_points(work: InsertionPlan) -> set[int]:
 
 def _harmful(
     work: InsertionPlan, without: dict[int, float]
-) -> Iterator[tuple[int, Reason]]:
+) -> Iterator[tuple[int, Removal]]:
     """Yield moves with points behind which moves without any are worse for them.
 
     From which flank a joint leaves is a matter of the moves before.
@@ -253,7 +253,7 @@ def _harmful(
         last = int(np.searchsorted(cut, v)) - 1
         near = last >= 0 and v - cut[last] <= NEAR
         if near and now[v] > without.get(v, np.inf) + WORSE:
-            yield int(cut[last]), Reason("a later move would be worse")
+            yield int(cut[last]), Removal("a later move would be worse")
 
 
 def _objections(work: InsertionPlan, told: InTime) -> dict[int, Objection]:
