@@ -322,6 +322,11 @@ class CandidateGroup:
             return None
         return self.joint + 1
 
+    @property
+    def sets_zero(self) -> bool:
+        """Whether the candidates move the zero of their joint."""
+        return self.candidates[0].effect.sets_zero
+
     def make_columns(self, batch: ArmStates, whitener: Whitener) -> CandidateGroup:
         """Make the columns."""
         columns = make_columns(self.joint, self.candidates, batch, whitener)
@@ -382,12 +387,18 @@ class Library:
             shelves = [shelf.make_columns(at, fit.whitener) for shelf in shelves]
         return cls(tuple(shelves), frozenset(without))
 
-    def of_mean(self, joint: int | None) -> Library:
+    def of_mean(self, joint: int | None, moved: bool = False) -> Library:
         """Return the laws of a joint, from 1, with a mean; None: all other candidates.
 
         The zero of a given model holds the mean of what the model lacks.
+
+        Args:
+            joint: The joint.
+            moved: Whether what moves its zero is asked for, or all else.
         """
-        some = tuple(s for s in self.shelves if s.mean_of == joint)
+        some = tuple(
+            s for s in self.shelves if s.mean_of == joint and s.sets_zero == moved
+        )
         return replace(self, shelves=some)
 
     def at_rows(self, rows: NDArray[np.int64]) -> Library:
@@ -416,10 +427,12 @@ def candidates(
     return sorted(every, key=lambda c: c.family.tier)
 
 
-def by_mean(candidates: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
-    """Split candidates by whether the zero of their joint holds their mean."""
-    some = [c for c in candidates if c.effect.has_mean()]
-    return some, [c for c in candidates if not c.effect.has_mean()]
+def by_mean(candidates: Sequence[Candidate]) -> tuple[list[Candidate], ...]:
+    """Split candidates by what the zero of their joint is beside them: moved, open."""
+    moved = [c for c in candidates if c.effect.sets_zero]
+    others = [c for c in candidates if not c.effect.sets_zero]
+    some = [c for c in others if c.effect.has_mean()]
+    return moved, some, [c for c in others if not c.effect.has_mean()]
 
 
 def numbers(joint: int | None, alike: Sequence[Candidate], rows: int) -> int:

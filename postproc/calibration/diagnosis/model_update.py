@@ -36,7 +36,8 @@ GIVEN = "model"  # group of the given model's own uncertainty
 TRACKER = "tracker"  # group of a set-up's parameters that place the base
 CLEARLY = 3.0  # standard errors
 ZERO = "zero"  # groups of zeros of joints that are open again
-OPEN = 3e-3  # [rad] by which the zero of a joint may differ beside what the model lacks
+OPEN = 3e-4  # [rad] by which the zero of a joint differs beside what a model lacks
+MOVED = 3e-3  # [rad] .. beside what moved it
 SET_ANEW = ("base shift", "base turn", "tool")  # groups of what may be others since
 
 
@@ -104,13 +105,14 @@ class Revision(Effect):
             factor=self.factor[:, known],
             groups=tuple(self.groups[k] for k in known),
         )
-        return closed.free_zeros(lacking - offsets)
+        moved = {j for e in others if e.sets_zero for j in joints_of(e)} - offsets
+        return closed.free_zeros(moved, moved=True).free_zeros(lacking - offsets)
 
     def fix_model(self) -> Revision:
         """Return the given model as it is, nothing of it to be fitted."""
         return replace(self, factor=self.factor[:, :0], groups=())
 
-    def free_zeros(self, joints: Collection[int]) -> Revision:
+    def free_zeros(self, joints: Collection[int], moved: bool = False) -> Revision:
         """Return the revision with the zeros of joints to be fitted again."""
         names = self.model.effects.names
         zeros = {f"{ZERO}{j}": f"geometry.theta{j}" for j in sorted(joints)}
@@ -121,7 +123,7 @@ class Revision(Effect):
         if not added:
             return self
         more = np.zeros((len(names), len(added)))
-        more[list(added.values()), range(len(added))] = OPEN
+        more[list(added.values()), range(len(added))] = MOVED if moved else OPEN
         return replace(
             self,
             factor=np.concatenate([self.factor, more], axis=1),

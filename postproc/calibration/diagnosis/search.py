@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
@@ -139,10 +140,10 @@ def ranking(projection: Projection, causes: Causes) -> list[Score]:
     """
     views = Views(projection)
     scores = []
-    for joint in (None, *JOINTS):
-        some = causes.library.of_mean(joint)
+    for joint, moved in ((None, False), *product(JOINTS, (False, True))):
+        some = causes.library.of_mean(joint, moved)
         if some.shelves:
-            view = views.of_joint(joint)
+            view = views.of_joint(joint, moved)
             square = float(view.rest @ view.rest)
             reduced = some.reduce(view, view.rest[:, None])
             known = frozenset(view.names)
@@ -187,15 +188,16 @@ class Views:
     """
 
     projection: Projection
-    made: dict[int | str, Projection] = field(default_factory=dict)
+    made: dict[tuple[int, bool] | str, Projection] = field(default_factory=dict)
 
-    def of_joint(self, joint: int | None) -> Projection:
-        """See it with the zero of a joint, from 1, open."""
+    def of_joint(self, joint: int | None, moved: bool = False) -> Projection:
+        """See it with the zero of a joint, from 1, open, or moved by something."""
         if joint is None:
             return self.projection
-        if joint not in self.made:
-            self.made[joint] = free_joint_zero(self.projection, joint)
-        return self.made[joint]
+        if (joint, moved) not in self.made:
+            made = free_joint_zero(self.projection, joint, moved)
+            self.made[joint, moved] = made
+        return self.made[joint, moved]
 
     def of_carrier(self, carrier: Carrier) -> Projection:
         """See it with a constant motion of a carrier open, where a model is given."""
@@ -211,10 +213,13 @@ class Views:
         """See it as a candidate is seen."""
         if family.along is not None:
             return self.of_carrier(carrier(family.along))
-        return self.of_joint(family.joint if effect.has_mean() else None)
+        joint = family.joint if effect.has_mean() else None
+        return self.of_joint(joint, effect.sets_zero)
 
 
-def free_joint_zero(projection: Projection, joint: int) -> Projection:
+def free_joint_zero(
+    projection: Projection, joint: int, moved: bool = False
+) -> Projection:
     """Return a filter that takes the zero of a joint, from 1, out of the rows too.
 
     It is the same where no given model is revised, or its zero is open already.
@@ -222,9 +227,10 @@ def free_joint_zero(projection: Projection, joint: int) -> Projection:
     fit = projection.fit
     first, *others = fit.combination.effects or (JointOffset(()),)
     offsets = [j for e in others if isinstance(e, JointOffset) for j in e.joints]
-    if joint in offsets or first.free_zeros((joint,)) is first:
+    opened = first.free_zeros((joint,), moved)
+    if joint in offsets or opened is first:
         return projection
-    laid = beside(fit, (first.free_zeros((joint,)), *others))
+    laid = beside(fit, (opened, *others))
     left = {n for n in fit.combination.names if n not in projection.names}
     out = [k for k, n in enumerate(laid.combination.names) if n in left]
     return Projection.leaving(laid, np.array(out, dtype=np.int64))

@@ -73,6 +73,7 @@ class Effect(ABC):
         acts: What it moves and what drives that, in the words of the table of causes,
             where it is more than `cells`, several of them at once say.
         at_one_row: True for what happens once, at one moment of a campaign.
+        sets_zero: True for what leaves the zero of its joint at another place.
         free: True for a function that may have any shape: what no law predicts.
         everywhere: True for what is the same at all poses, unseen ones too.
         published: True for what a method of the literature trains: no fit of effects
@@ -88,6 +89,7 @@ class Effect(ABC):
     variation_of: ClassVar[str | None] = None
     acts: ClassVar[tuple[tuple[str, str], ...]] = ()
     at_one_row: ClassVar[bool] = False
+    sets_zero: ClassVar[bool] = False
     free: ClassVar[bool] = False
     everywhere: ClassVar[bool] = False
     published: ClassVar[bool] = False
@@ -201,8 +203,13 @@ class Effect(ABC):
         """Return True if the zero of its joint, fitted without it, holds its mean."""
         return False
 
-    def free_zeros(self, joints: Collection[int]) -> Effect:
-        """Return it with the zeros of joints, from 1, to be fitted again."""
+    def free_zeros(self, joints: Collection[int], moved: bool = False) -> Effect:
+        """Return it with the zeros of joints, from 1, to be fitted again.
+
+        Args:
+            joints: The joints.
+            moved: Whether something has moved these zeros, by whatever amount.
+        """
         return self
 
     def attribute_drift(self, told: bool, batch: ArmStates) -> Effect:

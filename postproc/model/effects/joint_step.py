@@ -36,6 +36,7 @@ class JointStep(CampaignStep, JointEffect):
     """
 
     name: ClassVar[str] = "joint_step"
+    sets_zero: ClassVar[bool] = True
     search_policy: ClassVar[SearchPolicy] = SearchPolicy.ALWAYS
     cells: ClassVar[Cells] = (*own_cells("order", "step"), *own_cells("time", "step"))
 
