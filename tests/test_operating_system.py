@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -92,7 +93,7 @@ def test_signals_wait_for_the_end_of_a_block():
     before = signal.signal(signal.SIGTERM, lambda number, frame: came.append(number))
     try:
         with hold_signals(signal.SIGTERM):
-            os.kill(os.getpid(), signal.SIGTERM)
+            signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
             assert not came
         assert came == [signal.SIGTERM]
     finally:

@@ -24,6 +24,7 @@ from postproc.robot.cell import (
     Cell,
     FrameSection,
     LimitSection,
+    MotionSection,
     load_cell,
 )
 
@@ -53,9 +54,12 @@ class JobSetup:
             options["shared_points"] = shared
         if (most := self.cell.limits.averaged_mm) != LimitSection().averaged_mm:
             options["averaged_mm"] = most
+        cell = _in_first_words(self.cell.file.model_dump(mode="json"))
+        if self.cell.file.motion == MotionSection():
+            del cell["motion"]
         parts = {
             "version": __version__,
-            "cell": _in_first_words(self.cell.file.model_dump(mode="json")),
+            "cell": cell,
             "arm": self.cell.arm.file.model_dump(mode="json"),
             "model": self.model.id,
             "options": options,

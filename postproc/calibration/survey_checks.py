@@ -185,7 +185,7 @@ def check_signs(survey: Measurements, arm: Arm) -> None:
     raise MeasurementError(
         survey.path,
         "by the lambda columns the links of all joints run ahead of their drives: "
-        "backlash does not do that",
+        "backlash does not do that, unless they run on when drives stop",
         "lambda is 1 if the joint arrived in its positive direction. Where the columns "
         "have the other sign, add --set measurements.lambda_sign=-1; else =1",
     )

@@ -58,7 +58,7 @@ def cell(tmp_path: Path, points: int = 1) -> Cell:
     )
     path.write_text(
         '[robot]\narm = "nj220-2.7"\n[tool]\nxyz_mm = [80.0, -40.0, 150.0]\n'
-        f"[survey]\npoints_mm = [{plate}]\n"
+        f"[survey]\npoints_mm = [{plate}]\n[measurements]\nlambda_sign = 1\n"
     )
     return load_cell(path)
 

@@ -16,7 +16,7 @@ from postproc.model.noise import poses_of
 from postproc.robot.cell import load_cell
 from tests.calibration.simulator import PLATE, random_arm, random_states, survey_of
 
-CELL = load_cell("programs/cell.toml")
+CELL = load_cell("programs/cell.toml", changes=("measurements.lambda_sign=1",))
 
 
 def repeated(poses: int, repeats: int, seed: int = 0, shift: float = 0.0) -> tuple:  # type: ignore[type-arg]
