@@ -240,7 +240,7 @@ def test_a_given_model_of_other_data_is_judged_as_it_is() -> None:
     assert found.diagnosis.before.mean_mm == pytest.approx(wanted, rel=0.02)
 
 
-@pytest.mark.parametrize("seed", [341, 342])
+@pytest.mark.parametrize("seed", [341, pytest.param(342, marks=pytest.mark.slow)])
 def test_a_nest_that_is_new_leaves_an_unchanged_model_as_it_was(seed: int) -> None:
     arm = virtual_arm(seed, BASE)
     old, new = survey(arm, seed, 250), survey(arm, seed + 1, 60)
