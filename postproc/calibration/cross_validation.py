@@ -23,6 +23,7 @@ from postproc.model.noise import poses_of
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
+from postproc.robot.state import States
 
 PARTS = 5
 STRAY = 5.0  # standard deviations beyond which an error counts no more
@@ -89,10 +90,15 @@ class HeldOutRows:
 
     def by_pose(self) -> Floats:
         """Average the length of the error over every pose, (poses,) [m]."""
-        size = np.linalg.norm(self.error, axis=1)[self.used]
-        _, label = np.unique(self.pose[self.used], return_inverse=True)
-        label = label.reshape(-1)
-        return np.asarray(np.bincount(label, size) / np.bincount(label))
+        return _lengths_by_pose(self.error[self.used], self.pose[self.used])
+
+
+def _lengths_by_pose(error: Floats, pose: Ints) -> Floats:
+    """Average the lengths of errors (n, 3) over every pose, (poses,) [m]."""
+    _, label = np.unique(pose, return_inverse=True)
+    label = label.reshape(-1)
+    size = np.bincount(label, np.linalg.norm(error, axis=1))
+    return np.asarray(size / np.bincount(label))
 
 
 @dataclass(frozen=True)
@@ -133,9 +139,9 @@ def parts_of(pose: Ints, seed: int, parts: int = PARTS) -> Ints:
     return np.asarray(dealt[label])
 
 
-def regions_of(survey: Measurements) -> Ints:
+def regions_of(states: States) -> Ints:
     """Cut rows into regions of joint space, whole poses, (n,)."""
-    return whole_poses(regions(survey.states.q), poses_of(survey.states))
+    return whole_poses(regions(states.q), poses_of(states))
 
 
 def predict_held_out(
@@ -224,7 +230,17 @@ class PairedErrors:
     @classmethod
     def of(cls, first: HeldOutRows, second: HeldOutRows) -> PairedErrors:
         """Pair the poses."""
-        fall = first.by_pose() - second.by_pose()
+        return cls._of_falls(first.by_pose() - second.by_pose())
+
+    @classmethod
+    def between(cls, first: Floats, second: Floats, pose: Ints) -> PairedErrors:
+        """Pair the poses of errors of the same rows, (n, 3) [m] each."""
+        by_pose = (_lengths_by_pose(error, pose) for error in (first, second))
+        return cls._of_falls(np.subtract(*by_pose))
+
+    @classmethod
+    def _of_falls(cls, fall: Floats) -> PairedErrors:
+        """Take by how much the second one is better at every pose, (poses,) [m]."""
         spread = float(fall.std(ddof=1)) if len(fall) > 1 else np.inf
         return cls(float(fall.mean()), spread / len(fall) ** 0.5, len(fall))
 

@@ -6,7 +6,8 @@ in all rows too. Geometry is free beside both.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -23,36 +24,42 @@ LESS = 0.7  # of the median residual that may be left by a change
 ALONE = 0.2  # of the change of one joint that others may have
 
 
+@dataclass(frozen=True)
+class JointChange:
+    """A joint that is off by another angle from one row on.
+
+    Attributes:
+        joint: The joint, from 0.
+        by: What its angles lack from there on [rad].
+        first: Number of the row.
+    """
+
+    joint: int
+    by: float
+    first: int
+
+
 @dataclass(frozen=True, eq=False)
 class Sided:
     """Rows with what backlash does to them, without everything else.
 
     Attributes:
         free: What else moves the rows, orthonormal columns, (n, 3, p).
-        moved: Motion per rad of every joint times its direction, (n, 3, 6) [m].
+        turned: Motion per rad of every joint, (n, 3, 6) [m].
         left: What the rows are off by, (n, 3) [m].
         weight: Of the rows, (n,).
         side: Directions of the file, (n, 6).
     """
 
     free: Floats
-    moved: Floats
+    turned: Floats
     left: Floats
     weight: Floats
     side: Floats
 
     @classmethod
-    def of(
-        cls, batch: ArmStates, free: Floats, left: Floats, side: Floats | None = None
-    ) -> Sided:
-        """Take rows and what else may move them.
-
-        Args:
-            batch: n rows.
-            free: Columns that are free, (n, 3, p).
-            left: What the rows are off by, (n, 3) [m].
-            side: Other directions than those of the file, (n, 6).
-        """
+    def of(cls, batch: ArmStates, free: Floats, left: Floats) -> Sided:
+        """Take rows of errors `left` (n, 3) [m], beside free columns (n, 3, p)."""
         n = len(batch)
         flat = free.reshape(3 * n, -1)
         scale = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
@@ -62,9 +69,13 @@ class Sided:
         root = np.sqrt(weight)[:, None]
         u, size, _ = np.linalg.svd(flat / scale * np.repeat(root, 3)[:, None], False)
         basis = u[:, size > 1e-6 * size[0]].reshape(n, 3, -1)
-        side = batch.states.direction if side is None else side
-        moved = batch.jacobian * side[:, None, :] * root[:, :, None]
-        return cls(basis, moved, left * root, weight, side)
+        turned = batch.jacobian * root[:, :, None]
+        return cls(basis, turned, left * root, weight, batch.states.direction)
+
+    @cached_property
+    def moved(self) -> Floats:
+        """Motion per rad of every joint times its direction, (n, 3, 6) [m]."""
+        return self.turned * self.side[:, None, :]
 
     def score_changes(self) -> Floats:
         """Return the squares that backlash explains where lambda changes sign at a row.
@@ -116,6 +127,26 @@ class Sided:
         rest = (y - free @ (free.T @ y)).reshape(-1, 3)
         return np.asarray(np.linalg.norm(rest, axis=1))
 
+    @cached_property
+    def joint_change(self) -> JointChange | None:
+        """The joint that is off by another angle from one row on, None if none is.
+
+        Zeros of the joints are among what is free.
+        """
+        n = len(self.left)
+        if n < 2 * FEWEST:
+            return None
+        forward = replace(self, side=np.ones((n, 6)))
+        first = forward.most_telling_row()
+        value, error, after = forward.backlashes([np.arange(n) >= first])
+        joint = int(np.argmax(np.abs(value[0]) / np.maximum(error[0], 1e-12)))
+        by = float(value[0, joint])
+        others = np.delete(np.abs(value[0]) - CLEAR * error[0], joint)
+        clear = abs(by) > CLEAR * error[0, joint] and others.max() < ALONE * abs(by)
+        if not clear or np.median(after) > LESS * np.median(self.beside_free()):
+            return None
+        return JointChange(joint, by, first)
+
     def telling(self, rows: Bools) -> Bools:
         """Return the joints that some rows reach from both directions, (6,)."""
         some = self.side[rows]
@@ -160,41 +191,3 @@ def all_reversed(sided: Sided) -> bool:
     value, error, _ = sided.backlashes([every])
     clear = (np.abs(value[0]) > CLEAR * error[0]) & sided.telling(every)
     return bool(clear.sum() >= MOST_JOINTS and (value[0][clear] > 0.0).all())
-
-
-def find_joint_step(batch: ArmStates, free: Floats, left: Floats) -> JointChange | None:
-    """Find the row from which on one joint is off by another angle, or None.
-
-    Args:
-        batch: n rows.
-        free: What else moves them, the zeros of the joints too, (n, 3, p).
-        left: What they are off by, (n, 3) [m].
-    """
-    n = len(left)
-    if n < 2 * FEWEST:
-        return None
-    sided = Sided.of(batch, free, left, np.ones((n, 6)))
-    first = sided.most_telling_row()
-    value, error, after = sided.backlashes([np.arange(n) >= first])
-    joint = int(np.argmax(np.abs(value[0]) / np.maximum(error[0], 1e-12)))
-    by = float(value[0, joint])
-    others = np.delete(np.abs(value[0]) - CLEAR * error[0], joint)
-    clear = abs(by) > CLEAR * error[0, joint] and others.max() < ALONE * abs(by)
-    if not clear or np.median(after) > LESS * np.median(sided.beside_free()):
-        return None
-    return JointChange(joint, by, first)
-
-
-@dataclass(frozen=True)
-class JointChange:
-    """A joint that is off by another angle from one row on.
-
-    Attributes:
-        joint: The joint, from 0.
-        by: What its angles lack from there on [rad].
-        first: Number of the row.
-    """
-
-    joint: int
-    by: float
-    first: int

@@ -313,17 +313,14 @@ def _prepare(survey: Measurements, cell: Cell, frame: Frame) -> PreparedRows:
         tracker, setup = placed.origin, (Placement.name,)
         monuments = in_base_frame(monuments, placed)
     survey, reversals = split_reversals(survey, cell.arm)
-    check_survey(survey, cell.arm)
+    sided = check_survey(survey, cell.arm)
     if cell.measurements.lambda_sign is None:
-        check_signs(survey, cell.arm)
+        check_signs(survey, sided)
+    asked = ask_about_steps(survey, sided)
     if frame == "base":
         setup = (*setup, *file_shifts(survey, cell.arm, cell.tracker))
     survey = check_orientations(survey, cell.arm)
-    notes = (
-        *survey.warnings,
-        *list_losses(cell.arm, survey),
-        *ask_about_steps(survey, cell.arm),
-    )
+    notes = (*survey.warnings, *list_losses(cell.arm, survey), *asked)
     survey = replace(survey, warnings=notes)
     mounted = cell.file.robot.mounting is not None
     return PreparedRows(

@@ -119,7 +119,7 @@ def find_cause(
     guesses = chain(
         _guesses(states, position),
         (
-            _offset_guess(states, position, j, by)
+            guess_offset(states, position, j, by)
             for j in range(6)
             if abs(by := _offset(arm, states[bad], in_base(position)[bad], error, j))
             > LEAST_OFFSET
@@ -255,7 +255,7 @@ def _guess_columns(states: States, position: Floats) -> Iterator[Guess]:
         )  # fmt: skip
 
 
-def _offset_guess(states: States, position: Floats, joint: int, by: float) -> Guess:
+def guess_offset(states: States, position: Floats, joint: int, by: float) -> Guess:
     """Undo that a joint is off by an angle [rad]."""
     deg = f"{np.rad2deg(by):+.2f} deg"
     return Guess(
@@ -300,7 +300,7 @@ def cause_in_any_frame(survey: Measurements, arm: Arm) -> str:
             "--set measurements.frame=tracker"
         )
     offsets = (
-        _offset_guess(states, position, j, _offset_in_any_frame(survey[some], arm, j))
+        guess_offset(states, position, j, _offset_in_any_frame(survey[some], arm, j))
         for j in range(1, 5)  # the frame and the probe hold those of joints 1 and 6
     )
     for guess in chain(_guesses(states, position), offsets):

@@ -13,7 +13,6 @@ from postproc.calibration.direction_signs import (
     Sided,
     all_reversed,
     find_change_of_sign,
-    find_joint_step,
 )
 from postproc.calibration.likely_causes import (
     CLOSE,
@@ -24,6 +23,7 @@ from postproc.calibration.likely_causes import (
     find_cause,
     find_cause_in_tracker_frame,
     find_moved_tracker,
+    guess_offset,
     no_error,
     wrong_directions,
 )
@@ -62,8 +62,11 @@ MAY_BE = {1: " or the base or the tracker turned", 6: " or the tool turned"}
 TOOL_APART = 1e-3  # [m] tools that differ by less are told by the fit, not refused
 
 
-def check_survey(survey: Measurements, arm: Arm) -> None:
+def check_survey(survey: Measurements, arm: Arm) -> Sided:
     """Check units, frame, tools and number of rows of a survey in the base frame.
+
+    Returns:
+        The rows beside geometry, for `check_signs` and `ask_about_steps`.
 
     Raises:
         MeasurementError: With the likely reason and the cure.
@@ -75,8 +78,10 @@ def check_survey(survey: Measurements, arm: Arm) -> None:
     _check_frame(survey, arm, gap, "nominal")
     check_tools(survey, arm)
     _check_kinds(survey, gap)
-    _check_change_of_sign(survey, arm, None)
-    _check_joint_step(survey, arm, None)
+    sided = as_surveyed(survey, arm)
+    _check_change_of_sign(survey, sided)
+    _check_joint_step(survey, sided)
+    return sided
 
 
 def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
@@ -104,16 +109,15 @@ def check_against(survey: Measurements, arm: Arm, model: Model) -> None:
             "(--set measurements.lambda_sign=-1 turns all of them)"
         )
         raise MeasurementError(survey.path, wrong, cure)
-    _check_change_of_sign(survey, arm, model)
-    _check_joint_step(survey, arm, model)
+    sided = as_surveyed(survey, arm, model)
+    _check_change_of_sign(survey, sided)
+    _check_joint_step(survey, sided)
     _check_arm(survey, arm, error(survey.states))
 
 
-def _check_change_of_sign(survey: Measurements, arm: Arm, model: Model | None) -> None:
+def _check_change_of_sign(survey: Measurements, sided: Sided) -> None:
     """Refuse rows of which lambda has the other sign from one row on."""
-    if survey.inferred.all():
-        return
-    found = find_change_of_sign(as_surveyed(survey, arm, model))
+    found = None if survey.inferred.all() else find_change_of_sign(sided)
     if found is None:
         return
     rows, place = found
@@ -129,20 +133,15 @@ def _check_change_of_sign(survey: Measurements, arm: Arm, model: Model | None) -
     )
 
 
-def _check_joint_step(survey: Measurements, arm: Arm, model: Model | None) -> None:
+def _check_joint_step(survey: Measurements, sided: Sided) -> None:
     """Refuse rows of which a joint is off by far from one row on."""
-    found = find_joint_step(*beside_geometry(survey, arm, model))
+    found = sided.joint_change
     if found is None or abs(found.by) < LEAST_OFFSET:
         return
-    at, joint = found.first, found.joint + 1
-    raise MeasurementError(
-        survey.path,
-        f"{len(survey) - at} of {len(survey)} rows, from row {survey.ids[at]} on, look "
-        f"like joint {joint} is off by {np.rad2deg(found.by):+.2f} deg"
-        f"{MAY_BE.get(joint, '')}",
-        "Correct the joint's zero (mastering), or fit these rows by themselves",
-        line=int(survey.line[at]),
-    )
+    guess = guess_offset(survey.states, survey.position, found.joint, found.by)
+    guess = replace(guess, look=guess.look + MAY_BE.get(found.joint + 1, ""))
+    rows = np.arange(len(survey)) >= found.first
+    _check_cause(survey, Cause(guess, rows, "from"))
 
 
 def as_surveyed(survey: Measurements, arm: Arm, model: Model | None = None) -> Sided:
@@ -154,13 +153,6 @@ def as_surveyed(survey: Measurements, arm: Arm, model: Model | None = None) -> S
         model: What is known of the arm, or None. Beside a model the base, the tool and
             the zeros of the joints are free.
     """
-    return Sided.of(*beside_geometry(survey, arm, model))
-
-
-def beside_geometry(
-    survey: Measurements, arm: Arm, model: Model | None = None
-) -> tuple[ArmStates, Floats, Floats]:
-    """Return rows, free columns, (n, 3, p), and what rows are off by, (n, 3) [m]."""
     batch = ArmStates(arm, survey.states)
     left = survey.position - batch.walk.tcp
     if model is not None:
@@ -171,16 +163,16 @@ def beside_geometry(
     else:
         parts = [rigid_motions(batch.walk.tcp), batch.walk.flange, batch.jacobian]
         free = np.concatenate(parts, axis=2)
-    return batch, free, left
+    return Sided.of(batch, free, left)
 
 
-def check_signs(survey: Measurements, arm: Arm) -> None:
+def check_signs(survey: Measurements, sided: Sided) -> None:
     """Refuse lambda columns by which links run ahead of their drives.
 
     Raises:
         MeasurementError: With what to state of them.
     """
-    if survey.inferred.all() or not all_reversed(as_surveyed(survey, arm)):
+    if survey.inferred.all() or not all_reversed(sided):
         return
     raise MeasurementError(
         survey.path,
@@ -191,9 +183,9 @@ def check_signs(survey: Measurements, arm: Arm) -> None:
     )
 
 
-def ask_about_steps(survey: Measurements, arm: Arm) -> tuple[str, ...]:
+def ask_about_steps(survey: Measurements, sided: Sided) -> tuple[str, ...]:
     """Ask about a joint that is off by a little from one row on."""
-    found = find_joint_step(*beside_geometry(survey, arm))
+    found = sided.joint_change
     if found is None:
         return ()
     return (

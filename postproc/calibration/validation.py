@@ -253,7 +253,7 @@ def _weigh_addition(fitted: Fit, rung: Rung, task: FitTask) -> float:
 
 def _conclude(task: FitTask, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Validated:
     """Put figures together, and compare with a set-up without errors of the arm."""
-    region = predict_held_out_linearly(fitted, regions_of(task.survey))
+    region = predict_held_out_linearly(fitted, regions_of(task.survey.states))
     error = summarise(rows, mean_error_mm(region), chosen)
     plain = task.errors(SET_UP, rows.part, rows.used)
     if PairedErrors.of(plain, rows).better or mean_error_mm(plain) < FLOOR / MM:

@@ -46,8 +46,7 @@ ABOVE = 1.2  # of the noise floor: more is told
 
 def tell(found: Diagnosis) -> str:
     """Write a diagnosis for a terminal."""
-    expected = filter(None, [found.tell_expected()])
-    lines = [*expected, f"verdict: {found.verdict}", found.story()]
+    lines = found.headlines()
     if found.findings:
         lines.append(
             table_text(FINDINGS, (_finding_row(found, k) for k in _numbers(found)))

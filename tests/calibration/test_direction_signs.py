@@ -10,13 +10,11 @@ import pytest
 from postproc.calibration.direction_signs import (
     all_reversed,
     find_change_of_sign,
-    find_joint_step,
 )
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.survey_checks import (
     as_surveyed,
     ask_about_steps,
-    beside_geometry,
     check_against,
     check_signs,
     check_survey,
@@ -70,10 +68,10 @@ def test_good_rows_and_a_joint_that_stepped_are_not_called_so(
 @pytest.mark.parametrize("n", [40, 160])
 def test_the_row_from_which_a_joint_is_off_is_found(seed: int, n: int) -> None:
     for step in (6e-3, -2e-2):
-        found = find_joint_step(*beside_geometry(measured(seed, n, step=step), NJ))
+        found = as_surveyed(measured(seed, n, step=step), NJ).joint_change
         assert found is not None and (found.joint, found.first) == (4, n // 2)
         assert found.by == pytest.approx(-step, abs=1e-3)
-    assert find_joint_step(*beside_geometry(measured(seed, n), NJ)) is None
+    assert as_surveyed(measured(seed, n), NJ).joint_change is None
 
 
 def test_a_joint_that_is_off_from_a_row_on_is_refused_by_row_and_line() -> None:
@@ -130,12 +128,14 @@ def test_fresh_rows_are_refused_against_a_model() -> None:
 
 
 def test_the_other_sign_in_all_rows_is_refused() -> None:
-    check_signs(measured(2), NJ)
+    good, other = measured(2), measured(2, turned=slice(None))
+    check_signs(good, as_surveyed(good, NJ))
     with pytest.raises(MeasurementError, match=r"run ahead .*lambda_sign=-1"):
-        check_signs(measured(2, turned=slice(None)), NJ)
+        check_signs(other, as_surveyed(other, NJ))
 
 
 def test_a_small_step_of_a_joint_is_asked_about() -> None:
-    assert ask_about_steps(measured(2), NJ) == ()
-    (asked,) = ask_about_steps(measured(2, step=4e-3), NJ)
+    good, late = measured(2), measured(2, step=4e-3)
+    assert ask_about_steps(good, as_surveyed(good, NJ)) == ()
+    (asked,) = ask_about_steps(late, as_surveyed(late, NJ))
     assert "joint 5 is off by -0.2" in asked

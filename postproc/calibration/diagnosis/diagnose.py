@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from postproc.arrays import Bools, Floats, Ints, data_frame
 from postproc.calibration.cross_validation import (
@@ -19,6 +18,7 @@ from postproc.calibration.cross_validation import (
     PairedErrors,
     mean_error_mm,
     predict_held_out_linearly,
+    regions_of,
     summarise,
 )
 from postproc.calibration.diagnosis.held_out import (
@@ -27,7 +27,6 @@ from postproc.calibration.diagnosis.held_out import (
     deal,
     multi_directional,
     noise_floor,
-    regions,
     whole_poses,
 )
 from postproc.calibration.diagnosis.investigate import (
@@ -62,7 +61,6 @@ from postproc.calibration.direction_labels import mend_directions
 from postproc.calibration.effect_selection import attribute_drift, model_of
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.monuments import exclude_effects
-from postproc.calibration.orientations import means
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.report import list_downweighted, report_directions
 from postproc.calibration.reversal_test import (
@@ -96,7 +94,6 @@ KEPT = (
     "a refit to these rows predicts held-out ones no better, beyond what chance does: "
     "the model is written as it was given"
 )
-WORSE = 0.025  # probability of calling a model worse that is not
 PARTS = 5
 RUN = 8  # consecutive rows that are held out together
 MANY = 2000  # rows from which one part is enough
@@ -132,42 +129,32 @@ class HeldOut:
             std: Its standard deviations of all rows, (n, 3) [m], where others than
                 those of the fit hold.
         """
-        region = whole_poses(regions(fit.batch.states.q), fit.pose)
+        region = regions_of(fit.batch.states)
         far = mean_error_mm(predict_held_out_linearly(fit, region))
-        return summarise(self.with_std(fit, std), far, chosen=True)
-
-    def with_std(self, fit: Fit, std: Floats | None = None) -> HeldOutRows:
-        """Return what the extended model leaves with how sure it is, see `expect`."""
         every = predict_held_out_linearly(fit, self.part)
         stated = every.std if std is None else std
-        return HeldOutRows(
+        left = HeldOutRows(
             self.after, stated[self.rows], self.part[self.rows],
             np.ones(len(self.rows), dtype=bool), self.pose, every.tracker[self.rows],
         )  # fmt: skip
+        return summarise(left, far, chosen=True)
 
     @property
     def worse(self) -> bool:
         """Whether the extended model leaves more, beyond what chance does."""
-        before, after = (
-            np.linalg.norm(e, axis=1)[:, None] for e in (self.before, self.after)
-        )
-        _, label = np.unique(self.pose, return_inverse=True)
-        rise = means(after - before, label.reshape(-1))[:, 0]
-        if len(rise) < 2:
-            return False
-        limit = student.isf(WORSE, len(rise) - 1) * rise.std(ddof=1) / len(rise) ** 0.5
-        return bool(rise.mean() > limit)
+        return PairedErrors.between(self.after, self.before, self.pose).better
 
     def keeping(self, given: Fit) -> HeldOut:
-        """Return it with what the given model leaves, its set-up fitted anew.
+        """Return it with what the given model leaves, its set-up refitted.
 
         A probe point that the given model knows is where it has it, unless what the
         rows say of it predicts others better.
         """
         states = given.batch.states
         every = predict_held_out_linearly(given, self.part)
-        anew, point = states.across(every.error)[self.rows], states.tool_id[self.rows]
-        after = np.where(_is_less(anew, self.before, point)[:, None], anew, self.before)
+        refitted = states.across(every.error)[self.rows]
+        better = _is_less(refitted, self.before, states.tool_id[self.rows])
+        after = np.where(better[:, None], refitted, self.before)
         return replace(self, after=after)
 
 
@@ -278,9 +265,7 @@ class Extension:
         """Say in some lines what was found, and what it leaves of held-out rows."""
         found = self.diagnosis
         lines = [
-            *filter(None, [found.tell_expected()]),
-            f"verdict: {found.verdict}",
-            found.story(),
+            *found.headlines(),
             f"before {found.before.tell()}",
             f"after  {found.after.tell()}",
             *found.notes,
@@ -357,8 +342,15 @@ def extend_model(
         given = survey.position - nominal - model.error(arm, survey.states)
     held_out = hold_out(traced.search, sides, seed, progress, given)
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
+    kept = None
     if given is not None and diagnosis.verdict == "noise" and not traced.findings:
-        diagnosis = _keep_given(traced.search, held_out, model, diagnosis)
+        kept = _keep_given(traced.search, held_out, model)
+    if kept is not None:
+        notes = (*diagnosis.notes, KEPT)
+        diagnosis = replace(diagnosis, notes=notes, expected=kept)
+    elif not held_out.worse:
+        expected = held_out.expect(traced.search.fit)
+        diagnosis = replace(diagnosis, expected=expected)
     extended = _extend_model(model, survey, traced.search, diagnosis)
     widths = newer_widths(model.flank_widths, extended, arm, reversals)
     extended = replace(extended, flank_widths=widths)
@@ -367,29 +359,27 @@ def extend_model(
     return Extension(diagnosis, extended, traced.search, held_out)
 
 
-def _keep_given(
-    found: Search, held_out: HeldOut, model: Model, diagnosis: Diagnosis
-) -> Diagnosis:
-    """Keep a given model that rows add nothing to, unless a refit is surely better.
+def _keep_given(found: Search, held_out: HeldOut, model: Model) -> HeldOutError | None:
+    """Return what a given model is expected to leave where it is to be kept.
 
     Its set-up, such as where each probe point is, is found from the rows in any case.
+
+    Returns:
+        None where a refit predicts held-out rows better, beyond what chance does.
     """
     base = found.base
     first, *setup = base.combination.effects
     if not isinstance(first, Revision):
-        return diagnosis
+        return None
     given, kept = found.fit, replace(held_out, after=held_out.before)
     if setup:
         effects = (first.fix_model(), *setup)
         given = fit_effects(base.batch, base.position, effects, base.noise.origin)
         kept = held_out.keeping(given)
-    pair = kept.with_std(given), held_out.with_std(found.fit)
-    if PairedErrors.of(*pair).better:
-        return diagnosis
+    if PairedErrors.between(kept.after, held_out.after, held_out.pose).better:
+        return None
     std = model.reading(base.batch.arm, base.batch.states).std
-    expected = kept.expect(given, std)
-    notes = (*diagnosis.notes, KEPT)
-    return replace(diagnosis, notes=notes, expected=expected)
+    return kept.expect(given, std)
 
 
 def _with_mended_directions(
@@ -444,7 +434,6 @@ def _conclude(
         not_excluded=not_excluded(found.fit.batch),
         fixed_points=() if survey.motion is None else survey.motion.tell(),
         notes=tuple(w for w in survey.warnings if w.endswith(AVERAGED)),
-        expected=None if held_out.worse else held_out.expect(found.fit),
         set_anew=FrameShift.of(found.fit),
         explained=_measure_explained(held_out, floor) if traced.findings else None,
     )

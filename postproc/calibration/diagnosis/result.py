@@ -183,9 +183,10 @@ class Diagnosis:
         """How often the noise floor held-out rows are left."""
         return self.after.mean_mm / max(self.noise_floor_mm, 1e-12)
 
-    def tell_expected(self) -> str:
-        """Say what is expected of new poses; nothing where no model may be used."""
-        return "" if self.expected is None else self.expected.describe()
+    def headlines(self) -> list[str]:
+        """Say what is expected of new poses, unless rejected, and the verdict."""
+        expected = [] if self.expected is None else [self.expected.describe()]
+        return [*expected, f"verdict: {self.verdict}", self.story()]
 
     def story(self) -> str:
         """Tell in a sentence what is named, and what remains."""
