@@ -334,6 +334,16 @@ def path_in(folder: Path, text: str) -> Path:
     return folder / text.replace("\\", "/")
 
 
+def toml_text(text: str) -> str:
+    r"""Write a text as TOML has it.
+
+    >>> print(toml_text(r'C:\cell "7"'))
+    "C:\\cell \"7\""
+    """
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
 def find_beside(place: Path, name: str) -> Path | None:
     """Find a file of a name, in any case, in the folder of another."""
     if not name or not place.parent.is_dir():

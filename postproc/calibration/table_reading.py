@@ -41,6 +41,7 @@ from postproc.calibration.tables import (
 )
 from postproc.calibration.text_table import TextTable, read_headed
 from postproc.exceptions import MeasurementError, PostprocError
+from postproc.files import toml_text
 from postproc.model.effect_sum import Combination
 from postproc.model.kinematics import ArmStates
 from postproc.model.registration import rigid_fit
@@ -251,7 +252,7 @@ def _decide_units(
     angles = asked.get("angle_unit", (found.angle,))
     lengths = asked.get("unit", (found.length,))
     best = _only_one(
-        _candidate(table, cell, joints, places, angle, length)
+        _attempt(table, cell, joints, places, angle, length)
         for angle in angles
         for length in lengths
         if angle in DEGREES_PER and length in MM_PER
@@ -271,7 +272,7 @@ def _by_arm(table: TextTable, cell: Cell) -> tuple[Format, tuple[str, ...]]:
     Raises:
         MeasurementError: No reading fits, or several do.
     """
-    best = _only_one(_candidates(table, cell))
+    best = _only_one(_attempts(table, cell))
     if best is None:
         raise MeasurementError(
             table.path,
@@ -289,7 +290,7 @@ def _by_arm(table: TextTable, cell: Cell) -> tuple[Format, tuple[str, ...]]:
     return form, ("columns", f"unit {best.length}", f"angle_unit {best.angle}")
 
 
-def _candidates(table: TextTable, cell: Cell) -> Iterator[Attempt]:
+def _attempts(table: TextTable, cell: Cell) -> Iterator[Attempt]:
     """Try all columns of numbers side by side as joints and as places."""
     numbers = numbers_in(table, table.columns)
     numeric = np.asarray(np.isfinite(numbers).all(axis=0))
@@ -302,14 +303,14 @@ def _candidates(table: TextTable, cell: Cell) -> Iterator[Attempt]:
                 continue
             for angle in DEGREES_PER:
                 for length in UNSTATED:
-                    yield _candidate(
+                    yield _attempt(
                         table, cell, names[a : a + 6], names[b : b + 3], angle, length
                     )
 
 
-def _only_one(candidates: Iterator[Attempt]) -> Attempt | None:
-    """Return the candidate that fits, None where none does or several do."""
-    ranked = sorted(candidates, key=lambda one: one.misfit)
+def _only_one(attempts: Iterator[Attempt]) -> Attempt | None:
+    """Return the attempt that fits, None where none does or several do."""
+    ranked = sorted(attempts, key=lambda one: one.misfit)
     if not ranked or not ranked[0].misfit <= ROUGH:
         return None
     if len(ranked) > 1 and ranked[1].misfit < CLEAR * ranked[0].misfit:
@@ -317,7 +318,7 @@ def _only_one(candidates: Iterator[Attempt]) -> Attempt | None:
     return ranked[0]
 
 
-def _candidate(
+def _attempt(
     table: TextTable,
     cell: Cell,
     joints: Sequence[str],
@@ -381,9 +382,9 @@ def map_text(readings: Sequence[FileReading]) -> str:
 def _terms(terms: Sequence[tuple[str, float]]) -> str:
     """Write an entry of a map."""
     several = [
-        _quote(name)
+        toml_text(name)
         if factor == 1.0
-        else f"{{ column = {_quote(name)}, factor = {factor!r} }}"
+        else f"{{ column = {toml_text(name)}, factor = {factor!r} }}"
         for name, factor in terms
     ]
     return several[0] if len(several) == 1 else f"[{', '.join(several)}]"
@@ -393,10 +394,4 @@ def _value(value: object) -> str:
     """Write an option of a map."""
     if isinstance(value, bool):
         return str(value).lower()
-    return _quote({"\t": "tab", r"\s+": "space"}.get(str(value), str(value)))
-
-
-def _quote(text: str) -> str:
-    """Write a text as TOML has it."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'
+    return toml_text({"\t": "tab", r"\s+": "space"}.get(str(value), str(value)))

@@ -15,7 +15,7 @@ import typer
 from postproc.cli.common import app, report_errors, say
 from postproc.cli.project import NAME
 from postproc.exceptions import OutputError, PostprocError
-from postproc.files import write_all
+from postproc.files import toml_text, write_all
 
 CELL = "cell.toml"
 OTHER = "other"  # controller of arms of other makers
@@ -150,7 +150,7 @@ def _cell_text(given: Answers, arm: str) -> bytes:
         "# Lengths in mm, angles in degrees (Euler ZYZ).",
         "",
         "[robot]",
-        f"arm = {_quote(arm)}",
+        f"arm = {toml_text(arm)}",
         *_robot_lines(given),
         *_tool_lines(given.tool),
         *_survey_lines(given.nest or []),
@@ -190,7 +190,7 @@ def _robot_lines(given: Answers) -> list[str]:
     own = _controller_of(given.arm or "")
     wanted = _controller_running(given.language)
     if wanted is not None and wanted not in (own if isinstance(own, list) else [own]):
-        lines.append(f"controller = {_quote(wanted)}")
+        lines.append(f"controller = {toml_text(wanted)}")
     if given.accuracy is not None:
         state = "true" if given.accuracy is OnOff.ON else "false"
         lines.append(
@@ -222,9 +222,9 @@ def _measurement_lines(frame: PlacesFrame | None, instrument: str | None) -> lis
     """Write [measurements]."""
     lines = ["", "[measurements]"]
     if frame is not None:
-        lines.append(f"frame = {_quote(frame)}")
+        lines.append(f"frame = {toml_text(frame)}")
     if instrument:
-        lines.append(f"instrument = {_quote(instrument)}")
+        lines.append(f"instrument = {toml_text(instrument)}")
     return lines if len(lines) > 2 else []
 
 
@@ -242,12 +242,6 @@ def _numbers(option: str, text: str, counts: tuple[int, ...]) -> list[float]:
         many = " or ".join(map(str, counts))
         raise PostprocError(f"{option} {text}: give {many} numbers between commas")
     return numbers
-
-
-def _quote(text: str) -> str:
-    """Write a text as TOML has it."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'
 
 
 # Questions on a terminal.

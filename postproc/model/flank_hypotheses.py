@@ -17,7 +17,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.model.backlash_width import SHARP, ahead, on_the_way
-from postproc.model.model import CONFIRMED, UNLIKE, Model, Width
+from postproc.model.model import CONFIRMED, UNLIKE, UNTOLD, Model, Width
 from postproc.robot.arm import Arm
 
 OPEN = 0.05  # weight of a hypothesis that counts
@@ -125,8 +125,7 @@ def _of_joint(leads: bool, width: Width | None, in_motion: str) -> FlankOfJoint:
     if stops == "elastic" and in_motion == CONFIRMED:
         found = _EQUAL  # steps along a path are too coarse to tell a flank's width
     weight *= found
-    told = width is not None and stops not in ("", "unlike")
-    least, most = width if told and width is not None else (1.0, np.inf)
+    least, most = UNTOLD if width is None or stops in ("", "unlike") else width
     most = most if np.isfinite(most) else max(GIVES, least)
     nominal = float(np.sqrt(least * most)) if stops == "elastic" else 1.0
     weights = dict(zip(_ORDER, weight.tolist(), strict=True))

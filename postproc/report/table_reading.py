@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
+from postproc.calibration.measurements import POSITION
 from postproc.calibration.recognise import Terms
 from postproc.calibration.table_reading import FileReading
 from postproc.calibration.tables import JOINTS, clock_of
@@ -13,7 +14,6 @@ from postproc.robot.pose import MM
 
 SIGNS = {"\t": "tab", r"\s+": "blanks", ",": "comma", ";": "semicolon", "|": "stroke"}
 UNITS = {"deg": "degrees", "rad": "radians"}
-PLACES = ("x_mm", "y_mm", "z_mm")
 COMPARED = "only this reading fits the arm"
 
 
@@ -58,7 +58,7 @@ def _columns(one: FileReading) -> dict[str, str]:
         return {"columns": "by their places"}
     columns = dict(one.form.columns)
     rows: dict[str, str] = {}
-    for title, group in (("joints", JOINTS), ("x, y, z", PLACES)):
+    for title, group in (("joints", JOINTS), ("x, y, z", POSITION)):
         own = {name: columns.pop(name) for name in group if name in columns}
         if own:
             unit = _unit(one, "angle_unit" if group is JOINTS else "unit")
