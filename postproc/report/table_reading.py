@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
+
 from postproc.calibration.measurements import POSITION
 from postproc.calibration.recognise import Terms
 from postproc.calibration.table_reading import FileReading
@@ -33,7 +35,7 @@ def print_reading(
         "not used": ", ".join(map(repr, one.found.unused if one.found else ())),
         "poses": _poses(one, program),
         "directions": _directions(one, program),
-        "probe points": _tools(one),
+        "probe points": _tools(one, program),
         "frame": _frame(one, stated),
         "not counted": _list_dropped(one),
     }
@@ -105,10 +107,15 @@ def _directions(one: FileReading, program: Path | None) -> str:
     return f"inferred from {clock}, as joint moves"
 
 
-def _tools(one: FileReading) -> str:
-    """Say how many rows each probe point has."""
-    count = Counter(one.rows.states.tool_id.tolist())
-    return ", ".join(f"{tool}: {rows} rows" for tool, rows in sorted(count.items()))
+def _tools(one: FileReading, program: Path | None) -> str:
+    """Say how many rows each probe point has; a program mounts them by their places."""
+    states = one.rows.states
+    if program is not None:
+        _, count = np.unique(states.tool.round(9), axis=0, return_counts=True)
+        rows = ", ".join(map(str, count.tolist()))
+        return f"{len(count)}, as the program mounts them: {rows} rows"
+    tools = Counter(states.tool_id.tolist())
+    return ", ".join(f"{tool}: {rows} rows" for tool, rows in sorted(tools.items()))
 
 
 def _frame(one: FileReading, stated: PointFrame | None) -> str:
