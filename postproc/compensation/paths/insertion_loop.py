@@ -230,7 +230,6 @@ def _result(work: InsertionPlan) -> CompensatedProgram:
     in_time = replace(
         told,
         before=work.first.before,
-        other_side=told.other_side[work.own],
         inserted=_report_insertions(work, told),
     )
     kept = of_source(work.latest.kept, work.own)
