@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -39,7 +40,6 @@ class InTime:
         before, after: The program as it was written, and as it is compensated.
         paths: How far it leaves its paths, as the model says.
         guessed: Which limits of the joints the arm file guesses.
-        other_side: Where a joint arrives otherwise in time than along the path, (n, 6).
         arm: The arm.
         inserted: The points that were put on its ways; None where nobody asked.
         in_motion: What a measured path says of the joints, see `Model.in_motion`.
@@ -49,10 +49,14 @@ class InTime:
     after: ProgramCycle
     paths: PathAccuracy
     guessed: tuple[str, ...]
-    other_side: Bools
     arm: Arm
     inserted: Insertions | None = None
     in_motion: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def other_side(self) -> Bools:
+        """Where a joint arrives otherwise in time than along the path, (n, 6)."""
+        return disagreements(self.arm, self.after)[self.own]
 
     @property
     def own(self) -> Ints:
@@ -261,9 +265,8 @@ def run_in_time(
     paths = predict_paths(
         before, after, shift, cell, setting.model, setting.temperature, owner, arcs
     )
-    guessed, other = list_guessed_limits(cell.arm), disagreements(cell.arm, after)
-    told = setting.model.in_motion
-    return InTime(before, after, paths, guessed, other, cell.arm, in_motion=told)
+    guessed, told = list_guessed_limits(cell.arm), setting.model.in_motion
+    return InTime(before, after, paths, guessed, cell.arm, in_motion=told)
 
 
 def describe_verification(in_motion: Mapping[str, str]) -> str:

@@ -92,10 +92,7 @@ def pair(bench_cell):
 
 
 def told_of(outcome, before, after) -> InTime:
-    return replace(
-        outcome.in_time, before=before, after=after,
-        other_side=np.zeros((len(after), 6), dtype=bool),
-    )  # fmt: skip
+    return replace(outcome.in_time, before=before, after=after)
 
 
 @pytest.mark.parametrize(

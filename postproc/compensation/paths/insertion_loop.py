@@ -1,15 +1,28 @@
-"""Ways corrected between the targets: points where a path would be left too far.
+"""Why a point is where it is: the rules by which points come on the ways of a program.
 
-A point is put where the predicted deviation of a move is largest, corrected as every
-target is, and the program is predicted again, until no move leaves its path farther
-than asked for or no point helps. Where a joint changes its flank that gives a point on
-the old flank and one on the new, and few others.
+A plan is immutable. A rule is a function from a plan and what is predicted of it (a
+`PathPrediction` holds both) to another plan, which is predicted again:
+
+1. `insert_reapproaches`: targets are approached anew from a stop, where asked for.
+2. `find_split`: which moves leave their paths too far, and may get points.
+3. `drop_where_steep`: of two points between which a correction changes too fast, the
+   one with less room goes.
+4. `put_points`: a point comes where every part of a path is left the farthest, and in
+   front of it a stop that preloads the backlash. Where a joint changes its flank that
+   gives one point on the old flank, one on the new, and few others. Arcs are cut at
+   their points on the way as well; flat pieces become chords, or are halved.
+5. `join_flat_pieces`: pieces of arcs that are still too flat go on to the next cut.
+6. `BestPoints.restore`: of all that was tried on a move what did best.
+7. `choose_plans`: of these points, fewer of them and none, what the data allow.
+8. `judge`: what is no better for certain is thinned out, or taken back.
+
+3 and 4 are repeated until neither changes anything, then 5, then 8.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import hypot
 
@@ -17,7 +30,6 @@ import numpy as np
 
 from postproc.compensation.options import Job
 from postproc.compensation.paths.arc_splitting import (
-    bending,
     cut_at_vias,
     halve_flat_pieces,
     join_flat_pieces,
@@ -25,7 +37,13 @@ from postproc.compensation.paths.arc_splitting import (
     whole_arcs,
 )
 from postproc.compensation.paths.arcs import Cut, halves, point_on_way
-from postproc.compensation.paths.insertion_plan import InsertionPlan, Write, of_source
+from postproc.compensation.paths.insertion_plan import InsertionPlan
+from postproc.compensation.paths.insertion_prediction import (
+    InsertionTask,
+    PathPrediction,
+    Write,
+    of_source,
+)
 from postproc.compensation.paths.insertion_report import Insertions
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.plan_outcomes import BEGINS, compare
@@ -36,7 +54,6 @@ from postproc.compensation.paths.reapproach import (
 )
 from postproc.compensation.paths.split_selection import find_split
 from postproc.compensation.pipeline import CompensatedProgram
-from postproc.compensation.timing_comparison import InTime
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
 from postproc.robot.pose import MM
@@ -52,6 +69,9 @@ MORE_ROOM = "Allow more points: --max-inserted"
 SHORTER = "A lower speed, or a smaller [limits] segment_ms, allows shorter pieces"
 TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
 LATEST = 0.9  # of a way: the last place of it for a stop
+
+
+Rule = Callable[[PathPrediction], InsertionPlan]
 
 
 def correct_paths(
@@ -80,133 +100,153 @@ def correct_paths(
             f"reapproach: no stops are inserted into {language.name} programs. Leave "
             "the key out; findings direction-uncertain advise how to approach targets"
         )
-    work = InsertionPlan(draft, first, setting, write, splitter)
+    task = InsertionTask(draft, first, setting, write, splitter)
+    now = task.predict(InsertionPlan())
     if splitter is not None and setting.options.reapproach:
-        insert_reapproaches(work, splitter)
-    find_split(work)
-    if work.open or work.approaches:
-        best = BestPoints(work)
-        _improve(work, best)
-        _bend(work, best)
-        best.restore()
-        judge(work)
-    return _result(work)
+        now = insert_reapproaches(now, splitter)
+    now = task.predict(find_split(now))
+    if now.plan.open or now.plan.approaches:
+        now, best = _repeat(now, BestPoints(), put_points, drop_where_steep)
+        now, best = _repeat(now, best, join_flat_pieces)
+        now = judge(task.predict(best.restore(now)))
+    return _result(now)
 
 
-def _improve(work: InsertionPlan, best: BestPoints) -> None:
-    """Put points on the ways until none is left too far, or none helps."""
+def _nothing(now: PathPrediction) -> InsertionPlan:
+    return now.plan
+
+
+def _repeat(
+    now: PathPrediction, best: BestPoints, rule: Rule, repair: Rule = _nothing
+) -> tuple[PathPrediction, BestPoints]:
+    """Follow a rule until it changes nothing, and note what did best.
+
+    Args:
+        now: The program.
+        best: What did best before.
+        rule: The rule.
+        repair: What comes before it; what that changes is not noted.
+    """
     for _ in range(ROUNDS):
-        if _drop_where_steep(work):
-            work.make()
-            continue
-        flat = bending(work)
-        best.note(flat)
-        new = dict(_new_points(work))
-        chords = new_chords(work, flat)
-        more = halve_flat_pieces(work, flat, {*new, *(v for v, _ in chords)})
-        if not new and not chords and not more:
-            return
-        for v, shares in (new | more).items():
-            work.points[v] = tuple(sorted(map(float, shares)))
-        work.chords |= chords
-        cut_at_vias(work)
-        work.make()
+        plan = repair(now)
+        if plan.written == now.plan.written:
+            best = best.note(now)
+            plan = rule(now)
+            if plan.written == now.plan.written:
+                return replace(now, plan=plan), best
+        now = now.task.predict(plan)
+    return now, best
 
 
-def _drop_where_steep(work: InsertionPlan) -> bool:
+def drop_where_steep(now: PathPrediction) -> InsertionPlan:
     """Take back points beside which corrections change faster than they may.
 
     The error itself changes fast there, and all points of the way would be left for it:
     over a longer piece it changes less.
     """
-    changed = False
-    for v, known in [*work.points.items()]:
+    plan = now.plan
+    for v, known in now.plan.points.items():
         ends, gone = [0.0, *known, 1.0], set[float]()
         room = {b: c - a for a, b, c in zip(ends, ends[1:], ends[2:], strict=False)}
-        free = {*known[v in work.stops :]} - {1.0}
-        for k in work.steep_pieces(v):
+        free = {*known[v in plan.stops :]} - {1.0}
+        for k in now.steep_pieces(v):
             if either := free.intersection(ends[k : k + 2]):
                 gone.add(max(either, key=room.__getitem__))
         if gone:
-            work.drop(v, gone)
-            work.shut.setdefault(v, set()).update(gone)
-            changed = True
-    return changed
+            shut = {**plan.shut, v: plan.shut.get(v, frozenset()) | gone}
+            plan = replace(plan.drop(v, gone), shut=shut)
+    return plan
 
 
-def _bend(work: InsertionPlan, best: BestPoints) -> None:
-    """Let pieces of arcs that are too flat go on to the next cut."""
-    for _ in range(ROUNDS):
-        flat, changed = bending(work), False
-        best.note(flat)
-        for v, points in join_flat_pieces(work, flat).items():
-            changed |= points != work.points[v]
-            if points[:1] != work.points[v][:1]:
-                work.stops.discard(v)  # what comes first now is passed
-            work.points[v] = points
-        work.points = {v: points for v, points in work.points.items() if points}
-        if not changed:
-            return
-        work.make()
+def put_points(now: PathPrediction) -> InsertionPlan:
+    """Put points on the ways that are left too far, and cut their arcs."""
+    plan = _put_on_paths(now)
+    chords = new_chords(now)
+    changed = {v for v in plan.points if plan.points[v] != now.plan.points.get(v)}
+    plan = halve_flat_pieces(now, plan, {*changed, *(v for v, _ in chords)})
+    return cut_at_vias(now.task.visits, replace(plan, chords=plan.chords | chords))
 
 
-def _new_points(work: InsertionPlan) -> Iterator[tuple[int, list[float]]]:
-    """Yield the points of moves that get more of them, by their visit."""
-    room = work.room
-    sizes, whole = work.paths.after.sizes, whole_arcs(work)
+def _put_on_paths(now: PathPrediction) -> InsertionPlan:
+    """Put points on the paths that are left too far, the worst first."""
+    plan, room = now.plan, now.room
+    sizes, whole = now.paths.after.sizes, whole_arcs(now)
     for k in np.argsort(-sizes, kind="stable").tolist():
-        v = int(work.paths.visit[k])
-        known, via = work.points.get(v, ()), v in whole
-        near = v in work.beside and known in ((), (1.0,))
-        if v not in work.open or sizes[k] <= (work.tolerance / 2 if near else work.aim):
+        v = int(now.paths.visit[k])
+        if not _needs_points(now, v, sizes[k]):
             continue
-        left = room - via  # the point on the way of an arc becomes one, too
-        stop = _stop(work, k, v) if v in work.idle and left > 0 else None
-        if stop is not None:
-            left -= v not in work.stops
-            more = [stop, *known[v in work.stops :]]
-            work.stops.add(v)
-        else:
-            wanted = _on_path(work, k, v)
-            new = wanted[: max(left, 0)]
-            work.crowded |= len(new) < len(wanted)
-            left -= len(new)
-            more = [*known, *new] if new else []
-        if more:
-            room = left
+        via = v in whole  # the point on the way of an arc becomes one, too
+        more = _put_on_path(now, plan, k, room - via)
+        count = more.count - plan.count
+        if count or more.points.get(v) != plan.points.get(v):
+            room -= count + via
             if via:
-                first = point_on_way(work.source.reading.visits, v)
+                first = point_on_way(now.task.visits, v)
                 whole -= {first, first + 1}
-            yield v, more
+        plan = more
+    return plan
 
 
-def _stop(work: InsertionPlan, k: int, v: int) -> float | None:
+def _needs_points(now: PathPrediction, v: int, size: float) -> bool:
+    """Return True if a path that is so far off [m] at the most gets more points."""
+    plan, task = now.plan, now.task
+    near = v in plan.beside and plan.points.get(v, ()) in ((), (1.0,))
+    return v in plan.open and size > (task.tolerance / 2 if near else task.aim)
+
+
+def _put_on_path(
+    now: PathPrediction, plan: InsertionPlan, k: int, room: int
+) -> InsertionPlan:
+    """Put the stop in front of a path, or points where it is left too far.
+
+    Args:
+        now: The program.
+        plan: Its points, and those of other paths.
+        k: The path.
+        room: How many points may be put on it.
+    """
+    v = int(now.paths.visit[k])
+    known = plan.points.get(v, ())
+    if v in plan.idle and room > 0:
+        plan, stop = _find_stop(now, plan, k)
+        if stop is not None:
+            rest = known[v in plan.stops :]
+            return replace(plan, stops=plan.stops | {v}).put(v, (stop, *rest))
+    wanted = _on_path(now, k, v)
+    new = wanted[: max(room, 0)]
+    plan = replace(plan, crowded=plan.crowded or len(new) < len(wanted))
+    return plan.put(v, (*known, *new)) if new else plan
+
+
+def _find_stop(
+    now: PathPrediction, plan: InsertionPlan, k: int
+) -> tuple[InsertionPlan, float | None]:
     """Find where the arm stops to take up play before a path, as a share of it.
 
     How near does best is tried out. None where nothing is left to try.
     """
-    paths, samples = work.paths, work.paths.samples(k)
-    begin, length = paths.way[samples] < work.open[v][0], float(paths.way[samples][-1])
+    v, paths, samples = int(now.paths.visit[k]), now.paths, now.paths.samples(k)
+    begin, length = paths.way[samples] < plan.open[v][0], float(paths.way[samples][-1])
     places = [there / length for there in TAKEN if there < LATEST * length]
     off = float(paths.after.across[samples][begin].max(initial=0.0))
-    tried = work.tried.setdefault(v, [])
-    if v in work.stops and len(tried) < len(places):
-        tried.append((off, work.points[v][0]))
-    if off <= work.aim or len(tried) > len(places) or not places:
-        return None
-    if len(tried) == len(places):
-        best = min(tried)[1]
-        tried.append((0.0, best))  # it is settled
-        return best if best != work.points[v][0] else None
-    return places[len(tried)]
+    tried = plan.tried.get(v, ())
+    if v in plan.stops and len(tried) < len(places):
+        tried = (*tried, (off, plan.points[v][0]))
+    stop = None
+    if off > now.task.aim and len(tried) <= len(places) and places:
+        stop = places[len(tried)] if len(tried) < len(places) else min(tried)[1]
+        if len(tried) == len(places):
+            tried = (*tried, (0.0, stop))  # it is settled
+            stop = stop if stop != plan.points[v][0] else None
+    return replace(plan, tried={**plan.tried, v: tried}), stop
 
 
-def _on_path(work: InsertionPlan, k: int, v: int) -> list[float]:
+def _on_path(now: PathPrediction, k: int, v: int) -> list[float]:
     """Find a point in every part of a path that is left too far, the worst first."""
-    paths, samples = work.paths, work.paths.samples(k)
+    plan, paths, samples = now.plan, now.paths, now.paths.samples(k)
     way, far = paths.way[samples], paths.after.across[samples]
-    known, shut = work.points.get(v, ()), work.shut.get(v, ())
-    least, clear, behind = work.open[v]
+    known, shut = plan.points.get(v, ()), plan.shut.get(v, ())
+    least, clear, behind = plan.open[v]
     ends = [0.0, *(share * way[-1] for share in known), float(way[-1])]
     found = []
     for i, (a, b) in enumerate(pairwise(ends)):
@@ -218,80 +258,79 @@ def _on_path(work: InsertionPlan, k: int, v: int) -> list[float]:
         if any(a < share * way[-1] < b for share in shut):
             continue
         top = inside[far[inside].argmax()]
-        if far[top] > work.aim:
+        if far[top] > now.task.aim:
             at = min(max(float(way[top]), low), high)
             found.append((float(far[top]), at / float(way[-1])))
     return [share for _, share in sorted(found, reverse=True)]
 
 
-def _result(work: InsertionPlan) -> CompensatedProgram:
+def _result(now: PathPrediction) -> CompensatedProgram:
     """Tell of the program as of the source's visits."""
-    told = work.latest.in_time or work.first
     in_time = replace(
-        told,
-        before=work.first.before,
-        other_side=told.other_side[work.own],
-        inserted=_report_insertions(work, told),
+        now.in_time, before=now.task.first.before, inserted=_report_insertions(now)
     )
-    kept = of_source(work.latest.kept, work.own)
-    return replace(work.latest, kept=kept, in_time=in_time)
+    kept = of_source(now.program.kept, now.own)
+    return replace(now.program, kept=kept, in_time=in_time)
 
 
-def _report_insertions(work: InsertionPlan, told: InTime) -> Insertions:
+def _report_insertions(now: PathPrediction) -> Insertions:
     """Say what was put on ways, and why moves that are left too far got nothing."""
+    task, plan, visits = now.task, now.plan, now.task.visits
     why = "its pieces would be too short, or the path no better"
-    if work.crowded:
+    if plan.crowded:
         why = "no more points may be inserted (max_inserted)"
-    too_far = set(work.paths.visit[work.too_far].tolist()) - work.points.keys()
-    visits, left = work.source.reading.visits, {}
+    too_far = set(now.paths.visit[now.too_far].tolist()) - plan.points.keys()
+    left = {}
     for v in sorted(too_far):  # what is known of one half of an arc is so of both
-        halved = (work.left[h] for h in halves(visits, v) if h in work.left)
-        left[v] = work.left.get(v) or next(halved, why)
+        halved = (plan.left[h] for h in halves(visits, v) if h in plan.left)
+        left[v] = plan.left.get(v) or next(halved, why)
     return Insertions(
-        work.own,
-        work.tolerance,
-        work.points,
-        work.stops & work.points.keys(),
+        now.own,
+        task.tolerance,
+        plan.points,
+        plan.stops & plan.points.keys(),
         left,
-        sizes_of(work.first.paths),
-        _promises(work, told),
-        find_reapproaches(work, told),
-        frozenset(work.unconfirmed),
-        _cures(work, told),
-        _cell_speed(work),
+        sizes_of(task.first.paths),
+        _promises(now),
+        find_reapproaches(now),
+        plan.unconfirmed,
+        _cures(now),
+        _cell_speed(now),
     )
 
 
-def _cell_speed(work: InsertionPlan) -> float:
+def _cell_speed(now: PathPrediction) -> float:
     """Return the speed of the cell if moves with points are judged at it [mm/s]."""
-    speed = work.setting.cell.file.motion.linear_mm_s or 0.0
-    own = work.first.before.targets.linear_speed[sorted(work.points)] / MM
+    task = now.task
+    speed = task.setting.cell.file.motion.linear_mm_s or 0.0
+    own = task.first.before.targets.linear_speed[sorted(now.plan.points)] / MM
     return speed if np.isclose(own, speed).any() else 0.0
 
 
-def _cures(work: InsertionPlan, told: InTime) -> dict[int, str]:
+def _cures(now: PathPrediction) -> dict[int, str]:
     """Say what helps the moves that are left too far, by visit."""
-    visits, found = work.source.reading.visits, {}
-    for k in work.too_far.tolist() if work.splitter is not None else ():
-        v, largest = int(told.paths.visit[k]), told.paths.after.largest[k]
-        known = [work.cures[h] for h in halves(visits, v) if work.cures.get(h)]
+    plan, paths, found = now.plan, now.paths, dict[int, str]()
+    for k in now.too_far.tolist() if now.task.splitter is not None else ():
+        v, largest = int(paths.visit[k]), paths.after.largest[k]
+        both = halves(now.task.visits, v)
+        known = [plan.cures[h] for h in both if plan.cures.get(h)]
         if known:
             found[v] = known[0]
-        elif v not in work.open:
+        elif v not in plan.open:
             found[v] = BY_HAND
-        elif told.paths.way[largest] < BEGINS and v not in work.stops:
-            found[v] = MEASURE_STARTS if v in work.unconfirmed else PRELOAD
+        elif paths.way[largest] < BEGINS and v not in plan.stops:
+            found[v] = MEASURE_STARTS if v in plan.unconfirmed else PRELOAD
         else:
-            found[v] = MORE_ROOM if work.crowded else SHORTER
+            found[v] = MORE_ROOM if plan.crowded else SHORTER
     return found
 
 
-def _promises(work: InsertionPlan, told: InTime) -> dict[int, float]:
+def _promises(now: PathPrediction) -> dict[int, float]:
     """Return what 95 % of every move stays within by all open hypotheses [m]."""
-    visits = work.source.reading.visits
-    moves = {halves(visits, v) for v in told.paths.visit.tolist()}
+    task = now.task
+    moves = {halves(task.visits, v) for v in now.paths.visit.tolist()}
     return {
-        v: compare((told.paths,), rows, work.tolerance).choose()[1]
+        v: compare((now.paths,), rows, task.tolerance).choose()[1]
         for rows in moves
         for v in rows
     }
@@ -314,70 +353,62 @@ class _Tried:
     chords: frozenset[Cut]
 
 
+@dataclass(frozen=True)
 class BestPoints:
     """What did best for every move that may be split, so far.
 
     Points are put where a path is left the farthest, one after the other; near a place
     where two joints turn back a next one can make the move worse.
+
+    Attributes:
+        best: What did best, by the first visit of each move.
+        refused: Why points of moves could not be corrected, what was said first.
     """
 
-    def __init__(self, work: InsertionPlan) -> None:
-        """Begin with nothing."""
-        self._best: dict[int, _Tried] = {}
-        self._refused: dict[int, str] = {}
-        self._work = work
+    best: Mapping[int, _Tried] = field(default_factory=dict)
+    refused: Mapping[int, str] = field(default_factory=dict)
 
-    def note(self, flat: Collection[Cut]) -> None:
-        """Look at how the moves do with the points that they have now.
-
-        Args:
-            flat: Pieces of arcs that are too flat, see `bending`.
-        """
-        refused = self._refusals()
-        self._refused = refused | self._refused  # what was said first
-        bad = self._unfit(flat, refused)
-        for v, tried in self._now().items():
-            known = self._best.setdefault(v, tried)
+    def note(self, now: PathPrediction) -> BestPoints:
+        """Look at how the moves do with the points that they have now."""
+        best, bad = dict(self.best), _unfit(now)
+        for v, tried in _list_tried(now).items():
+            known = best.setdefault(v, tried)
             if v not in bad and tried.size <= known.size + BETTER:  # the later one
-                self._best[v] = replace(tried, size=min(tried.size, known.size))
+                best[v] = replace(tried, size=min(tried.size, known.size))
+        return BestPoints(best, {**now.refusals, **self.refused})
 
-    def restore(self) -> None:
+    def restore(self, now: PathPrediction) -> InsertionPlan:
         """Give moves back the points that did better than those they have."""
-        work, now = self._work, self._now()
-        bad = self._unfit(bending(work), self._refusals())
-        worse = [
-            v for v in now if v in bad or (now[v].size > self._best[v].size + BETTER)
-        ]
-        for v in worse:
-            has, best = now[v], self._best[v]
-            others = {k: s for k, s in work.points.items() if k not in has.points}
-            work.points = {**others, **best.points}
-            work.stops = work.stops - has.stops | best.stops
-            work.chords = work.chords - has.chords | best.chords
-        for v in self._refused.keys() - work.points.keys():
-            work.left[v] = self._refused[v]
-        if worse:
-            work.make()
+        plan, bad = now.plan, _unfit(now)
+        for v, has in _list_tried(now).items():
+            best = self.best[v]
+            if v in bad or has.size > best.size + BETTER:
+                others = {k: s for k, s in plan.points.items() if k not in has.points}
+                plan = replace(
+                    plan,
+                    points={**others, **best.points},
+                    stops=plan.stops - has.stops | best.stops,
+                    chords=plan.chords - has.chords | best.chords,
+                )
+        for v in self.refused.keys() - plan.points.keys():
+            plan = plan.leave(v, self.refused[v])
+        return plan
 
-    def _refusals(self) -> dict[int, str]:
-        """Say why points of moves cannot be corrected, by their visits."""
-        work = self._work
-        return {v: told for v in work.points if (told := work.refusal(v))}
 
-    def _unfit(self, flat: Collection[Cut], refused: Collection[int]) -> set[int]:
-        """Return the moves with flat pieces, or refused points, by first visits."""
-        visits = self._work.source.reading.visits
-        return {halves(visits, v)[0] for v in (*(v for v, _ in flat), *refused)}
+def _unfit(now: PathPrediction) -> set[int]:
+    """Return the moves with flat pieces, or refused points, by first visits."""
+    rows: Collection[int] = {*(v for v, _ in now.flat), *now.refusals}
+    return {halves(now.task.visits, v)[0] for v in rows}
 
-    def _now(self) -> dict[int, _Tried]:
-        """Say what the moves have now, by their first visits, and how they do."""
-        work, sizes = self._work, sizes_of(self._work.paths)
-        found = {}
-        for own in {halves(work.source.reading.visits, v) for v in work.open}:
-            found[own[0]] = _Tried(
-                hypot(*(sizes.get(row, np.inf) for row in own)),
-                {row: work.points[row] for row in own if row in work.points},
-                frozenset(work.stops.intersection(own)),
-                frozenset(cut for cut in work.chords if cut[0] in own),
-            )
-        return found
+
+def _list_tried(now: PathPrediction) -> dict[int, _Tried]:
+    """Say what the moves have now, by their first visits, and how they do."""
+    plan, sizes, found = now.plan, sizes_of(now.paths), dict[int, _Tried]()
+    for own in {halves(now.task.visits, v) for v in plan.open}:
+        found[own[0]] = _Tried(
+            hypot(*(sizes.get(row, np.inf) for row in own)),
+            {row: plan.points[row] for row in own if row in plan.points},
+            plan.stops.intersection(own),
+            frozenset(cut for cut in plan.chords if cut[0] in own),
+        )
+    return found

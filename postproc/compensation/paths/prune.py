@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, any_in_rows
-from postproc.compensation.paths.arc_splitting import bending, may_be_chord
 from postproc.compensation.paths.arcs import (
-    Cut,
     halves,
     is_arc,
     largest_zones,
     measure_passing,
-    point_on_way,
     zone_sizes,
 )
 from postproc.compensation.paths.insertion_plan import InsertionPlan
+from postproc.compensation.paths.insertion_prediction import PathPrediction
 from postproc.compensation.paths.path_error import apart, sizes_of
 from postproc.compensation.paths.plan_outcomes import Objection, compare
 from postproc.compensation.paths.reapproach import WORSE, bad_approaches
-from postproc.compensation.timing_comparison import InTime
+from postproc.language.visits import Visits
 from postproc.robot.pose import lengths
 
 JUDGED = 8  # rounds in which points are taken back
@@ -31,139 +29,85 @@ NEAR = 4  # visits behind a move that may be worse for its points
 MOVED = 5e-6  # [m] that a rounded corner may move
 
 
-def judge(work: InsertionPlan) -> None:
+def judge(now: PathPrediction) -> PathPrediction:
     """Take back points that make moves no better for certain."""
-    choose_plans(work)
-    without = _of_moves(work, sizes_of(work.first.paths))
+    task = now.task
+    now = task.predict(choose_plans(now))
+    without = _of_moves(now, sizes_of(task.first.paths))
     for k in range(JUDGED):
-        bad = dict([*_harmful(work, without), *_bad(work, without)])
-        anew = bad_approaches(work)
+        bad = dict([*_harmful(now, without), *_bad(now, without)])
+        anew = bad_approaches(now)
         if not bad and not anew:
-            return
-        for v, (why, share, cure) in bad.items():
-            if share is None or k >= JUDGED / 2 or not _thin_out(work, v, share):
-                work.left[v], work.cures[v] = why, cure
-                _take_back(work, v)
+            return now
+        plan = now.plan
+        for v, removal in bad.items():
+            plan = _remove(task.visits, plan, v, removal, thins_out=k < JUDGED / 2)
         for v in anew:
-            work.left[v] = "a stop before its target is no help"
-            _take_back(work, v)
-        work.make()
-    work.left |= dict.fromkeys(work.points, "its points change with every round")
-    work.points.clear()
-    work.approaches.clear()
-    work.make()
+            plan = plan.leave(v, "a stop before its target is no help")
+            plan = plan.take_back(task.visits, v)
+        now = task.predict(plan)
+    left = dict.fromkeys(now.plan.points, "its points change with every round")
+    left = {**now.plan.left, **left}
+    return task.predict(replace(now.plan, left=left, points={}, approaches={}))
 
 
-def choose_plans(work: InsertionPlan) -> None:
+def choose_plans(now: PathPrediction) -> InsertionPlan:
     """Choose for every move with points how much of them it gets.
 
     See `choose_plan`: all points, those without the stop that preloads, points that
     correct half of what flanks change by, or none. What a hypothesis speaks against
-    is thinned out first.
+    is thinned out later.
     """
-    if not work.points:
-        return
-    full = _Inserted.of(work)
-    variants = [full, *_variants(work, full)]
-    made = [work.paths]
-    for variant in variants[1:]:
-        variant.insert(work)
-        work.make()
-        made.append(work.paths)
-    full.insert(work)
-    chosen: dict[int, _Inserted] = {}
-    for rows in _moves_with_points(work):
-        compared = compare((work.first.paths, *made), rows, work.tolerance)
+    task, chosen = now.task, now.plan
+    plans = [*_variants(now)]
+    made = [now.paths, *(task.predict(plan).paths for plan in plans[1:])]
+    for rows in _moves_with_points(now):
+        compared = compare((task.first.paths, *made), rows, task.tolerance)
         best, _ = compared.choose()
         if best:
-            chosen |= dict.fromkeys(rows, variants[best - 1])
+            for v in rows:
+                chosen = chosen.as_in(plans[best - 1], v)
         elif compared.objection(1) is None:
-            for v in work.points.keys() & {*rows}:
-                work.left[v] = "inserted points make it no better"
-                _take_back(work, v)
-    for v, variant in chosen.items():
-        variant.insert_into(work, v)
-    work.make()
+            for v in now.plan.points.keys() & {*rows}:
+                chosen = chosen.leave(v, "inserted points make it no better")
+                chosen = chosen.take_back(task.visits, v)
+    return chosen
 
 
-def _variants(work: InsertionPlan, full: _Inserted) -> Iterator[_Inserted]:
-    """Yield the points without stops, and those that correct half; work is changed."""
-    plain = full
-    if work.stops:
-        for v in sorted(work.stops):
-            work.stops.discard(v)
-            work.drop(v, {work.points[v][0]})
-        plain = _Inserted.of(work)
+def _variants(now: PathPrediction) -> Iterator[InsertionPlan]:
+    """Yield the plan, it without stops that preload, and points that correct half."""
+    plain = now.plan
+    yield plain
+    if plain.stops:
+        plain = plain.without_stops()
         yield plain
-    if any(flank.open_kinds for flank in work.flanks):
+    if plain.points and any(flank.open_kinds for flank in now.task.flanks):
         yield replace(plain, halved=frozenset(plain.points))
 
 
-@dataclass(frozen=True)
-class _Inserted:
-    """What a plan inserts, as in `InsertionPlan`."""
-
-    points: Mapping[int, tuple[float, ...]]
-    stops: frozenset[int]
-    chords: frozenset[Cut]
-    halved: frozenset[int] = frozenset()
-
-    @classmethod
-    def of(cls, work: InsertionPlan) -> _Inserted:
-        """Take what a program has now."""
-        return cls({**work.points}, frozenset(work.stops), frozenset(work.chords))
-
-    def insert(self, work: InsertionPlan) -> None:
-        """Give all moves what they have here."""
-        for v in [*(work.points.keys() | self.points.keys())]:
-            self.insert_into(work, v)
-
-    def insert_into(self, work: InsertionPlan, v: int) -> None:
-        """Give one visit what it has here."""
-        work.points.pop(v, None)
-        if v in self.points:
-            work.points[v] = self.points[v]
-        work.stops = work.stops - {v} | (self.stops & {v})
-        work.halved = work.halved - {v} | (self.halved & {v})
-        others = {cut for cut in work.chords if cut[0] != v}
-        work.chords = others | {cut for cut in self.chords if cut[0] == v}
-
-
-def _moves_with_points(work: InsertionPlan) -> list[tuple[int, ...]]:
+def _moves_with_points(now: PathPrediction) -> list[tuple[int, ...]]:
     """Return the visits of every move with points, of arcs both."""
-    visits = work.source.reading.visits
-    return sorted({halves(visits, v) for v in work.points})
+    return sorted({halves(now.task.visits, v) for v in now.plan.points})
 
 
-def _thin_out(work: InsertionPlan, v: int, share: float) -> bool:
-    """Take back the points around a place of a move, if that leaves others."""
-    known = work.points.get(v, ())
-    free = np.array([s for s in known[v in work.stops :] if s < 1.0])
+def _remove(
+    visits: Visits, plan: InsertionPlan, v: int, removal: Removal, thins_out: bool
+) -> InsertionPlan:
+    """Take back the points around a place of a move, or all of them."""
+    if removal.share is not None and thins_out:
+        gone = _around(plan, v, removal.share)
+        if gone:
+            return plan.drop(v, gone)
+    return plan.leave(v, removal.why, removal.cure).take_back(visits, v)
+
+
+def _around(plan: InsertionPlan, v: int, share: float) -> set[float]:
+    """Return the points around a place of a move, if there are others."""
+    known = plan.points.get(v, ())
+    free = np.array([s for s in known[v in plan.stops :] if s < 1.0])
     behind = int(np.searchsorted(free, share))
     gone = set(free[max(behind - 1, 0) : behind + 1].tolist())
-    if not gone or len(gone) == len(free):
-        return False
-    work.drop(v, gone)
-    return True
-
-
-def _take_back(work: InsertionPlan, v: int) -> None:
-    """Take back the points of a move; an arc that is cut no more stays whole."""
-    own = work.points.pop(v, ())
-    work.stops.discard(v)
-    work.halved.discard(v)
-    work.approaches.pop(v, None)
-    visits = work.source.reading.visits
-    if not is_arc(visits, v):
-        return
-    via = point_on_way(visits, v)
-    if own in ((), (1.0,)):  # what it has is the cut at the point on the way alone
-        work.points.pop(via, None)
-        work.points.pop(via + 1, None)
-    elif v == via and via + 1 in work.points:
-        work.points[via] = (1.0,)
-    elif work.points.get(via) == (1.0,):
-        del work.points[via]
+    return gone if len(gone) < len(free) else set()
 
 
 class Removal(NamedTuple):
@@ -175,23 +119,22 @@ class Removal(NamedTuple):
 
 
 def _bad(
-    work: InsertionPlan, without: dict[int, float]
+    now: PathPrediction, without: dict[int, float]
 ) -> Iterator[tuple[int, Removal]]:
     """Yield the moves with points that must go, and why."""
-    told = work.latest.in_time
-    if not work.points or told is None:
+    task, plan = now.task, now.plan
+    if not plan.points:
         return
-    flat = bending(work)
-    bent = {cut[0] for cut, far in flat.items() if not may_be_chord(work, cut, far)}
-    moved = told.before.path.aside[work.own] - work.first.before.path.aside
+    bent = {cut[0] for cut in now.flat if not now.may_be_chord(cut)}
+    moved = now.in_time.before.path.aside[now.own] - task.first.before.path.aside
     there = any_in_rows(np.abs(np.nan_to_num(moved)) > MOVED)
-    there[work.cut_arcs()] = False  # judged as the points that they are
-    before = work.source.reading.visits.before
+    there[now.cut_arcs] = False  # judged as the points that they are
+    before = task.visits.before
     judged = _Judged(
-        work, without, _worst(work, told), _objections(work, told),
+        now, without, _worst(now), _objections(now),
         there | (there[before] & (before >= 0)), bent,
     )  # fmt: skip
-    for v in sorted(_with_points(work)):
+    for v in sorted(_with_points(now)):
         if reason := judged.why_not(v):
             yield v, reason
 
@@ -201,7 +144,7 @@ class _Judged:
     """What is known of moves with points.
 
     Attributes:
-        work: The points.
+        now: The program.
         without: How far each move leaves its path without points [m].
         worst: .. and with them at the most, however they are rounded, and where.
         objections: Which hypotheses make moves worse, and where.
@@ -209,7 +152,7 @@ class _Judged:
         bent: Arcs with pieces that bend too little.
     """
 
-    work: InsertionPlan
+    now: PathPrediction
     without: dict[int, float]
     worst: dict[int, tuple[float, float]]
     objections: dict[int, Objection]
@@ -222,8 +165,8 @@ class _Judged:
             return Removal("with inserted points its path is not predicted")
         if v in self.bent:
             return Removal("its pieces would be too straight for arcs")
-        if refused := self.work.refusal(v):
-            return Removal(refused)
+        if v in self.now.refusals:
+            return Removal(self.now.refusals[v])
         far, share = self.worst[v]
         if far > self.without[v]:
             return Removal("inserted points make it no better", share)
@@ -235,41 +178,41 @@ class _Judged:
         return None
 
 
-def _with_points(work: InsertionPlan) -> set[int]:
+def _with_points(now: PathPrediction) -> set[int]:
     """Return the moves with points, of arcs that are cut both halves."""
-    return {*work.points, *(via + 1 for via in work.cut_arcs())}
+    return {*now.plan.points, *(via + 1 for via in now.cut_arcs)}
 
 
 def _harmful(
-    work: InsertionPlan, without: dict[int, float]
+    now: PathPrediction, without: dict[int, float]
 ) -> Iterator[tuple[int, Removal]]:
     """Yield moves with points behind which moves without any are worse for them.
 
     From which flank a joint leaves is a matter of the moves before.
     """
-    now = _of_moves(work, sizes_of(work.paths))
-    cut = np.array(sorted(work.points), dtype=np.int64)
-    for v in now.keys() - _with_points(work) - work.approaches.keys():
+    far = _of_moves(now, sizes_of(now.paths))
+    cut = np.array(sorted(now.plan.points), dtype=np.int64)
+    for v in far.keys() - _with_points(now) - now.plan.approaches.keys():
         last = int(np.searchsorted(cut, v)) - 1
         near = last >= 0 and v - cut[last] <= NEAR
-        if near and now[v] > without.get(v, np.inf) + WORSE:
+        if near and far[v] > without.get(v, np.inf) + WORSE:
             yield int(cut[last]), Removal("a later move would be worse")
 
 
-def _objections(work: InsertionPlan, told: InTime) -> dict[int, Objection]:
+def _objections(now: PathPrediction) -> dict[int, Objection]:
     """Say which hypotheses make moves with points worse, and at what share."""
-    found = {}
-    for rows in _moves_with_points(work):
-        compared = compare((work.first.paths, told.paths), rows, work.tolerance)
+    found, task = dict[int, Objection](), now.task
+    for rows in _moves_with_points(now):
+        compared = compare((task.first.paths, now.paths), rows, task.tolerance)
         objection = compared.objection(1)
         if objection is not None:
             found[rows[int(objection.place)]] = objection
     return found
 
 
-def _of_moves(work: InsertionPlan, far: dict[int, float]) -> dict[int, float]:
+def _of_moves(now: PathPrediction, far: dict[int, float]) -> dict[int, float]:
     """Say of both halves of an arc, which is one move, what the farther one is off."""
-    visits = work.source.reading.visits
+    visits = now.task.visits
     return {v: max(far.get(row, 0.0) for row in halves(visits, v)) for v in far}
 
 
@@ -303,19 +246,20 @@ class _Corner:
         return np.where(bend >= 0, np.maximum(*far) + self.beside * bend, 0.0)
 
 
-def _worst(work: InsertionPlan, told: InTime) -> dict[int, tuple[float, float]]:
+def _worst(now: PathPrediction) -> dict[int, tuple[float, float]]:
     """How far each move leaves its path, however its points are rounded.
 
     Returns:
         The distance [m], and where, as a share of the way.
     """
-    rounded, found = _list_roundings(work, told), dict[int, tuple[float, float]]()
-    for k, v in enumerate(told.paths.visit.tolist()):
-        samples = told.paths.samples(k)
-        way, off = told.paths.way[samples], told.paths.after.off[samples]
-        tangent = told.paths.tangent[samples]
-        worst = np.array(told.paths.after.across[samples])
-        points = zip(work.points.get(v, ()), rounded.get(v, ()), strict=True)
+    rounded, found = _list_roundings(now), dict[int, tuple[float, float]]()
+    paths = now.paths
+    for k, v in enumerate(paths.visit.tolist()):
+        samples = paths.samples(k)
+        way, off = paths.way[samples], paths.after.off[samples]
+        tangent = paths.tangent[samples]
+        worst = np.array(paths.after.across[samples])
+        points = zip(now.plan.points.get(v, ()), rounded.get(v, ()), strict=True)
         for share, corner in points:
             aside = np.abs(way - share * way[-1])
             worst = np.maximum(worst, corner.farthest(aside, off, tangent))
@@ -323,24 +267,25 @@ def _worst(work: InsertionPlan, told: InTime) -> dict[int, tuple[float, float]]:
     return found
 
 
-def _list_roundings(work: InsertionPlan, told: InTime) -> dict[int, list[_Corner]]:
+def _list_roundings(now: PathPrediction) -> dict[int, list[_Corner]]:
     """Say how points on ways may be rounded, where they are no stops.
 
     No corner is larger than half of a neighbouring piece; what cuts it off straight
     passes the point farthest. On an arc it is no larger than zones are, by any law.
     """
-    arm, found = work.setting.cell.arm, dict[int, list[_Corner]]()
+    task, plan, told = now.task, now.plan, now.in_time
+    arm, found = task.setting.cell.arm, dict[int, list[_Corner]]()
     p, c = (
         arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
         for cycle in (told.after, told.before)
     )
-    visits, arcs = work.source.reading.visits, work.list_wanted_arcs()
+    visits, arcs = task.visits, task.list_wanted_arcs(plan)
     zone = largest_zones(arm, told.after) if len(arcs) else None
     planned = zone_sizes(arm, told.after, told.after.targets)
-    for v, shares in work.points.items():
-        rows = [int(work.own[visits.before[v]]), *work.ends(v)]
+    for v, shares in plan.points.items():
+        rows = [int(now.own[visits.before[v]]), *now.ends(v)]
         if shares[-1] == 1.0:
-            rows.append(work.ends(v + 1)[0])
+            rows.append(now.ends(v + 1)[0])
         rows = rows[: len(shares) + 2]
         size = np.maximum(lengths(np.diff(p[rows], axis=0)), 1e-9)
         slope = np.diff((p - c)[rows], axis=0) / size[:, None]
@@ -351,7 +296,8 @@ def _list_roundings(work: InsertionPlan, told: InTime) -> dict[int, list[_Corner
             beside = measure_passing(half, arcs.radius_of(v))
         moved = np.diff(slope, axis=0) * half[:, None] / 2
         done = np.minimum(planned[rows[1:-1]] / np.maximum(half, 1e-12), 1.0)
-        moved[: int(v in work.stops)] = beside[: int(v in work.stops)] = 0.0
+        stop = int(v in plan.stops)
+        moved[:stop] = beside[:stop] = 0.0
         found[v] = [*map(_Corner, half, moved, done, beside)]
     return found
 

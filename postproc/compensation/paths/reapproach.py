@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from postproc.arrays import Bools, Floats, any_in_rows
 from postproc.compensation.approach_advice import place_to_approach
 from postproc.compensation.findings import SURE
 from postproc.compensation.outcome import Status
-from postproc.compensation.paths.insertion_plan import InsertionPlan, of_source
+from postproc.compensation.paths.insertion_prediction import (
+    InsertionTask,
+    PathPrediction,
+    of_source,
+)
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.write_points import numbers_at
 from postproc.compensation.pipeline import WindowResult
-from postproc.compensation.timing_comparison import InTime
 from postproc.language.language import Splitter
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
@@ -21,48 +26,49 @@ TRIES = 8  # rounds in which stops are taken back
 WORSE = 5e-5  # [m] that a path may be worse for such a stop
 
 
-def insert_reapproaches(work: InsertionPlan, splitter: Splitter) -> None:
+def insert_reapproaches(now: PathPrediction, splitter: Splitter) -> PathPrediction:
     """Approach targets anew that a joint reaches from a side that is not sure."""
-    visits = work.source.reading.visits
+    task, plan = now.task, now.plan
+    visits, room = task.visits, now.room
     ends = (visits.motion == Motion.LINEAR) & ~visits.fly
     ends &= ~visits.fly[visits.before]
-    for v in np.flatnonzero(ends & _find_uncertain(work.source.kept)).tolist():
-        file, line = int(visits.file[v]), int(work.lines[v])
-        may = not work.find_hindrance(splitter, v) and splitter.stops(file, line)
-        if may and work.room > 0:
-            place = _place_to_approach(work, v)
+    places = dict(plan.approaches)
+    for v in np.flatnonzero(ends & _find_uncertain(task.source.kept)).tolist():
+        file, line = int(visits.file[v]), int(task.lines[v])
+        may = not task.find_hindrance(splitter, v) and splitter.stops(file, line)
+        if may and len(places) < room:
+            place = _place_to_approach(task, v)
             if place is not None:
-                work.approaches[v] = place
+                places[v] = place
     for _ in range(TRIES):
-        work.make()
-        bad = bad_approaches(work) | _worse_paths(work)
+        now = task.predict(replace(plan, approaches=places))
+        bad = bad_approaches(now) | _worse_paths(now)
         if not bad:
-            return
-        for v in bad:
-            del work.approaches[v]
-    work.approaches.clear()
-    work.make()
+            return now
+        places = {v: place for v, place in places.items() if v not in bad}
+    return task.predict(plan)
 
 
-def _worse_paths(work: InsertionPlan) -> set[int]:
+def _worse_paths(now: PathPrediction) -> set[int]:
     """Find the targets approached anew to or from which the path is worse for it.
 
     Only where a path was asked for, and where it is farther off than that.
     """
-    before = work.source.reading.visits.before
-    was, now = sizes_of(work.first.paths), sizes_of(work.paths)
+    task, before = now.task, now.task.visits.before
+    was, far = sizes_of(task.first.paths), sizes_of(now.paths)
     worse = {
         v
-        for v, far in now.items()
-        if far > max(was.get(v, np.inf) + WORSE, work.tolerance)
+        for v, size in far.items()
+        if size > max(was.get(v, np.inf) + WORSE, task.tolerance)
     }
-    return {v for v in work.approaches if worse & {v, *np.flatnonzero(before == v)}}
+    own = now.plan.approaches
+    return {v for v in own if worse & {v, *np.flatnonzero(before == v)}}
 
 
-def _place_to_approach(work: InsertionPlan, v: int) -> Floats | None:
+def _place_to_approach(task: InsertionTask, v: int) -> Floats | None:
     """Find the numbers of a stop from which to approach a target."""
-    cell, cycle = work.setting.cell, work.first.before
-    visits, side = work.source.reading.visits, work.source.kept.decisions.side
+    cell, cycle = task.setting.cell, task.first.before
+    visits, side = task.visits, task.source.kept.decisions.side
     q = place_to_approach(
         cell.arm, cycle, v, int(visits.before[v]), np.abs(side[v]) < SURE,
         cell.limits.reapproach_mm * MM,
@@ -78,13 +84,13 @@ def _find_uncertain(kept: WindowResult) -> Bools:
     return kept.corrected & any_in_rows(np.abs(kept.decisions.side) < SURE)
 
 
-def bad_approaches(work: InsertionPlan) -> set[int]:
+def bad_approaches(now: PathPrediction) -> set[int]:
     """Find the targets that are approached anew and are no better for it."""
-    kept = of_source(work.latest.kept, work.own)
+    kept = of_source(now.program.kept, now.own)
     unsure, status = _find_uncertain(kept), kept.decisions.status
-    stops = work.latest.kept.decisions.status[work.own - 1]
-    others = np.flatnonzero(unsure & ~_find_uncertain(work.source.kept))
-    asked = np.array(sorted(work.approaches), dtype=np.int64)
+    stops = now.program.kept.decisions.status[now.own - 1]
+    others = np.flatnonzero(unsure & ~_find_uncertain(now.task.source.kept))
+    asked = np.array(sorted(now.plan.approaches), dtype=np.int64)
     bad = (
         unsure[asked]
         | (status[asked] != Status.CORRECTED)
@@ -94,14 +100,13 @@ def bad_approaches(work: InsertionPlan) -> set[int]:
     return {*asked[bad].tolist(), *asked[cause[cause >= 0]].tolist()}
 
 
-def find_reapproaches(work: InsertionPlan, told: InTime) -> dict[int, float]:
+def find_reapproaches(now: PathPrediction) -> dict[int, float]:
     """Return the shares of the ways at which targets are approached anew."""
-    p = work.setting.cell.arm.tcp(
-        told.before.path.q, told.before.targets.tool[:, :3, 3]
-    )
+    cycle = now.in_time.before
+    p = now.task.setting.cell.arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
     found = {}
-    for v in work.approaches:
-        row = int(work.own[v])
+    for v in now.plan.approaches:
+        row = int(now.own[v])
         there, back = (float(np.linalg.norm(p[row - 1] - p[k])) for k in
                        (row - 2, row))  # fmt: skip
         found[v] = there / (there + back)

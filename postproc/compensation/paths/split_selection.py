@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.compensation.paths.arcs import halves
-from postproc.compensation.paths.backlash_preload import take_up
+from postproc.compensation.paths.backlash_preload import BacklashPreload, take_up
 from postproc.compensation.paths.insertion_plan import InsertionPlan
+from postproc.compensation.paths.insertion_prediction import (
+    InsertionTask,
+    PathPrediction,
+)
 from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.split_constraints import shortest_pieces
 from postproc.language.languages import language_of
@@ -16,62 +21,67 @@ from postproc.language.languages import language_of
 SPEED = "Set the speed before the move, or [motion] linear_mm_s in the cell"
 
 
-def find_split(work: InsertionPlan) -> None:
+def find_split(now: PathPrediction) -> InsertionPlan:
     """Say which of the moves that leave their paths may be split."""
-    visits, paths = work.source.reading.visits, work.paths
-    shortest = work.setting.cell.limits.segment_ms / 1e3
-    pieces = shortest_pieces(visits, work.first.before, shortest)
-    far = set(paths.visit[work.to_split].tolist())
-    for v in sorted({half for row in far for half in halves(visits, row)}):
-        if told := _explain_refusal(work, v):
+    task, plan = now.task, now.plan
+    shortest = task.setting.cell.limits.segment_ms / 1e3
+    pieces = shortest_pieces(task.visits, task.first.before, shortest)
+    far = set(now.paths.visit[now.to_split].tolist())
+    open_, stops = dict(plan.open), dict[int, BacklashPreload | None]()
+    for v in sorted({half for row in far for half in halves(task.visits, row)}):
+        if told := _explain_refusal(now, v):
             if v in far:
-                work.left[v] = told
-                if np.isnan(work.first.before.targets.linear_speed[v]):
-                    work.cures[v] = SPEED
+                unknown = np.isnan(task.first.before.targets.linear_speed[v])
+                plan = plan.leave(v, told, SPEED if unknown else None)
             continue
-        work.open[v] = pieces[v]
-        if v not in far:
-            work.beside.add(v)
-        if work.setting.options.preload_backlash and _can_stop(work, v):
-            taken = take_up(work.first.after, work.setting, visits, v)
-            if taken.crossing and _is_within_lag(work, v, taken.crossing):
-                work.idle[v] = taken
-            elif taken.crossing:
-                work.unconfirmed.add(v)
+        open_[v] = pieces[v]
+        if task.setting.options.preload_backlash and _can_stop(task, v):
+            taken = take_up(task.first.after, task.setting, task.visits, v)
+            if taken.crossing:
+                fits = _is_within_lag(task, v, taken.crossing)
+                stops[v] = taken if fits else None
+    return replace(
+        plan,
+        open=open_,
+        beside=frozenset(open_.keys() - far),
+        idle={v: taken for v, taken in stops.items() if taken is not None},
+        unconfirmed=frozenset(v for v, taken in stops.items() if taken is None),
+    )
 
 
-def _explain_refusal(work: InsertionPlan, v: int) -> str:
+def _explain_refusal(now: PathPrediction, v: int) -> str:
     """Say why a path that is left too far gets no points, "" where it may."""
-    if work.splitter is None:
-        name = language_of(work.source.reading.sources[0].name).name
+    task = now.task
+    if task.splitter is None:
+        name = language_of(task.source.reading.sources[0].name).name
         return f"no points are inserted into {name} programs"
-    if v in work.approaches:
+    if v in now.plan.approaches:
         return "its target is approached again from an inserted stop"
-    return work.find_hindrance(work.splitter, v)
+    return task.find_hindrance(task.splitter, v)
 
 
-def _can_stop(work: InsertionPlan, v: int) -> bool:
+def _can_stop(task: InsertionTask, v: int) -> bool:
     """Tell whether the arm stands where a move begins, and may stop once more."""
-    visits = work.source.reading.visits
+    visits = task.visits
     before = int(visits.before[v])
-    if work.splitter is None or visits.fly[before] or visits.via[before]:
+    if task.splitter is None or visits.fly[before] or visits.via[before]:
         return False
-    return work.splitter.stops(int(visits.file[v]), int(work.lines[v]))
+    return task.splitter.stops(int(visits.file[v]), int(task.lines[v]))
 
 
-def _is_within_lag(work: InsertionPlan, v: int, joints: Sequence[int]) -> bool:
+def _is_within_lag(task: InsertionTask, v: int, joints: Sequence[int]) -> bool:
     """Return True if no open hypothesis makes a stop that crosses gaps matter.
 
     What a link lacks of its step behind a sharp gap's way, it is off by at the stop.
     """
-    lacks = (work.flanks[joint - 1].max_lag * _step(work, v, joint) for joint in joints)
-    return sum(lacks) <= resolution(work.tolerance)
+    lacks = (task.flanks[joint - 1].max_lag * _step(task, v, joint) for joint in joints)
+    return sum(lacks) <= resolution(task.tolerance)
 
 
-def _step(work: InsertionPlan, v: int, joint: int) -> float:
+def _step(task: InsertionTask, v: int, joint: int) -> float:
     """Return how far a joint's change of its flank moves the TCP at a visit [m]."""
-    cycle, arm = work.first.after, work.setting.cell.arm
+    cycle, arm = task.first.after, task.setting.cell.arm
     tool = cycle.targets.tool[v, :3, 3]
     by_joint = arm.jacobian(cycle.path.q[v][None], tool)[0, :3, joint - 1]
-    gap = 2.0 * work.setting.gap[joint - 1]
+    gap = 2.0 * task.setting.gap[joint - 1]
     return float(np.linalg.norm(by_joint) * gap)

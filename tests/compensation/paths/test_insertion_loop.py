@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -15,10 +15,10 @@ import pytest
 
 from postproc.arrays import Floats, Ints
 from postproc.compensation.paths import insertion_loop, prune
-from postproc.compensation.paths.arc_splitting import bending
 from postproc.compensation.paths.arcs import is_arc
-from postproc.compensation.paths.insertion_loop import TAKEN, BestPoints
-from postproc.compensation.paths.insertion_plan import AIM, InsertionPlan
+from postproc.compensation.paths.insertion_loop import TAKEN
+from postproc.compensation.paths.insertion_plan import InsertionPlan
+from postproc.compensation.paths.insertion_prediction import AIM, PathPrediction
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.plan_outcomes import BEGINS
 from postproc.model.backlash_width import ahead
@@ -150,14 +150,13 @@ def test_a_stop_is_not_judged_as_a_rounded_point(shop: Path) -> None:
 def test_points_that_did_better_are_put_back(
     shop: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def worse(work: InsertionPlan, best: BestPoints) -> None:
-        visits = work.source.reading.visits
-        for v in [v for v in work.points if not is_arc(visits, v)]:
-            work.points[v] = (0.5,)
-        work.make()
-        best.note(bending(work))
+    def worse(now: PathPrediction) -> InsertionPlan:
+        plan = now.plan
+        for v in [v for v in plan.points if not is_arc(now.task.visits, v)]:
+            plan = plan.put(v, (0.5,))
+        return plan
 
-    monkeypatch.setattr(insertion_loop, "_bend", worse)
+    monkeypatch.setattr(insertion_loop, "join_flat_pieces", worse)
     found = compensated(shop, "job.pdl", "put_back", "--path-tolerance", TOLERANCE)
     for old, new in zip(lines_of(told(shop, "points")), lines_of(found), strict=True):
         assert new["points"] == old["points"]
@@ -221,8 +220,8 @@ def test_points_do_no_harm_where_no_measured_path_says_how_flanks_change(
         usual = np.interp(new.way[here], old.way[there], old.across[there])
         far = new.way[here] > BEGINS  # where a move begins drives cross their gaps
         worse = (new.across[here] - usual)[far].max() / MM
-        assert worse < 0.1
-        assert new.across[here].max() < old.across[there].max() + 0.05 * MM
+        assert worse < 0.05
+        assert new.across[here].max() < old.across[there].max() + 0.01 * MM
 
 
 def test_a_link_ahead_of_its_drive_at_stops_is_not_sure_in_motion(shop: Path) -> None:
@@ -354,49 +353,50 @@ def test_arcs_are_cut_at_the_points_on_their_ways_too(shop: Path) -> None:
 def test_both_halves_of_an_arc_are_open_where_one_is(
     shop: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    works: list[InsertionPlan] = []
-    monkeypatch.setattr(insertion_loop, "judge", works.append)
-    monkeypatch.setattr(InsertionPlan, "to_split", property(one_half_of_every_arc))
+    judged: list[PathPrediction] = []
+    monkeypatch.setattr(insertion_loop, "judge", lambda p: judged.append(p) or p)
+    monkeypatch.setattr(PathPrediction, "to_split", property(one_half_of_every_arc))
     compensated(shop, "job.pdl", "halves", "--path-tolerance", TOLERANCE)
-    (work,) = works
-    via = np.flatnonzero(work.source.reading.visits.via)
-    assert len(via) > 1 and {*via, *(via + 1)} == set(work.open)
-    assert work.beside == set(via.tolist())
-    sizes = dict(zip(work.paths.visit.tolist(), work.paths.after.sizes, strict=True))
-    for half in work.beside:  # it gets points of its own where it leaves its path
-        alone = work.points.get(half, ()) in ((), (1.0,))
+    (now,) = judged
+    via = np.flatnonzero(now.task.visits.via)
+    assert len(via) > 1 and {*via, *(via + 1)} == set(now.plan.open)
+    assert now.plan.beside == set(via.tolist())
+    sizes = sizes_of(now.paths)
+    for half in now.plan.beside:  # it gets points of its own where it leaves its path
+        alone = now.plan.points.get(half, ()) in ((), (1.0,))
         assert not alone or sizes[half] <= TOLERANCE * MM / 2
 
 
-def one_half_of_every_arc(work: InsertionPlan) -> Ints:
-    behind = np.flatnonzero(work.source.reading.visits.via) + 1
-    return np.searchsorted(work.paths.visit, behind)
+def one_half_of_every_arc(now: PathPrediction) -> Ints:
+    behind = np.flatnonzero(now.task.visits.via) + 1
+    return np.searchsorted(now.paths.visit, behind)
 
 
 def test_of_two_points_too_close_for_the_error_the_one_with_more_room_goes() -> None:
-    work = Mock(points={7: (0.2, 0.5, 0.6)}, stops=set(), chords=set(), shut={})
-    work.steep_pieces.return_value = [2]  # from 0.5 to 0.6
-    work.drop = partial(InsertionPlan.drop, work)
-    assert insertion_loop._drop_where_steep(work)
-    assert work.points == {7: (0.2, 0.5)} and work.shut == {7: {0.6}}
-    work.steep_pieces.return_value = []
-    assert not insertion_loop._drop_where_steep(work)
+    plan = InsertionPlan(points={7: (0.2, 0.5, 0.6)})
+    now = Mock(plan=plan)
+    now.steep_pieces.return_value = [2]  # from 0.5 to 0.6
+    found = insertion_loop.drop_where_steep(now)
+    assert found.points == {7: (0.2, 0.5)} and found.shut == {7: {0.6}}
+    assert plan.points == {7: (0.2, 0.5, 0.6)} and not plan.shut  # as it was
+    now.steep_pieces.return_value = []
+    assert insertion_loop.drop_where_steep(now) is plan
 
 
 def test_where_the_error_changes_fast_points_beside_it_are_taken_back(
     shop: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    works: list[InsertionPlan] = []
-    judged = insertion_loop.judge
-    monkeypatch.setattr(insertion_loop, "judge", lambda w: (works.append(w), judged(w)))
+    judged: list[PathPrediction] = []
+    usual = insertion_loop.judge
+    monkeypatch.setattr(insertion_loop, "judge", lambda p: usual(judged.append(p) or p))
     strict = Path(CELL).read_text().replace("step_mm = 0.5", "step_mm = 0.1")
     (shop / "strict.toml").write_text(strict)
     done("compensate", shop / "job.pdl", "--cell", shop / "strict.toml", "--model",
          shop / "confirmed.json", "-o", shop / "strict.pdl", "--report",
          shop / "strict.json", "--path-tolerance", TOLERANCE)  # fmt: skip
-    (work,) = works
-    assert len(work.shut) > 2
-    assert all(not gone & {*work.points.get(v, ())} for v, gone in work.shut.items())
+    (plan,) = (now.plan for now in judged)
+    assert len(plan.shut) > 2
+    assert all(not gone & {*plan.points.get(v, ())} for v, gone in plan.shut.items())
     report = told(shop, "strict")
     assert all(target["status"] == "corrected" for target in report["targets"][2:])
     assert sum(path["inserted"] > 0 for path in report["path"]) > 5
@@ -681,27 +681,26 @@ def test_targets_are_approached_anew_only_where_no_path_is_worse(drilled: Path) 
 
 
 def test_an_arc_that_loses_all_points_is_whole_again() -> None:
-    work = Mock(points={5: (1.0,), 6: (0.4,)}, chords={(6, 1.0)})
-    InsertionPlan.drop(work, 6, {0.4})
-    assert work.points == {} and work.chords == set()
-    work = Mock(points={5: (0.5, 1.0), 6: (0.4,)}, chords=set())
-    InsertionPlan.drop(work, 6, {0.4})
-    assert work.points == {5: (0.5, 1.0)}
+    plan = InsertionPlan(
+        points={5: (1.0,), 6: (0.4,)}, chords=frozenset({(6, 1.0)})
+    ).drop(6, {0.4})
+    assert plan.points == {} and plan.chords == set()
+    plan = InsertionPlan(points={5: (0.5, 1.0), 6: (0.4,)}).drop(6, {0.4})
+    assert plan.points == {5: (0.5, 1.0)}
 
 
 def test_points_behind_which_a_move_would_be_worse_are_taken_back() -> None:
     def paths(*mm: float) -> Mock:
         return Mock(visit=np.array([3, 4, 9]), after=Mock(sizes=np.array(mm) * MM))
 
-    work = Mock(points={3: (0.5,)}, approaches={})
-    work.cut_arcs.return_value = []
-    work.source.reading.visits.motion = [Motion.LINEAR] * 10
+    now = Mock(plan=InsertionPlan(points={3: (0.5,)}), cut_arcs=[])
+    now.task.visits.motion = [Motion.LINEAR] * 10
     without = sizes_of(paths(0.3, 0.01, 0.01))
-    work.paths = paths(0.02, 0.07, 0.09)
-    ((v, (why, *_)),) = prune._harmful(work, without)  # 9 is too far behind
+    now.paths = paths(0.02, 0.07, 0.09)
+    ((v, (why, *_)),) = prune._harmful(now, without)  # 9 is too far behind
     assert v == 3 and "a later move would be worse" in why
-    work.paths = paths(0.02, 0.05, 0.09)
-    assert not [*prune._harmful(work, without)]
+    now.paths = paths(0.02, 0.05, 0.09)
+    assert not [*prune._harmful(now, without)]
 
 
 def test_a_rounded_point_is_judged_by_the_worst_of_all_its_zones() -> None:
