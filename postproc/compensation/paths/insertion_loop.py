@@ -37,7 +37,6 @@ from postproc.compensation.paths.reapproach import (
 from postproc.compensation.paths.split_selection import find_split
 from postproc.compensation.pipeline import CompensatedProgram
 from postproc.compensation.timing_comparison import InTime
-from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
 from postproc.robot.pose import MM
 
@@ -66,23 +65,15 @@ def correct_paths(
 
     Returns:
         The program, `kept` speaking of the visits of the source.
-
-    Raises:
-        PostprocError: Targets cannot be approached anew in its language.
     """
     reading, first = draft.reading, draft.in_time
     if first is None or not setting.options.inserts:
         return draft
     language = language_of(reading.sources[0].name)
     splitter = language.splitter(reading.sources)
-    if splitter is None and setting.options.reapproach:
-        raise PostprocError(
-            f"reapproach: no stops are inserted into {language.name} programs. Leave "
-            "the key out; findings direction-uncertain advise how to approach targets"
-        )
     work = InsertionPlan(draft, first, setting, write, splitter)
-    if splitter is not None and setting.options.reapproach:
-        insert_reapproaches(work, splitter)
+    if setting.options.reapproach:
+        insert_reapproaches(work)
     find_split(work)
     if work.open or work.approaches:
         best = BestPoints(work)

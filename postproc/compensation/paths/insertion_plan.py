@@ -53,7 +53,7 @@ class InsertionPlan:
         first: .. in time.
         setting: What it is compensated with.
         write: Writes a corrected program, and reads it again.
-        splitter: Writes points into its files; None where its language gets none.
+        splitter: Writes points into its files.
         open: Moves that may be split, by their visit: the shortest piece, and how far
             from both ends [m].
         beside: Those among them that keep near enough, but are halves of others' arcs.
@@ -77,7 +77,7 @@ class InsertionPlan:
     first: InTime
     setting: Job
     write: Write
-    splitter: Splitter | None
+    splitter: Splitter
     open: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     beside: set[int] = field(default_factory=set)
     points: dict[int, tuple[float, ...]] = field(default_factory=dict)
@@ -111,13 +111,15 @@ class InsertionPlan:
     @cached_property
     def _hindrances(self) -> dict[int, str]:
         visits, decided = self.source.reading.visits, self.source.kept.decisions
-        return hindrances(visits, decided, self.first.before)
+        cell, keeps_aux = self.setting.cell, self.splitter.keeps_aux
+        return hindrances(visits, decided, self.first.before, cell, keeps_aux)
 
-    def find_hindrance(self, splitter: Splitter, v: int) -> str:
+    def find_hindrance(self, v: int) -> str:
         """Say why nothing can be put on the way to a visit, "" for nothing."""
         visits = self.source.reading.visits
         file, line = int(visits.file[v]), int(self.lines[v])
-        return self._hindrances.get(v) or unwritable(splitter, visits, v, file, line)
+        given = self._hindrances.get(v)
+        return given or unwritable(self.splitter, visits, v, file, line)
 
     @property
     def tolerance(self) -> float:
@@ -165,14 +167,13 @@ class InsertionPlan:
         if not self.points and not self.approaches:
             self.__post_init__()
             return
-        if self.splitter is None:
-            return
         cell, clock = self.setting.cell, self.setting.clock
         with clock("insert"):
             stops = {v: self.idle[v] for v in self.stops & self.points.keys()}
             reading, own = insert(
                 self.source.reading, self.points, stops, self.splitter, cell,
                 self.chords, self.approaches, self._list_meant_sides(),
+                self._joints_along,
             )  # fmt: skip
         options = self.setting.options.without_clones()
         reading, kept = correct(reading, replace(self.setting, options=options))
@@ -183,6 +184,14 @@ class InsertionPlan:
             arcs = self.list_wanted_arcs()
             told = run_in_time(reading, again, kept.position, self.setting, owner, arcs)
         self.latest, self.own = CompensatedProgram(reading, kept, output, told), own
+
+    def _joints_along(self, v: int, share: Floats) -> Floats:
+        """Return the joint angles at shares (k,) of the way to a visit, (k, 6)."""
+        paths = self.first.paths
+        rows = paths.samples_to(v)
+        way = paths.way[rows]
+        found = [np.interp(share * way[-1], way, q) for q in paths.q[rows].T]
+        return np.stack(found, axis=1)
 
     def _list_meant_sides(self) -> dict[int, MeantSides]:
         """Say from which sides points on ways are meant to be passed.
@@ -227,10 +236,13 @@ class InsertionPlan:
         decided = self.latest.kept.decisions
         rows = self._on_way(v)
         left = rows[decided.status[rows] != Status.CORRECTED]
-        if not len(left):
-            return ""
-        why = decided.reasons[decided.why[left[0]]]
-        return f"points inserted into it cannot be corrected: {why}"
+        if len(left):
+            why = decided.reasons[decided.why[left[0]]]
+            return f"points inserted into it cannot be corrected: {why}"
+        visits = self.latest.reading.visits
+        passed = rows[~visits.via[rows]][v in self.stops :]
+        sized = visits.fly[passed] & (visits.zone_mm[passed] > 0.0)
+        return "" if sized.all() else self.splitter.unsized
 
     def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""

@@ -13,7 +13,6 @@ from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.write_points import numbers_at
 from postproc.compensation.pipeline import WindowResult
 from postproc.compensation.timing_comparison import InTime
-from postproc.language.language import Splitter
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -21,14 +20,14 @@ TRIES = 8  # rounds in which stops are taken back
 WORSE = 5e-5  # [m] that a path may be worse for such a stop
 
 
-def insert_reapproaches(work: InsertionPlan, splitter: Splitter) -> None:
+def insert_reapproaches(work: InsertionPlan) -> None:
     """Approach targets anew that a joint reaches from a side that is not sure."""
     visits = work.source.reading.visits
     ends = (visits.motion == Motion.LINEAR) & ~visits.fly
     ends &= ~visits.fly[visits.before]
     for v in np.flatnonzero(ends & _find_uncertain(work.source.kept)).tolist():
         file, line = int(visits.file[v]), int(work.lines[v])
-        may = not work.find_hindrance(splitter, v) and splitter.stops(file, line)
+        may = not work.find_hindrance(v) and work.splitter.stops(file, line)
         if may and work.room > 0:
             place = _place_to_approach(work, v)
             if place is not None:
@@ -70,7 +69,7 @@ def _place_to_approach(work: InsertionPlan, v: int) -> Floats | None:
     if q is None:
         return None
     pose = cell.arm.flange(q[None]) @ cycle.targets.tool[[v]]
-    return numbers_at(visits, v, pose[0])
+    return numbers_at(visits, v, pose[0], q)
 
 
 def _find_uncertain(kept: WindowResult) -> Bools:

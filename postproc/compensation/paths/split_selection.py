@@ -11,7 +11,6 @@ from postproc.compensation.paths.backlash_preload import take_up
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.split_constraints import shortest_pieces
-from postproc.language.languages import language_of
 
 SPEED = "Set the speed before the move, or [motion] linear_mm_s in the cell"
 
@@ -42,19 +41,16 @@ def find_split(work: InsertionPlan) -> None:
 
 def _explain_refusal(work: InsertionPlan, v: int) -> str:
     """Say why a path that is left too far gets no points, "" where it may."""
-    if work.splitter is None:
-        name = language_of(work.source.reading.sources[0].name).name
-        return f"no points are inserted into {name} programs"
     if v in work.approaches:
         return "its target is approached again from an inserted stop"
-    return work.find_hindrance(work.splitter, v)
+    return work.find_hindrance(v)
 
 
 def _can_stop(work: InsertionPlan, v: int) -> bool:
     """Tell whether the arm stands where a move begins, and may stop once more."""
     visits = work.source.reading.visits
     before = int(visits.before[v])
-    if work.splitter is None or visits.fly[before] or visits.via[before]:
+    if visits.fly[before] or visits.via[before]:
         return False
     return work.splitter.stops(int(visits.file[v]), int(work.lines[v]))
 
