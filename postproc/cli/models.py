@@ -59,18 +59,33 @@ def survey(
         Path | None,
         typer.Option("--job", help="Program whose working volume is surveyed."),
     ] = None,
+    checks: Annotated[
+        int | None,
+        typer.Option("--checks", help="Check the arm instead, by so many readings."),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", help="Model whose largest effects a check looks at."),
+    ] = None,
     changes: SetSurvey = None,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
-    from postproc.calibration.survey_program import write_survey
+    from postproc.calibration.survey_program import write_check, write_survey
+    from postproc.model.model import load_model
     from postproc.robot.cell import load_cell
 
     with report_errors():
+        if checks is not None and job is not None:
+            raise PostprocError("--checks and --job: leave one of them out")
         cell = cell_file(cell, output)
-        check_places([output], [cell, job])
+        check_places([output], [cell, job, model])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
-            summary = write_survey(loaded, output, poses, job)
+            if checks is None:
+                summary = write_survey(loaded, output, poses, job)
+            else:
+                known = None if model is None else load_model(model)
+                summary = write_check(loaded, output, checks, known)
         say(summary)
 
 

@@ -124,12 +124,12 @@ def compensate(
     given = None if is_stream(program) else Path(program)
     with report_errors(given, variables):
         cell, model = cell_file(cell, program), model_file(model, program)
-        output = output or _project_place(given)
         reports = Reports.of(report, PAGE)
         if reports.on_stdout and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         outputs = [output, *reports.files, variables_out]
         check_places(outputs, [given, variables, cell, model])
+        place = None if output is not None else _project_place(given)
         asked = changes_of(changes, orientation, shared_points, path_tolerance)
         loaded = load_cell(cell, changes=asked)
         options = Options(timing=loaded.compensation.timing)
@@ -147,7 +147,9 @@ def compensate(
             _print_outcome(outcome, every)
             raise PostprocError(f"--strict: {_why_nothing(outcome)}")
         places = Destination(files, (cell, model))
-        written = places.write(outcome, output, reports, variables_out)
+        if place is not None:
+            place.parent.mkdir(parents=True, exist_ok=True)
+        written = places.write(outcome, output or place, reports, variables_out)
         _print_outcome(outcome, every)
         if reports.on_stdout:
             write_text(STREAM, report_text(outcome))
@@ -164,14 +166,11 @@ def _model_of_project(program: Path) -> Path | None:
 
 
 def _project_place(program: Path | None) -> Path | None:
-    """Return where a program of a project goes; its folder is made."""
+    """Return where a program of a project goes."""
     project = None if program is None else find_project(program)
     if program is None or project is None:
         return None
-    place = project.output_of(program)
-    if place is not None:
-        place.parent.mkdir(parents=True, exist_ok=True)
-    return place
+    return project.output_of(program)
 
 
 def _why_nothing(outcome: Outcome) -> str:
