@@ -24,6 +24,7 @@ from postproc.cli.common import (
     changes_of,
     report_errors,
     say,
+    suggest,
     write_text,
 )
 from postproc.cli.project import cell_file, find_project, model_file
@@ -112,7 +113,7 @@ def compensate(
     the reason; 2: nothing is written.
     """
     from postproc.cli.common import stages
-    from postproc.cli.job_files import Destination
+    from postproc.cli.job_files import Destination, default_output
     from postproc.compensation import workers
     from postproc.compensation.compensate import compensate as run
     from postproc.compensation.options import Options
@@ -155,6 +156,9 @@ def compensate(
             write_text(STREAM, report_text(outcome))
         for path in written:
             say(f"written {path}")
+        target = output or place or (given and default_output(given))
+        if given is not None and target is not None and not is_stream(target):
+            suggest("diff", given, target)
     raise typer.Exit(outcome.exit_code)
 
 
