@@ -59,6 +59,8 @@ JOINED = {
 
 # Which modules know one effect in particular: all others take effects as they come.
 KNOWING = {
+    # What may have changed since the arm was surveyed.
+    "calibration.check_design": {"base_shift", "joint_offset", "tool_shift"},
     # Waves inside a map are what it names.
     "calibration.diagnosis.harmonics": {"transmission"},
     # The others move along the chain that it deviates.

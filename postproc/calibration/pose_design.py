@@ -269,6 +269,28 @@ def _rows_of_job(
     return np.asarray(columns * base.scales / TYPICAL_NOISE)
 
 
+def draw_poses(
+    arm: Arm,
+    probes: Floats,
+    count: int,
+    tracker: Floats | None,
+    rng: np.random.Generator,
+) -> States:
+    """Draw poses all over the joint ranges that can be measured, from one side each.
+
+    Args:
+        arm: The arm.
+        probes: Probe points in the flange frame, (k, 3) [m]; poses take turns.
+        count: How many.
+        tracker: Tracker position in the base frame, (3,) [m], or None.
+        rng: Draws them.
+
+    Raises:
+        PostprocError: Hardly any pose can be measured.
+    """
+    return _candidates(arm, probes, count, tracker, rng, _all_over(arm, rng))
+
+
 def _candidates(
     arm: Arm,
     probes: Floats,
@@ -303,3 +325,28 @@ def _candidates(
         "hardly any pose can be measured: the tracker does not see the probe or the "
         "arm cannot reach. Move the tracker or check the probe points"
     )
+
+
+# In which order poses are reached.
+
+
+def short_order(q: Floats, probe: Ints, speed: Floats) -> Ints:
+    """Order poses so that moves are short: the nearest pose in time comes next.
+
+    Args:
+        q: Joint angles of the poses, (n, 6) [rad].
+        probe: Index of the probe point, (n,); poses of one follow each other.
+        speed: Of the joints, (6,) [rad/s].
+
+    Returns:
+        The poses, (n,).
+    """
+    found: list[int] = []
+    for mounted in np.unique(probe):
+        left = np.flatnonzero(probe == mounted).tolist()
+        here = q[found[-1]] if found else q[left[0]]
+        while left:
+            times = np.abs((q[left] - here) / speed).max(axis=1)
+            found.append(left.pop(int(np.argmin(times))))
+            here = q[found[-1]]
+    return np.array(found, dtype=np.int64)

@@ -112,8 +112,30 @@ def say(text: str) -> None:
 
     Where stderr takes nothing, the exit code has to tell.
     """
+    text = "\n".join(map(printable, text.split("\n")))
     with suppress(OSError):
-        typer.echo("\n".join(map(printable, text.split("\n"))), err=True)
+        if is_terminal():
+            from postproc.report.terminal import lay_out_message
+
+            text = lay_out_message(text, sys.stderr)
+        typer.echo(text, err=True)
+
+
+def is_terminal() -> bool:
+    """Return True if a person reads the messages on a terminal."""
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
+def suggest(*words: object, **options: Path | None) -> None:
+    """Print the next command to type, on a terminal only.
+
+    Args:
+        *words: The command.
+        **options: Files that the user has named by options; the project has others.
+    """
+    if is_terminal():
+        given = (f"--{name} {path}" for name, path in options.items() if path)
+        say(f"next: postproc {' '.join([*map(str, words), *given])}")
 
 
 def guard_output(command: Callable[P, R]) -> Callable[P, R]:

@@ -21,6 +21,7 @@ from postproc.cli.common import (
     say,
     split_names,
     stages,
+    suggest,
     write_text,
 )
 from postproc.cli.project import cell_file, model_file, model_to_write
@@ -59,19 +60,35 @@ def survey(
         Path | None,
         typer.Option("--job", help="Program whose working volume is surveyed."),
     ] = None,
+    checks: Annotated[
+        int | None,
+        typer.Option("--checks", help="Check the arm instead, by so many readings."),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", help="Model whose largest effects a check looks at."),
+    ] = None,
     changes: SetSurvey = None,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
-    from postproc.calibration.survey_program import write_survey
+    from postproc.calibration.survey_program import write_check, write_survey
+    from postproc.model.model import load_model
     from postproc.robot.cell import load_cell
 
     with report_errors():
-        cell = cell_file(cell, output)
-        check_places([output], [cell, job])
+        if checks is not None and job is not None:
+            raise PostprocError("--checks and --job: leave one of them out")
+        asked, cell = cell, cell_file(cell, output)
+        check_places([output], [cell, job, model])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
-            summary = write_survey(loaded, output, poses, job)
+            if checks is None:
+                summary = write_survey(loaded, output, poses, job)
+            else:
+                known = None if model is None else load_model(model)
+                summary = write_check(loaded, output, checks, known)
         say(summary)
+        suggest("read", "MEASURED.csv", "--program", output, cell=asked)
 
 
 @app.command()
@@ -214,8 +231,8 @@ def fit(
 
     names = None if effects is None else split_names(effects)
     with report_errors():
-        cell = cell_file(cell, data[0])
-        output = model_to_write(output, force, data[0])
+        asked, cell = cell, cell_file(cell, data[0])
+        named, output = output, model_to_write(output, force, data[0])
         reports = Reports.of(report, PAGE)
         check_places([output, *reports.files], [*data, cell, program])
         loaded = load_cell(cell, changes=changes_of(changes))
@@ -234,6 +251,8 @@ def fit(
         reports.write_json(lambda: fit_json(found))
         if not reports.on_stdout:
             typer.echo(tell_fit_files(found, output))
+            if not found.rejected:
+                suggest("compensate", "PROGRAM", cell=asked, model=named)
         if found.rejected:
             raise typer.Exit(2)
 

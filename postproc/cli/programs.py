@@ -24,6 +24,7 @@ from postproc.cli.common import (
     changes_of,
     report_errors,
     say,
+    suggest,
     write_text,
 )
 from postproc.cli.project import cell_file, find_project, model_file
@@ -112,7 +113,7 @@ def compensate(
     the reason; 2: nothing is written.
     """
     from postproc.cli.common import stages
-    from postproc.cli.job_files import Destination
+    from postproc.cli.job_files import Destination, default_output
     from postproc.compensation import workers
     from postproc.compensation.compensate import compensate as run
     from postproc.compensation.options import Options
@@ -124,12 +125,12 @@ def compensate(
     given = None if is_stream(program) else Path(program)
     with report_errors(given, variables):
         cell, model = cell_file(cell, program), model_file(model, program)
-        output = output or _project_place(given)
         reports = Reports.of(report, PAGE)
         if reports.on_stdout and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         outputs = [output, *reports.files, variables_out]
         check_places(outputs, [given, variables, cell, model])
+        place = None if output is not None else _project_place(given)
         asked = changes_of(changes, orientation, shared_points, path_tolerance)
         loaded = load_cell(cell, changes=asked)
         options = Options(timing=loaded.compensation.timing)
@@ -147,12 +148,17 @@ def compensate(
             _print_outcome(outcome, every)
             raise PostprocError(f"--strict: {_why_nothing(outcome)}")
         places = Destination(files, (cell, model))
-        written = places.write(outcome, output, reports, variables_out)
+        if place is not None:
+            place.parent.mkdir(parents=True, exist_ok=True)
+        written = places.write(outcome, output or place, reports, variables_out)
         _print_outcome(outcome, every)
         if reports.on_stdout:
             write_text(STREAM, report_text(outcome))
         for path in written:
             say(f"written {path}")
+        target = output or place or (given and default_output(given))
+        if given is not None and target is not None and not is_stream(target):
+            suggest("diff", given, target)
     raise typer.Exit(outcome.exit_code)
 
 
@@ -164,14 +170,11 @@ def _model_of_project(program: Path) -> Path | None:
 
 
 def _project_place(program: Path | None) -> Path | None:
-    """Return where a program of a project goes; its folder is made."""
+    """Return where a program of a project goes."""
     project = None if program is None else find_project(program)
     if program is None or project is None:
         return None
-    place = project.output_of(program)
-    if place is not None:
-        place.parent.mkdir(parents=True, exist_ok=True)
-    return place
+    return project.output_of(program)
 
 
 def _why_nothing(outcome: Outcome) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from postproc.exceptions import FileError, PostprocError, ProjectError
@@ -49,15 +50,28 @@ def find_project(beside: str | Path | None = None) -> Project | None:
     """
     if beside is not None and is_stream(beside):
         return None
-    folders = [Path.cwd()]
+    here = Path.cwd()
+    folders = [here]
     if beside is not None:
         place = Path(beside).absolute()
         folders.insert(0, place if place.is_dir() else place.parent)
     for folder in folders:
         for one in (folder, *folder.parents):
             if (one / NAME).is_file():
-                return read_project(one / NAME)
+                return _read_once(one / NAME, here, (one / NAME).stat().st_mtime_ns)
     return None
+
+
+@lru_cache(maxsize=4)
+def _read_once(path: Path, here: Path, changed: int) -> Project:
+    """Read a project file once a command, though several of its keys are asked for.
+
+    Args:
+        path: The file.
+        here: The working folder, which places are relative to.
+        changed: When the file has changed last [ns].
+    """
+    return read_project(path)
 
 
 def read_project(path: Path) -> Project:

@@ -92,7 +92,7 @@ def init(
 
     Exit 2: a file exists already, or an answer is wrong; nothing is written.
     """
-    from postproc.robot.cell import load_cell
+    from postproc.robot.cell import explain_few_probes, load_cell
 
     with report_errors():
         places = [folder / CELL, folder / NAME]
@@ -108,14 +108,17 @@ def init(
             raise PostprocError(f"init: no arm and no terminal to ask on: {cure}")
         own = given.arm.endswith(".toml")
         whole = str(Path(given.arm).absolute()) if own else given.arm
-        cell = load_cell(_cell_text(given, whole), name=str(places[0]))
-        text = _cell_text(given, _arm_beside(given.arm, folder))
+        runs = _controller_of(given.arm)
+        cell = load_cell(_cell_text(given, whole, runs), name=str(places[0]))
+        text = _cell_text(given, _arm_beside(given.arm, folder), runs)
         folder.mkdir(parents=True, exist_ok=True)
         write_all({places[0]: text, places[1]: PROJECT.encode()})
         for name in ("programs", "compensated"):
             (folder / name).mkdir(exist_ok=True)
         suffix = _suffix(cell.controllers)
         say(f"written {places[0]} and {places[1]}")
+        if few := explain_few_probes(cell):
+            say(few)
         say(f"next: postproc survey --poses 300 -o {folder / f'survey{suffix}'}")
 
 
@@ -144,14 +147,20 @@ def _arm_beside(arm: str, folder: Path) -> str:
     return Path(os.path.relpath(place, folder)).as_posix()
 
 
-def _cell_text(given: Answers, arm: str) -> bytes:
-    """Write a cell file of an arm, as the cell names it."""
+def _cell_text(given: Answers, arm: str, runs: object) -> bytes:
+    """Write a cell file.
+
+    Args:
+        given: What is known of the cell.
+        arm: The arm, as the cell names it.
+        runs: Whose controllers run it, as its file has it.
+    """
     lines = [
         "# Lengths in mm, angles in degrees (Euler ZYZ).",
         "",
         "[robot]",
         f"arm = {toml_text(arm)}",
-        *_robot_lines(given),
+        *_robot_lines(given, runs),
         *_tool_lines(given.tool),
         *_survey_lines(given.nest or []),
         *_measurement_lines(given.frame, given.instrument),
@@ -184,12 +193,12 @@ def _controller_running(language: str | None) -> str | None:
     return known[language.lower()]
 
 
-def _robot_lines(given: Answers) -> list[str]:
+def _robot_lines(given: Answers, runs: object) -> list[str]:
     """Write [robot] but for the arm; the controller only where it is not the arm's."""
     lines = []
-    own = _controller_of(given.arm or "")
+    own = runs if isinstance(runs, list) else [runs]
     wanted = _controller_running(given.language)
-    if wanted is not None and wanted not in (own if isinstance(own, list) else [own]):
+    if wanted is not None and wanted not in own:
         lines.append(f"controller = {toml_text(wanted)}")
     if given.accuracy is not None:
         state = "true" if given.accuracy is OnOff.ON else "false"

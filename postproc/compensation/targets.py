@@ -79,7 +79,7 @@ def report_rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
         visits: Every arrival.
         away: How far the path passes each, (n,) [mm].
     """
-    rows = np.flatnonzero(away > 0)
+    rows = np.flatnonzero((away > 0) & ~visits.via)
     if len(rows) == 0:
         return []
     found = [_note(visits, int(rows[0]), Code.FLY_ASSUMED, text)

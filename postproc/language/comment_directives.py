@@ -1,7 +1,7 @@
 """Comments that mark moves and points, in each language's own sign.
 
 ``-- MEASURE P12``: the move is measured, under that id; ``-- TAUGHT``: a point that was
-taught with the arm.
+taught with the arm; ``-- postproc: inserted``: a line that postproc has inserted.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ from postproc import _native
 from postproc.language.source import Source
 
 MEASURE, TAUGHT = "MEASURE", "TAUGHT"
+INSERTED = "postproc: inserted"  # ends a line with a point on the way of a move
+AT_VIA = " (via)"  # .. where it leads to the point on the way of an arc
+AT_APPROACH = " (approach)"  # .. where it is a stop from which a target is reached
 
 
 @dataclass(frozen=True)
@@ -50,3 +53,26 @@ class Comments:
     def list_taught(self, source: Source) -> frozenset[int]:
         """Return the lines of points that are marked as taught."""
         return frozenset(line for line, _ in self.marks(source, TAUGHT))
+
+
+def insertion_mark(line: bytes, sign: str) -> str | None:
+    """Return what an inserted line is for, None for any other line.
+
+    Args:
+        line: The line.
+        sign: What comments begin with.
+
+    >>> insertion_mark(b"MOVE TO p -- postproc: inserted (via)", "--")
+    ' (via)'
+    >>> insertion_mark(b"MoveL p,v100,z0,t; ! postproc: inserted", "!")
+    ''
+    """
+    found = _INSERTED.search(line)
+    if found is None or found[1] != sign.encode():
+        return None
+    return (found[2] or b"").decode()
+
+
+_INSERTED = re.compile(
+    rb"(--|!|;) postproc: inserted( \((?:via|approach)\))?[ \t]*\r?\n?$"
+)

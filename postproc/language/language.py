@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from postproc.arrays import Floats, Ints
 from postproc.files import FolderListing
 from postproc.language.archive import Archive
+from postproc.language.comment_directives import AT_APPROACH, AT_VIA, insertion_mark
 from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.number_edits import Skeleton
 from postproc.language.pose_encoding import Dialect
@@ -167,7 +168,16 @@ class ArcPiece:
 
 
 class Splitter(ABC):
-    """The files of a job, to put points on the ways of its moves."""
+    """The files of a job, to put points on the ways of its moves.
+
+    Attributes:
+        unsized: Why points stay out whose blending is not known, "" where the arm
+            passes them however they are blended.
+        keeps_aux: External axes stay where they are on the way to points.
+    """
+
+    unsized: str = ""
+    keeps_aux: bool = False
 
     @abstractmethod
     def hinders(self, file: int, line: int) -> str:
@@ -257,6 +267,7 @@ class Language(ABC):
         tells_accuracy: Programs or controllers show whether the controller compensates
             on its own; else the cell must say so itself.
         names_numbers: Positions stand in braces, with a name before every number.
+        via_first: The point on the way of an arc stands before its end.
     """
 
     name: str
@@ -266,6 +277,7 @@ class Language(ABC):
     dialect: Dialect
     tells_accuracy: bool = True
     names_numbers: bool = False
+    via_first: bool = True
 
     @abstractmethod
     def recognises(self, text: bytes) -> bool:
@@ -291,24 +303,21 @@ class Language(ABC):
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone variables in them."""
 
-    def splitter(self, sources: Sequence[Source]) -> Splitter | None:
-        """Parse the files of a job to put points on ways, None where nobody knows how.
-
-        Only where the language passes them for certain.
-        """
-        return None
+    @abstractmethod
+    def splitter(self, sources: Sequence[Source]) -> Splitter:
+        """Parse the files of a job to put points on the ways of its moves."""
 
     def is_inserted(self, line: bytes) -> bool:
-        """Tell whether a line is a point that a `Splitter` wrote."""
-        return False
+        """Return True if a line is a point that a `Splitter` wrote."""
+        return insertion_mark(line, self.comment) is not None
 
     def is_approach(self, line: bytes) -> bool:
-        """Tell whether such a line is a stop from which a target is approached."""
-        return False
+        """Return True if such a line is a stop from which a target is approached."""
+        return insertion_mark(line, self.comment) == AT_APPROACH
 
     def ends_at_via(self, line: bytes) -> bool:
-        """Tell whether such a line leads to the point on the way of an arc."""
-        return False
+        """Return True if such a line leads to the point on the way of an arc."""
+        return insertion_mark(line, self.comment) == AT_VIA
 
     def holds_joints(self, line: str) -> bool:
         """Tell whether the numbers of a line are joint angles, as far as it shows."""

@@ -60,6 +60,9 @@ class Terms:
     cloning: str = "see --shared-points clone"
 
 
+WIDEST = -99999.9  # [mm, deg] no number of a target is longer as it is written
+
+
 class Dialect(ABC):
     """What the w numbers of a target mean.
 
@@ -105,6 +108,11 @@ class Dialect(ABC):
         """Return how many numbers a target has."""
         return len(self.pose_decimals)
 
+    @property
+    def widest(self) -> tuple[float, ...]:
+        """Return numbers of a pose that none is longer than as it is written, (w,)."""
+        return (WIDEST,) * self.width
+
     @abstractmethod
     def poses(self, values: Floats) -> Floats:
         """Return the poses (k, 4, 4) [m] that numbers (k, w) say."""
@@ -117,6 +125,15 @@ class Dialect(ABC):
             values: Numbers of poses, (k, w).
             by: Rotations in the frame of the numbers, (k, 3, 3).
         """
+
+    def count_flags(self, values: Floats, q: Floats) -> Floats:
+        """Write the flags of new poses, as far as they depend on more than the branch.
+
+        Args:
+            values: Numbers of poses on one branch, with flags of another one, (k, w).
+            q: Joint angles there, (k, 6) [rad].
+        """
+        return values
 
     def shift_rotations(self, angles: Floats) -> Floats:
         """Return the rotations (k, 3, 3) that the angles (k, 3) [deg] of shifts say.

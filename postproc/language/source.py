@@ -400,17 +400,17 @@ def insert_after(source: Source, line: int, text: str) -> Edit:
     return Edit(Span(found.end(), found.end()), new + found.group())
 
 
-def check_length(source: Source, length: int) -> None:
+def check_length(source: Source, length: int, most: int = LONGEST_LINE) -> None:
     """Refuse a line that is longer than lines of the language, and of its file, are.
 
     Raises:
         CloneError: It is.
     """
-    if length <= LONGEST_LINE:
+    if length <= most:
         return
     longest = int(np.diff(source.line_starts, append=len(source.data)).max())
     if length > longest:
-        raise CloneError(f"a line would be longer than {LONGEST_LINE} characters")
+        raise CloneError(f"a line would be longer than {most} characters")
 
 
 def find_free_name(old: str, taken: set[str], longest: int) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import SequenceMatcher
 from functools import cached_property, partial
@@ -446,23 +446,34 @@ def _beside_points(
     others = TextLines.of(b"".join(after[k] + b"\n" for k in kept.tolist()))
     others = others.part(0, len(kept))
     place = np.searchsorted(kept, inserted)  # lines of the original before each
+    language, cut = language_of(file), set[int]()
+    if language.via_first:
+        cut = {
+            at + 1
+            for at, row in zip(place.tolist(), inserted.tolist(), strict=True)
+            if language.ends_at_via(after[row])
+        }
     if len(others) != len(before):  # more differs: the points come last
         yield from _rows(file, before, others)
         place[:] = len(before)
     done = 0
     for at in np.unique(place).tolist():
         if len(others) == len(before):
-            yield describe_changes(
-                file, before.part(done, at), others.part(done, at), done
-            )
+            part = before.part(done, at), others.part(done, at)
+            yield _without_change(describe_changes(file, *part, done), cut)
         done = at
         texts = [after[k] for k in inserted[place == at].tolist()]
         yield _text_rows(file, np.zeros(len(texts), dtype=int), "+ ", texts)
     if len(others) == len(before):
-        rest = len(before)
-        yield describe_changes(
-            file, before.part(done, rest), others.part(done, rest), done
-        )
+        rest = before.part(done, len(before)), others.part(done, len(before))
+        yield _without_change(describe_changes(file, *rest, done), cut)
+
+
+def _without_change(rows: DiffRows, lines: Collection[int]) -> DiffRows:
+    """Take the change of some lines back: their first point is another one now."""
+    gone = np.isin(rows.line, np.array(sorted(lines), dtype=np.int64))
+    change = np.where(gone, np.nan, rows.change_mm)
+    return replace(rows, change_mm=change, has_change=rows.has_change & ~gone)
 
 
 def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> DiffRows:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -28,6 +29,7 @@ from rich.text import Text
 
 from postproc import _native
 from postproc.arrays import Cells, format_texts
+from postproc.diagnostics import Code
 from postproc.exceptions import printable
 
 # Tables: aligned, row by row, never held whole.
@@ -36,6 +38,7 @@ from postproc.exceptions import printable
 # next row on. The width of a column at a row is thus the longest cell before it, which
 # is one running maximum.
 
+PAGE_WIDTH = 80  # columns of a terminal that does not tell
 PLAIN_WIDTH = 200  # of a table with a column that folds
 MEASURED = 1000  # rows that the widths of the columns are taken from
 GAP = "  "
@@ -253,6 +256,62 @@ class _Layout:
         return self.text(block, widths)[0].decode().removesuffix("\n")
 
 
+# Messages, as a person reads them on a terminal.
+
+SEVERITY_COLOURS = {"error": "red", "warning": "yellow", "note": "faint"}
+HANGING = " " * 4  # before what goes on of a message
+_PLACED = re.compile(r"(\S[^|]*?): ([a-z]+(?:-[a-z]+)+): ")
+_CODES = {str(code.value): code for code in Code}
+_LEADS = {"postproc: ": "red", "warning: ": "yellow", "next: ": "bold"}
+
+
+def lay_out_message(text: str, out: TextIO) -> str:
+    """Fold the lines of a message at words, and colour what they begin with.
+
+    Lines that begin with a blank are excerpts of programs, and stay as they are.
+
+    Args:
+        text: The message.
+        out: The terminal; NO_COLOR holds.
+    """
+    width, coloured = max(_columns(out), 40), is_coloured(out)
+    found = []
+    for line in text.split("\n"):
+        if line[:1].isspace() or not line:
+            found.append(line)
+            continue
+        folded = textwrap.wrap(
+            line, width, subsequent_indent=HANGING, break_long_words=False,
+            break_on_hyphens=False, drop_whitespace=True,
+        )  # fmt: skip
+        found.append("\n".join(folded))
+        if coloured:
+            found[-1] = _colour_lead(found[-1])
+    return "\n".join(found)
+
+
+def _colour_lead(line: str) -> str:
+    """Colour the code of a finding by its severity, and the word of a message."""
+    for word, colour in _LEADS.items():
+        if line.startswith(word):
+            return paint(word, colour) + line[len(word) :]
+    placed = _PLACED.match(line)
+    code = None if placed is None else _CODES.get(placed[2])
+    if placed is None or code is None:
+        return line
+    colour = SEVERITY_COLOURS[code.severity]
+    lead = f"{paint(placed[1], 'bold')}: {paint(placed[2], colour)}: "
+    return lead + line[placed.end() :]
+
+
+def _columns(out: TextIO) -> int:
+    """Return how wide a terminal is, 80 where it does not tell."""
+    try:
+        return os.get_terminal_size(out.fileno()).columns or PAGE_WIDTH
+    except (OSError, ValueError):
+        return PAGE_WIDTH
+
+
 # How far something is.
 
 
@@ -322,7 +381,7 @@ class StageLog:
 
 @contextmanager
 def stage_bar(out: TextIO | None = None) -> Iterator[Callable[[str, float], None]]:
-    """Show the stage of a job and how far all of it is.
+    """Show the stage of a job, how far all of it is, and the time that is left.
 
     Without a terminal a line tells every stage of a job that lasts.
 
@@ -337,7 +396,11 @@ def stage_bar(out: TextIO | None = None) -> Iterator[Callable[[str, float], None
         log = StageLog(out)
         yield lambda stage, share: log(stage)
         return
-    columns = (BarColumn(), TextColumn("{task.description}", markup=False))
+    columns = (
+        BarColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}", markup=False),
+    )
     with Progress(*columns, console=_Steady(file=out), transient=True) as progress:
         bar = progress.add_task("starting", total=1.0)
         yield lambda stage, share: progress.update(

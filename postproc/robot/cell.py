@@ -37,8 +37,9 @@ from postproc.robot.pose import MM, pose_from_record, rotation_from_zyz
 Source = Literal["cad", "tracker", "taught"]
 Effect = Literal["motionless", "moves", "sets-frames"]
 SurveyMode = Literal["lhs", "optimal", "d-optimal"]
-DESIGN = frozenset({"mode", "seed", "reversals"})  # keys of how poses are chosen
+DESIGN = frozenset("mode seed reversals order".split())  # how poses are chosen
 ArmNumber = PositiveInt  # which arm of its controller
+ANY_TOOL = 3  # probe points of a survey that holds for any tool
 MOTIONLESS = "motionless"  # beside names: the key whose value lists patterns
 STILL = "still"  # what that was called
 
@@ -184,6 +185,7 @@ class SurveySection(Strict):
         mode: How poses are chosen, see `design_survey`.
         seed: Of the random draws of poses.
         reversals: How often every joint turns back in small steps, too.
+        order: Of the poses: as they are drawn, or so that moves are short.
     """
 
     points_mm: list[Triple] = Field(default_factory=list)
@@ -193,6 +195,7 @@ class SurveySection(Strict):
     mode: SurveyMode = "lhs"
     seed: NonNegativeInt = 0
     reversals: NonNegativeInt = 0
+    order: Literal["drawn", "short"] = "drawn"
 
     @property
     def names_points(self) -> bool:
@@ -740,3 +743,14 @@ def _aux(file: CellFile, path: Path) -> dict[int, str]:
                 path, "not an axis number", 'Write 1 = "gun"', place=f"$.aux.{key}"
             )
     return {int(key): str(kind) for key, kind in file.aux.items()}
+
+
+def explain_few_probes(cell: Cell) -> str:
+    """Say what fewer than `ANY_TOOL` probe points mean, "" for enough of them."""
+    count = len(cell.probes)
+    if count >= ANY_TOOL:
+        return ""
+    return (
+        f"{count} of {ANY_TOOL} probe points: the model will hold only for tools with "
+        f"the tip there. Give {ANY_TOOL} under [survey] points_mm"
+    )

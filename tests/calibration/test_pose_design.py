@@ -9,6 +9,7 @@ from postproc.calibration.pose_design import (
     Design,
     design_survey,
     joint_box,
+    short_order,
     usable,
 )
 from postproc.exceptions import PostprocError
@@ -95,3 +96,16 @@ def test_wrong_wishes_are_refused() -> None:
         design_survey(NJ, TOOL[None], 10, "best")
     with pytest.raises(PostprocError, match="0 poses"):
         design_survey(NJ, TOOL[None], 0)
+
+
+def test_a_short_order_saves_travel_and_keeps_probe_points_together() -> None:
+    d = design_survey(NJ, PLATE, 60, seed=1)
+    order = short_order(d.q, d.probe, NJ.velocity)
+    assert sorted(order.tolist()) == [*range(60)]
+    assert (np.diff(d.probe[order]) != 0).sum() == 2
+    drawn = np.argsort(d.probe, kind="stable")
+    travel = [
+        np.abs(np.diff(d.q[rows], axis=0) / NJ.velocity).max(axis=1).sum()
+        for rows in (order, drawn)
+    ]
+    assert travel[0] < 0.75 * travel[1]

@@ -94,3 +94,12 @@ def test_a_person_is_asked(tmp_path, monkeypatch):
     assert cell.arm.name == "kr210-r2700-extra" and len(cell.probes) == 2
     assert cell.controllers == ("kuka",)
     assert cell.measurements.frame == "tracker"
+
+
+@pytest.mark.parametrize(("nests", "warned"), [(2, True), (3, False)])
+def test_too_few_reflectors_are_said_at_once(tmp_path, nests, warned):
+    given = [("--nest", f"{100 * k},0,100") for k in range(nests)]
+    arm = ("--arm", "irb6640-185-2.8")
+    found = cli("init", tmp_path, *arm, *(word for pair in given for word in pair))
+    assert found.exit_code == 0
+    assert (f"{nests} of 3 probe points" in found.stderr) is warned

@@ -6,6 +6,7 @@ import shutil
 
 import pytest
 
+from postproc.cli import project as project_file
 from postproc.cli.project import NAME, find_project
 from tests.written import FIRST, POSE, cli, program
 
@@ -38,6 +39,22 @@ def test_compensate_finds_cell_model_and_output(project):
     assert cli("compensate", JOB, *given).exit_code == 0
     assert cli("compensate", JOB).exit_code == 0
     assert (project / OUTPUT).read_bytes() == (project / "whole.pdl").read_bytes()
+
+
+def test_a_wrong_program_makes_no_folder(project):
+    (project / JOB).write_text("PROGRAM job\nVAR\n")
+    assert cli("compensate", JOB).exit_code == 2
+    assert not (project / "compensated").exists()
+
+
+def test_the_project_file_is_read_once(project, monkeypatch):
+    read = []
+    own = project_file.read_project
+    monkeypatch.setattr(
+        project_file, "read_project", lambda path: read.append(path) or own(path)
+    )
+    assert cli("compensate", JOB).exit_code == 0
+    assert len(read) == 1
 
 
 @pytest.mark.parametrize("folder", ["programs/line", ".."])

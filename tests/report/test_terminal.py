@@ -5,12 +5,13 @@ from __future__ import annotations
 import io
 import threading
 
-from postproc.cli.common import stages
+from postproc.cli.common import stages, suggest
 from postproc.exceptions import printable
 from postproc.report.terminal import (
     PLAIN_WIDTH,
     Column,
     fold_cells,
+    lay_out_message,
     print_table,
     progress_bar,
     show_status,
@@ -124,3 +125,51 @@ def test_a_log_is_told_the_stages_of_what_lasts(monkeypatch):
     with stage_bar(log) as share_of:
         share_of("candidates", 0.5)
     assert log.getvalue() == "30 s: fit\n21 s: candidates\n"
+
+
+FINDING = (
+    "job.pdl:506: direction-uncertain: the approach direction is uncertain, because "
+    "axis 5 reversed shortly before: start the approach 37 mm farther back"
+)
+
+
+def test_messages_fit_a_terminal_and_lose_no_word(monkeypatch):
+    monkeypatch.setenv("NO_COLOR", "1")
+    text = lay_out_message(FINDING + "\n    506 | MOVE LINEAR TO " + "x" * 90, Screen())
+    *lines, excerpt = text.splitlines()
+    assert max(map(len, lines)) <= 80 and len(lines) == 2
+    assert " ".join(line.strip() for line in lines) == FINDING
+    assert excerpt == "    506 | MOVE LINEAR TO " + "x" * 90
+
+
+def test_a_finding_has_the_colour_of_its_severity(monkeypatch):
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    shown = {
+        lead: lay_out_message(f"{lead}so it is", Screen())
+        for lead in ("a.pdl:1: conflict: ", "a.pdl:1: direction-uncertain: ",
+                     "a.pdl:1: no-such-code: ", "postproc: ", "written ")
+    }  # fmt: skip
+    assert "\x1b[33mdirection-uncertain" in shown["a.pdl:1: direction-uncertain: "]
+    assert "\x1b[31mpostproc: " in shown["postproc: "]
+    for plain in ("a.pdl:1: no-such-code: ", "written "):
+        assert "\x1b" not in shown[plain]
+
+
+def test_the_next_command_is_shown_on_a_terminal_only(monkeypatch):
+    screen = Screen()
+    monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.setenv("NO_COLOR", "1")
+    suggest("compensate", "PROGRAM", cell="cell.toml", model=None)
+    assert screen.getvalue() == "next: postproc compensate PROGRAM --cell cell.toml\n"
+    pipe = io.StringIO()
+    monkeypatch.setattr("sys.stderr", pipe)
+    suggest("compensate", "PROGRAM")
+    assert pipe.getvalue() == ""
+
+
+def test_stages_show_the_time_that_is_left():
+    out = Screen()
+    with stage_bar(out) as told:
+        told("search", 0.5)
+    assert ":--" in out.getvalue() or "0:00" in out.getvalue()

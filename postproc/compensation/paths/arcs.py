@@ -8,7 +8,7 @@ piece.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
@@ -85,6 +85,8 @@ class CutArc:
         chords: Which pieces are chords whatever they bend.
         turns: What the tool turns by at the cuts in its own frame, (k, 3) [rad]; at
             the end of the arc it stays what the source wrote.
+        joints: Joint angles (k, 6) [rad] at shares (k,) of the way to a visit; None:
+            points have the flags of the arc's start.
     """
 
     numbers: Floats
@@ -94,6 +96,7 @@ class CutArc:
     via: int
     chords: Chords
     turns: tuple[Floats, Floats]
+    joints: Callable[[int, Floats], Floats] | None = None
 
     @classmethod
     def of(
@@ -103,6 +106,7 @@ class CutArc:
         via: int,
         chords: Chords,
         turns: Mapping[int, Floats] = MappingProxyType({}),
+        joints: Callable[[int, Floats], Floats] | None = None,
     ) -> CutArc:
         """Look at the arc with the point `via` on its way."""
         rows = [int(visits.before[via]), via, via + 1]
@@ -111,7 +115,8 @@ class CutArc:
         cuts = points.get(via, ()), points.get(via + 1, ())
         still = [np.zeros((len(own), 3)) for own in cuts]
         turned = turns.get(via, still[0]), turns.get(via + 1, still[1])
-        return cls(visits.values[rows[0]], visits, halves, cuts, via, chords, turned)
+        start = visits.values[rows[0]]
+        return cls(start, visits, halves, cuts, via, chords, turned, joints)
 
     def pieces(self) -> tuple[list[ArcPiece], Floats]:
         """Return the pieces but the last, and the point on that one's way, (w,)."""
@@ -143,7 +148,11 @@ class CutArc:
         out[0, :3] = pose[:3, 3] / MM
         own = rotation_from_vector(self._turn(half, share)[None])[0]
         turned = pose[:3, :3] @ own @ self.halves[0].rotation[0].T
-        return np.asarray(self.visits.dialect.rotate(out, turned[None])[0])
+        out = self.visits.dialect.rotate(out, turned[None])
+        if self.joints is not None:
+            q = self.joints(self.via + half, np.array([share]))
+            out = self.visits.dialect.count_flags(out, q)
+        return np.asarray(out[0])
 
     def _turn(self, half: int, share: float) -> Floats:
         """Return what the tool turns by at a share of a half, (3,) [rad]."""

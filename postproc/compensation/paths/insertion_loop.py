@@ -54,7 +54,6 @@ from postproc.compensation.paths.reapproach import (
 )
 from postproc.compensation.paths.split_selection import find_split
 from postproc.compensation.pipeline import CompensatedProgram
-from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
 from postproc.robot.pose import MM
 
@@ -86,24 +85,16 @@ def correct_paths(
 
     Returns:
         The program, `kept` speaking of the visits of the source.
-
-    Raises:
-        PostprocError: Targets cannot be approached anew in its language.
     """
     reading, first = draft.reading, draft.in_time
     if first is None or not setting.options.inserts:
         return draft
     language = language_of(reading.sources[0].name)
     splitter = language.splitter(reading.sources)
-    if splitter is None and setting.options.reapproach:
-        raise PostprocError(
-            f"reapproach: no stops are inserted into {language.name} programs. Leave "
-            "the key out; findings direction-uncertain advise how to approach targets"
-        )
     task = InsertionTask(draft, first, setting, write, splitter)
     now = task.predict(InsertionPlan())
-    if splitter is not None and setting.options.reapproach:
-        now = insert_reapproaches(now, splitter)
+    if setting.options.reapproach:
+        now = insert_reapproaches(now)
     now = task.predict(find_split(now))
     if now.plan.open or now.plan.approaches:
         now, best = _repeat(now, BestPoints(), put_points, drop_where_steep)
@@ -310,7 +301,7 @@ def _cell_speed(now: PathPrediction) -> float:
 def _cures(now: PathPrediction) -> dict[int, str]:
     """Say what helps the moves that are left too far, by visit."""
     plan, paths, found = now.plan, now.paths, dict[int, str]()
-    for k in now.too_far.tolist() if now.task.splitter is not None else ():
+    for k in now.too_far.tolist():
         v, largest = int(paths.visit[k]), paths.after.largest[k]
         both = halves(now.task.visits, v)
         known = [plan.cures[h] for h in both if plan.cures.get(h)]

@@ -61,14 +61,14 @@ class InsertionTask:
         first: .. in time.
         setting: What it is compensated with.
         write: Writes a corrected program, and reads it again.
-        splitter: Writes points into its files; None where its language gets none.
+        splitter: Writes points into its files.
     """
 
     source: CompensatedProgram
     first: InTime
     setting: Job
     write: Write
-    splitter: Splitter | None
+    splitter: Splitter
     _known: dict[Written, PathPrediction] = field(default_factory=dict, repr=False)
 
     @property
@@ -88,13 +88,16 @@ class InsertionTask:
 
     @cached_property
     def _hindrances(self) -> dict[int, str]:
-        return hindrances(self.visits, self.source.kept.decisions, self.first.before)
+        decided, keeps_aux = self.source.kept.decisions, self.splitter.keeps_aux
+        return hindrances(
+            self.visits, decided, self.first.before, self.setting.cell, keeps_aux
+        )
 
-    def find_hindrance(self, splitter: Splitter, v: int) -> str:
+    def find_hindrance(self, v: int) -> str:
         """Say why nothing can be put on the way to a visit, "" for nothing."""
         file, line = int(self.visits.file[v]), int(self.lines[v])
         found = self._hindrances.get(v)
-        return found or unwritable(splitter, self.visits, v, file, line)
+        return found or unwritable(self.splitter, self.visits, v, file, line)
 
     @property
     def tolerance(self) -> float:
@@ -122,13 +125,14 @@ class InsertionTask:
 
     def _make(self, plan: InsertionPlan) -> PathPrediction:
         own = np.arange(len(self.visits))
-        if self.splitter is None or not (plan.points or plan.approaches):
+        if not (plan.points or plan.approaches):
             return PathPrediction(self, plan, self.source, own)
         cell, clock = self.setting.cell, self.setting.clock
         with clock("insert"):
             reading, own = insert(
                 self.source.reading, plan.points, plan.preloads, self.splitter, cell,
                 plan.chords, plan.approaches, self._list_meant_sides(plan),
+                self._joints_along,
             )  # fmt: skip
         options = self.setting.options.without_clones()
         reading, kept = correct(reading, replace(self.setting, options=options))
@@ -141,6 +145,14 @@ class InsertionTask:
             )  # fmt: skip
         program = CompensatedProgram(reading, kept, output, told)
         return PathPrediction(self, plan, program, own)
+
+    def _joints_along(self, v: int, share: Floats) -> Floats:
+        """Return the joint angles at shares (k,) of the way to a visit, (k, 6)."""
+        paths = self.first.paths
+        rows = paths.samples_to(v)
+        way = paths.way[rows]
+        found = [np.interp(share * way[-1], way, q) for q in paths.q[rows].T]
+        return np.stack(found, axis=1)
 
     def _list_meant_sides(self, plan: InsertionPlan) -> dict[int, MeantSides]:
         """Say from which sides points on ways are meant to be passed.
@@ -253,10 +265,13 @@ class PathPrediction:
         decided = self.program.kept.decisions
         rows = self._on_way(v)
         left = rows[decided.status[rows] != Status.CORRECTED]
-        if not len(left):
-            return ""
-        why = decided.reasons[decided.why[left[0]]]
-        return f"points inserted into it cannot be corrected: {why}"
+        if len(left):
+            why = decided.reasons[decided.why[left[0]]]
+            return f"points inserted into it cannot be corrected: {why}"
+        visits = self.program.reading.visits
+        passed = rows[~visits.via[rows]][v in self.plan.stops :]
+        sized = visits.fly[passed] & (visits.zone_mm[passed] > 0.0)
+        return "" if sized.all() else self.task.splitter.unsized
 
     def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""

@@ -18,7 +18,6 @@ from postproc.compensation.paths.insertion_prediction import (
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.write_points import numbers_at
 from postproc.compensation.pipeline import WindowResult
-from postproc.language.language import Splitter
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -26,7 +25,7 @@ TRIES = 8  # rounds in which stops are taken back
 WORSE = 5e-5  # [m] that a path may be worse for such a stop
 
 
-def insert_reapproaches(now: PathPrediction, splitter: Splitter) -> PathPrediction:
+def insert_reapproaches(now: PathPrediction) -> PathPrediction:
     """Approach targets anew that a joint reaches from a side that is not sure."""
     task, plan = now.task, now.plan
     visits, room = task.visits, now.room
@@ -35,7 +34,7 @@ def insert_reapproaches(now: PathPrediction, splitter: Splitter) -> PathPredicti
     places = dict(plan.approaches)
     for v in np.flatnonzero(ends & _find_uncertain(task.source.kept)).tolist():
         file, line = int(visits.file[v]), int(task.lines[v])
-        may = not task.find_hindrance(splitter, v) and splitter.stops(file, line)
+        may = not task.find_hindrance(v) and task.splitter.stops(file, line)
         if may and len(places) < room:
             place = _place_to_approach(task, v)
             if place is not None:
@@ -76,7 +75,7 @@ def _place_to_approach(task: InsertionTask, v: int) -> Floats | None:
     if q is None:
         return None
     pose = cell.arm.flange(q[None]) @ cycle.targets.tool[[v]]
-    return numbers_at(visits, v, pose[0])
+    return numbers_at(visits, v, pose[0], q)
 
 
 def _find_uncertain(kept: WindowResult) -> Bools:

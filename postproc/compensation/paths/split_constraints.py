@@ -16,22 +16,38 @@ from postproc.compensation.paths.arcs import (
     hindrances_of_arcs,
     is_arc,
 )
+from postproc.compensation.payload import payload_of
 from postproc.language.language import ArcPiece, Splitter
 from postproc.language.source import CloneError
 from postproc.language.visits import Meaning, OrientationLaw, Visits
 from postproc.motion.cycle_time import ProgramCycle
+from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, has_unknown
 from postproc.robot.trajectory import Motion
 
 CLOSEST = 1e-3  # [m] length of the shortest piece, however slow the move is
 CLEAR = 0.02  # [m] from a rounded end: how large its corner is depends on the moves
 LAST_FLATS = 2.0  # of `FLAT`: the sagitta of the last piece of an arc, no chord
-WIDEST = -99999.9  # no number of a point is longer as it is written
+SAME_LOAD = 1e-3  # [kg, m] by which a stated load may differ from the cell's
 ALIKE = 1e-6  # a tool whose axes turn by less keeps its orientation
 
 
-def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int, str]:
-    """Say why moves of a program must stay in one piece, by their visit."""
+def hindrances(
+    v: Visits,
+    decisions: Decisions,
+    cycle: ProgramCycle,
+    cell: Cell,
+    keeps_aux: bool = False,
+) -> dict[int, str]:
+    """Say why moves of a program must stay in one piece, by their visit.
+
+    Args:
+        v: The program.
+        decisions: How its targets are corrected.
+        cycle: .. in time.
+        cell: Its payload is the one that paths are predicted with.
+        keeps_aux: See `Splitter.keeps_aux`.
+    """
     status, before = decisions.status, np.maximum(v.before, 0)
     corrected = (status == Status.CORRECTED) | (status == Status.UNCHANGED)
     ends = (v.literal >= 0) & (v.target == Meaning.POSE) & corrected
@@ -52,9 +68,9 @@ def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int
         (~(ends & ends[before]), "its ends are not both corrected poses"),
         (v.shift >= 0, "its end is shifted from a point"),
         (v.weaves, "it weaves, or may: the pattern would restart at every point"),
-        (v.load > 0, "the program states the payload on it"),
+        (_carries_otherwise(v, cell), "the program states the payload on it"),
         (~alike, "it starts with other frames or configuration flags"),
-        (~np.isnan(v.aux).all(axis=1), "auxiliary axes move with it"),
+        (_aux_moves(v, before, keeps_aux), "auxiliary axes move with it"),
         (v.tool_remote, "the arm holds the part"),
         *hindrances_of_arcs(v, alike),
         (_turns_otherwise(v, before), "it is uncertain how the tool turns along it"),
@@ -70,9 +86,24 @@ def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int
     return found
 
 
+def _carries_otherwise(v: Visits, cell: Cell) -> Bools:
+    """Return where the program states another load than the cell, (n,)."""
+    mass, centre = payload_of(v, cell)
+    off = np.column_stack([mass - cell.payload_mass, centre - cell.payload_com])
+    same = np.abs(np.nan_to_num(off, nan=np.inf)).max(axis=1) <= SAME_LOAD
+    return np.asarray((v.load > 0) & ~same)
+
+
+def _aux_moves(v: Visits, before: Ints, kept: bool) -> Bools:
+    """Return where external axes move, or points would not keep them still, (n,)."""
+    if not kept:
+        return np.asarray(~np.isnan(v.aux).all(axis=1))
+    return np.asarray(~np.isclose(v.aux, v.aux[before], equal_nan=True).all(axis=1))
+
+
 def unwritable(splitter: Splitter, visits: Visits, v: int, file: int, line: int) -> str:
     """Say what in the text of a move hinders points on its way, "" for nothing."""
-    widest = np.full((1, visits.dialect.width), WIDEST)
+    widest = np.array([visits.dialect.widest])
     config = visits.configs[visits.config[v]]
     try:
         said = splitter.hinders(file, line)

@@ -16,7 +16,6 @@ from postproc.compensation.paths.insertion_prediction import (
 )
 from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.split_constraints import shortest_pieces
-from postproc.language.languages import language_of
 
 SPEED = "Set the speed before the move, or [motion] linear_mm_s in the cell"
 
@@ -52,19 +51,16 @@ def find_split(now: PathPrediction) -> InsertionPlan:
 def _explain_refusal(now: PathPrediction, v: int) -> str:
     """Say why a path that is left too far gets no points, "" where it may."""
     task = now.task
-    if task.splitter is None:
-        name = language_of(task.source.reading.sources[0].name).name
-        return f"no points are inserted into {name} programs"
     if v in now.plan.approaches:
         return "its target is approached again from an inserted stop"
-    return task.find_hindrance(task.splitter, v)
+    return task.find_hindrance(v)
 
 
 def _can_stop(task: InsertionTask, v: int) -> bool:
     """Tell whether the arm stands where a move begins, and may stop once more."""
     visits = task.visits
     before = int(visits.before[v])
-    if task.splitter is None or visits.fly[before] or visits.via[before]:
+    if visits.fly[before] or visits.via[before]:
         return False
     return task.splitter.stops(int(visits.file[v]), int(task.lines[v]))
 

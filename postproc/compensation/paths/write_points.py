@@ -6,7 +6,7 @@ They lie on the programmed path; what corrects them is what corrects all targets
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from types import MappingProxyType
 from typing import Any
@@ -31,6 +31,9 @@ from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, lengths, rotation_from_vector, rotation_vector
 from postproc.robot.trajectory import Motion
 
+JointsAlong = Callable[[int, Floats], Floats]
+"""Joint angles (k, 6) [rad] at shares (k,) of the way to a visit."""
+
 ROUNDED = 2e-6  # [m] that a point on a way may move where it is written anew
 TURNED = 2e-3  # [rad] .. and the tool turn: what drives turn it by is a tenth of that
 
@@ -44,6 +47,7 @@ def insert(
     chords: Chords = (),
     approaches: Mapping[int, Floats] = MappingProxyType({}),
     meant: Mapping[int, MeantSides] = MappingProxyType({}),
+    joints: JointsAlong | None = None,
 ) -> tuple[ParsedProgram, Ints]:
     """Put points on the ways of a program.
 
@@ -56,6 +60,7 @@ def insert(
         chords: Pieces of arcs that are chords.
         approaches: Stops from which targets are approached anew, by visit, (w,) each.
         meant: From which sides points of lines are meant to be passed, by visit.
+        joints: Where the joints are, for the flags of points; None: as at their starts.
 
     Returns:
         The program with points, proven to make the same moves otherwise, and those of
@@ -65,7 +70,7 @@ def insert(
         VerificationError: It would make other moves.
         CloneError: A point cannot be written.
     """
-    edits = _edits(reading, points, stops, splitter, cell, chords, meant)
+    edits = _edits(reading, points, stops, splitter, cell, chords, meant, joints)
     lines, visits = lines_in_files(reading, cell), reading.visits
     for visit, numbers in approaches.items():
         config = visits.configs[visits.config[visit]]
@@ -101,6 +106,7 @@ def _edits(
     cell: Cell,
     chords: Chords,
     meant: Mapping[int, MeantSides],
+    joints: JointsAlong | None,
 ) -> list[list[Edit]]:
     """Write the points, file by file."""
     visits, found = reading.visits, defaultdict[int, list[Edit]](list)
@@ -110,11 +116,14 @@ def _edits(
         file, line = int(visits.file[visit]), int(lines[visit])
         if visits.via[visit]:
             turns = {v: _turns(v, points, stops, meant) for v in (visit, visit + 1)}
-            arc = CutArc.of(visits, points, visit, chords, turns)
+            arc = CutArc.of(visits, points, visit, chords, turns, joints)
             pieces, via = arc.pieces()
             found[file] += splitter.arc(file, line, pieces, via, config, visit in stops)
         elif not is_arc(visits, visit):
-            numbers = between(visits, visit, np.array(points[visit]))
+            share = np.array(points[visit])
+            numbers = between(visits, visit, share)
+            if joints is not None:
+                numbers = visits.dialect.count_flags(numbers, joints(visit, share))
             tool = visits.dialect.poses(numbers)[:, :3, :3]
             axis = np.einsum("kij,kj->ki", tool, _turns(visit, points, stops, meant))
             numbers = visits.dialect.rotate(numbers, rotation_from_vector(axis))
@@ -190,13 +199,21 @@ def _aims(
     return out
 
 
-def numbers_at(visits: Visits, visit: int, pose: Floats) -> Floats:
-    """Write a TCP pose (4, 4) [m] in the arm's base as numbers of a visit, (w,)."""
+def numbers_at(visits: Visits, visit: int, pose: Floats, q: Floats) -> Floats:
+    """Write a TCP pose in the arm's base as numbers of a visit, (w,).
+
+    Args:
+        visits: The program.
+        visit: In whose frames.
+        pose: The pose, (4, 4) [m].
+        q: Joint angles there, (6,) [rad].
+    """
     numbers = np.array(visits.values[[visit]])
     pose = base_in_uframe(visits, np.array([visit]))[0] @ pose
     turn = pose[:3, :3] @ visits.dialect.poses(numbers)[0, :3, :3].T
     numbers[0, :3] = pose[:3, 3] / MM
-    return np.asarray(visits.dialect.rotate(numbers, turn[None])[0])
+    numbers = visits.dialect.rotate(numbers, turn[None])
+    return np.asarray(visits.dialect.count_flags(numbers, q[None])[0])
 
 
 # The proof that a program with points makes the same moves otherwise.
@@ -212,12 +229,10 @@ def _find_inserted(
         old = np.array([e.span.end - e.span.start for e in own], dtype=np.int64)
         begin = np.array([e.span.start for e in own], dtype=np.int64)
         begin += np.cumsum(size - old) - (size - old)
-        lines = source.line_starts[visits.line - 1]
+        rows = np.flatnonzero(visits.file == file) if own else begin
+        lines = source.line_starts[visits.line[rows] - 1]
         at = np.searchsorted(begin, lines, side="right") - 1
-        inside = (at >= 0) & (visits.file == file)
-        if len(own):
-            inside &= lines < (begin + size)[at]
-        found |= inside
+        found[rows] = (at >= 0) & (lines < (begin + size)[at])
     return found
 
 
@@ -271,13 +286,29 @@ def _prove(
         if are_near(before, same, cut):
             values = np.array(same.values)
             values[cut] = before.values[cut]
-            same = replace(same, values=values)
+            aux = np.array(same.aux)  # what is not written there stays as it is
+            aux[cut] = np.where(np.isnan(aux[cut]), before.aux[cut], aux[cut])
+            same = replace(same, values=values, aux=aux, **_passing(before, same, cut))
         problem = equivalent(before, same, nothing, before.values)
     if problem:
         raise VerificationError(
             f"{before.files[0]}: points on the ways would change what the program "
             f"does ({problem}); nothing is written"
         )
+
+
+def _passing(before: Visits, after: Visits, cut: Ints) -> dict[str, Any]:
+    """Return how points are passed, those on the ways of arcs as in the source.
+
+    As the end of a piece such a point says how it is blended, and the tool turns as on
+    lines where the piece is a chord: arcs are cut where that makes no difference.
+    """
+    found = {}
+    for name in ("zone_mm", "zone_rule", "overlap_percent", "blend", "orientation_law"):
+        column = np.array(getattr(after, name))
+        column[cut] = getattr(before, name)[cut]
+        found[name] = column
+    return found
 
 
 def are_near(before: Visits, after: Visits, rows: Ints) -> bool:

@@ -89,7 +89,7 @@ class KrlCloner(Cloner):
         if operand.name != name.partition("[")[0]:
             raise CloneError(f"{operand.name} stands for {name} here")
         source = self.task.files[file].text.source
-        if _is_of_form(source, line):
+        if is_of_form(source, line):
             raise CloneError("an inline form names its point in its own text")
         span = self._find_name(file, row, operand.name)
         spelt = source.text[span.start : span.end]
@@ -211,7 +211,7 @@ class KrlCloner(Cloner):
         return file.text.source.text[span.end : end].rstrip()
 
 
-def _is_of_form(source: Source, line: int) -> bool:
+def is_of_form(source: Source, line: int) -> bool:
     """Return True if a line stands in a fold that an inline form has written."""
     open_ = 0
     for number in range(line - 1, 0, -1):

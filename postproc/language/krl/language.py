@@ -29,6 +29,7 @@ from postproc.language.language import (
     Cloner,
     JobReading,
     Language,
+    Splitter,
     Start,
 )
 from postproc.language.measuring_program import (
@@ -98,6 +99,12 @@ class Krl(Language):
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone points of its data lists."""
         return KrlCloner.of(KrlTask([read_krl(source) for source in sources]))
+
+    def splitter(self, sources: Sequence[Source]) -> Splitter:
+        """Parse the files of a job to put points on the ways of its moves."""
+        from postproc.language.krl.insert_moves import KrlSplitter
+
+        return KrlSplitter(tuple(read_krl(source) for source in sources))
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]

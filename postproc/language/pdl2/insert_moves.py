@@ -10,18 +10,12 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.language.language import ArcPiece, Splitter
+from postproc.language.insert_moves import LayoutSplitter, MoveLayout, spell
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.clones import code_of
-from postproc.language.pdl2.pose_encoding import (
-    AT_APPROACH,
-    AT_VIA,
-    DEGREE_DECIMALS,
-    INSERTED,
-    MM_DECIMALS,
-)
+from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import Program
-from postproc.language.source import CloneError, Edit, Source, Span, check_length
+from postproc.language.source import CloneError, Span
 
 _EVENT = re.compile(r"\b(AT|TIME|DISTANCE|PERCENT|SEGMENT|EVENT)\b", re.I)
 _ENABLE = re.compile(r"\bENABLE\b(?!\s+CONDITION\s*\[\s*\d+\s*\])", re.I)
@@ -39,7 +33,7 @@ _MOTION = frozenset(
 
 
 @dataclass(frozen=True)
-class Pdl2Splitter(Splitter):
+class Pdl2Splitter(LayoutSplitter):
     """The program files of a job, to put points on the ways of moves.
 
     Attributes:
@@ -78,7 +72,7 @@ class Pdl2Splitter(Splitter):
         return ""
 
     def stops(self, file: int, line: int) -> bool:
-        """Tell whether the arm may stop once more, see `Splitter.stops`."""
+        """Return True if the arm may stop once more, see `Splitter.stops`."""
         program = self.programs[file]
         row = int(np.searchsorted(program.lines.line, line)) - 1
         for one in map(program.statement, range(row, -1, -1)):
@@ -86,105 +80,48 @@ class Pdl2Splitter(Splitter):
                 return isinstance(one, ast.Move)
         return False
 
-    def points(
-        self, file: int, line: int, numbers: Floats, config: str, stop: bool
-    ) -> Edit:
-        """Write moves to points before another one, see `Splitter.points`."""
-        form = _Form.of(self.programs[file], line)
-        text = ""
-        for number, own in enumerate(numbers):
-            way = f"LINEAR TO {_place(own, config)}"
-            text += form.line(way, stop and number == 0)
-        return form.before(text)
-
-    def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
-        """Write a stop to approach a target from, see `Splitter.approach`."""
-        form = _Form.of(self.programs[file], line)
-        way = f"LINEAR TO {_place(numbers, config)}"
-        return form.before(form.line(way, True, AT_APPROACH))
-
-    def arc(
-        self,
-        file: int,
-        line: int,
-        pieces: Sequence[ArcPiece],
-        via: Floats,
-        config: str,
-        stop: bool,
-    ) -> list[Edit]:
-        """Write pieces of an arc before its move, see `Splitter.arc`."""
-        form = _Form.of(self.programs[file], line)
-        old = _VIA.search(form.code)
-        if old is None:
-            raise CloneError("the point on its way does not stand in the move")
-        text = ""
-        for number, piece in enumerate(pieces):
-            end = old[1] if piece.end is None else _place(piece.end, config)
-            way = f"LINEAR TO {end}"
-            if piece.via is not None:
-                way = f"CIRCULAR TO {end} VIA {_place(piece.via, config)}"
-            mark = AT_VIA if piece.at_via else ""
-            text += form.line(way, stop and number == 0, mark)
-        start = form.start + old.start(1)
-        new = _place(via, config)
-        check_length(form.source, len(form.code) + len(new) - len(old[1]))
-        span = Span(start, start + len(old[1]))
-        return [form.before(text), Edit(span, new.encode("latin-1"))]
-
-
-@dataclass(frozen=True)
-class _Form:
-    """How a move is laid out: what the points in front of it look like.
-
-    Attributes:
-        source: Its file.
-        start: Offset of its line there.
-        code: Its line, without the comment.
-        indent, arm, settings: What begins the line, names the arm, and is set.
-    """
-
-    source: Source
-    start: int
-    code: str
-    indent: str
-    arm: str
-    settings: str
-
-    @classmethod
-    def of(cls, program: Program, line: int) -> _Form:
-        """Look at a move.
-
-        Raises:
-            CloneError: It is not understood.
-        """
+    def layout(self, file: int, line: int) -> Pdl2Layout:
+        """Look at a move, see `LayoutSplitter.layout`."""
+        program = self.programs[file]
         source, code = program.lines.source, code_of(program, line).rstrip()
         head, settings = _HEAD.match(code), _WITH.search(code)
         if head is None:
             raise CloneError("the move is not understood")
         rest = f" {settings[0]}" if settings else ""
         start = int(source.line_starts[line - 1])
-        return cls(source, start, code, head[1], head[2] or "", rest)
+        return Pdl2Layout(source, start, code, head[1], "--", head[2] or "", rest)
 
-    def line(self, way: str, stops: bool, mark: str = "") -> str:
-        """Write a move; a way is told by its trajectory and its points."""
+
+@dataclass(frozen=True)
+class Pdl2Layout(MoveLayout):
+    """How a move is laid out, see `MoveLayout`.
+
+    Attributes:
+        arm, settings: What names the arm, and is set for the move alone.
+    """
+
+    arm: str
+    settings: str
+
+    @property
+    def via(self) -> Span:
+        """Return where the point of an arc stands, see `MoveLayout.via`."""
+        found = _VIA.search(self.code)
+        if found is None:
+            raise CloneError("the point on its way does not stand in the move")
+        return Span(*found.span(1))
+
+    def place(self, numbers: Floats, config: str) -> str:
+        """Write a position, its numbers (6,)."""
+        return (
+            f"POS({', '.join(spell(numbers, PDL2_DIALECT.pose_decimals))}, '{config}')"
+        )
+
+    def move(self, end: str, via: str | None, stops: bool) -> str:
+        """Write a move, see `MoveLayout.move`."""
         word, advance = ("MOVE", "") if stops else ("MOVEFLY", " ADVANCE")
-        one = f"{word} {self.arm}{way}{advance}{self.settings}"
-        new = f"{self.indent}{one} {INSERTED}{mark}"
-        check_length(self.source, len(new))
-        return new + self.source.newline.decode("ascii")
-
-    def before(self, text: str) -> Edit:
-        """Put lines in front of the move."""
-        return Edit(Span(self.start, self.start), text.encode("latin-1"))
-
-
-def _place(numbers: Floats, config: str) -> str:
-    """Write a position, its numbers (6,)."""
-    told = ", ".join(
-        f"{x:.{MM_DECIMALS if k < 3 else DEGREE_DECIMALS}f}"
-        for k, x in enumerate(numbers.tolist())
-    )
-    return f"POS({told}, '{config}')"
+        way = f"LINEAR TO {end}" if via is None else f"CIRCULAR TO {end} VIA {via}"
+        return f"{word} {self.arm}{way}{advance}{self.settings}"
 
 
 def _in_its_text(program: Program, row: int) -> str:

@@ -24,7 +24,7 @@ from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.number_edits import Skeleton
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve
-from postproc.language.pdl2.pose_encoding import AT_APPROACH, AT_VIA, MARK, PDL2_DIALECT
+from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import Program, parse, parse_again
 from postproc.language.pdl2.side_effects import dead_lines
 from postproc.language.pdl2.variable_file import (
@@ -50,6 +50,7 @@ class Pdl2(Language):
     suffixes = Pdl2FileName.programs
     comment = "--"
     dialect = PDL2_DIALECT
+    via_first = False
 
     def recognises(self, text: bytes) -> bool:
         """Tell that a text may be PDL2: what begins as nothing else is taken for it."""
@@ -112,20 +113,6 @@ class Pdl2(Language):
 
         own = [one for one in sources if not Pdl2FileName(one.name).is_variables]
         return Pdl2Splitter([parse(source) for source in own])
-
-    def is_inserted(self, line: bytes) -> bool:
-        """Tell by the comment that such lines end with."""
-        return MARK.search(line) is not None
-
-    def is_approach(self, line: bytes) -> bool:
-        """Tell by that comment as well."""
-        found = MARK.search(line)
-        return found is not None and found[1] == AT_APPROACH.encode()
-
-    def ends_at_via(self, line: bytes) -> bool:
-        """Tell by that comment as well."""
-        found = MARK.search(line)
-        return found is not None and found[1] == AT_VIA.encode()
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]

@@ -16,11 +16,6 @@ MM_DECIMALS, DEGREE_DECIMALS, JOINT_DECIMALS = 3, 4, 5
 COMMENTS = Comments("--", "'")
 FLAG = re.compile(r"([SEW])|T([123])\s*:\s*([+-]?\d+)", re.IGNORECASE)
 
-INSERTED = "-- postproc: inserted"  # ends such a line
-AT_VIA = " (via)"  # .. where it leads to the point on the way of an arc
-AT_APPROACH = " (approach)"  # .. where it is a stop from which a target is reached
-MARK = re.compile(rb"-- postproc: inserted( \((?:via|approach)\))?[ \t]*\r?$")
-
 _STOPS = (
     "${} is TRUE, and the path arrives on another {} than the configuration string "
     "says: the controller stops here"

@@ -160,7 +160,7 @@ class RapidCloner(Cloner):
             return self._beside(points, declared)
         first, last = source.line_of(begin), source.line_of(max(end - 1, begin))
         before = source.text[int(source.line_starts[first - 1]) : begin]
-        if before.strip() or not _ends_line(source, end):
+        if before.strip() or not ends_line(source, end):
             raise CloneError("its declaration shares a line with other code")
         return point.file, insert_after(source, last, before + declared)
 
@@ -177,7 +177,7 @@ class RapidCloner(Cloner):
         if any(isinstance(one, said.RecordHead | said.TypeAlias) for one in rows):
             raise CloneError("the module of its moves defines types, which stand first")
         begin, end = text.span(modules[0].first)
-        if not _ends_line(text.source, end):
+        if not ends_line(text.source, end):
             raise CloneError("other code stands on the line of its module")
         line = text.source.line_of(max(end - 1, begin))
         return file, insert_after(text.source, line, f"  {declared}")
@@ -195,7 +195,7 @@ def _quiet(text: str) -> str:
     return _QUIET.sub(lambda found: " " * len(found.group()), text)
 
 
-def _ends_line(source: Source, end: int) -> bool:
+def ends_line(source: Source, end: int) -> bool:
     """Return True if nothing but a comment stands behind a statement on its line."""
     rest = re.match(r"[ \t]*;?[ \t]*(![^\r\n]*)?(?=[\r\n]|\Z)", source.text[end:])
     return rest is not None

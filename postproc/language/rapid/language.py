@@ -20,6 +20,7 @@ from postproc.language.language import (
     Cloner,
     JobReading,
     Language,
+    Splitter,
     Start,
 )
 from postproc.language.measuring_program import MeasuringProgram
@@ -88,6 +89,13 @@ class Rapid(Language):
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the modules of a task to clone points in them."""
         return RapidCloner.of(*_tasks(sources, Start()))
+
+    def splitter(self, sources: Sequence[Source]) -> Splitter:
+        """Parse the modules of a task to put points on the ways of its moves."""
+        from postproc.language.rapid.insert_moves import RapidSplitter
+
+        task, beside = _tasks(sources, Start())
+        return RapidSplitter(task, tuple(beside))
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.comment_directives import Comments
-from postproc.language.pose_encoding import Dialect, Terms
+from postproc.language.pose_encoding import WIDEST, Dialect, Terms
 from postproc.robot.pose import MM
 
 MM_DECIMALS, QUATERNION_DECIMALS, JOINT_DECIMALS = 3, 6, 5
@@ -77,6 +77,11 @@ class RapidNumbers(Dialect):
     )
     joint_decimals: tuple[int, ...] = (JOINT_DECIMALS,) * WIDTH
 
+    @property
+    def widest(self) -> tuple[float, ...]:
+        """Return numbers that none of a pose is longer than, see `Dialect.widest`."""
+        return (WIDEST,) * 3 + (-1.0,) * 8
+
     def poses(self, values: Floats) -> Floats:
         """Return the poses (k, 4, 4) [m] that numbers (k, 11) say."""
         values = np.asarray(values, dtype=float)
@@ -117,6 +122,12 @@ class RapidNumbers(Dialect):
         words = [w for w, bit in (("S", 2), ("E", 1), ("W", 4)) if slot[0] & bit]
         said = [f"T{k + 1}:{t:g}" for k, t in enumerate(turns[0]) if t == t]
         return " ".join([*words, *said])
+
+    def count_flags(self, values: Floats, q: Floats) -> Floats:
+        """Count the quarter turns of new poses, see `Dialect.count_flags`."""
+        out = np.array(values)
+        out[:, 7:10] = np.floor(q[:, COUNTED] / QUARTER)
+        return out
 
     def rewrite_flags(self, values: Floats, q: Floats, before: Floats) -> Floats:
         """Count the quarter turns anew of joints that left theirs, see `Dialect`.

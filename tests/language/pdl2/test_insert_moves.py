@@ -141,7 +141,3 @@ def test_an_arc_through_a_variable_is_not_cut() -> None:
     splitter = Pdl2().splitter([source("MOVE CIRCULAR TO p VIA r")])
     with pytest.raises(CloneError, match="on its way"):
         splitter.arc(0, LINE, [ArcPiece(None, None, True)], np.zeros(6), "", False)
-
-
-def test_rapid_has_no_points_yet() -> None:
-    assert language_of("a.mod").splitter([]) is None

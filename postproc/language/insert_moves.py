@@ -1,0 +1,155 @@
+"""Points on the way of a move: moves in front of it, laid out as it is."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from postproc.arrays import Floats
+from postproc.language.comment_directives import AT_APPROACH, AT_VIA, INSERTED
+from postproc.language.language import ArcPiece, Splitter
+from postproc.language.source import (
+    LONGEST_LINE,
+    CloneError,
+    Edit,
+    Source,
+    Span,
+    check_length,
+)
+
+PASSED_MM = 0.3  # size of the zone of inserted points, where they have one of their own
+
+
+@dataclass(frozen=True)
+class MoveLayout(ABC):
+    """How a move is laid out: what the moves in front of it look like.
+
+    Attributes:
+        source: Its file.
+        start: Offset of its line there.
+        code: Its line, without the comment.
+        indent: What begins the line.
+        comment: What comments of its language begin with.
+        longest: Characters that a line of the language may have.
+    """
+
+    source: Source
+    start: int
+    code: str
+    indent: str
+    comment: str
+    longest: int = field(default=LONGEST_LINE, kw_only=True)
+
+    @property
+    @abstractmethod
+    def via(self) -> Span:
+        """Return where in the line the numbers of the point of an arc stand.
+
+        Raises:
+            CloneError: They stand elsewhere.
+        """
+
+    @abstractmethod
+    def place(self, numbers: Floats, config: str) -> str:
+        """Write a position, its numbers (w,)."""
+
+    @abstractmethod
+    def move(self, end: str, via: str | None, stops: bool) -> str:
+        """Write a move to a place, along an arc where `via` is a point on its way."""
+
+    def line(self, end: str, via: str | None, stops: bool, mark: str = "") -> str:
+        """Write a line with a move."""
+        move = self.move(end, via, stops)
+        new = f"{self.indent}{move} {self.comment} {INSERTED}{mark}"
+        check_length(self.source, len(new), self.longest)
+        return new + self.source.newline.decode("ascii")
+
+    def before(self, text: str) -> Edit:
+        """Put lines in front of the move."""
+        return Edit(Span(self.start, self.start), text.encode("latin-1"))
+
+
+class LayoutSplitter(Splitter):
+    """Puts points on ways by the layouts of moves."""
+
+    @abstractmethod
+    def layout(self, file: int, line: int) -> MoveLayout:
+        """Look at a move.
+
+        Raises:
+            CloneError: It is not understood.
+        """
+
+    def points(
+        self, file: int, line: int, numbers: Floats, config: str, stop: bool
+    ) -> Edit:
+        """Write moves to points before another one, see `Splitter.points`."""
+        layout, text = self.layout(file, line), ""
+        for number, own in enumerate(numbers):
+            text += layout.line(layout.place(own, config), None, stop and number == 0)
+        return layout.before(text)
+
+    def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
+        """Write a stop to approach a target from, see `Splitter.approach`."""
+        layout = self.layout(file, line)
+        place = layout.place(numbers, config)
+        return layout.before(layout.line(place, None, True, AT_APPROACH))
+
+    def arc(
+        self,
+        file: int,
+        line: int,
+        pieces: Sequence[ArcPiece],
+        via: Floats,
+        config: str,
+        stop: bool,
+    ) -> list[Edit]:
+        """Write pieces of an arc before its move, see `Splitter.arc`."""
+        layout, text = self.layout(file, line), ""
+        begin, behind = layout.via
+        old, new = layout.code[begin:behind], layout.place(via, config)
+        for number, piece in enumerate(pieces):
+            end = old if piece.end is None else layout.place(piece.end, config)
+            way = None if piece.via is None else layout.place(piece.via, config)
+            mark = AT_VIA if piece.at_via else ""
+            text += layout.line(end, way, stop and number == 0, mark)
+        length = len(layout.code) + len(new) - len(old)
+        check_length(layout.source, length, layout.longest)
+        span = Span(layout.start + begin, layout.start + behind)
+        return [layout.before(text), Edit(span, new.encode("latin-1"))]
+
+
+def spell(numbers: Floats, decimals: Sequence[int]) -> list[str]:
+    """Write numbers with so many decimals each.
+
+    >>> spell([1.0, -0.25], (3, 0))
+    ['1.000', '-0']
+    """
+    return [f"{x:.{d}f}" for x, d in zip(numbers, decimals, strict=True)]
+
+
+def split_arguments(text: str, quote: str = '"') -> list[Span]:
+    """Split a text at its commas outside of brackets and strings, blanks stripped.
+
+    Raises:
+        CloneError: A bracket or a string does not end.
+
+    >>> [tuple(part) for part in split_arguments(" a(1, 2), [b,c] ")]
+    [(1, 8), (10, 15)]
+    """
+    depth, quoted, ends = 0, False, [-1]
+    for at, sign in enumerate(text):
+        quoted ^= sign == quote
+        if not quoted:
+            depth += (sign in "([{") - (sign in ")]}")
+            if sign == "," and depth == 0:
+                ends.append(at)
+    if depth or quoted:
+        raise CloneError("the move is not understood")
+    found = []
+    for begin, end in zip(ends, [*ends[1:], len(text)], strict=True):
+        part = text[begin + 1 : end]
+        first = begin + 1 + len(part) - len(part.lstrip())
+        found.append(Span(first, first + len(part.strip())))
+    return found

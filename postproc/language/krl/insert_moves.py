@@ -1,0 +1,205 @@
+"""Points on the way of a move: LIN and CIRC before it, laid out as it is."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from postproc.arrays import Floats
+from postproc.language.insert_moves import (
+    PASSED_MM,
+    LayoutSplitter,
+    MoveLayout,
+    spell,
+    split_arguments,
+)
+from postproc.language.krl import syntax as said
+from postproc.language.krl.clones import is_of_form
+from postproc.language.krl.modal_state import PLANNED
+from postproc.language.krl.pose_encoding import COMPONENTS, KRL_DIALECT
+from postproc.language.krl.program import KrlFile
+from postproc.language.source import CloneError, Span
+
+LINES = {"lin": "LIN", "circ": "LIN", "slin": "SLIN", "scirc": "SLIN"}
+_HEAD = re.compile(r"\s*(S?LIN|S?CIRC)\b", re.I)
+_BLENDING = re.compile(r"(?:\s*\bC_\w+)+\s*$", re.I)
+_WITH = re.compile(r"\bWITH\b", re.I)
+_ACTUAL = re.compile(rb"\$(?:POS|AXIS)_(?:BACK|FOR|RET)\b|\$DIST_NEXT\b", re.I)
+_READS = re.compile(rb"\$(?:POS|AXIS)_(?:ACT|INT)(?:_\w+)?\b|\$DISTANCE\b", re.I)
+_ACTIVE = frozenset(["fdat_act", "pdat_act", "ldat_act"])
+_STOPPED = "ir_stopm"  # the controller's own, in every program of an inline form
+_Row = tuple[int, int]  # a file, and a statement of it
+
+
+@dataclass(frozen=True)
+class KrlSplitter(LayoutSplitter):
+    """The files of a job, to put points on the ways of moves.
+
+    Attributes:
+        files: The files.
+    """
+
+    files: tuple[KrlFile, ...]
+    unsized: str = (
+        "points on its way would be passed at a distance that is not known: set "
+        "$APO.CDIS before it"
+    )
+    keeps_aux: bool = True
+
+    def hinders(self, file: int, line: int) -> str:
+        """Say why a move must stay in one piece, see `Splitter.hinders`."""
+        own = self.files[file]
+        row = _row_of(own, line)
+        move = own.text.statement(row)
+        if not isinstance(move, said.KrlMove):
+            return "it does not stand alone on its line"
+        for problem, hinders in (
+            (self._beside, bool(self._beside)),
+            ("it stands in a file of the controller, which is not rewritten",
+             own.is_system),
+            ("it stands in a spline block, whose curve depends on all of its points",
+             any(row in rows for rows in own.splines)),
+            ("it is neither a line nor an arc to a place", move.word not in LINES),
+            ("it ends at an angle (CA)", move.angle is not None),
+            ("a TRIGGER belongs to it, or to a move beside it",
+             self._triggered is None or (file, row) in self._triggered),
+            ("an inline form would drop the points when it is edited",
+             is_of_form(own.text.source, line)),
+        ):  # fmt: skip
+            if hinders:
+                return problem
+        return ""
+
+    def _statements(self) -> Iterator[said.SourceStatement]:
+        """Yield the statements of the user's files, one of each form."""
+        for file in self.files:
+            if not file.is_system:
+                yield from file.text.said
+
+    @cached_property
+    def _beside(self) -> str:
+        """Say why no move may be split: what counts moves, or reads where they are."""
+        own = [*self._statements()]
+        if any(isinstance(one, said.ContinueWord) for one in own):
+            return "the program runs ahead of its moves (CONTINUE)"
+        texts = [one.text.source.data for one in self.files if not one.is_system]
+        if any(map(_ACTUAL.search, texts)):
+            return "the program reads where the move under way begins or ends"
+        watched = any(
+            isinstance(one, said.InterruptDeclared)
+            and getattr(one.action, "name", "") != _STOPPED
+            for one in own
+        )
+        if watched and any(map(_READS.search, texts)):
+            return "an interrupt may read where the arm is on its way"
+        return ""
+
+    @cached_property
+    def _triggered(self) -> frozenset[_Row] | None:
+        """Return moves with triggers, and those beside them; None for all moves."""
+        found = set[_Row]()
+        for number, file in enumerate(self.files):
+            moves, text = file.moves, file.text
+            for row in text.where(lambda one: isinstance(one, said.PathTrigger)):
+                at = bisect(moves, row)
+                if at == len(moves) or not all(
+                    isinstance(text.statement(k), said.PathTrigger | said.SplineBlock)
+                    or _is_setting(text.statement(k))
+                    for k in range(row, moves[at])
+                ):
+                    return None  # which move it belongs to does not show
+                found |= {(number, k) for k in moves[max(at - 1, 0) : at + 2]}
+        return frozenset(found)
+
+    def stops(self, file: int, line: int) -> bool:
+        """Return True if the arm may stop once more, see `Splitter.stops`."""
+        own = self.files[file]
+        for one in map(own.text.statement, range(_row_of(own, line) - 1, -1, -1)):
+            if not _is_setting(one):
+                return isinstance(one, said.KrlMove)
+        return False
+
+    def layout(self, file: int, line: int) -> KrlLayout:
+        """Look at a move, see `LayoutSplitter.layout`."""
+        text = self.files[file].text
+        source, (_, end) = text.source, text.span(_row_of(self.files[file], line))
+        start = int(source.line_starts[line - 1])
+        code = source.text[start:end].rstrip()
+        head = _HEAD.match(code)
+        if head is None:
+            raise CloneError("the move is not understood")
+        blending = _BLENDING.search(code)
+        stop = blending.start() if blending else len(code)
+        with_ = _WITH.search(code, head.end(), stop)
+        behind = with_.start() if with_ else stop
+        skip = head.end()
+        ends = [Span(a + skip, b + skip) for a, b in split_arguments(code[skip:behind])]
+        settings = code[with_.end() : stop].strip() if with_ else ""
+        indent, word = code[: head.start(1)], head[1].lower()
+        return KrlLayout(source, start, code, indent, ";", word, ends[0], settings)
+
+
+def _row_of(file: KrlFile, line: int) -> int:
+    """Return the only move on a line.
+
+    Raises:
+        CloneError: There are others.
+    """
+    rows = [row for row in file.moves if file.text.line(row) == line]
+    if len(rows) != 1:
+        raise CloneError("no single move stands on its line")
+    return rows[0]
+
+
+def _is_setting(one: said.SourceStatement) -> bool:
+    """Return True if a statement sets how moves are made, and does nothing else."""
+    if isinstance(one, said.Assignment):
+        return one.target.name in PLANNED or one.target.name in _ACTIVE
+    if not isinstance(one, said.Instruction) or one.name != "bas":
+        return False
+    command = one.arguments[0].value if one.arguments else None
+    return isinstance(command, said.EnumValue) and not command.name.startswith("#out_")
+
+
+@dataclass(frozen=True)
+class KrlLayout(MoveLayout):
+    """How a move is laid out, see `MoveLayout`.
+
+    Attributes:
+        word: Of the move, in lower case.
+        first: Where its first place stands in the line.
+        settings: What holds for the move alone, as it is written.
+    """
+
+    word: str
+    first: Span
+    settings: str
+
+    @property
+    def via(self) -> Span:
+        """Return where the point of an arc stands, see `MoveLayout.via`."""
+        if self.code[self.first.start] != "{":
+            raise CloneError("the point on its way does not stand in the move")
+        return self.first
+
+    def place(self, numbers: Floats, config: str) -> str:
+        """Write a position, its numbers (8,); lines and arcs ignore S and T."""
+        told = spell(numbers[:6], KRL_DIALECT.pose_decimals[:6])
+        named = zip(COMPONENTS, told, strict=False)
+        return f"{{{','.join(f'{name.upper()} {x}' for name, x in named)}}}"
+
+    def move(self, end: str, via: str | None, stops: bool) -> str:
+        """Write a move, see `MoveLayout.move`."""
+        word = LINES[self.word] if via is None else self.word.upper()
+        way = end if via is None else f"{via},{end}"
+        spline = self.word.startswith("s")
+        settings = self.settings
+        if spline and not stops and "$APO" not in settings.upper():
+            zone = f"$APO.CDIS={PASSED_MM}"
+            settings = f"{settings},{zone}" if settings else zone
+        with_ = f" WITH {settings}" if settings else ""
+        blending = "" if stops else " C_SPL" if spline else " C_DIS"
+        return f"{word} {way}{with_}{blending}"
