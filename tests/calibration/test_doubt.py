@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ ONE_DECIMAL, EXACT = 1, 5
 Case = tuple[Fit, Measurements, States, np.ndarray]
 
 
+@cache
 def campaign(
     seed: int,
     soft: tuple[float, float, float],

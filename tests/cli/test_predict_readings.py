@@ -18,6 +18,7 @@ AT, TURN = np.array([4.0, -3.0, 1.5]), Rotation.from_euler("ZYX", [2.0, 0.02, 0.
 AWAY, TURNED = np.array([-2.0, 3.5, 1.2]), Rotation.from_euler("ZYX", [-1.0, 0.0, 0.03])
 PILLARS = np.array([[2.0, 2.0, 0.5], [-1.5, 2.5, 1.5], [1.0, -2.5, 1.0]])
 EFFECTS = ("--effects", "geometry,backlash,tracker_drift")
+_fitted: dict[tuple[bytes, tuple[str, ...]], bytes] = {}  # models by their surveys
 RESIDUAL = re.compile(r"residual mean ([\d.]+) mm")
 
 
@@ -81,8 +82,14 @@ class Campaign:
 
     def fit(self, data: Path, *options: str) -> Path:
         model = self.folder / "m.json"
-        found = cli("fit", data, "--cell", self.cell, "-o", model, *EFFECTS, *options)
-        assert found.exit_code == 0, found.stderr
+        key = data.read_bytes(), options
+        if key not in _fitted:
+            found = cli(
+                "fit", data, "--cell", self.cell, "-o", model, *EFFECTS, *options
+            )
+            assert found.exit_code == 0, found.stderr
+            _fitted[key] = model.read_bytes()
+        model.write_bytes(_fitted[key])
         return model
 
     def predict(self, data: Path, *options: str):  # type: ignore[no-untyped-def]

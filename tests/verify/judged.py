@@ -84,9 +84,16 @@ def shipped(
     name: str, models: Mapping[str, Model], options: Options = DEFAULT_OPTIONS
 ) -> Compensated:
     """Compensate one of `programs/` with the model of its own arm."""
-    cell = load_cell(PROGRAMS / SHIPPED[name])
-    files = read_files(PROGRAMS / name)
-    return compensated(files, cell, models[SHIPPED[name]], options)
+    model = models[SHIPPED[name]]
+    key = name, model.id, options
+    if key not in _shipped:
+        cell = load_cell(PROGRAMS / SHIPPED[name])
+        files = read_files(PROGRAMS / name)
+        _shipped[key] = compensated(files, cell, model, options)
+    return _shipped[key]
+
+
+_shipped: dict[tuple[str, str, Options], Compensated] = {}
 
 
 def own_models(folder: Path) -> dict[str, Model]:

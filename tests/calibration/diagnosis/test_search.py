@@ -21,11 +21,9 @@ from tests.slow import slow
 from tests.undeclared_score import close, ok
 from tests.undeclared_trial import moved, run, without_rigid
 
-PLANTED = [
-    ("compliance", 300, 0.5),
-    ("joint_step", 313, 0.3),
-]
+PLANTED = [("compliance", 300, 0.5)]
 MORE_PLANTED = [
+    ("joint_step", 313, 0.3),
     ("payload", 301, 0.5),
     ("transmission_free", 302, 0.5),
     ("coupling", 303, 1.0),

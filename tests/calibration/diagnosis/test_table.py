@@ -7,7 +7,7 @@ import pytest
 
 from postproc.calibration.diagnosis.candidates import Library, Projection
 from postproc.calibration.diagnosis.investigate import Investigation, no_progress, trace
-from postproc.calibration.diagnosis.score import rank_some
+from postproc.calibration.diagnosis.score import Null, rank_some
 from postproc.calibration.diagnosis.search import Search, ranking, search
 from postproc.calibration.diagnosis.table import Causes, Table
 from postproc.calibration.regression import Fit
@@ -105,9 +105,14 @@ def test_an_empty_campaign_adds_no_cell() -> None:
         assert trace(empty, seed=0).findings == ()
 
 
-def test_a_threshold_holds_for_names_and_cells_together(base: Fit) -> None:
-    view = Projection.of(base)
-    both = Causes.of(base).null(view, seed=0)
+@pytest.fixture(scope="module")
+def null(base: Fit) -> Null:
+    """Thresholds of names and cells together."""
+    return Causes.of(base).null(Projection.of(base), seed=0)
+
+
+def test_a_threshold_holds_for_names_and_cells_together(base: Fit, null: Null) -> None:
+    view, both = Projection.of(base), null
     assert both.cells is not None
     scores = ranking(view, Causes.of(base))
     cell = next(s for s in scores if s.family.effect == PART_MOTION)
@@ -117,11 +122,10 @@ def test_a_threshold_holds_for_names_and_cells_together(base: Fit) -> None:
 
 
 def test_several_names_stand_for_a_cell_only_where_they_explain_more(
-    base: Fit,
+    base: Fit, null: Null, traced: Investigation
 ) -> None:
     """A link that bends with the temperature is no chain of three other names."""
     names = Causes(Library.of(base))
-    null = Causes.of(base).null(Projection.of(base), seed=0)
     without: Search = search(base, names, null, no_progress)
-    within = trace(base, seed=0).search
+    within = traced.search
     assert within.fit.log_evidence > without.fit.log_evidence

@@ -176,13 +176,20 @@ def test_flanks_that_a_measured_path_refutes_get_fewer_points(shop: Path) -> Non
         assert refuted["promise_mm"] >= usual["promise_mm"]
 
 
-def test_a_measured_path_that_does_not_tell_changes_nothing(shop: Path) -> None:
-    known(shop, "uncertain")
+@pytest.fixture(scope="module")
+def cautious(shop: Path) -> Path:
+    """Points of a model that no measured path has judged."""
     asked = ("--path-tolerance", TOLERANCE)
-    for name in ("uncertain", "model"):
-        compensated(shop, "job.pdl", f"by_{name}", *asked, model=name)
-    texts = [(shop / f"by_{n}.pdl").read_bytes().split(b"\n", 1)[1]
-             for n in ("uncertain", "model")]  # fmt: skip
+    compensated(shop, "job.pdl", "cautious", *asked, model="model")
+    return shop
+
+
+def test_a_measured_path_that_does_not_tell_changes_nothing(cautious: Path) -> None:
+    known(cautious, "uncertain")
+    asked = ("--path-tolerance", TOLERANCE)
+    compensated(cautious, "job.pdl", "untold", *asked, model="uncertain")
+    texts = [(cautious / f"{n}.pdl").read_bytes().split(b"\n", 1)[1]
+             for n in ("untold", "cautious")]  # fmt: skip
     assert texts[0] == texts[1]
 
 
@@ -199,15 +206,13 @@ def test_points_are_kept_beside_a_start_that_nothing_mends(shop: Path) -> None:
 
 @pytest.mark.parametrize("gears", ["sharp", "elastic"])
 def test_points_do_no_harm_where_no_measured_path_says_how_flanks_change(
-    shop: Path, gears: str
+    cautious: Path, gears: str
 ) -> None:
-    asked = ("--path-tolerance", TOLERANCE)
-    cautious = compensated(shop, "job.pdl", "cautious", *asked, model="model")
-    assert any(path["inserted"] for path in cautious["path"])
+    assert any(path["inserted"] for path in told(cautious, "cautious")["path"])
     scores = []
     for name in ("cautious", "plain"):
-        run = simulate_file(shop / f"{name}.pdl", CELL, SEED, path=True, gears=gears,
-                            reference=shop / "job.pdl")  # fmt: skip
+        run = simulate_file(cautious / f"{name}.pdl", CELL, SEED, path=True,
+                            gears=gears, reference=cautious / "job.pdl")  # fmt: skip
         assert run.paths is not None
         scores.append(run.paths)
     new, old = scores

@@ -16,6 +16,7 @@ from postproc.compensation.paths.path_error import apart
 from postproc.compensation.program import plan_visits, prepare_cell, read_program
 from postproc.compensation.timing_comparison import InTime, run_in_time
 from postproc.language.visits import Visits
+from postproc.model.effects import BASE_EFFECTS
 from postproc.model.flank_hypotheses import FlankKind
 from postproc.model.model import load_model
 from postproc.report.simulation import setup_of, visits_of
@@ -86,7 +87,9 @@ def fitted() -> bytes:
         done("survey", "--cell", CELL, *DESIGN, "-o", survey)
         measured = folder / "survey.csv"
         done("simulate", survey, "--cell", CELL, *ARM, "-o", measured)
-        done("fit", measured, "--cell", CELL, "-o", model)
+        # All that this arm has: to look for effects would fit ten times.
+        effects = ",".join(BASE_EFFECTS)
+        done("fit", measured, "--cell", CELL, "-o", model, "--effects", effects)
         return model.read_bytes()
 
 
