@@ -113,7 +113,7 @@ def write_survey(
         OutputError: The program cannot be written.
     """
     cell = as_cell(cell)
-    language = _language_for(cell, output)
+    language = language_for(cell, output)
     asked = cell.file.survey or SurveySection()
     arm, probes = cell.arm, cell.probes
     arrivals = None if job is None else plan_arrivals(job, cell)
@@ -138,7 +138,7 @@ def write_survey(
     return summary
 
 
-def _language_for(cell: Cell, output: Path) -> Language:
+def language_for(cell: Cell, output: Path) -> Language:
     """Return the language that a survey is written in.
 
     A file that is no program by its name is one of the arm's controller. A controller

@@ -59,18 +59,28 @@ def survey(
         Path | None,
         typer.Option("--job", help="Program whose working volume is surveyed."),
     ] = None,
+    iso: Annotated[
+        bool,
+        typer.Option("--iso9283", help="Write a test after ISO 9283 instead."),
+    ] = False,
     changes: SetSurvey = None,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
+    from postproc.calibration.iso9283.program import write_iso_program
     from postproc.calibration.survey_program import write_survey
     from postproc.robot.cell import load_cell
 
     with report_errors():
+        if iso and job is not None:
+            raise PostprocError("--iso9283 has poses of its own. Leave out --job")
         cell = cell_file(cell, output)
         check_places([output], [cell, job])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
-            summary = write_survey(loaded, output, poses, job)
+            if iso:
+                summary = write_iso_program(loaded, output)
+            else:
+                summary = write_survey(loaded, output, poses, job)
         say(summary)
 
 
