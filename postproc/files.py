@@ -461,6 +461,7 @@ SCHEMAS = {
     "explanation": 2,
     "fit": 1,
     "history": 1,
+    "iso9283": 1,
     "report": 2,
     "simulation": 1,
     "tree": 1,

@@ -48,7 +48,7 @@ def test_commands_that_are_only_named_exist(page):
         return  # names what is no more, too
     known, text = options(), page.read_text(encoding="utf-8")
     text = text.replace("\\\n", " ")
-    named = r"(?m)(?:`|\$ |\| |^ {4})postproc ([a-z]+)([^`|\n]*)"
+    named = r"(?m)(?:`|\$ |\| |^ {4})postproc ([a-z][a-z0-9]*)([^`|\n]*)"
     for name, rest in re.findall(named, text):
         assert name in known, f"{page}: there is no postproc {name}"
         given = set(re.findall(r"(?<!\S)--[a-z][\w-]*", rest))

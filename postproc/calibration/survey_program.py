@@ -179,7 +179,7 @@ def write_check(
 
 def _write(cell: Cell, output: Path, program: MeasuringProgram) -> None:
     """Write a measuring program in the language that its file names."""
-    text = _language_for(cell, output).write_measuring(program, output)
+    text = language_for(cell, output).write_measuring(program, output)
     write_all({output: text.encode("ascii")})
 
 
@@ -230,7 +230,7 @@ def write_survey(
         OutputError: The program cannot be written.
     """
     cell = as_cell(cell)
-    _language_for(cell, output)
+    language_for(cell, output)
     asked = cell.file.survey or SurveySection()
     arm, probes = cell.arm, cell.probes
     arrivals = None if job is None else plan_arrivals(job, cell)
@@ -255,7 +255,7 @@ def write_survey(
     return "\n".join(filter(None, told))
 
 
-def _language_for(cell: Cell, output: Path) -> Language:
+def language_for(cell: Cell, output: Path) -> Language:
     """Return the language that a survey is written in.
 
     A file that is no program by its name is one of the arm's controller. A controller

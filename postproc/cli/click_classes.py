@@ -8,7 +8,16 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 GROUPS = {
-    "Calibrate": ("survey", "read", "fit", "diagnose", "history", "compare", "predict"),
+    "Calibrate": (
+        "survey",
+        "read",
+        "fit",
+        "diagnose",
+        "history",
+        "compare",
+        "predict",
+        "iso9283",
+    ),
     "Compensate": ("compensate", "explain", "batch"),
     "Check": ("diff", "check", "restore", "report"),
     "Set up and try": ("init", "arm", "simulate"),

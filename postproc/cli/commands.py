@@ -9,13 +9,16 @@ import typer
 from typer.models import CommandInfo
 
 from postproc import __version__
-from postproc.cli import arms, loop, models, plant, programs, setup
+from postproc.cli import arms, iso9283, loop, models, plant, programs, setup
 from postproc.cli.click_classes import Command
 from postproc.cli.common import app, epilog, guard_output
 
 NAME = "__name__"  # a command is called like its function
 
-__all__ = ["app", "application", "arms", "loop", "models", "plant", "programs", "setup"]
+__all__ = [
+    "app", "application", "arms", "iso9283", "loop", "models", "plant", "programs",
+    "setup",
+]  # fmt: skip
 
 
 def _name_of(command: CommandInfo) -> str:

@@ -275,7 +275,15 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc explain job.pdl --cell cell.toml",
         "postproc explain job.pdl --cell cell.toml --model model.json --line 42",
     ),
-    "survey": ("postproc survey --cell cell.toml --poses 300 -o survey.pdl",),
+    "survey": (
+        "postproc survey --cell cell.toml --poses 300 -o survey.pdl",
+        "postproc survey --cell cell.toml --iso9283 -o iso.pdl",
+    ),
+    "iso9283": (
+        "postproc iso9283 readings.csv --before before.csv --load '118 kg'"
+        " --speed '200 mm/s'",
+        "postproc iso9283 measured.csv --program iso.pdl --cell cell.toml",
+    ),
     "simulate": (
         "postproc simulate survey.pdl --cell cell.toml -o measured.csv",
         "postproc simulate out/job.pdl --cell cell.toml --reference job.pdl",

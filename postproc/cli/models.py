@@ -68,27 +68,46 @@ def survey(
         Path | None,
         typer.Option("--model", help="Model whose largest effects a check looks at."),
     ] = None,
+    iso: Annotated[
+        bool,
+        typer.Option("--iso9283", help="Write a test after ISO 9283 instead."),
+    ] = False,
     changes: SetSurvey = None,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
+    from postproc.calibration.iso9283.program import write_iso_program
     from postproc.calibration.survey_program import write_check, write_survey
     from postproc.model.model import load_model
     from postproc.robot.cell import load_cell
 
     with report_errors():
-        if checks is not None and job is not None:
-            raise PostprocError("--checks and --job: leave one of them out")
+        _refuse_both({"--checks": checks is not None, "--job": job is not None,
+                      "--iso9283": iso})  # fmt: skip
         asked, cell = cell, cell_file(cell, output)
         check_places([output], [cell, job, model])
         loaded = load_cell(cell, changes=changes_of(changes))
         with busy("choose poses"):
-            if checks is None:
+            if iso:
+                summary = write_iso_program(loaded, output)
+            elif checks is None:
                 summary = write_survey(loaded, output, poses, job)
             else:
                 known = None if model is None else load_model(model)
                 summary = write_check(loaded, output, checks, known)
         say(summary)
         suggest("read", "MEASURED.csv", "--program", output, cell=asked)
+
+
+def _refuse_both(given: dict[str, bool]) -> None:
+    """Refuse options of which each names other poses.
+
+    Raises:
+        PostprocError: There are several.
+    """
+    names = [name for name, is_there in given.items() if is_there]
+    if len(names) > 1:
+        problem = " and ".join(names)
+        raise PostprocError(f"{problem}: each names other poses. Give one of them")
 
 
 @app.command()

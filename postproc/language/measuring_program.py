@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from postproc.arrays import Floats
 from postproc.exceptions import ProgramError
 
 SLOW = 200.0  # [mm/s] of the tool, where a move must say how fast it is
+CORNER_MM = 5  # from a corner that is flown through, where a language says how far
 SHARE = 20  # [%] of the speed of the axes, where the program says it once
 GENTLY = 50  # [%] of their acceleration
 NAME = 24  # letters that every controller takes
@@ -40,6 +44,32 @@ class MeasuringMove:
     measured: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class MeasuringLine:
+    """A straight move of the mounted probe point at `SLOW`.
+
+    Attributes:
+        pose: Where it ends: the probe point, turned like the flange, in the world,
+            (4, 4) [m].
+        joints_deg: Joint angles at its end.
+        slot: Their branch, 4 W + 2 S + E.
+        flown: It goes on into the next line without a stop, within `CORNER_MM`.
+    """
+
+    pose: Floats
+    joints_deg: tuple[float, ...]
+    slot: int
+    flown: bool = False
+
+    @property
+    def q(self) -> Floats:
+        """Return the joint angles at its end, (1, 6) [rad]."""
+        return np.deg2rad([self.joints_deg])
+
+
+MeasuringStep = MountedProbe | MeasuringMove | MeasuringLine
+
+
 @dataclass(frozen=True)
 class MeasuringProgram:
     """What a survey does.
@@ -47,7 +77,8 @@ class MeasuringProgram:
     Attributes:
         name: Of the program: letters, digits, ``_``.
         heading: Comments that it begins with.
-        steps: What it does, one behind the other; first a probe point is mounted.
+        steps: What it does, one behind the other; first a probe point is mounted. A
+            line begins where a joint move or a line ended.
         settle_s: How long it stands still to be measured [s].
         mass_kg: What the arm carries, NaN where that is not known.
         centre_mm: Centre of that mass in the flange frame.
@@ -55,7 +86,7 @@ class MeasuringProgram:
 
     name: str
     heading: tuple[str, ...]
-    steps: tuple[MountedProbe | MeasuringMove, ...]
+    steps: tuple[MeasuringStep, ...]
     settle_s: float
     mass_kg: float
     centre_mm: tuple[float, ...]
@@ -64,6 +95,11 @@ class MeasuringProgram:
     def probes(self) -> tuple[MountedProbe, ...]:
         """Return the probe points in their order."""
         return tuple(one for one in self.steps if isinstance(one, MountedProbe))
+
+    @property
+    def has_lines(self) -> bool:
+        """Whether any of its moves is straight."""
+        return any(isinstance(one, MeasuringLine) for one in self.steps)
 
 
 def is_measuring_program(text: bytes) -> bool:

@@ -15,8 +15,8 @@ from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 
 COMMANDS = (
     "compensate", "diff", "restore", "explain", "survey", "simulate", "fit", "predict",
-    "diagnose", "read", "init", "compare", "batch", "check", "report", "history",
-    "arm list", "arm from-urdf", "arm from-machine-dat",
+    "diagnose", "read", "init", "compare", "iso9283", "batch", "check", "report",
+    "history", "arm list", "arm from-urdf", "arm from-machine-dat",
 )  # fmt: skip
 UNREACHED = "MOVE LINEAR TO POS(9000.0, 0.0, 0.0, 0.0, 175.0, 0.0, '')"
 STAMP = rb"-- postproc \S+ model=[0-9a-f]{16} source=[0-9a-f]{64}"

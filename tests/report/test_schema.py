@@ -20,6 +20,7 @@ COMMANDS = {
         "--effects", "geometry", "--report", "-",
     ),
     "history": ("history", "model.json", "--report", "-"),
+    "iso9283": ("iso9283", "poses.csv", "--report", "-"),
     "report": (
         "compensate", "job.pdl", "--cell", "cell.toml", "--model", "model.json",
         "-o", "new.pdl", "--report", "-",
@@ -43,6 +44,8 @@ def folder(job_folder, tmp_path_factory):
     for name in ("cell.toml", "model.json"):
         (place / name).write_bytes((job_folder / name).read_bytes())
     (place / "rows.csv").write_bytes((job_folder / "survey.csv").read_bytes())
+    head = "pose,cycle,x_cmd_mm,y_cmd_mm,z_cmd_mm,x_mm,y_mm,z_mm\n"
+    (place / "poses.csv").write_text(head + "P1,1,0,0,0,0,0,1\nP1,2,0,0,0,0,0,2\n")
     (place / "job.pdl").write_bytes(program("job", 2, 1))
     for name in ("out", "nominal"):
         (place / name).mkdir()

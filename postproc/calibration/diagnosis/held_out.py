@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from postproc.arrays import Floats
 from postproc.calibration.design_matrix import DesignMatrix
 from postproc.calibration.evidence import invert_information
+from postproc.calibration.iso9283.definitions import variation
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import Candidate
 from postproc.model.kinematics import ArmStates
@@ -327,6 +328,5 @@ def multi_directional(batch: ArmStates, error: Floats) -> float | None:
     apart = []
     for pose in poses:
         centres = np.array([error[rows].mean(axis=0) for rows in pose])
-        gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2)
-        apart.append(float(gaps.max()))
+        apart.append(variation(centres))
     return float(np.mean(apart))

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
+from postproc.language.krl.pose_encoding import abc_from_rotation
 from postproc.language.krl.symbols import AXES
 from postproc.language.measuring_program import (
+    CORNER_MM,
     GENTLY,
     SHARE,
-    MeasuringMove,
+    SLOW,
+    MeasuringLine,
     MeasuringProgram,
+    MeasuringStep,
     MountedProbe,
 )
+from postproc.robot.pose import MM
 
 # What the inline form INI of every program says, then speed and acceleration.
 _INI = (
@@ -23,6 +30,12 @@ _INI = (
     f"BAS (#VEL_PTP,{SHARE} )",
     f"BAS (#ACC_PTP,{GENTLY} )",
 )
+# Lines are in the world, so fast, and leave for the next one so near their end.
+_LINES = (
+    "$BASE=$NULLFRAME",
+    f"$VEL.CP={SLOW / 1000:g}",
+    f"$APO.CDIS={CORNER_MM}",
+)
 
 
 def write_krl(program: MeasuringProgram) -> str:
@@ -33,6 +46,7 @@ def write_krl(program: MeasuringProgram) -> str:
         f"DEF {program.name} ( )",
         *(f"; {text}" for text in program.heading),
         *_INI,
+        *(_LINES if program.has_lines else ()),
         *_write_load(program),
     ]
     for step in program.steps:
@@ -53,12 +67,13 @@ def _frame(xyz_mm: tuple[float, ...]) -> str:
     return f"{{X {x:.3f},Y {y:.3f},Z {z:.3f},A 0.0,B 0.0,C 0.0}}"
 
 
-def _write_step(
-    step: MountedProbe | MeasuringMove, program: MeasuringProgram
-) -> Iterator[str]:
+def _write_step(step: MeasuringStep, program: MeasuringProgram) -> Iterator[str]:
     if isinstance(step, MountedProbe):
         yield f"; probe point {step.number}"
         yield f"$TOOL={_frame(step.xyz_mm)}"
+        return
+    if isinstance(step, MeasuringLine):
+        yield f"LIN {_write_pose(step)}{' C_DIS' if step.flown else ''}"
         return
     if step.measured:
         yield f"; MEASURE {step.measured}"
@@ -66,3 +81,11 @@ def _write_step(
     yield f"PTP {{{','.join(f'{name.upper()} {v:.5f}' for name, v in named)}}}"
     if step.measured:
         yield f"WAIT SEC {program.settle_s:.1f}"
+
+
+def _write_pose(line: MeasuringLine) -> str:
+    """Write the end of a line as a frame, which keeps the configuration."""
+    angles = abc_from_rotation(line.pose[None, :3, :3], np.zeros((1, 3)))[0]
+    numbers = (*(line.pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist())
+    named = zip("XYZABC", numbers, strict=True)
+    return f"{{{','.join(f'{name} {v:.5f}' for name, v in named)}}}"

@@ -10,6 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats, Ints
+from postproc.calibration.iso9283.definitions import (
+    pose_accuracy,
+    repeatability,
+    variation,
+)
+from postproc.calibration.iso9283.figures import POSE_CYCLES, few
 
 # Figures as plain data, drawn by the page.
 
@@ -203,6 +209,7 @@ class PoseFigures:
         repeated: Poses reached more than once from one side.
         several: Poses reached from several sides.
         arrivals: Arrivals a side that the figures of `variation` rest on, at least.
+        cycles: Arrivals that those of `accuracy` and `repeatability` rest on, likewise.
     """
 
     accuracy: tuple[float, float]
@@ -211,6 +218,17 @@ class PoseFigures:
     repeated: int
     several: int
     arrivals: int
+    cycles: int
+
+    @property
+    def remarks(self) -> dict[str, str]:
+        """Say of every figure why it is no ISO value, "" where it is one."""
+        repeated = few(self.cycles, POSE_CYCLES) if self.repeated else ""
+        several = few(self.arrivals, POSE_CYCLES) if self.several else ""
+        return dict(
+            zip(("accuracy", "repeatability", "variation"),
+                (repeated, repeated, several), strict=True)
+        )  # fmt: skip
 
 
 def pose_figures(q_deg: Floats, direction: Ints, error_mm: Floats) -> PoseFigures:
@@ -223,28 +241,24 @@ def pose_figures(q_deg: Floats, direction: Ints, error_mm: Floats) -> PoseFigure
     """
     pose = _number(np.round(q_deg / SAME))
     side = _number(np.column_stack([pose, direction]))
-    accuracy, repeatability, variation, arrivals = [], [], [], []
-    for k in np.unique(side):
-        e = error_mm[side == k]
-        if len(e) > 1:
-            centre = e.mean(axis=0)
-            distance = np.linalg.norm(e - centre, axis=1)
-            accuracy.append(float(np.linalg.norm(centre)))
-            repeatability.append(float(distance.mean() + 3 * distance.std(ddof=1)))
+    repeated = [e for k in np.unique(side) if len(e := error_mm[side == k]) > 1]
+    accuracy = [pose_accuracy(np.zeros(3), e) for e in repeated]
+    spread = [repeatability(e) for e in repeated]
+    apart, arrivals = [], []
     for k in np.unique(pose):
         sides, counts = np.unique(side[pose == k], return_counts=True)
         if len(sides) > 1:
             centres = np.array([error_mm[side == s].mean(axis=0) for s in sides])
-            apart = np.linalg.norm(centres[:, None] - centres[None], axis=2)
-            variation.append(float(apart.max()))
+            apart.append(variation(centres))
             arrivals.append(int(counts.min()))
     return PoseFigures(
         _mean_max(accuracy),
-        _mean_max(repeatability),
-        _mean_max(variation),
+        _mean_max(spread),
+        _mean_max(apart),
         len(accuracy),
-        len(variation),
+        len(apart),
         min(arrivals, default=0),
+        min(map(len, repeated), default=0),
     )
 
 

@@ -280,6 +280,15 @@ def test_iso_figures_by_their_definition() -> None:
     assert (found.repeated, found.several, found.arrivals) == (2, 1, 2)
 
 
+def test_figures_of_a_few_arrivals_are_no_iso_values() -> None:
+    one, two = (
+        pose_figures(np.zeros((n, 6)), np.ones((n, 6), dtype=int), np.ones((n, 3)))
+        for n in (29, 30)
+    )
+    assert one.remarks["repeatability"] == "not an ISO value: 29 of 30 cycles"
+    assert set(two.remarks.values()) == {""}
+
+
 def test_iso_figures_need_repetition() -> None:
     found = pose_figures(np.eye(6), np.ones((6, 6), dtype=int), np.ones((6, 3)))
     assert np.isnan([*found.accuracy, *found.variation]).all()

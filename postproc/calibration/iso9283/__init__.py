@@ -1,0 +1,1 @@
+"""Performance figures after ISO 9283: definitions, readings, figures, program."""
