@@ -462,6 +462,7 @@ SCHEMAS = {
     "fit": 1,
     "history": 1,
     "report": 2,
+    "robot-check": 1,
     "simulation": 1,
     "tree": 1,
 }

@@ -11,6 +11,7 @@ GROUPS = {
     "Calibrate": ("survey", "read", "fit", "diagnose", "history", "compare", "predict"),
     "Compensate": ("compensate", "explain", "batch"),
     "Check": ("diff", "check", "restore", "report"),
+    "Keep a plant": ("robot",),
     "Set up and try": ("init", "arm", "simulate"),
 }
 KEYS = {

@@ -9,13 +9,16 @@ import typer
 from typer.models import CommandInfo
 
 from postproc import __version__
-from postproc.cli import arms, loop, models, plant, programs, setup
+from postproc.cli import arms, loop, models, plant, programs, robot, setup
 from postproc.cli.click_classes import Command
 from postproc.cli.common import app, epilog, guard_output
 
 NAME = "__name__"  # a command is called like its function
 
-__all__ = ["app", "application", "arms", "loop", "models", "plant", "programs", "setup"]
+__all__ = [
+    "app", "application", "arms", "loop", "models", "plant", "programs", "robot",
+    "setup",
+]  # fmt: skip
 
 
 def _name_of(command: CommandInfo) -> str:
@@ -25,6 +28,7 @@ def _name_of(command: CommandInfo) -> str:
 for _group, _commands in (
     ("", app.registered_commands),
     ("arm ", arms.arm.registered_commands),
+    ("robot ", robot.robot.registered_commands),
 ):
     for _command in _commands:
         _command.cls = Command

@@ -1,0 +1,1 @@
+"""The record of a robot: its models, checks and events, and what follows from them."""
