@@ -28,12 +28,14 @@ from postproc.cli.common import (
 )
 from postproc.cli.project import cell_file, find_project, model_file
 from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
+from postproc.cli.robot import release
 from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places, is_stream
 
 if TYPE_CHECKING:
     from postproc.compensation.outcome import Outcome
     from postproc.compensation.program_files import ProgramFiles
+    from postproc.record.robots import Release
 
 
 def _explain_code(code: str | None) -> None:
@@ -148,12 +150,34 @@ def compensate(
             raise PostprocError(f"--strict: {_why_nothing(outcome)}")
         places = Destination(files, (cell, model))
         written = places.write(outcome, output, reports, variables_out)
+        _release(loaded.file.robot.serial_number, files.path, output, fitted.id)
         _print_outcome(outcome, every)
         if reports.on_stdout:
             write_text(STREAM, report_text(outcome))
         for path in written:
             say(f"written {path}")
     raise typer.Exit(outcome.exit_code)
+
+
+def _release(
+    serial: str | None, program: Path | None, output: Path | None, model: str
+) -> None:
+    """Record a program of a robot that the project keeps a record of."""
+    if serial is None or program is None:
+        return
+    from postproc.cli.job_files import default_output
+
+    target = output or default_output(program)
+    if is_stream(target):
+        return
+
+    def found() -> list[Release]:
+        from postproc.compensation.sidecar import file_sha256
+        from postproc.record.robots import Release
+
+        return [Release(serial, program, target, model, file_sha256(target))]
+
+    release(program, found)
 
 
 def _model_of_project(program: Path) -> Path | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -24,10 +24,8 @@ from postproc.exceptions import PostprocError, RecordError
 from postproc.files import check_places
 
 if TYPE_CHECKING:
-    from postproc.model.model import Model
     from postproc.record.database import Record
-    from postproc.record.robots import CheckFile
-    from postproc.robot.cell import Cell
+    from postproc.record.robots import CheckFile, Release
 
 robot = typer.Typer(
     no_args_is_help=True,
@@ -52,13 +50,13 @@ At = Annotated[
 Operator = Annotated[str, typer.Option("--operator", help="Who read them.")]
 
 
-def record_file(given: Path | None) -> Path:
+def record_file(given: Path | None, beside: Path | None = None) -> Path:
     """Return the record of an option, else of the project or the working folder."""
     from postproc.record.database import NAME
 
     if given is not None:
         return given
-    project = find_project()
+    project = find_project(beside)
     return (Path() if project is None else project.path.parent) / NAME
 
 
@@ -271,25 +269,21 @@ def backup(
         say(f"written {output}")
 
 
-def release(cell: Cell, model: Model, programs: list[tuple[Path, Path]]) -> None:
-    """Record compensated programs of a robot that the record has.
-
-    Without a record, or a serial number in the cell, nothing is done.
+def release(beside: Path, releases: Callable[[], list[Release]]) -> None:
+    """Record compensated programs in the record of the project, if there is one.
 
     Args:
-        cell: The cell.
-        model: What they were compensated with.
-        programs: Original and output of each.
+        beside: A program, or the folder of them: its project's record counts.
+        releases: Lists the programs.
 
     Raises:
         RecordError: The record cannot be used.
     """
-    serial, place = cell.file.robot.serial_number, record_file(None)
-    if serial is None or not place.exists():
+    place = record_file(None, beside)
+    if not place.exists() or not (found := releases()):
         return
     from postproc.record.database import open_record
-    from postproc.record.robots import note_release
+    from postproc.record.robots import note_releases
 
     with open_record(place) as record:
-        for original, output in programs:
-            note_release(record, serial, original, output, model)
+        note_releases(record, found)

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.sidecar import restore_file
+from postproc.compensation.sidecar import file_sha256, restore_file
 from postproc.exceptions import PostprocError, RecordError
 from postproc.record.database import Record
 from postproc.record.life import Life
-from postproc.record.robots import note_release
+from postproc.record.robots import Release, note_releases
 from postproc.record.rows import ProgramRow
 from postproc.record.stale import newest
 
@@ -76,7 +76,10 @@ def _replace(
         place = folder / Path(row.output).name
         folder.mkdir(parents=True, exist_ok=True)
         files = outcome.save(folder)
-        note_release(record, life.robot.serial, home / row.path, place, model)
+        release = Release(
+            life.robot.serial, home / row.path, place, model.id, file_sha256(place)
+        )
+        note_releases(record, [release])
     except (PostprocError, OSError) as exc:
         return ReplacedProgram(row, why=str(exc))
     return ReplacedProgram(row, tuple(files), _count_uncorrected(outcome))

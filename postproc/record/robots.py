@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -263,29 +263,50 @@ def _record_refresh(
             record.set_state(program.row, moves_mm=known)
 
 
-def note_release(
-    record: Record, serial: str, original: Path, output: Path, model: Model
-) -> bool:
-    """Record a program that was compensated, unless the record has it as it is.
+@dataclass(frozen=True)
+class Release:
+    """A program that was compensated.
+
+    Attributes:
+        serial: The robot.
+        original, output: The program, and what was written of it.
+        model: Id of the model.
+        sha256: Hash of what was written.
+    """
+
+    serial: str
+    original: Path
+    output: Path
+    model: str
+    sha256: str
+
+
+def note_releases(record: Record, releases: Iterable[Release]) -> int:
+    """Record programs that were compensated, but for those that it has as they are.
 
     Returns:
-        Whether it was recorded: the record may not have the robot or the model.
+        How many are new: robots that the record does not have do not count.
     """
-    if serial not in {r.serial for r in record.rows(RobotRow)}:
-        return False
-    digest, path = sha256(read_input(output)), _relative(record, original)
-    before = [p for p in record.rows(ProgramRow, serial) if p.path == path]
-    if before and (before[-1].sha256, before[-1].model) == (digest, model.id):
-        return True
-    row = ProgramRow(
-        None, serial, path, _relative(record, output), model.id, digest, today()
-    )
-    with record.writing():
-        record.add(row)
-    return True
+    known = {r.serial for r in record.rows(RobotRow)}
+    last = {(p.serial, p.path): p for p in record.rows(ProgramRow)}
+    new, now = list[ProgramRow](), today()
+    for one in releases:
+        path = _relative(record, one.original)
+        before = last.get((one.serial, path))
+        same = before and (before.sha256, before.model) == (one.sha256, one.model)
+        if one.serial in known and not same:
+            output = _relative(record, one.output)
+            new.append(
+                ProgramRow(None, one.serial, path, output, one.model, one.sha256, now)
+            )
+    if new:
+        with record.writing():
+            for row in new:
+                record.add(row)
+    return len(new)
 
 
 __all__ = [
     "CheckFile", "Refreshed", "add_robot", "check_robot", "moment", "note_event",
-    "note_release", "refresh_robot",
+    "note_releases", "refresh_robot",
 ]  # fmt: skip

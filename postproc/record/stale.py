@@ -11,8 +11,9 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Outcome, Status
 from postproc.exceptions import PostprocError
 from postproc.model.model import Model
+from postproc.record.database import Record
 from postproc.record.life import Life
-from postproc.record.rows import ProgramRow
+from postproc.record.rows import CURRENT, ModelRow, ProgramRow, RobotRow
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 
@@ -91,3 +92,19 @@ def largest_change(before: Outcome, after: Outcome) -> float:
     along = np.einsum("ni,ni->n", moved, np.nan_to_num(other.std_error) ** 2 * moved)
     unsure = np.sqrt(along) / np.maximum(size, 1e-12)
     return float(np.where(size > SURE * unsure, size, 0.0).max(initial=0.0)) / MM
+
+
+def list_stale(record: Record, limit: float = STALE_MM) -> list[Path]:
+    """List the originals of programs that a refresh has found stale.
+
+    So are those of an older model of which nobody can tell by how much they move.
+    """
+    current = {(m.serial, m.id) for m in record.rows(ModelRow) if m.state == CURRENT}
+    found = []
+    for serial in {r.serial for r in record.rows(RobotRow)}:
+        for row in newest(record.rows(ProgramRow, serial)):
+            if (serial, row.model) in current:
+                continue
+            if row.moves_mm is None or row.moves_mm > limit:
+                found.append(record.path.parent / row.path)
+    return sorted(found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,7 +15,8 @@ from postproc.calibration.monuments import ReferenceRows
 from postproc.robot.state import make_states
 from tests.calibration.simulator import HIGH, LOW, PLATE, Simulated, random_arm
 
-NESTS = 2
+PROGRAMS = Path(__file__).parents[2] / "programs"
+NESTS = 2  # read in a check; a survey reads all
 MONUMENTS = np.array([[2.2, -1.6, -0.3], [2.4, 1.5, 0.2], [0.4, -2.3, 0.8]])
 POSES = 5  # of a check, each from both sides
 
@@ -61,8 +63,9 @@ def placed(rng: np.random.Generator) -> np.ndarray:
 
 
 def measure(
-    robot: Robot, q: np.ndarray, side: np.ndarray, rng: np.random.Generator
-) -> Measurements:
+    robot: Robot, q: np.ndarray, side: np.ndarray, rng: np.random.Generator,
+    nests: int = NESTS,
+) -> Measurements:  # fmt: skip
     """Read the nests at poses, and the monuments first and last, from a new place."""
     T = placed(rng)
 
@@ -70,8 +73,8 @@ def measure(
         noisy = points + robot.tracker * rng.standard_normal(points.shape)
         return np.asarray(noisy @ T[:3, :3].T + T[:3, 3])
 
-    rows = np.repeat(np.arange(len(q)), NESTS)
-    nest = np.tile(np.arange(NESTS), len(q))
+    rows = np.repeat(np.arange(len(q)), nests)
+    nest = np.tile(np.arange(nests), len(q))
     shaken = q + robot.joint * rng.standard_normal(q.shape)
     at = robot.tcp(shaken[rows], side[rows], PLATE[nest])
     n, m = len(rows), len(MONUMENTS)
@@ -120,19 +123,11 @@ def write_readings(path: Path, rows: Measurements) -> None:
 
 
 def write_cell(path: Path, serial: str) -> Path:
-    """Write the cell of a drawn robot."""
-    path.write_text(
-        f'''[robot]
-arm = "nj220-2.7"
-serial_number = "{serial}"
-absolute_accuracy = false
-
-[measurements]
-frame = "tracker"
-lambda_sign = 1
-
-[survey]
-points_mm = {(PLATE[:NESTS] * 1e3).tolist()}
-'''
-    )
+    """Write the cell of a drawn robot: that of the programs, with nests of its own."""
+    text = (PROGRAMS / "cell.toml").read_text()
+    robot = f'[robot]\nserial_number = "{serial}"\n'
+    nests = f"points_mm = {(PLATE * 1e3).tolist()}"
+    text = re.sub(r"points_mm = \[.*?\n\]", nests, text, flags=re.S)
+    measured = '[measurements]\nframe = "tracker"\nlambda_sign = 1\n'
+    path.write_text(text.replace("[robot]\n", robot, 1) + "\n" + measured)
     return path

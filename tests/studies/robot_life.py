@@ -40,7 +40,7 @@ MONTHS, SURVEYED, SEEN = 24, 220, 300
 
 def survey(robot: Robot, cell: Cell, rng: np.random.Generator) -> Model:
     """Survey an arm in the tracker's frame, and fit it."""
-    rows = measure(robot, *draw_poses(SURVEYED, rng), rng)
+    rows = measure(robot, *draw_poses(SURVEYED, rng), rng, len(PLATE))
     found = fit_measurements(rows, cell, frame="tracker", validate=False)
     return found.model
 
