@@ -199,7 +199,8 @@ def _stale_below(source: Path) -> frozenset[str]:
     from postproc.record.stale import list_stale
 
     with open_record(record_file(None, source)) as record:
-        found = [place.resolve() for place in list_stale(record)]
+        folder = record.path.parent
+        found = [(folder / row.path).resolve() for row in list_stale(record)]
     root = source.resolve()
     below = (place for place in found if place.is_relative_to(root))
     return frozenset(place.relative_to(root).as_posix() for place in below)

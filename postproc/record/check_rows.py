@@ -34,7 +34,8 @@ class CheckRows:
         states: States of the n rows of the arm.
         ids: Their names.
         position: Measured, (n, 3) [m].
-        pose: Number of the pose of each, (n,).
+        pose: Number of the pose of each, (n,), whatever side it was come to from.
+        arrival: Number of pose and side, (n,).
         pose_columns: Derivatives by what is unknown of its pose, (n, 3, 9).
         pose_variance: Variances of that where no check has been, (n, 9).
         fixed: By how much fixed points lie beside where the survey had them, (f, 3).
@@ -48,6 +49,7 @@ class CheckRows:
     ids: tuple[str, ...]
     position: Floats
     pose: Ints
+    arrival: Ints
     pose_columns: Floats
     pose_variance: Floats
     fixed: Floats
@@ -65,7 +67,8 @@ class CheckRows:
         return CheckRows(
             self.states[rows],
             tuple(n for n, kept in zip(self.ids, rows, strict=True) if kept),
-            self.position[rows], self.pose[rows], self.pose_columns[rows],
+            self.position[rows], self.pose[rows], self.arrival[rows],
+            self.pose_columns[rows],
             self.pose_variance[rows], self.fixed, self.points,
             self.noise[np.ix_(every, every)], self.placing[every],
         )  # fmt: skip
@@ -107,12 +110,18 @@ def place_check(rows: Measurements, arm: Arm, model: Model, frame: str) -> Check
     fixed = seen @ T[:3, :3].T + T[:3, 3] - known
     placing = rigid_motions(np.concatenate([position, known]))
     placing = placing.reshape(-1, 6)[:, : 6 if is_free else 0]
-    at = effects.at(batch, model.values)
+    at, pose = effects.at(batch, model.values), poses_of(states)
     return CheckRows(
-        states, rows.ids, position, poses_of(states), _pose_columns(at),
-        _pose_variance(model, at), fixed, names,
+        states, rows.ids, position, pose, _number_arrivals(pose, states),
+        _pose_columns(at), _pose_variance(model, at), fixed, names,
         _noise(rows, model, at, position, known), placing,
     )  # fmt: skip
+
+
+def _number_arrivals(pose: Ints, states: States) -> Ints:
+    """Number poses by the side that joints come to them from as well, (n,)."""
+    key = np.concatenate([pose[:, None], states.direction], axis=1)
+    return np.asarray(np.unique(key, axis=0, return_inverse=True)[1].reshape(-1))
 
 
 def _on_survey_nests(rows: Measurements, model: Model) -> States:

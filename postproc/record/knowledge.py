@@ -1,10 +1,10 @@
 """What is known of an arm from its survey and all checks since, as a normal law.
 
-The unknowns are the model's parameters and, of every pose that a check has visited,
-what no effect describes there: it comes again at every visit, and is no change of the
-arm. Readings are linearised where the arm is thought to be (an iterated extended Kalman
-filter; Jazwinski, Stochastic Processes and Filtering Theory, 1970, section 8.3). Where
-the tracker stood is new in every check, and nothing is known of it beforehand.
+The unknowns are the model's parameters and, of every pose that a check has visited from
+a side, what no effect describes there: it comes again at every visit, and is no change
+of the arm. Readings are linearised where the arm is thought to be (an iterated extended
+Kalman filter; Jazwinski, Stochastic Processes and Filtering Theory, 1970, section 8.3).
+Where the tracker stood is new in every check, and nothing is known of it beforehand.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from postproc.model.model import Model
 from postproc.record.check_rows import CheckRows
 from postproc.record.events import REFITTED, Event, open_base
 from postproc.robot.arm import Arm
+from postproc.robot.state import States
 
 PASSES = 4  # linearisations of an update
 SETTLED = 1e-9  # [m] by which the last of them moves a reading at most
@@ -60,7 +61,8 @@ class Knowledge:
         model: The model; its values are where effects with settings begin.
         mean: Parameters, then nine unknowns a pose, (k,).
         covariance: Of them, (k, k).
-        poses: Joint angles of the poses, (n, 6) [rad].
+        poses: Joint angles of the poses, and from which side each joint came to them,
+            (n, 12) [rad].
     """
 
     arm: Arm
@@ -73,7 +75,7 @@ class Knowledge:
     def of(cls, model: Model, arm: Arm) -> Knowledge:
         """Begin with what a survey's model knows."""
         model = open_base(model.without_clock(()))
-        nothing = np.zeros((0, 6))
+        nothing = np.zeros((0, 12))
         return cls(arm, model, model.values.copy(), model.covariance.copy(), nothing)
 
     @property
@@ -99,10 +101,10 @@ class Knowledge:
 
     def visiting(self, rows: CheckRows) -> Knowledge:
         """Return it with the poses of a check among the unknowns."""
-        new = np.flatnonzero(self.find_poses(rows.states.q) < 0)
+        new = np.flatnonzero(self.find_poses(rows.states) < 0)
         if not len(new):
             return self
-        _, first = np.unique(rows.pose[new], return_index=True)
+        _, first = np.unique(rows.arrival[new], return_index=True)
         first = np.sort(new[first])
         prior = np.concatenate([rows.pose_variance[k] for k in first])
         count, old = len(prior), len(self.mean)
@@ -111,20 +113,16 @@ class Knowledge:
         covariance[range(old, old + count), range(old, old + count)] = prior
         return replace(
             self, mean=np.append(self.mean, np.zeros(count)), covariance=covariance,
-            poses=np.concatenate([self.poses, rows.states.q[first]]),
+            poses=np.concatenate([self.poses, _pose_of(rows.states)[first]]),
         )  # fmt: skip
 
-    def find_poses(self, q: Floats) -> Ints:
-        """Return which known pose each of n rows stands at, (n,), -1 for none.
-
-        Args:
-            q: Joint angles, (n, 6) [rad].
-        """
+    def find_poses(self, states: States) -> Ints:
+        """Return which known pose each of n rows stands at, (n,), -1 for none."""
         if not len(self.poses):
-            return np.full(len(q), -1)
-        far = np.abs(q[:, None] - self.poses).max(axis=2)
+            return np.full(len(states), -1)
+        far = np.abs(_pose_of(states)[:, None] - self.poses).max(axis=2)
         near = far.argmin(axis=1)
-        return np.where(far[np.arange(len(q)), near] < SAME, near, -1)
+        return np.where(far[np.arange(len(states)), near] < SAME, near, -1)
 
     def expect(self, rows: CheckRows, at: Floats | None = None) -> Expected:
         """Predict the readings of a check whose poses are among the unknowns.
@@ -139,7 +137,7 @@ class Knowledge:
         moved = effects.at(batch, values)
         columns = np.zeros((len(rows), 3, len(at)))
         columns[:, :, self.parameters] = effects.columns(moved)
-        first = len(values) + OF_POSE * self.find_poses(rows.states.q)
+        first = len(values) + OF_POSE * self.find_poses(rows.states)
         for k, begin in enumerate(first):
             columns[k, :, begin : begin + OF_POSE] = rows.pose_columns[k]
         flat = columns.reshape(-1, len(at))
@@ -194,3 +192,8 @@ class Knowledge:
         return replace(
             self.model, values=self.mean[own], covariance=self.covariance[own, own]
         )
+
+
+def _pose_of(states: States) -> Floats:
+    """Return joint angles and directions: what tells poses apart, (n, 12)."""
+    return np.concatenate([states.q, states.direction], axis=1)

@@ -94,17 +94,17 @@ def largest_change(before: Outcome, after: Outcome) -> float:
     return float(np.where(size > SURE * unsure, size, 0.0).max(initial=0.0)) / MM
 
 
-def list_stale(record: Record, limit: float = STALE_MM) -> list[Path]:
-    """List the originals of programs that a refresh has found stale.
+def list_stale(record: Record, limit: float = STALE_MM) -> list[ProgramRow]:
+    """List programs that a refresh has found stale.
 
     So are those of an older model of which nobody can tell by how much they move.
     """
-    current = {(m.serial, m.id) for m in record.rows(ModelRow) if m.state == CURRENT}
-    found = []
-    for serial in {r.serial for r in record.rows(RobotRow)}:
-        for row in newest(record.rows(ProgramRow, serial)):
-            if (serial, row.model) in current:
-                continue
-            if row.moves_mm is None or row.moves_mm > limit:
-                found.append(record.path.parent / row.path)
-    return sorted(found)
+    models = record.rows(ModelRow)
+    current = {(m.serial, m.id) for m in models if m.state == CURRENT}
+    return [
+        row
+        for robot in record.rows(RobotRow)
+        for row in newest(record.rows(ProgramRow, robot.serial))
+        if (row.serial, row.model) not in current
+        and (row.moves_mm is None or row.moves_mm > limit)
+    ]

@@ -14,8 +14,8 @@ from postproc.record.database import Record
 from postproc.record.life import Life
 from postproc.record.replacement import ReplacedProgram
 from postproc.record.robots import UNTOLD, Refreshed
-from postproc.record.rows import ModelRow, ProgramRow, RobotRow, VerdictRow
-from postproc.record.stale import STALE_MM, StaleProgram
+from postproc.record.rows import ModelRow, RobotRow, VerdictRow
+from postproc.record.stale import STALE_MM, StaleProgram, list_stale
 from postproc.report.terminal import Column, table_text
 
 LISTED = (
@@ -29,26 +29,30 @@ ROOT = float(np.sqrt(2.0))
 
 def list_robots(record: Record) -> str:
     """Write a row for each robot."""
+    stale = [row.serial for row in list_stale(record)]
     rows = []
     for robot in record.rows(RobotRow):
-        verdicts = record.rows(VerdictRow, robot.serial)
-        programs = record.rows(ProgramRow, robot.serial)
-        stale = sum((p.moves_mm or 0.0) > STALE_MM for p in programs)
-        last = verdicts[-1].date[:10] if verdicts else ""
+        life = Life.of(record, robot.serial)
+        last = life.verdicts[-1].date[:10] if life.verdicts else ""
         rows.append(
-            (robot.serial, robot.arm, robot.line, state_of(robot, verdicts),
-             str(len(verdicts)), last, str(stale))
+            (robot.serial, robot.arm, robot.line, state_of(life),
+             str(len(life.verdicts)), last, str(stale.count(robot.serial)))
         )  # fmt: skip
     return table_text(LISTED, rows)
 
 
-def state_of(robot: RobotRow, verdicts: Sequence[VerdictRow]) -> str:
-    """Say how a robot is, by its last check."""
-    if robot.state != "in use":
-        return robot.state
-    if not verdicts:
+def state_of(life: Life) -> str:
+    """Say how a robot is, by its last check and what has come since."""
+    if life.robot.state != "in use":
+        return life.robot.state
+    if not life.verdicts:
         return "not checked"
-    return "in control" if verdicts[-1].in_control else "act"
+    last = life.verdicts[-1]
+    if any(m.date > last.date for m in life.models):
+        return "not checked since its model is new"
+    if any(e.date > last.date for e in life.events):
+        return "not checked since its last event"
+    return "in control" if last.in_control else "act"
 
 
 def show_robot(life: Life) -> str:

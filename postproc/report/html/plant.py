@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -9,7 +10,7 @@ from postproc.record.database import Record
 from postproc.record.life import Life
 from postproc.record.rows import ProgramRow, RobotRow, VerdictRow
 from postproc.record.schedule import next_check
-from postproc.record.stale import STALE_MM, newest
+from postproc.record.stale import STALE_MM, list_stale, newest
 from postproc.report.html.page import render
 from postproc.report.record import state_of
 
@@ -66,7 +67,9 @@ STYLES = {"in control": "corrected", "act": "conflict"}
 
 def plant_page(record: Record) -> str:
     """Make the page of all robots of a record, those to act on first."""
-    rows = [_row(record, robot) for robot in record.rows(RobotRow)]
+    stale = Counter(row.serial for row in list_stale(record))
+    robots = record.rows(RobotRow)
+    rows = [_row(record, robot, stale[robot.serial]) for robot in robots]
     rows.sort(key=lambda row: (row.state != "act", row.robot.serial))
     count = {state: sum(r.state == state for r in rows) for state in STYLES}
     return render(
@@ -76,10 +79,10 @@ def plant_page(record: Record) -> str:
     )  # fmt: skip
 
 
-def _row(record: Record, robot: RobotRow) -> PlantRow:
+def _row(record: Record, robot: RobotRow, stale: int) -> PlantRow:
     life = Life.of(record, robot.serial)
     verdicts, events = life.verdicts, life.events
-    state = state_of(robot, verdicts)
+    state = state_of(life)
     last = verdicts[-1] if verdicts else None
     programs = newest(record.rows(ProgramRow, robot.serial))
     current = life.models[-1] if life.models else None
@@ -91,7 +94,7 @@ def _row(record: Record, robot: RobotRow) -> PlantRow:
         last.date[:10] if last else "", last.mean_mm if last else None,
         last.within_mm if last else None,
         f"{current.id} since {current.date[:10]}" if current else "none",
-        sum((p.moves_mm or 0.0) > STALE_MM for p in programs), len(programs),
+        stale, len(programs),
         "not known" if due is None else due.isoformat(), checks, marks,
         last.moved if last else "",
     )  # fmt: skip
