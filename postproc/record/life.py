@@ -125,6 +125,17 @@ class Life:
         """Read a model of the record."""
         return load_model(row.content, name=row.file)
 
+    def check_moment(self, date: str) -> None:
+        """Refuse what happened before the survey of the robot's model.
+
+        Raises:
+            RecordError: It did.
+        """
+        begun = self.surveyed.date
+        if date < begun:
+            problem = f"{date} is before the model of {begun}, from which on it counts"
+            raise RecordError(self.record.path, problem, "Correct --at")
+
     def read_check(
         self, content: bytes, file: str, cell: Cell, model: Model, program: str = ""
     ) -> CheckRows:
@@ -143,17 +154,20 @@ class Life:
         rows = read_measurements(content, cell=cell, name=file, program=program or None)
         return place_check(rows, cell.arm, model, survey_frame(cell, None))
 
-    def watch(self, cell: Cell, until: str | None = None) -> Watch:
+    def watch(self, cell: Cell, until: str, sha256: str = "") -> Watch:
         """Follow the robot from its survey through all checks and events.
 
         Args:
             cell: Of the robot.
-            until: A moment; None: now.
+            until: A moment.
+            sha256: Hash of readings that do not count, because they are to be judged.
         """
         row = self.surveyed
         model = self.model(row)
         watch = Watch(Knowledge.of(model, cell.arm))
         for one in self._since(row.date, until):
+            if isinstance(one, SurveyRow) and one.sha256 == sha256:
+                continue
             if isinstance(one, EventRow):
                 watch = watch.after(event_of(one))
             else:
@@ -161,14 +175,14 @@ class Life:
                 watch = watch.take_in(rows)
         return watch
 
-    def _since(self, begin: str, until: str | None) -> Iterator[EventRow | SurveyRow]:
+    def _since(self, begin: str, until: str) -> Iterator[EventRow | SurveyRow]:
         """Yield events, and checks that were in control or read for a refresh."""
         told = {v.survey: v.in_control for v in self.verdicts}
         counted = [
             s for s in self.surveys if s.kind == CHECK and told.get(s.id or 0, 1)
         ]
         every: list[EventRow | SurveyRow] = [*self.events, *counted]
-        every = [x for x in every if begin <= x.date and (not until or x.date <= until)]
+        every = [x for x in every if begin <= x.date <= until]
         yield from sorted(every, key=lambda x: (x.date, x.table != "event", x.id or 0))
 
 

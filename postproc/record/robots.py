@@ -139,9 +139,10 @@ def check_robot(record: Record, serial: str, given: CheckFile) -> tuple[Verdict,
         PostprocError: The robot is not there, or the readings cannot be used.
     """
     life, content = Life.of(record, serial), read_input(given.file)
+    life.check_moment(given.date)
     cell, digest = life.cell(), sha256(content)
     known = any(s.sha256 == digest and s.kind == CHECK for s in life.surveys)
-    watch = life.watch(cell, given.date)
+    watch = life.watch(cell, given.date, digest)
     model = life.model(life.surveyed)
     rows = life.read_check(content, given.file.name, cell, model, _name(given))
     verdict, _ = watch.judge(rows)
@@ -184,6 +185,7 @@ def note_event(
         RecordError: The robot is not there, or the event is none.
     """
     life = Life.of(record, serial)
+    life.check_moment(date)
     if kind not in EVENTS:
         problem, cure = f"there is no event {kind!r}", f"One of {', '.join(EVENTS)}"
         raise RecordError(record.path, problem, cure)
@@ -224,6 +226,7 @@ def refresh_robot(
         PostprocError: The robot is not there, or a file cannot be used.
     """
     life, content = Life.of(record, serial), read_input(given.file)
+    life.check_moment(given.date)
     cell, current = life.cell(), life.current
     model = life.model(life.surveyed)
     progress("follow the robot since its survey")
