@@ -171,13 +171,13 @@ def _release(
     if is_stream(target):
         return
 
-    def found() -> list[Release]:
+    def list_releases() -> list[Release]:
         from postproc.compensation.sidecar import file_sha256
         from postproc.record.robots import Release
 
         return [Release(serial, program, target, model, file_sha256(target))]
 
-    release(program, found)
+    release(program, list_releases)
 
 
 def _model_of_project(program: Path) -> Path | None:

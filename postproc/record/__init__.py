@@ -1,1 +1,1 @@
-"""The record of a robot: its models, checks and events, and what follows from them."""
+"""Robots over years: checks, events."""
