@@ -96,3 +96,7 @@ class DiskFullError(OutputError):
 
 class PlanError(PostprocError):
     """A motion that cannot be planned: no time law, no inverse kinematics."""
+
+
+class RecordError(FileError):
+    """A record of robots that cannot be used, or does not hold what is asked for."""

@@ -463,6 +463,7 @@ SCHEMAS = {
     "history": 1,
     "iso9283": 1,
     "report": 2,
+    "robot-check": 1,
     "simulation": 1,
     "tree": 1,
 }

@@ -183,3 +183,25 @@ def print_any_text(*streams: TextIO | None) -> None:
         with suppress(AttributeError, ValueError, OSError):
             if stream is not None and stream.errors == "strict":
                 stream.reconfigure(errors="replace")  # type: ignore[attr-defined]
+
+
+# Disks.
+
+_SHARED = ("nfs", "cifs", "smb", "fuse.sshfs", "9p", "afs", "ceph", "gluster", "lustre")
+_REMOTE = 4  # of GetDriveTypeW: a drive of the network
+
+
+def is_shared_disk(path: Path) -> bool:
+    """Return True if a place is known to lie on a disk of the network."""
+    place = path.absolute().parent
+    if sys.platform == "win32":
+        import ctypes
+
+        return bool(ctypes.windll.kernel32.GetDriveTypeW(place.anchor) == _REMOTE)
+    try:
+        mounts = Path("/proc/mounts").read_text("utf-8", "replace").splitlines()
+    except OSError:
+        return False
+    found = [line.split()[1:3] for line in mounts if len(line.split()) > 2]
+    around = [(len(at), kind) for at, kind in found if place.is_relative_to(at)]
+    return max(around, default=(0, ""))[1].startswith(_SHARED)

@@ -25,6 +25,7 @@ LAYERS = (
     ("verify",),
     ("compensation", "simulation"),
     ("calibration",),
+    ("record",),
     ("report",),
     ("batch",),
     ("cli",),
@@ -102,6 +103,10 @@ KNOWING = {
     "calibration.monuments": {"base_shift", "tracker_drift"},
     "calibration.effect_selection": {"probe_turn", "tool_shift"},
     "calibration.diagnosis.files": {"placement"},
+    # What a mastering by marks leaves of zeros, and where the base may be.
+    "record.events": {"geometry"},
+    # Fixed points are seen rigidly moved where the tracker stands elsewhere.
+    "record.check_rows": {"base_shift"},
 }
 
 # Foreign libraries that every module may use.

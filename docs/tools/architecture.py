@@ -30,6 +30,7 @@ LAYERS = (
     ("verify",),
     ("compensation", "simulation"),
     ("calibration",),
+    ("record",),
     ("report",),
     ("batch",),
     ("cli",),
@@ -38,7 +39,8 @@ WIDTH, HEIGHT = 860, 700
 BOXES = {  # x, y, width, height
     "cli": (20, 15, 820, 48),
     "batch": (500, 95, 250, 62),
-    "report": (180, 120, 270, 62),
+    "report": (235, 120, 245, 62),
+    "record": (60, 120, 162, 62),
     "calibration": (20, 225, 200, 105),
     "compensation": (290, 225, 345, 105),
     "simulation": (660, 225, 180, 105),
@@ -78,15 +80,17 @@ FLOW = (
     Arrow("Visits", "language", "verify", (690, 475), (690, 445)),
     Arrow("Visits", "language", "simulation", (785, 475), (785, 330)),
     Arrow("Model", "calibration", "compensation", (220, 290), (290, 290)),
-    Arrow("Measurements", "calibration", "report", (200, 225), (200, 182)),
+    Arrow("Measurements", "calibration", "report", (219, 225), (245, 182)),
     Arrow("Outcome", "compensation", "report", (370, 225), (370, 182)),
     Arrow("Outcome", "compensation", "batch", (540, 225), (540, 157)),
-    Arrow("Extension", "calibration", "cli", (90, 225), (90, 63)),
+    Arrow("Extension", "calibration", "cli", (30, 225), (30, 63)),
     Arrow("Summary", "batch", "cli", (610, 95), (610, 63)),
 )
 LINES = {  # grey: upper chapter, lower chapter, from, to
     ("cli", "report"): ((315, 63), (315, 120)),
-    ("report", "simulation"): ((450, 172), (690, 225)),
+    ("report", "simulation"): ((480, 172), (690, 225)),
+    ("report", "record"): ((235, 150), (222, 150)),
+    ("record", "calibration"): ((150, 182), (150, 225)),
     ("language", "robot"): ((615, 555), (615, 605)),
 }
 

@@ -267,6 +267,8 @@ class BatchOptions:
         plan: Which cell and model each program is compensated with.
         log: Where the log goes, from which a later run resumes.
         resume: Keep what is done and unchanged.
+        only: Programs that are made again whatever they are, all others that are there
+            stay, see `TargetTree.holds`; None: all are made that have changed.
     """
 
     source: Path
@@ -274,6 +276,7 @@ class BatchOptions:
     plan: BatchPlan
     log: Path
     resume: bool
+    only: frozenset[str] | None = None
 
 
 def default_log(target: Path) -> Path:
@@ -400,12 +403,18 @@ class BatchRun:
             setup = self.order.plan.setups[unit.setup]
             digest = digest_of(unit.files, sources, setup.digest)
             before = self.earlier.get(unit.program)
-            if self.order.resume and before and before.digest == digest:
-                if self.target.holds(before.outputs):
-                    self.add(replace(before, skipped=True))
-                    continue
+            if before and self._stays(unit.program, before, digest):
+                self.add(replace(before, skipped=True))
+                continue
             self.digests[unit.program] = digest
             yield Task(unit, sources)
+
+    def _stays(self, program: str, before: JournalEntry, digest: str) -> bool:
+        """Return True if a program that is there need not be made again."""
+        only = self.order.only
+        unchanged = self.order.resume and before.digest == digest
+        stays = unchanged if only is None else program not in only
+        return stays and self.target.holds(before.outputs)
 
     def deliver(self, result: Result) -> None:
         """Write what a worker made; of what failed nothing may be in the tree."""

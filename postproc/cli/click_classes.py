@@ -20,6 +20,7 @@ GROUPS = {
     ),
     "Compensate": ("compensate", "explain", "batch"),
     "Check": ("diff", "check", "restore", "report"),
+    "Keep a plant": ("robot",),
     "Set up and try": ("init", "arm", "simulate"),
 }
 KEYS = {

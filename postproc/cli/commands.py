@@ -9,7 +9,16 @@ import typer
 from typer.models import CommandInfo
 
 from postproc import __version__
-from postproc.cli import arms, iso9283, loop, models, plant, programs, setup
+from postproc.cli import (
+    arms,
+    iso9283,
+    loop,
+    models,
+    plant,
+    programs,
+    robot,
+    setup,
+)
 from postproc.cli.click_classes import Command
 from postproc.cli.common import app, epilog, guard_output
 
@@ -17,6 +26,7 @@ NAME = "__name__"  # a command is called like its function
 
 __all__ = [
     "app", "application", "arms", "iso9283", "loop", "models", "plant", "programs",
+    "robot",
     "setup",
 ]  # fmt: skip
 
@@ -28,6 +38,7 @@ def _name_of(command: CommandInfo) -> str:
 for _group, _commands in (
     ("", app.registered_commands),
     ("arm ", arms.arm.registered_commands),
+    ("robot ", robot.robot.registered_commands),
 ):
     for _command in _commands:
         _command.cls = Command

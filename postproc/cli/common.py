@@ -329,6 +329,23 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc batch nominal compensated --plan batch.toml --resume",
     ),
     "check": ("postproc check compensated --model model.json --source nominal",),
+    "robot add": (
+        "postproc robot add R010 --cell cell.toml --model model.json --line 3",
+    ),
+    "robot list": ("postproc robot list",),
+    "robot show": ("postproc robot show R010",),
+    "robot check": (
+        "postproc robot check R010 readings.csv",
+        "postproc robot check R010 points.csv --program check.pdl --report -",
+    ),
+    "robot event": (
+        "postproc robot event R010 remastered --joints 2,3",
+        "postproc robot event R010 crash --at 2026-11-28T07:30",
+    ),
+    "robot refresh": ("postproc robot refresh R010 readings.csv -o model.json",),
+    "robot replace": ("postproc robot replace R010 R011 -o compensated",),
+    "robot page": ("postproc robot page -o plant.html",),
+    "robot backup": ("postproc robot backup -o copy.sqlite",),
     "arm list": ("postproc arm list",),
     "arm from-urdf": (
         "postproc arm from-urdf robot.urdf -o arm.toml",

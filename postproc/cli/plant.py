@@ -18,6 +18,7 @@ from postproc.cli.common import (
 )
 from postproc.cli.project import MAKE, cell_file, find_project, model_file
 from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
+from postproc.cli.robot import record_file, release
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.exceptions import PostprocError
 from postproc.files import check_places
@@ -26,8 +27,9 @@ from postproc.operating_system import count_cores
 if TYPE_CHECKING:
     from postproc.batch.journal import Summary
     from postproc.batch.plan import BatchPlan
-    from postproc.batch.run import Gather
+    from postproc.batch.run import BatchOptions, Gather
     from postproc.batch.second_opinion import TreeOpinion
+    from postproc.record.robots import Release
 
 CellFile = Annotated[
     Path | None,
@@ -74,6 +76,9 @@ def batch(
     resume: Annotated[
         bool, typer.Option("--resume", help="Skip finished, unchanged files.")
     ] = False,
+    stale: Annotated[
+        bool, typer.Option("--stale", help="Make only stale programs of robots again.")
+    ] = False,
     report: PageOption = None,
     changes: SetOption = None,
 ) -> None:
@@ -100,9 +105,11 @@ def batch(
         check_places(reports.files, [cell, model, plan])
         for line in _archive_lines(source, made):
             say(line)
-        order = run.BatchOptions(source, target, made, run.default_log(target), resume)
+        log, only = run.default_log(target), _stale_below(source) if stale else None
+        order = run.BatchOptions(source, target, made, log, resume or stale, only)
         with progress_bar(f"{source} -> {target}") as told:
             summary = run.batch(order, _workers(jobs), told)
+        release(source, lambda: _list_releases(order))
         _print_summary(summary, table=not reports.on_stdout)
         say(f"log: {order.log}")
         _write_reports(reports, f"{source} -> {target}", order.log)
@@ -180,6 +187,43 @@ def _print_summary(summary: Summary, table: bool) -> None:
         print_table(columns, summary.rows())
     for line in summary.lists():
         say(line)
+
+
+def _stale_below(source: Path) -> frozenset[str]:
+    """Return the stale programs of a tree, by their places below it.
+
+    Raises:
+        RecordError: There is no record.
+    """
+    from postproc.record.database import open_record
+    from postproc.record.stale import list_stale
+
+    with open_record(record_file(None, source)) as record:
+        folder = record.path.parent
+        found = [(folder / row.path).resolve() for row in list_stale(record)]
+    root = source.resolve()
+    below = (place for place in found if place.is_relative_to(root))
+    return frozenset(place.relative_to(root).as_posix() for place in below)
+
+
+def _list_releases(order: BatchOptions) -> list[Release]:
+    """List the programs of a tree that were compensated for robots with numbers."""
+    from postproc.batch.journal import read_entries
+    from postproc.compensation.sidecar import read_sidecar, sidecar_path
+    from postproc.record.robots import Release
+
+    setups = [(s.model.id, s.cell.file.robot.serial_number) for s in order.plan.setups]
+    serials = {model: serial for model, serial in setups if serial is not None}
+    found = []
+    for entry in read_entries(order.log).values() if serials else ():
+        output = order.target / entry.place
+        if entry.place in entry.outputs and sidecar_path(output).exists():
+            model = read_sidecar(sidecar_path(output)).model
+            if model in serials:
+                digest = entry.outputs[entry.place]
+                original = order.source / entry.place
+                found.append(Release(serials[model], original, output, model, digest))
+    return found
 
 
 def _write_reports(reports: Reports, title: str, log: Path) -> None:

@@ -29,12 +29,14 @@ from postproc.cli.common import (
 )
 from postproc.cli.project import cell_file, find_project, model_file
 from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
+from postproc.cli.robot import release
 from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places, is_stream
 
 if TYPE_CHECKING:
     from postproc.compensation.outcome import Outcome
     from postproc.compensation.program_files import ProgramFiles
+    from postproc.record.robots import Release
 
 
 def _explain_code(code: str | None) -> None:
@@ -151,6 +153,9 @@ def compensate(
         if place is not None:
             place.parent.mkdir(parents=True, exist_ok=True)
         written = places.write(outcome, output or place, reports, variables_out)
+        _release(
+            loaded.file.robot.serial_number, files.path, output or place, fitted.id
+        )
         _print_outcome(outcome, every)
         if reports.on_stdout:
             write_text(STREAM, report_text(outcome))
@@ -160,6 +165,27 @@ def compensate(
         if given is not None and target is not None and not is_stream(target):
             suggest("diff", given, target)
     raise typer.Exit(outcome.exit_code)
+
+
+def _release(
+    serial: str | None, program: Path | None, output: Path | None, model: str
+) -> None:
+    """Record a program of a robot that the project keeps a record of."""
+    if serial is None or program is None:
+        return
+    from postproc.cli.job_files import default_output
+
+    target = output or default_output(program)
+    if is_stream(target):
+        return
+
+    def list_releases() -> list[Release]:
+        from postproc.compensation.sidecar import file_sha256
+        from postproc.record.robots import Release
+
+        return [Release(serial, program, target, model, file_sha256(target))]
+
+    release(program, list_releases)
 
 
 def _model_of_project(program: Path) -> Path | None:

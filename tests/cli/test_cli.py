@@ -16,7 +16,9 @@ from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 COMMANDS = (
     "compensate", "diff", "restore", "explain", "survey", "simulate", "fit", "predict",
     "diagnose", "read", "init", "compare", "iso9283", "batch", "check", "report",
-    "history", "arm list", "arm from-urdf", "arm from-machine-dat",
+    "history", "arm list", "arm from-urdf", "arm from-machine-dat", "robot add",
+    "robot list", "robot show", "robot check", "robot event", "robot refresh",
+    "robot replace", "robot page", "robot backup",
 )  # fmt: skip
 UNREACHED = "MOVE LINEAR TO POS(9000.0, 0.0, 0.0, 0.0, 175.0, 0.0, '')"
 STAMP = rb"-- postproc \S+ model=[0-9a-f]{16} source=[0-9a-f]{64}"

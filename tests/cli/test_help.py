@@ -39,7 +39,7 @@ def commands_in(line: str) -> list[list[str]]:
 
 def command_of(call: list[str]) -> str:
     """Return the name of the command that a call begins with."""
-    return " ".join(call[:2] if call[0] == "arm" else call[:1])
+    return " ".join(call[:2] if call[0] in ("arm", "robot") else call[:1])
 
 
 def test_every_command_has_examples():

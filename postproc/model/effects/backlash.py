@@ -8,6 +8,7 @@ from typing import ClassVar
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
+    PLAY,
     Candidate,
     Cells,
     JointEffect,
@@ -26,6 +27,7 @@ class Backlash(JointEffect):
     """Joint error lambda * b: half the gap, on the side that the joint comes from."""
 
     name: ClassVar[str] = "backlash"
+    renewed_by: ClassVar[frozenset[str]] = PLAY
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "lambda"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.ALWAYS

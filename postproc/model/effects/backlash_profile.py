@@ -14,6 +14,7 @@ from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
     ANY,
     FAR,
+    PLAY,
     Candidate,
     Cells,
     JointEffect,
@@ -42,6 +43,7 @@ class BacklashProfile(JointEffect):
     """
 
     name: ClassVar[str] = "backlash_profile"
+    renewed_by: ClassVar[frozenset[str]] = PLAY
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "lambda"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.ALWAYS

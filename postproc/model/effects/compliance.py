@@ -11,6 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
+    GEARED,
     Candidate,
     Cells,
     Effect,
@@ -156,6 +157,7 @@ class Compliance(WeightEffect, JointEffect):
     """
 
     name: ClassVar[str] = "compliance"
+    renewed_by: ClassVar[frozenset[str]] = GEARED
     cells: ClassVar[Cells] = own_cells("torque {j}", "linear")
 
     along: tuple[float, float, float] | None = None

@@ -14,6 +14,7 @@ from postproc.arrays import Floats
 from postproc.model.carrier import carrier
 from postproc.model.covariate import JOINTS, covariate
 from postproc.model.effects.effect import (
+    DRIVEN,
     FREE,
     Candidate,
     Effect,
@@ -54,6 +55,7 @@ class Curve(CarriedEffect):
     """
 
     name: ClassVar[str] = "curve"
+    renewed_by: ClassVar[frozenset[str]] = DRIVEN
     naming_policy: ClassVar[NamingPolicy] = NamingPolicy.UNEXPLAINED
     free: ClassVar[bool] = True
 

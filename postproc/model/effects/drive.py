@@ -19,6 +19,7 @@ from postproc.arrays import Floats
 from postproc.model.covariate import CARRYING, JOINTS
 from postproc.model.effects.backlash import Backlash
 from postproc.model.effects.effect import (
+    DRIVEN,
     NAMED,
     Candidate,
     Effect,
@@ -176,6 +177,7 @@ class DriveBacklash(DriveEffect):
     """
 
     name: ClassVar[str] = "drive_backlash"
+    renewed_by: ClassVar[frozenset[str]] = DRIVEN
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "lambda"),)
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "lambda"
@@ -213,6 +215,7 @@ class DriveTransmission(DriveEffect):
     """
 
     name: ClassVar[str] = "drive_transmission"
+    renewed_by: ClassVar[frozenset[str]] = DRIVEN
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "joint"),)
 
     waves: tuple[tuple[int, float], ...] = ()
@@ -284,6 +287,7 @@ class DriveLoad(DriveEffect):
     """
 
     name: ClassVar[str] = "drive_load"
+    renewed_by: ClassVar[frozenset[str]] = DRIVEN
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "torque"),)
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "torque"

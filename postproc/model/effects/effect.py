@@ -26,6 +26,14 @@ from postproc.robot.state import States
 Origin = Literal["arm", "state", "setup"]
 
 Cells = tuple[tuple[str, str, str], ...]  # carrier, driver and law of each
+EVENTS = (
+    "remastered", "motor", "gear", "arm", "tool", "base", "crash", "payload",
+    "software",
+)  # fmt: skip
+GEARED = frozenset({"gear", "arm"})
+DRIVEN = frozenset({"motor", "gear", "arm"})
+PLAY = frozenset({"gear", "crash", "arm"})
+ZERO = frozenset({"remastered", "motor", "gear", "crash", "arm"})
 PART_MOTION = "part_motion"  # what has no name but its place, its driver and its law
 ANY = ("linear", "step", "saturating", "curve", "harmonic")
 
@@ -78,6 +86,8 @@ class Effect(ABC):
         everywhere: True for what is the same at all poses, unseen ones too.
         published: True for what a method of the literature trains: no fit of effects
             knows it.
+        renewed_by: Events in the life of a robot after which it may be another one, of
+            `EVENTS`; nothing for what belongs to a survey's set-up.
     """
 
     name: ClassVar[str]
@@ -94,6 +104,7 @@ class Effect(ABC):
     everywhere: ClassVar[bool] = False
     published: ClassVar[bool] = False
     cells: ClassVar[Cells] = ()
+    renewed_by: ClassVar[frozenset[str]] = frozenset({"arm"})
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
@@ -236,6 +247,12 @@ class Effect(ABC):
     def list_nonlinear_drivers(self) -> tuple[str, ...]:
         """List the covariates of `States` that drive it by a law that is no line."""
         return ()
+
+    def list_renewals(self) -> tuple[frozenset[str], ...]:
+        """Return after which events each of its p parameters may be another one."""
+        none = self.belongs_to() == "setup"
+        own = frozenset[str]() if none else self.renewed_by
+        return tuple(own for _ in self.parameters())
 
     def refers_to(self) -> str:
         """Name the state that predictions are for, where it passes with time alone."""

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Effect, Parameter
+from postproc.model.effects.effect import ZERO, Effect, Parameter
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates, Deviation
@@ -20,6 +20,13 @@ from postproc.robot.state import States
 AXES = ("x", "y", "z")
 KINDS = ("a", "d", "alpha", "theta", "beta")
 LENGTH, ANGLE = 1e-3, 1e-3  # [m], [rad] prior scales of a new arm
+RENEWED_BY = {
+    "base shift": frozenset({"base", "crash"}),
+    "base turn": frozenset({"base", "crash"}),
+    "tool": frozenset({"tool", "crash", "arm"}),
+    "zero": ZERO,
+    "link": frozenset({"crash", "arm"}),
+}
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,12 @@ class Geometry(Effect):
         ]
         tool = [Parameter(f"tool_{a}", "m", LENGTH, "tool") for a in AXES]
         return (*(base if self.base else []), *links, *tool)
+
+    def list_renewals(self) -> tuple[frozenset[str], ...]:
+        """Tell zeros of joints, links, base and tool apart."""
+        parts = ("zero" if p.name.startswith("theta") else p.group
+                 for p in self.parameters())  # fmt: skip
+        return tuple(RENEWED_BY.get(part, RENEWED_BY["link"]) for part in parts)
 
     def deviation(self, p: Floats) -> Deviation:
         """Read parameters (p,) as deviations of the chain."""

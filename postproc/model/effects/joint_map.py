@@ -10,6 +10,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
+    DRIVEN,
     FREE,
     Candidate,
     Cells,
@@ -47,6 +48,7 @@ class JointMap(JointEffect):
     """
 
     name: ClassVar[str] = "joint_map"
+    renewed_by: ClassVar[frozenset[str]] = DRIVEN
     fit_policy: ClassVar[FitPolicy] = FitPolicy.LAST
     free: ClassVar[bool] = True
     cells: ClassVar[Cells] = own_cells("joint {j}", "curve", "step", "saturating")

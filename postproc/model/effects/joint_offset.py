@@ -10,6 +10,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
+    ZERO,
     Candidate,
     JointEffect,
     Parameter,
@@ -34,6 +35,7 @@ class JointOffset(JointEffect):
     """
 
     name: ClassVar[str] = "joint_offset"
+    renewed_by: ClassVar[frozenset[str]] = ZERO
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "constant"),)
     everywhere: ClassVar[bool] = True
 

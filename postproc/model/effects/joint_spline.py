@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter, fade
+from postproc.model.effects.effect import DRIVEN, JointEffect, Parameter, fade
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.effects.smooth import smooth, smooth_count
 from postproc.model.kinematics import ArmStates
@@ -50,6 +50,7 @@ class JointSpline(JointEffect):
     """
 
     name: ClassVar[str] = "joint_spline"
+    renewed_by: ClassVar[frozenset[str]] = DRIVEN
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "joint"),)
     fit_policy: ClassVar[FitPolicy] = FitPolicy.LAST
     free: ClassVar[bool] = True

@@ -32,6 +32,7 @@ class Lag(JointEffect):
     """
 
     name: ClassVar[str] = "lag"
+    renewed_by: ClassVar[frozenset[str]] = frozenset({"motor", "arm", "software"})
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "speed"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT

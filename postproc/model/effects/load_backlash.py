@@ -11,6 +11,7 @@ from postproc.arrays import Floats
 from postproc.model.covariate import carrying
 from postproc.model.effects.effect import (
     ANY,
+    PLAY,
     Candidate,
     Cells,
     Effect,
@@ -47,6 +48,7 @@ class LoadBacklash(JointEffect):
     """
 
     name: ClassVar[str] = "load_backlash"
+    renewed_by: ClassVar[frozenset[str]] = PLAY
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "torque"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT

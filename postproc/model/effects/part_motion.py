@@ -13,6 +13,7 @@ from postproc.model.carrier import Carrier, carrier
 from postproc.model.covariate import JOINTS, by_weight, covariate, unit
 from postproc.model.effects.compliance import moments
 from postproc.model.effects.effect import (
+    DRIVEN,
     FREE,
     PART_MOTION,
     Effect,
@@ -209,6 +210,7 @@ class PartMotion(CarriedEffect):
     """
 
     name: ClassVar[str] = PART_MOTION
+    renewed_by: ClassVar[frozenset[str]] = DRIVEN
 
     source: str = "joint 1"
     factor: str = ""

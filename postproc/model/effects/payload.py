@@ -36,6 +36,7 @@ class Payload(JointEffect):
     """
 
     name: ClassVar[str] = "payload"
+    renewed_by: ClassVar[frozenset[str]] = frozenset({"payload", "arm"})
     acts: ClassVar[tuple[tuple[str, str], ...]] = (("joint", "payload"),)
     driven_by: ClassVar[str] = "payload"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT

@@ -8,6 +8,7 @@ from typing import ClassVar
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
+    DRIVEN,
     Candidate,
     Cells,
     JointEffect,
@@ -30,6 +31,7 @@ class Scale(JointEffect):
     """
 
     name: ClassVar[str] = "scale"
+    renewed_by: ClassVar[frozenset[str]] = DRIVEN
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
     cells: ClassVar[Cells] = own_cells("joint {j}", "linear")
 

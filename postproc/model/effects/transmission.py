@@ -10,6 +10,8 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
+    DRIVEN,
+    GEARED,
     NAMED,
     Candidate,
     Cells,
@@ -31,6 +33,7 @@ LOWEST = 2.5  # order that refining never falls below
 FINEST = 0.25  # step of the free orders
 ALIKE = 0.9  # correlation of two waves over the poses that are not told apart
 LOOKED_AT = 1000  # angles that are enough to see how they are spaced
+OUTPUT_SIDE = 4.0  # highest order of waves that a gear's output side makes
 
 
 @dataclass(frozen=True)
@@ -115,6 +118,11 @@ class Transmission(JointEffect):
             for j, k in self.waves
             for wave in ("sin", "cos")
         )
+
+    def list_renewals(self) -> tuple[frozenset[str], ...]:
+        """Tell waves of the output side, which a new motor leaves as they are."""
+        sides = (GEARED if k <= OUTPUT_SIDE else DRIVEN for _, k in self.waves)
+        return tuple(side for side in sides for _ in ("sin", "cos"))
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the waves, (n, p)."""

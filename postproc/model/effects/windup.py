@@ -11,6 +11,7 @@ from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS, loops, varies
 from postproc.model.effects.effect import (
     ANY,
+    GEARED,
     Candidate,
     Cells,
     Effect,
@@ -46,6 +47,7 @@ class Windup(JointEffect):
     """
 
     name: ClassVar[str] = "windup"
+    renewed_by: ClassVar[frozenset[str]] = GEARED
     direct: ClassVar[bool] = True
     driven_by: ClassVar[str] = "travel"
     fit_policy: ClassVar[FitPolicy] = FitPolicy.IF_EVIDENT
