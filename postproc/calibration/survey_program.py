@@ -9,7 +9,8 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.calibration.measured_program import plan_arrivals
-from postproc.calibration.pose_design import design_survey, where_to_reverse
+from postproc.calibration.pose_design import design_survey
+from postproc.calibration.reversal_design import STEPS, design_reversals
 from postproc.exceptions import ProgramError
 from postproc.files import write_all
 from postproc.language.language import Language
@@ -27,7 +28,6 @@ from postproc.robot.pose import MM
 BACK = np.deg2rad(2.0)  # how far to the side every approach starts [rad]
 SETTLE = 1.5  # [s] pause before the tracker reads
 ANY_TOOL = 3  # probe points of a survey that holds for any tool
-STEPS = np.array([0.1, 0.2, 0.4, 0.8, 1.6]) * 1e-3  # [rad] of a drive that turns back
 
 
 def plan_survey(
@@ -120,16 +120,17 @@ def write_survey(
     design = design_survey(
         arm, probes, poses, asked.mode, cell.tracker, asked.seed, arrivals
     )
-    turned = (
-        where_to_reverse(arm, design, probes, asked.reversals)
+    back = (
+        design_reversals(arm, design, probes, asked.reversals)
         if asked.reversals
-        else []
+        else None
     )
-    name = name_of_file(output.stem)
-    program = plan_survey(cell, design.q, design.side, design.probe, name, turned)
+    name, turns = name_of_file(output.stem), () if back is None else back.turns
+    program = plan_survey(cell, design.q, design.side, design.probe, name, turns)
     text = language.write_measuring(program, output)
     write_all({output: text.encode("ascii")})
     summary = f"{output}: {design.summary()}"
+    summary += "" if back is None else f"\n{len(turns)} {back.summary()}"
     if len(probes) < ANY_TOOL:
         summary += (
             f"\n{len(probes)} of {ANY_TOOL} probe points: the model will hold only for "
