@@ -14,7 +14,7 @@ from postproc.calibration.direction_labels import judge_directions
 from postproc.calibration.expected_noise import ENOUGH_REPEATS, count_repeats
 from postproc.calibration.measurements import DroppedRow, Measurements
 from postproc.calibration.regression import Fit, Unseen, observe
-from postproc.calibration.reversal_test import tell_widths
+from postproc.calibration.reversal_test import tell_open, tell_widths
 from postproc.model.effects.effect import Effect
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import FreePart, Model
@@ -162,7 +162,8 @@ class FitReport:
         found: What every effect does at every joint, largest first.
         directions: Wrong directions, or None where the file has none.
         free: What functions without a law predict; None for published methods.
-        flanks: What reversals tell of the flanks of the joints; "" without reversals.
+        flanks: What reversals tell of the flanks of the joints, and what they leave
+            open; "" without reversals.
         held_out: What new poses are expected to be left, None where none were held out.
         rejected: Why the model must not be used; "" where it may be.
     """
@@ -229,7 +230,15 @@ def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
         found=find(fit),
         directions=report_directions(fit, survey),
         free=FreeForms.of(model.free_part(fit.batch.arm, fit.batch.states[used])),
-        flanks=tell_widths(model.flank_widths),
+        flanks="; ".join(
+            filter(
+                None,
+                (
+                    tell_widths(model.flank_widths),
+                    tell_open(model, fit.batch.arm, jacobian),
+                ),
+            )
+        ),
         pose_mm=float(np.sqrt(model.noise.pose_variance(jacobian).mean()) / MM),
         split=_split(fit),
         repeated="estimated"

@@ -15,12 +15,13 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.calibration.measurements import Measurements
-from postproc.model.backlash_width import half_widths, on_the_way
-from postproc.model.flank_hypotheses import verdict_of
+from postproc.model.backlash_width import half_gap, half_widths, on_the_way
+from postproc.model.flank_hypotheses import flanks_of, verdict_of
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import UNLIKE, UNTOLD, Model, Width
 from postproc.model.whitening import Whitener
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 
 STILL = 1e-6  # [rad] a drive that is said to stand
 SMALL = np.deg2rad(0.5)  # [rad] a step that is no approach of its own
@@ -29,6 +30,7 @@ WIDTHS = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0)  # gaps that are tried
 CLEAR = 4.5  # nats by which a width is ruled out: three standard errors
 LIKE = 0.2  # of the gap that the model has, by which the steps may differ
 TELLS = 0.25  # standard error of that share up to which steps tell
+LITTLE = 2e-5  # [m] off a path: what is open there matters to nobody
 EXCESS = 4.0  # standard deviations that the steps may scatter by more than readings
 
 
@@ -216,3 +218,30 @@ def tell_widths(widths: tuple[Width, ...]) -> str:
         joints.setdefault(word, []).append(str(joint))
     told = (f"joint {', '.join(own)} {word}" for word, own in joints.items())
     return f"flanks at stops: {'; '.join(told)}"
+
+
+def tell_open(model: Model, arm: Arm, jacobian: Floats) -> str:
+    """Say which joints' flanks reversals leave open, and what that costs paths.
+
+    A link whose flank is open may lack a part of its step behind the way of a sharp
+    gap: so far, at the most, a path may be off.
+
+    Args:
+        model: A model with what reversals say.
+        arm: Its arm.
+        jacobian: Of the probe at the poses of the survey, (n, 3, 6) [m/rad].
+
+    Returns:
+        "" where there were no reversals.
+    """
+    if not model.flank_widths:
+        return ""
+    lag = np.array([flank.max_lag for flank in flanks_of(model, arm)])
+    elastic = [verdict_of(width) == "elastic" for width in model.flank_widths]
+    lever = np.linalg.norm(jacobian, axis=1).max(axis=0)
+    size = np.where(elastic, 0.0, lag * lever * 2.0 * half_gap(model, arm))
+    joints = [j for j in np.argsort(-size, kind="stable") if size[j] > LITTLE]
+    if not joints:
+        return "no flank that matters is open"
+    cost = ", ".join(f"joint {j + 1} {size[j] / MM:.2f} mm" for j in joints)
+    return f"open, with what a path may be off by at the most: {cost}"

@@ -77,7 +77,11 @@ def test_reversals_turn_one_drive_back_from_where_all_came(
     visits = read_program({path.name: path.read_bytes()}, job_cell).visits
     first = path.read_text().splitlines()[0]
     many, measured = map(int, re.findall(r"and (\d+) reversals: (\d+) meas", first)[0])
-    assert measured == 2 * POSES + 6 * many == sum(map(bool, visits.measure_id))
+    assert (
+        measured
+        == 2 * POSES + (1 + len(STEPS)) * many
+        == sum(map(bool, visits.measure_id))
+    )
     steps = [
         (i, *map(int, name.split(".")))
         for i, name in enumerate(visits.measure_id)
@@ -106,7 +110,7 @@ def test_reversals_turn_one_drive_back_from_where_all_came(
         (("--set", "tracker.xyz_mm=[1,2]"), "$.xyz_mm"),
         (
             ("--poses", "11", "--set", "survey.reversals=4"),
-            "need 12 poses, and there are 11",
+            "need 16 poses, and there are 11",
         ),
     ],
 )
