@@ -148,7 +148,7 @@ def _move(q: Floats, measured: str = "") -> MeasuringMove:
 
 def write_check(
     cell: Cell, output: Path, readings: int, model: Model | None = None
-) -> str:
+) -> tuple[str, CheckDesign]:
     """Design a check as [survey] of the cell says, and write it as a program.
 
     Args:
@@ -158,7 +158,7 @@ def write_check(
         model: The arm's error as it was surveyed, None where it was not.
 
     Returns:
-        What was written, in words.
+        What was written, in words, and the check.
 
     Raises:
         ProgramError: The arm has a controller of another language.
@@ -170,11 +170,12 @@ def write_check(
     program = plan_check(cell, check, name_of_file(output.stem))
     _write(cell, output, program)
     poses = len(dict.fromkeys(name[:-1] for name in check.names))
-    return (
+    summary = (
         f"{output}: a check of {readings} readings at {poses} poses, the last one "
         f"repeats the first; chosen for {', '.join(check.effects)}\n"
         f"{describe_duration(cell, program)}"
     )
+    return summary, check
 
 
 def _write(cell: Cell, output: Path, program: MeasuringProgram) -> None:

@@ -93,7 +93,12 @@ def survey(
                 summary = write_survey(loaded, output, poses, job)
             else:
                 known = None if model is None else load_model(model)
-                summary = write_check(loaded, output, checks, known)
+                summary, design = write_check(loaded, output, checks, known)
+                if known is not None:
+                    from postproc.record.foresight import foresee
+                    from postproc.report.record import tell_foreseen
+
+                    summary += tell_foreseen(foresee(loaded, known, design))
         say(summary)
         suggest("read", "MEASURED.csv", "--program", output, cell=asked)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from postproc.files import schema
 from postproc.record.causes import BASE, TOOL, ZERO
 from postproc.record.control import Verdict
 from postproc.record.database import Record
+from postproc.record.foresight import Foreseen
 from postproc.record.life import Life
 from postproc.record.replacement import ReplacedProgram
 from postproc.record.robots import UNTOLD, Refreshed
@@ -86,13 +87,8 @@ def tell_check(serial: str, verdict: Verdict, known: bool) -> str:
         f"95 % {verdict.within_mm:.3f}, max {verdict.worst_mm:.3f}",
         f"T2 {verdict.statistic:.1f} (limit {verdict.limit:.1f}), moving average "
         f"{verdict.drift:.1f} (limit {verdict.drift_limit:.1f})",
-        f"found in 95 %: {_least(verdict)}",
+        *_power(verdict),
     ]
-    if verdict.blind:
-        lines.append(f"this check cannot see: {', '.join(verdict.blind)}")
-    pairs = [" from ".join(pair) for pair in verdict.alike]
-    if pairs:
-        lines.append(f"and it hardly tells {', '.join(pairs)}")
     if known:
         lines.append("the record had these readings: nothing was added")
     if not verdict.in_control:
@@ -124,10 +120,25 @@ def _words(nats: float) -> str:
     return f"{word} ({nats:.0f} nats)"
 
 
-def _least(verdict: Verdict) -> str:
+def tell_foreseen(foreseen: Foreseen) -> str:
+    """Say what a check will tell, on lines of its own."""
+    return "".join(f"\n{line}" for line in _power(foreseen))
+
+
+def _power(check: Verdict | Foreseen) -> list[str]:
+    """Say what a check finds, what it cannot see, and what it hardly tells apart."""
+    lines = [f"found in 95 %: {_least(check.found)}"]
+    if check.blind:
+        lines.append(f"this check cannot see: {', '.join(check.blind)}")
+    if pairs := [" from ".join(pair) for pair in check.alike]:
+        lines.append(f"and it hardly tells {', '.join(pairs)}")
+    return lines
+
+
+def _least(found: Mapping[str, float]) -> str:
     """Write the least change of each single cause that is found."""
     told = []
-    for name, size in verdict.found.items():
+    for name, size in found.items():
         if not np.isfinite(size):
             continue
         if name.startswith(ZERO):
