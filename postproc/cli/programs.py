@@ -106,6 +106,14 @@ def compensate(
     orientation: OrientationOption = False,
     shared_points: SharedPointsOption = None,
     path_tolerance: PathToleranceOption = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance",
+            metavar="MM",
+            help="Exit 0 only if every target is expected within it.",
+        ),
+    ] = None,
     changes: SetOption = None,
     every: EveryOption = False,
 ) -> None:
@@ -146,7 +154,9 @@ def compensate(
                 files, loaded, fitted, options=options, progress=progress,
                 processes=crowd,
             )  # fmt: skip
-        if strict and outcome.exit_code:
+        refused = strict and outcome.exit_code
+        outcome = outcome.with_tolerance(tolerance)
+        if refused:
             _print_outcome(outcome, every)
             raise PostprocError(f"--strict: {_why_nothing(outcome)}")
         places = Destination(files, (cell, model))
@@ -241,6 +251,10 @@ def _print_outcome(outcome: Outcome, every: bool) -> None:
         if source:
             say(source)
     say(outcome.summary())
+    if outcome.tolerance is not None:
+        from postproc.report.tolerance import tell_tolerance
+
+        say(tell_tolerance(outcome, outcome.tolerance))
     if outcome.in_time is not None:
         say(outcome.in_time.summary(outcome.visits))
     if outcome.opinion is not None:

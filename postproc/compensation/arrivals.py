@@ -107,6 +107,27 @@ class ArrivalStates:
 
         return self._by_block(rows, both, 2)
 
+    def predict(self, rows: Ints) -> Floats:
+        """Predict the error at some visits, and how it scatters, (r, 3, 3) [m].
+
+        Args:
+            rows: Visits, ascending, as for `shares`.
+
+        Returns:
+            The error; the standard deviation of an arrival per axis, widened as
+            held-out readings scatter more than their noise; and 1 where the state is
+            outside of what was surveyed, else 0. NaN where joint angles or the tool
+            are not known.
+        """
+
+        def all_three(arm: Arm, states: States) -> Floats:
+            found = self.model.predict(arm, states)
+            std = max(self.model.reading_spread, 1.0) * found.std_arrival
+            outside = np.repeat(found.any_outside[:, None].astype(float), 3, axis=1)
+            return np.stack([found.error, std, outside], axis=1)
+
+        return self._by_block(rows, all_three, 3)
+
     def _by_block(
         self, rows: Ints, evaluate: Callable[[Arm, States], Floats], k: int
     ) -> Floats:

@@ -20,7 +20,7 @@ from postproc.compensation.sidecar import (
     sidecar_path,
 )
 from postproc.diagnostics import Code, Reason
-from postproc.exceptions import ProgramError
+from postproc.exceptions import PostprocError, ProgramError
 from postproc.files import (
     Content,
     check_places,
@@ -41,6 +41,7 @@ if TYPE_CHECKING:  # it loads all of the planning, which a record does not want
     from postproc.arrays import DataFrame
     from postproc.compensation.arrivals import ArrivalStates
     from postproc.compensation.timing_comparison import InTime
+    from postproc.compensation.tolerance import ToleranceCheck
     from postproc.verify.opinion import Opinion
 
 # What came of a program: every visit with its status, and the exit code.
@@ -126,6 +127,7 @@ class Outcome:
             effects in their errors; None where nobody knows.
         in_time: The program run in time, before and after; None where nobody asked.
         opinion: A second opinion on it; None where nobody asked.
+        tolerance: Expected true errors against a tolerance; None where nobody asked.
         inputs: Files that it was read from, which `save` must not write over.
     """
 
@@ -145,6 +147,7 @@ class Outcome:
     arrivals: ArrivalStates | None = None
     in_time: InTime | None = None
     opinion: Opinion | None = None
+    tolerance: ToleranceCheck | None = None
     inputs: tuple[Path, ...] = ()
 
     def __str__(self) -> str:
@@ -231,16 +234,35 @@ class Outcome:
     def exit_code(self) -> int:
         """Return 1 where a target could have been compensated and was not.
 
-        Also where the compensated program does not run as the original does, or a
-        second opinion disagrees.
+        Also where the compensated program does not run as the original does, a second
+        opinion disagrees, or a visit does not pass the tolerance.
         """
         left = (Status.CONFLICT, Status.RUNTIME, Status.REJECTED)
         missed = any(d.code in NOT_FOLLOWED for d in self.diagnostics)
         missed |= self.in_time is not None and self.in_time.falls_short
         missed |= self.opinion is not None and not self.opinion.agrees
+        missed |= self.tolerance is not None and not self.tolerance.passes
         far = [one.code is Code.ARRIVALS_FAR_APART for one in self.decisions.reasons]
         missed |= bool(np.array(far)[self.decisions.why].any())
         return NOT_ALL if missed or np.isin(self.decisions.status, left).any() else DONE
+
+    def with_tolerance(self, tolerance_mm: float | None) -> Outcome:
+        """Judge every visit by its expected true error, see `check_tolerance`.
+
+        Raises:
+            PostprocError: The tolerance is no positive number, or how the arm arrives
+                is not known.
+        """
+        if tolerance_mm is None:
+            return self
+        from postproc.compensation.tolerance import check_tolerance
+
+        if self.arrivals is None:
+            raise PostprocError("--tolerance: how the arm arrives is not known")
+        d = self.decisions
+        judged = (d.status != Status.UNCHANGED) | (self.visits.literal >= 0)
+        found = check_tolerance(self.arrivals, d.correction, judged, tolerance_mm)
+        return replace(self, tolerance=found)
 
     def summary(self) -> str:
         """Say in one line what came of the program."""

@@ -61,10 +61,20 @@ def report_pieces(outcome: Outcome) -> Iterator[bytes]:
             if outcome.opinion is None
             else {"second_opinion": outcome.opinion.to_dict()}
         ),
+        **tolerance_of(outcome),
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
         "stages_s": dict(outcome.stages),
     }
     yield ("],\n" + json.dumps(finite(tail))[1:] + "\n").encode()
+
+
+def tolerance_of(outcome: Outcome) -> dict[str, object]:
+    """Describe expected errors against a tolerance; nothing where nobody asked."""
+    if outcome.tolerance is None:
+        return {}
+    from postproc.report.tolerance import tolerance_json
+
+    return {"tolerance": tolerance_json(outcome.tolerance)}
 
 
 def in_time_of(outcome: Outcome) -> dict[str, object]:
