@@ -24,6 +24,7 @@
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
 # make wheel       a wheel for every Python from 3.11 on, tried in a new environment, in dist
 # make wheels  the same, and one for Windows, cross-built: needs rustup and mingw-w64
+# make windows     try that one under Wine: same bytes as here; needs wine and maven, too
 # make native      lint and tests of the native core by itself, for who changes it
 # make docs     run every command of the documentation, write it as a site to build/docs
 # make pictures remake the pictures of the documentation (needs chromium, chromium-driver)
@@ -38,7 +39,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test slow lint format bench evidence reproduce accuracy intervals detection undeclared paths blind real chaos fuzz docs clean
-.PHONY: campaigns languages plant-bench generated growth awkward native golden pictures lock wheel wheels
+.PHONY: campaigns languages plant-bench generated growth awkward native golden pictures lock wheel wheels windows
 .DELETE_ON_ERROR:
 
 help:
@@ -126,6 +127,9 @@ wheels: wheel
 	@PATH="$$PATH:$$HOME/.cargo/bin" CARGO_BUILD_TARGET=$(WINDOWS) $(PYTHON_BIN) -m pip --quiet \
 		--disable-pip-version-check wheel --no-deps --no-build-isolation -w dist .
 	@ls dist/postproc-*.whl
+
+windows: $(STAMP)
+	@PYTHON=$(abspath $(PYTHON_BIN)) bash .ci/windows
 
 native: $(STAMP)
 	@cd native && PATH="$$PATH:$$HOME/.cargo/bin" && cargo fmt --check && \
