@@ -8,6 +8,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 
@@ -26,6 +27,10 @@ from postproc.simulation.kinematics import NJ220, Chain
 from postproc.simulation.reference import WORKING_RANGE
 from tests.any_controller import EVERY, any_controller
 from tests.pipes import made_device, made_pipe
+
+# How long an example takes says how busy a machine is.
+hypothesis.settings.register_profile("postproc", deadline=None)
+hypothesis.settings.load_profile("postproc")
 
 ROOT = Path(__file__).parents[1]
 SEED = 4

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
 import pytest
 
 
-def slow(cases: Iterable[Any]) -> Iterator[Any]:
+def slow(cases: Iterable[Any]) -> list[Any]:
     """Mark cases of a parametrized test."""
-    for case in cases:
-        values = case if isinstance(case, tuple) else (case,)
-        yield pytest.param(*values, marks=pytest.mark.slow)
+    several = [case if isinstance(case, tuple) else (case,) for case in cases]
+    return [pytest.param(*values, marks=pytest.mark.slow) for values in several]

@@ -154,9 +154,8 @@ def compensate(
                 files, loaded, fitted, options=options, progress=progress,
                 processes=crowd,
             )  # fmt: skip
-        refused = strict and outcome.exit_code
         outcome = outcome.with_tolerance(tolerance)
-        if refused:
+        if strict and outcome.exit_code:
             _print_outcome(outcome, every)
             raise PostprocError(f"--strict: {_why_nothing(outcome)}")
         places = Destination(files, (cell, model))
@@ -220,9 +219,12 @@ def _why_nothing(outcome: Outcome) -> str:
             "the second opinion disagrees (listed above), nothing is written. "
             "Please report it with the program"
         )
+    what = "targets are not corrected"
+    if outcome.tolerance is not None and not outcome.tolerance.passes:
+        what = "targets do not pass the tolerance"
     return (
-        "targets are not corrected (listed above), nothing is written. "
-        "Change them, or run without --strict"
+        f"{what} (listed above), nothing is written. Change them, or run without "
+        "--strict"
     )
 
 

@@ -39,7 +39,7 @@ CLOSE = 3.0  # nats within which another cause may be it as well
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class CheckVerdict:
     """What a check says of an arm.
 
     Attributes:
@@ -119,7 +119,7 @@ class Watch:
         knowledge = self.knowledge.after(event)
         return replace(self, knowledge=knowledge, averages={}, share=0.0)
 
-    def judge(self, rows: CheckRows) -> tuple[Verdict, Watch]:
+    def judge(self, rows: CheckRows) -> tuple[CheckVerdict, Watch]:
         """Judge a check, and take it in where it is in control."""
         knowledge = self.knowledge.visiting(rows)
         expected, scale = knowledge.expect(rows), self.scale
@@ -130,7 +130,7 @@ class Watch:
         statistic = expected.statistic / scale
         ranked = weigh([*causes, *readings_of(rows.ids)], expected, scale)
         found = {c.name: least_found(c, expected, limit, scale) for c in causes}
-        verdict = Verdict(
+        verdict = CheckVerdict(
             statistic, limit, expected.free, drift, drift_limit,
             errors_of(expected, rows), tuple(ranked), found,
             tuple(name for name, least in found.items() if not np.isfinite(least)),

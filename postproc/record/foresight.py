@@ -13,7 +13,7 @@ from postproc.calibration.monuments import ReferenceRows
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
 from postproc.record.check_rows import CheckRows, place_check
-from postproc.record.control import Verdict, Watch
+from postproc.record.control import CheckVerdict, Watch
 from postproc.record.knowledge import Knowledge
 from postproc.robot.cell import Cell
 from postproc.robot.state import make_states
@@ -48,7 +48,7 @@ def foresee(cell: Cell, model: Model, design: CheckDesign) -> Foreseen:
     return Foreseen(verdict.found, verdict.blind, verdict.alike)
 
 
-def _judge(cell: Cell, model: Model, rows: CheckRows) -> Verdict:
+def _judge(cell: Cell, model: Model, rows: CheckRows) -> CheckVerdict:
     return Watch(Knowledge.of(model, cell.arm)).judge(rows)[0]
 
 

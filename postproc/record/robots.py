@@ -12,7 +12,7 @@ from postproc.exceptions import RecordError
 from postproc.files import read_input
 from postproc.model.effects.effect import EVENTS
 from postproc.model.model import Model, load_model
-from postproc.record.control import Verdict
+from postproc.record.control import CheckVerdict
 from postproc.record.database import Record
 from postproc.record.events import OF_JOINTS
 from postproc.record.life import Life, moment, today
@@ -129,7 +129,9 @@ def _retire_model(record: Record, serial: str) -> None:
             record.set_state(row, state=OLD)
 
 
-def check_robot(record: Record, serial: str, given: CheckFile) -> tuple[Verdict, bool]:
+def check_robot(
+    record: Record, serial: str, given: CheckFile
+) -> tuple[CheckVerdict, bool]:
     """Judge the readings of a check, and record them with the verdict.
 
     Returns:
@@ -165,7 +167,7 @@ def _survey_of(serial: str, given: CheckFile, content: bytes, life: Life) -> Sur
     )  # fmt: skip
 
 
-def _row_of(serial: str, survey: int, date: str, verdict: Verdict) -> VerdictRow:
+def _row_of(serial: str, survey: int, date: str, verdict: CheckVerdict) -> VerdictRow:
     moved = "" if verdict.in_control else verdict.shown[0].describe()
     return VerdictRow(
         None, serial, survey, date, len(verdict.errors), verdict.mean_mm,

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.files import schema
 from postproc.record.causes import BASE, TOOL, ZERO
-from postproc.record.control import Verdict
+from postproc.record.control import CheckVerdict
 from postproc.record.database import Record
 from postproc.record.foresight import Foreseen
 from postproc.record.life import Life
@@ -79,7 +79,7 @@ def _check(row: VerdictRow) -> str:
     return f"check: {'in control' if row.in_control else row.moved}; {size}"
 
 
-def tell_check(serial: str, verdict: Verdict, known: bool) -> str:
+def tell_check(serial: str, verdict: CheckVerdict, known: bool) -> str:
     """Write a verdict on one screen."""
     lines = [
         _headline(serial, verdict),
@@ -96,7 +96,7 @@ def tell_check(serial: str, verdict: Verdict, known: bool) -> str:
     return "\n".join(lines)
 
 
-def _headline(serial: str, verdict: Verdict) -> str:
+def _headline(serial: str, verdict: CheckVerdict) -> str:
     if verdict.in_control:
         but = f", but for {', '.join(verdict.blind)}" if verdict.blind else ""
         return f"{serial}: in control{but}"
@@ -125,7 +125,7 @@ def tell_foreseen(foreseen: Foreseen) -> str:
     return "".join(f"\n{line}" for line in _power(foreseen))
 
 
-def _power(check: Verdict | Foreseen) -> list[str]:
+def _power(check: CheckVerdict | Foreseen) -> list[str]:
     """Say what a check finds, what it cannot see, and what it hardly tells apart."""
     lines = [f"found in 95 %: {_least(check.found)}"]
     if check.blind:
@@ -148,7 +148,7 @@ def _least(found: Mapping[str, float]) -> str:
     return ", ".join(told)
 
 
-def _next_step(serial: str, verdict: Verdict) -> str:
+def _next_step(serial: str, verdict: CheckVerdict) -> str:
     best = verdict.shown[0].cause
     if best.event is None:
         return "next: read that pose again, then check again"
@@ -160,7 +160,7 @@ def _next_step(serial: str, verdict: Verdict) -> str:
     )
 
 
-def check_json(serial: str, verdict: Verdict) -> str:
+def check_json(serial: str, verdict: CheckVerdict) -> str:
     """Return a verdict as JSON."""
     causes = [
         {"cause": s.cause.name, "also": list(s.cause.also), "nats": round(s.nats, 3),

@@ -114,6 +114,10 @@ def test_strict_turns_1_into_2_and_writes_nothing(desk):
     assert desk.names() == {"job.pdl"}
     done = desk.put("fine.pdl", program(FIRST, POSE))
     assert desk.compensate(done, "-o", out, "--strict").exit_code == 0
+    out.unlink()
+    found = desk.compensate(done, "-o", out, "--strict", "--tolerance", "0.0001")
+    assert found.exit_code == 2 and "do not pass the tolerance" in found.stderr
+    assert not out.exists()
 
 
 def test_report_has_one_row_a_visit_in_program_order(desk):

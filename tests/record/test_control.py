@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from postproc.record.causes import causes_of, noncentrality
 from postproc.record.check_rows import CheckRows, place_check
-from postproc.record.control import Verdict, Watch
+from postproc.record.control import CheckVerdict, Watch
 from postproc.record.events import Event
 from postproc.record.knowledge import Knowledge
 from tests.calibration.simulator import NJ
@@ -26,7 +26,7 @@ def read(drawn: Drawn, robot: Robot, rng: np.random.Generator) -> CheckRows:
 
 
 @pytest.fixture(scope="module")
-def months(drawn: Drawn) -> tuple[Watch, list[Verdict]]:
+def months(drawn: Drawn) -> tuple[Watch, list[CheckVerdict]]:
     rng, watch, told = (
         np.random.default_rng(11),
         Watch(Knowledge.of(drawn.model, NJ)),
@@ -39,7 +39,7 @@ def months(drawn: Drawn) -> tuple[Watch, list[Verdict]]:
 
 
 def test_an_arm_that_is_as_it_was_is_in_control(
-    months: tuple[Watch, list[Verdict]],
+    months: tuple[Watch, list[CheckVerdict]],
 ) -> None:
     _, told = months
     # designed for 1 % alarms: more than one in ten has a chance of 0.4 %
@@ -50,7 +50,7 @@ def test_an_arm_that_is_as_it_was_is_in_control(
 
 
 def test_what_a_survey_left_at_a_pose_is_no_alarm_month_after_month(
-    drawn: Drawn, months: tuple[Watch, list[Verdict]],
+    drawn: Drawn, months: tuple[Watch, list[CheckVerdict]],
 ) -> None:  # fmt: skip
     watch, _ = months
     begun, known = Knowledge.of(drawn.model, NJ), watch.knowledge
@@ -79,7 +79,7 @@ def change(robot: Robot, changes: dict[str, tuple[int, float]]) -> Robot:
 
 @pytest.mark.parametrize("name", CHANGED)
 def test_what_moved_is_found_and_named_at_the_next_check(
-    name: str, drawn: Drawn, months: tuple[Watch, list[Verdict]]
+    name: str, drawn: Drawn, months: tuple[Watch, list[CheckVerdict]]
 ) -> None:
     watch, _ = months
     changes, _ = CHANGED[name]
@@ -92,7 +92,7 @@ def test_what_moved_is_found_and_named_at_the_next_check(
 
 
 def test_a_change_is_found_again_once_its_event_is_recorded(
-    drawn: Drawn, months: tuple[Watch, list[Verdict]]
+    drawn: Drawn, months: tuple[Watch, list[CheckVerdict]]
 ) -> None:
     watch, _ = months
     changes, event = CHANGED["zero of joint 3"]
@@ -107,7 +107,7 @@ def test_a_change_is_found_again_once_its_event_is_recorded(
 
 
 def test_a_reading_that_went_wrong_is_named(
-    drawn: Drawn, months: tuple[Watch, list[Verdict]]
+    drawn: Drawn, months: tuple[Watch, list[CheckVerdict]]
 ) -> None:
     watch, _ = months
     rows = read(drawn, drawn.robot, np.random.default_rng(15))

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from postproc.calibration.fit import fit_measurements
 from postproc.model.model import Model
 from postproc.record.check_rows import place_check
-from postproc.record.control import Verdict, Watch
+from postproc.record.control import CheckVerdict, Watch
 from postproc.record.events import Event
 from postproc.record.knowledge import Knowledge
 from postproc.robot.cell import Cell, load_cell
@@ -65,7 +65,7 @@ def left_mm(robot: Robot, model: Model, rng: np.random.Generator) -> float:
 def watch_months(
     robot: Robot, model: Model, poses: tuple[np.ndarray, np.ndarray], months: int,
     rng: np.random.Generator,
-) -> tuple[Watch, list[Verdict]]:  # fmt: skip
+) -> tuple[Watch, list[CheckVerdict]]:  # fmt: skip
     """Check an arm month after month."""
     watch, verdicts = Watch(Knowledge.of(model, NJ)), []
     for _ in range(months):
