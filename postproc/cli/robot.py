@@ -283,7 +283,9 @@ def release(beside: Path, releases: Callable[[], list[Release]]) -> None:
     if not place.exists() or not (found := releases()):
         return
     from postproc.record.database import open_record
-    from postproc.record.robots import note_releases
+    from postproc.record.robots import note_releases, tell_outdated
 
     with open_record(place) as record:
         note_releases(record, found)
+        for line in tell_outdated(record, found):
+            say(f"warning: {line}")

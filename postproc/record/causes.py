@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import brentq
@@ -51,8 +52,12 @@ class Change:
         return out
 
 
-def causes_of(model: Model) -> list[Change]:
-    """List what may change of an arm, from single zeros to whole gears, each once."""
+@lru_cache(maxsize=4)
+def causes_of(model: Model) -> tuple[Change, ...]:
+    """List what may change of an arm, from single zeros to whole gears, each once.
+
+    Those of a model are listed once: a robot's life asks for them in every check.
+    """
     found = dict[tuple[int, ...], Change]()
     for name, event in _events():
         variance = event.widening(model)
@@ -61,7 +66,7 @@ def causes_of(model: Model) -> list[Change]:
             found[key] = replace(found[key], also=(*found[key].also, name))
         elif key:
             found[key] = Change(name, event, own, np.sqrt(variance[own]))
-    return list(found.values())
+    return tuple(found.values())
 
 
 def _events() -> Iterator[tuple[str, Event]]:
@@ -124,7 +129,7 @@ def _length(change: Floats, std: Floats) -> str:
     return f"{size / MM:.2f} +- {along / MM:.2f} mm"
 
 
-def weigh(causes: list[Change], expected: Expected, scale: float) -> list[Shown]:
+def weigh(causes: Sequence[Change], expected: Expected, scale: float) -> list[Shown]:
     """Weigh every cause by the readings of a check, the likeliest first.
 
     The evidence of a change of unknown size is the mean over sizes, each with a normal

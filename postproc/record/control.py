@@ -9,6 +9,7 @@ exponentially weighted moving average control chart, Technometrics 34, 1992).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -160,7 +161,7 @@ class Watch:
         )  # fmt: skip
 
     def _average(
-        self, causes: list[Change], expected: Expected
+        self, causes: Sequence[Change], expected: Expected
     ) -> tuple[dict[str, Floats], float]:
         """Average what the causes explain, each with unit variance in each check."""
         averages = {}
@@ -172,7 +173,7 @@ class Watch:
         return averages, (1.0 - NEW) ** 2 * self.share + NEW**2
 
     def _drift(
-        self, causes: list[Change], expected: Expected, averages: dict[str, Floats],
+        self, causes: Sequence[Change], expected: Expected, averages: dict[str, Floats],
         share: float,
     ) -> tuple[float, float]:  # fmt: skip
         """Return the largest average and its limit, as minus log of chance.
@@ -235,7 +236,7 @@ def errors_of(
 
 
 def _confusable(
-    causes: list[Change], expected: Expected
+    causes: Sequence[Change], expected: Expected
 ) -> tuple[tuple[str, str], ...]:
     """List pairs of single causes that a check cannot tell apart."""
     single = [c for c in causes if "motor" not in c.name and "gear" not in c.name]

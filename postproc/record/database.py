@@ -52,6 +52,10 @@ MIGRATIONS = (
         id INTEGER PRIMARY KEY, serial TEXT NOT NULL REFERENCES robot,
         path TEXT NOT NULL, output TEXT NOT NULL, model TEXT NOT NULL,
         sha256 TEXT NOT NULL, released TEXT NOT NULL, moves_mm REAL);
+    CREATE INDEX survey_of ON survey (serial);
+    CREATE INDEX event_of ON event (serial);
+    CREATE INDEX verdict_of ON verdict (serial);
+    CREATE INDEX program_of ON program (serial);
     """,
 )
 TABLES = ("robot", "survey", "event", "model", "verdict", "program")

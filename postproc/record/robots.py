@@ -311,7 +311,30 @@ def note_releases(record: Record, releases: Iterable[Release]) -> int:
     return len(new)
 
 
+def tell_outdated(record: Record, releases: Iterable[Release]) -> list[str]:
+    """Say which robots' programs were compensated with another model than the newest.
+
+    Returns:
+        A line for each robot and model.
+    """
+    current = {m.serial: m for m in record.rows(ModelRow) if m.state == CURRENT}
+    pairs = sorted({(one.serial, one.model) for one in releases})
+    return [
+        f"{serial}: compensated with model {model}, but {current[serial].id} "
+        f"({current[serial].file}) is the newest in {record.path}"
+        for serial, model in pairs
+        if serial in current and current[serial].id != model
+    ]
+
+
 __all__ = [
-    "CheckFile", "Refreshed", "add_robot", "check_robot", "moment", "note_event",
-    "note_releases", "refresh_robot",
+    "CheckFile",
+    "Refreshed",
+    "add_robot",
+    "check_robot",
+    "moment",
+    "note_event",
+    "note_releases",
+    "refresh_robot",
+    "tell_outdated",
 ]  # fmt: skip

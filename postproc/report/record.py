@@ -192,7 +192,10 @@ def tell_refresh(serial: str, found: Refreshed, output: str) -> str:
             "warning: no event is recorded since the last model: the readings move it "
             "as far as the survey was unsure alone"
         )
-    return "\n".join([*lines, *tell_stale(found.stale)])
+    lines += tell_stale(found.stale)
+    lines.append(f"next: compensate with {output}; postproc batch --stale makes the "
+                 "stale ones again")  # fmt: skip
+    return "\n".join(lines)
 
 
 def tell_stale(stale: Iterable[StaleProgram]) -> list[str]:

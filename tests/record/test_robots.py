@@ -114,6 +114,11 @@ def test_stale_programs_alone_are_made_again(home: Path) -> None:
         last = record.rows(ProgramRow, "R010")[-1]
         current = [m for m in record.rows(ModelRow) if m.state == "current"]
     assert [m.id for m in current] == [last.model]
+    words = "compensate", "nominal/drilling.pdl", "-o", "x.pdl"
+    old = run(*words, "--model", "model.json")
+    assert f"but {last.model} (new.json) is the newest" in old.stderr
+    new = run(*words)
+    assert "is the newest" not in new.stderr
     made = (home / "compensated" / "drilling.pdl").stat().st_mtime_ns
     assert run("batch", "--stale").exit_code == 0
     assert (home / "compensated" / "drilling.pdl").stat().st_mtime_ns == made
@@ -156,7 +161,7 @@ def test_another_robot_takes_over_its_programs(home: Path, drawn: Drawn) -> None
     finally:
         (home / "drilling.away").rename(home / "nominal" / "drilling.pdl")
     assert "1 of 1 programs written" in found.stdout, found.output
-    assert (home / "taken" / "drilling.pdl").exists()
+    assert len([*(home / "taken").glob("*.pdl")]) == 1
     found = run("robot", "replace", "R010", "R011", "-o", "taken")
     assert found.exit_code == 2
     assert "replaced by R011 already" in found.stderr
