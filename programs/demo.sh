@@ -22,6 +22,9 @@ run_or_1() { run "$@" || [ $? -eq 1 ]; }
 
 title() { printf '\n== %s\n' "$*"; }
 
+echo "Look at: the error of the model on poses it has not seen, what every program says"
+echo "of its uncorrected targets, and the table of true errors at the end."
+
 title "A survey program: 300 poses, each approached from both sides"
 run postproc survey --cell $cell --poses 300 -o demo/survey.pdl
 
@@ -34,7 +37,7 @@ run postproc fit demo/survey.csv --cell $cell -o demo/model.json
 for job in $jobs; do
     title "$job.pdl: every target moved against the predicted error"
     run_or_1 postproc compensate programs/$job.pdl --cell $cell --model demo/model.json \
-        -o demo/$job.pdl --report demo/$job.json
+        -o demo/$job.pdl --report demo/$job.json --report demo/$job.html
     run_or_1 postproc diff programs/$job.pdl demo/$job.pdl >demo/$job.diff
     head -n 14 demo/$job.diff
     echo "  ... all of it in demo/$job.diff"
@@ -59,17 +62,33 @@ for job in $jobs; do
     done
 done
 
-title "Another language: a welding task of two RAPID modules on an IRB 6640, explained"
-run postproc explain programs/welding/Welding.mod --cell programs/welding/cell.toml \
-    >demo/welding.txt
-head -n 12 demo/welding.txt
-echo "  ... all of it in demo/welding.txt"
+# The whole loop on another arm, in its language: folder, program, suffix of a survey.
+nests="[[80.0, -40.0, 150.0], [-60.0, 100.0, 200.0], [50.0, 90.0, 320.0]]" # reflectors
+loop() {
+    local cell=programs/$1/cell.toml job=programs/$1/$2 out=demo/$1
+    mkdir "$out"
+    run postproc survey --cell "$cell" --poses 100 --set "survey.points_mm=$nests" \
+        -o "$out/survey.$3"
+    run postproc simulate "$out/survey.$3" --cell "$cell" -o "$out/readings.csv"
+    run postproc fit "$out/readings.csv" --cell "$cell" --effects geometry,backlash \
+        -o "$out/model.json" >"$out/fit.txt"
+    tail -n 3 "$out/fit.txt"
+    run_or_1 postproc compensate "$job" --cell "$cell" --model "$out/model.json" \
+        -o "$out/$2" >"$out/compensate.txt" 2>&1
+    grep visits "$out/compensate.txt"
+    for file in programs/"$1"/*; do # what belongs to the job and needed no change
+        [ -e "$out/${file##*/}" ] || cp "$file" "$out"
+    done
+    for program in "$job" "$out/$2"; do
+        run postproc simulate "$program" --cell "$cell" --reference "$job"
+    done
+}
+
+title "Another language: a welding task of two RAPID modules on an IRB 6640"
+loop welding Welding.mod mod
 
 title "And another: a milling job in KRL on a KR 210, three sources with their data lists"
-run postproc explain programs/facing/Milling.src --cell programs/facing/cell.toml \
-    >demo/facing.txt
-head -n 12 demo/facing.txt
-echo "  ... all of it in demo/facing.txt"
+loop facing Milling.src src
 
 title "True error of the tool at the targets, and of its path between them, mm"
 python - $jobs <<'TABLE'
@@ -91,3 +110,5 @@ for job in sys.argv[1:]:
         row = figures(told["true_error"]) + figures(told["path_accuracy"])
         print(f"{job:12}{state:14}{row}")
 TABLE
+
+title "Where every target went and why, for a browser: file://$PWD/demo/drilling.html"
