@@ -15,6 +15,7 @@ import pytest
 from postproc.exceptions import RecordError
 from postproc.record.database import MIGRATIONS, TABLES, open_record
 from postproc.record.rows import EventRow, ModelRow, RobotRow
+from tests.slow import slow
 
 ROBOT = RobotRow("R010", "nj220-2.7", "cell.toml", "", "2026-11-28T00:00:00")
 
@@ -103,13 +104,14 @@ def test_two_writers_at_once_lose_nothing(place: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="there are no kills")
-def test_a_kill_leaves_it_readable_and_complete(place: Path) -> None:
+@pytest.mark.parametrize("count", [3, *slow([100])])
+def test_a_kill_leaves_it_readable_and_complete(place: Path, count: int) -> None:
     context = multiprocessing.get_context("spawn")
-    for k in range(3):
+    for k in range(count):
         writer = context.Process(target=_write, args=(place, f"k{k}-", 100_000))
         writer.start()
         begun, seen = time.monotonic(), 0
-        while seen < 3 and time.monotonic() - begun < 30:
+        while seen < 1 + k % 5 and time.monotonic() - begun < 30:
             with open_record(place) as record:
                 notes = [e.note for e in record.rows(EventRow)]
             seen = sum(note.startswith(f"k{k}-") for note in notes)
