@@ -13,6 +13,7 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from postproc.cli.commands import app
+from postproc.files import schema
 from postproc.model.model import load_model
 from postproc.record.database import open_record
 from postproc.record.rows import ModelRow, ProgramRow, VerdictRow
@@ -130,6 +131,7 @@ def test_the_same_readings_are_recorded_once(home: Path) -> None:
     words = "later.csv", "--at", "2031-04-01", "--report", "-"
     found = run("robot", "check", "R010", *words)
     told = json.loads(found.stdout)
+    assert [*told.items()][:2] == [*schema("robot-check").items()]
     assert (told["robot"], told["in_control"]) == ("R010", True)
     with open_record(home / "plant.sqlite") as record:
         assert len(record.rows(VerdictRow)) == before

@@ -34,7 +34,8 @@ COMMANDS = {
         "--jobs", "1", "--report", "-",
     ),
 }  # fmt: skip
-SLOW = {"diagnosis"}  # looked at where one is made: tests/cli/test_diagnose_path.py
+# Looked at where they are made: tests/cli/test_diagnose_path, tests/record/test_robots.
+SLOW = {"diagnosis", "robot-check"}
 
 
 @pytest.fixture(scope="module")

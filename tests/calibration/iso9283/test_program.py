@@ -111,4 +111,4 @@ def test_a_test_has_poses_of_its_own(desk):
     job = desk.folder / "job.pdl"
     given = ("--cell", desk.cell, "--iso9283", "--job", job)
     done = cli("survey", *given, "-o", desk.folder / "iso.pdl")
-    assert done.exit_code == 2 and "Leave out --job" in done.stderr
+    assert done.exit_code == 2 and "each names other poses" in done.stderr
