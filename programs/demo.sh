@@ -74,7 +74,7 @@ loop() {
         -o "$out/model.json" >"$out/fit.txt"
     tail -n 3 "$out/fit.txt"
     run_or_1 postproc compensate "$job" --cell "$cell" --model "$out/model.json" \
-        -o "$out/$2" >"$out/compensate.txt" 2>&1
+        --shared-points clone -o "$out/$2" >"$out/compensate.txt" 2>&1
     grep visits "$out/compensate.txt"
     for file in programs/"$1"/*; do # what belongs to the job and needed no change
         [ -e "$out/${file##*/}" ] || cp "$file" "$out"
