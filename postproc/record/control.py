@@ -2,20 +2,18 @@
 
 Readings are compared with what the survey and all checks since expect of them, so that
 what a survey left at a pose, and what comes again every month, is no alarm. Two tests
-share the false alarms: Hotelling's T2 of one check, and an exponentially weighted
-moving average over checks of what each cause explains (Lowry et al., A multivariate
-exponentially weighted moving average control chart, Technometrics 34, 1992).
+share the false alarms: Hotelling's T2 of one check, and `Averages` over checks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from postproc.arrays import Bools, Floats
+from postproc.record.averages import NO_AVERAGES, Averages
 from postproc.record.causes import (
     Change,
     Shown,
@@ -23,7 +21,6 @@ from postproc.record.causes import (
     causes_of,
     least_found,
     limit_of,
-    project,
     readings_of,
     weigh,
 )
@@ -33,8 +30,6 @@ from postproc.record.knowledge import Expected, Knowledge
 from postproc.robot.pose import MM
 
 FALSE_ALARMS = 0.01  # of checks of an arm that is as it was, both tests together
-NEW = 0.3  # weight of the newest check in the average
-DRAWS, SEED = 20_000, 9283  # of the law of the largest average
 TRUSTED = 60.0  # degrees of freedom that the expected variance counts as
 CLOSE = 3.0  # nats within which another cause may be it as well
 
@@ -50,7 +45,7 @@ class CheckVerdict:
             odds that chance exceeds it, and its limit.
         errors: Lengths of what is left of the readings of the arm, (n,) [m].
         shown: Causes, the likeliest first, with readings that may have gone wrong.
-        found: Least change of every cause that is found in 95 %, in words.
+        found: Least change of every cause that is found in 95 %, in sizes of its kind.
         blind: Causes that this check cannot see.
         alike: Pairs of causes that it cannot tell apart.
     """
@@ -99,118 +94,62 @@ class Watch:
 
     Attributes:
         knowledge: Of the arm.
-        averages: Of what every cause explains, by name.
-        share: Sum of the squared weights in them.
+        averages: Of what every cause explains.
         squares, free: Sum of T2 of checks in control, and of degrees of freedom.
     """
 
     knowledge: Knowledge
-    averages: dict[str, Floats] = field(default_factory=dict)
-    share: float = 0.0
+    averages: Averages = NO_AVERAGES
     squares: float = 0.0
     free: float = 0.0
 
     @property
     def scale(self) -> float:
         """Variance of readings over what is expected of it, by checks so far."""
-        return max(1.0, (TRUSTED + self.squares) / (TRUSTED + self.free))
+        return max(1.0, (TRUSTED + self.squares) / self.certainty)
+
+    @property
+    def certainty(self) -> float:
+        """Degrees of freedom from which that variance is known."""
+        return TRUSTED + self.free
 
     def after(self, event: Event) -> Watch:
         """Return what is left of it after an event: averages begin again."""
-        knowledge = self.knowledge.after(event)
-        return replace(self, knowledge=knowledge, averages={}, share=0.0)
+        return replace(
+            self, knowledge=self.knowledge.after(event), averages=NO_AVERAGES
+        )
 
     def judge(self, rows: CheckRows) -> tuple[CheckVerdict, Watch]:
         """Judge a check, and take it in where it is in control."""
-        knowledge = self.knowledge.visiting(rows)
-        expected, scale = knowledge.expect(rows), self.scale
-        causes = causes_of(knowledge.model)
-        averages, share = self._average(causes, expected)
-        drift, drift_limit = self._drift(causes, expected, averages, share)
-        limit = limit_of(expected.free, FALSE_ALARMS / 2, TRUSTED + self.free)
-        statistic = expected.statistic / scale
-        ranked = weigh([*causes, *readings_of(rows.ids)], expected, scale)
-        found = {c.name: least_found(c, expected, limit, scale) for c in causes}
+        expected = self.knowledge.visiting(rows).expect(rows)
+        after = self._take_in(rows, expected)
+        causes = causes_of(self.knowledge.model)
+        drift, drift_limit = after.averages.test(
+            causes, expected, self.certainty, FALSE_ALARMS / 2
+        )
+        limit = limit_of(expected.free, FALSE_ALARMS / 2, self.certainty)
+        ranked = weigh([*causes, *readings_of(rows.ids)], expected, self.scale)
+        found = {c.name: least_found(c, expected, limit, self.scale) for c in causes}
         verdict = CheckVerdict(
-            statistic, limit, expected.free, drift, drift_limit,
+            expected.statistic / self.scale, limit, expected.free, drift, drift_limit,
             errors_of(expected, rows), tuple(ranked), found,
             tuple(name for name, least in found.items() if not np.isfinite(least)),
             _confusable(causes, expected),
         )  # fmt: skip
-        if not verdict.in_control:
-            return verdict, self
-        return verdict, self._with(rows, expected, averages, share)
+        return verdict, after if verdict.in_control else self
 
     def take_in(self, rows: CheckRows) -> Watch:
         """Take in a check that is in control, or was read for a new model."""
-        knowledge = self.knowledge.visiting(rows)
-        expected = knowledge.expect(rows)
-        averages, share = self._average(causes_of(knowledge.model), expected)
-        return self._with(rows, expected, averages, share)
+        return self._take_in(rows, self.knowledge.visiting(rows).expect(rows))
 
-    def _with(
-        self,
-        rows: CheckRows,
-        expected: Expected,
-        averages: dict[str, Floats],
-        share: float,
-    ) -> Watch:
+    def _take_in(self, rows: CheckRows, expected: Expected) -> Watch:
+        causes = causes_of(self.knowledge.model)
         return Watch(
-            self.knowledge.update(rows), averages, share,
-            self.squares + expected.statistic, self.free + expected.free,
-        )  # fmt: skip
-
-    def _average(
-        self, causes: Sequence[Change], expected: Expected
-    ) -> tuple[dict[str, Floats], float]:
-        """Average what the causes explain, each with unit variance in each check."""
-        averages = {}
-        for cause in causes:
-            u, B = project(cause, expected)
-            own = _whiten(B) @ u / np.sqrt(self.scale)
-            before = self.averages.get(cause.name, np.zeros(len(own)))
-            averages[cause.name] = (1.0 - NEW) * before + NEW * own
-        return averages, (1.0 - NEW) ** 2 * self.share + NEW**2
-
-    def _drift(
-        self, causes: Sequence[Change], expected: Expected, averages: dict[str, Floats],
-        share: float,
-    ) -> tuple[float, float]:  # fmt: skip
-        """Return the largest average and its limit, as minus log of chance.
-
-        The causes overlap, and the scatter of readings is known from few: the law of
-        the largest average is drawn.
-        """
-        root, sure = _root(expected.precision), TRUSTED + self.free
-        rng = np.random.default_rng(SEED)
-        draws = rng.standard_normal((DRAWS, root.shape[1]))
-        draws /= np.sqrt(rng.chisquare(sure, DRAWS) / sure)[:, None]
-        largest, seen = np.zeros(DRAWS), 0.0
-        for cause in causes:
-            known = _whiten(project(cause, expected)[1]) @ cause.columns(expected).T
-            drawn = ((draws @ (known @ root).T) ** 2).sum(axis=1)
-            free = int(np.linalg.matrix_rank(known @ root))
-            if not free:
-                continue
-            largest = np.maximum(largest, -chi2.logsf(drawn, free))
-            square = float((averages[cause.name] ** 2).sum()) / share
-            seen = max(seen, -float(chi2.logsf(square, free)))
-        return seen, float(np.quantile(largest, 1.0 - FALSE_ALARMS / 2))
-
-
-def _whiten(B: Floats) -> Floats:
-    """Return W with W B W' = 1 on what shows at all, (r, r)."""
-    size, axes = np.linalg.eigh(B)
-    shows = size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)
-    scale = np.where(shows, 1.0 / np.sqrt(np.where(shows, size, 1.0)), 0.0)
-    return np.asarray((axes * scale) @ axes.T)
-
-
-def _root(M: Floats) -> Floats:
-    """Return Q with Q Q' = M, (m, f)."""
-    size, axes = np.linalg.eigh(M)
-    kept = size > 1e-9 * size.max()
-    return np.asarray(axes[:, kept] * np.sqrt(size[kept]))
+            self.knowledge.update(rows),
+            self.averages.add(causes, expected, self.scale),
+            self.squares + expected.statistic,
+            self.free + expected.free,
+        )
 
 
 def errors_of(
