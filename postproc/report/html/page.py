@@ -59,6 +59,7 @@ def short(text: str, limit: int) -> str:
 # One self-contained page: template, style, scripts and data in one text.
 
 PLAIN_BYTES = 3_000_000  # data up to this size stay readable in the file
+SYSTEM, ANY_SYSTEM = 9, 255  # byte of a gzip header (RFC 1952), and none in particular
 PLAIN, PACKED = "application/json", "application/gzip"
 
 # No plotly server, no fonts from elsewhere, no formula renderer: nothing to fetch.
@@ -125,7 +126,8 @@ def embed(payload: Mapping[str, Any]) -> tuple[str, Markup]:
 
 def pack(text: str) -> Markup:
     """Compress text, and write it in base 64: a third to two fifths of its size."""
-    packed = gzip.compress(text.encode("utf-8"), compresslevel=5, mtime=0)
+    packed = bytearray(gzip.compress(text.encode("utf-8"), compresslevel=5, mtime=0))
+    packed[SYSTEM] = ANY_SYSTEM  # as every Python from 3.13 on writes it
     return Markup(base64.b64encode(packed).decode("ascii"))  # nothing of HTML is in it
 
 
