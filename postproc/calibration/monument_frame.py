@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.arrays import Floats
 from postproc.calibration.measurements import Measurements, places_of_points
 from postproc.calibration.monuments import APART
 from postproc.model.model import Monument
@@ -31,6 +32,40 @@ def monuments_of(survey: Measurements) -> tuple[Monument, ...]:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class CommonPoints:
+    """Fixed points that rows have in common with a model's survey.
+
+    Attributes:
+        names: Of the points.
+        here: Where the rows have them, (f, 3) [m].
+        there: Where the survey had them, base frame, (f, 3) [m].
+    """
+
+    names: tuple[str, ...]
+    here: Floats
+    there: Floats
+
+    @classmethod
+    def of(cls, rows: Measurements, monuments: Sequence[Monument]) -> CommonPoints:
+        """Find them by their names."""
+        here, there = places_of_points(rows), dict(monuments)
+        names = tuple(sorted(set(here) & set(there)))
+        return cls(
+            names,
+            np.array([here[name] for name in names]).reshape(-1, 3),
+            np.array([there[name] for name in names]).reshape(-1, 3),
+        )
+
+    @property
+    def are_enough(self) -> bool:
+        """Whether they tell shift and turn: three that lie apart, not on a line."""
+        if len(self.names) < WHOLE:
+            return False
+        size = np.linalg.svd(self.here - self.here.mean(axis=0), compute_uv=False)
+        return bool(size[1] > APART)
+
+
 def at_monuments(
     rows: Measurements, monuments: Sequence[Monument], whole: bool = False
 ) -> tuple[Measurements, str]:
@@ -46,15 +81,11 @@ def at_monuments(
     Returns:
         The rows, moved, and how, a line for a terminal; "" where they were not.
     """
-    fixed, there = rows.references, dict(monuments)
-    names = sorted(set(fixed.name if fixed is not None else ()) & set(there))
-    if fixed is None or not names:
+    common = CommonPoints.of(rows, monuments)
+    names, seen, known = common.names, common.here, common.there
+    if not names:
         return rows, ""
-    places = places_of_points(rows)
-    seen = np.stack([places[name] for name in names])
-    known = np.array([there[name] for name in names])
-    size = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
-    turns = len(names) >= WHOLE and size[1] > APART
+    turns = common.are_enough
     if whole and not turns:
         return rows, ""
     T = rigid_fit(seen, known) if turns else np.eye(4)

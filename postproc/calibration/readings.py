@@ -122,7 +122,7 @@ def _of_tracker(rows: Measurements, cell: Cell, model: Model, clock: str) -> Rea
     arm, placed = cell.arm, model.registration
     base, note = at_monuments(rows, model.monuments, whole=True)
     if note and placed is not None:
-        base = replace(base, states=_probes(rows, placed))
+        base = replace(base, states=on_survey_nests(rows, placed))
     elif not note:
         if placed is None:
             return _own_registration(rows, cell, model)
@@ -190,13 +190,20 @@ def _place_rows(rows: Measurements, placed: Registration) -> Measurements:
     Raises:
         MeasurementError: A probe point that the registration does not know.
     """
-    states = _probes(rows, placed)
+    states = on_survey_nests(rows, placed)
     position = placed.to_base(rows.position, rows.states.station)
     return replace(rows, states=states, position=position)
 
 
-def _probes(rows: Measurements, placed: Registration) -> States:
+def on_survey_nests(
+    rows: Measurements, placed: Registration, cure: str = CURE
+) -> States:
     """Put tools where the registration has the probe points.
+
+    Args:
+        rows: The rows.
+        placed: The registration.
+        cure: What to do about a probe point that it does not know.
 
     Raises:
         MeasurementError: A probe point that the registration does not know.
@@ -205,7 +212,7 @@ def _probes(rows: Measurements, placed: Registration) -> States:
         return placed.on_probes(rows.states)
     except KeyError as exc:
         problem = f"tool_id {exc} is no probe point of the model's survey"
-        raise MeasurementError(rows.path, problem, CURE) from None
+        raise MeasurementError(rows.path, problem, cure) from None
 
 
 # When the rows were read.
@@ -227,14 +234,18 @@ def at_moments(
     """
     states = rows.states
     if after:
-        later = np.arange(len(rows)) + LATER
-        states = states.with_(order=later, time=np.full(len(rows), LATER))
-        return rows.with_states(states), frozenset(("order", "time"))
+        return rows.with_states(after_survey(states)), frozenset(("order", "time"))
     known = {"time"} if len(rows) and not np.isnan(states.time).any() else set()
     if table.has("order") or table.sha256 in model.data_sha256:
         return rows, frozenset({"order", *known})
     states = states.with_(order=np.arange(len(rows)) + LATER)
     return rows.with_states(states), frozenset(known)
+
+
+def after_survey(states: States) -> States:
+    """Return states that come after all moments of any survey."""
+    later = np.arange(len(states)) + LATER
+    return states.with_(order=later, time=np.full(len(states), LATER))
 
 
 def describe_missing_setup(model: Model) -> str:

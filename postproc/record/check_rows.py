@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.calibration.measurements import Measurements, places_of_points
-from postproc.calibration.monuments import APART
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.monument_frame import CommonPoints
+from postproc.calibration.readings import after_survey, on_survey_nests
 from postproc.calibration.stops import pool_readings, stops_of
 from postproc.exceptions import MeasurementError
 from postproc.model.effects.base_shift import rigid_motions
@@ -19,8 +20,6 @@ from postproc.model.registration import rigid_fit
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
-LATER = 1e9  # a moment after any survey
-WHOLE = 3  # fixed points, not on a line, that tell where a tracker stood
 FEWEST = 3  # rows of the arm
 LEAST = 1e-6  # [m] that effects do not describe of a pose, at least
 CURE = "Read the nests of the survey, or fit a survey with this tool"
@@ -39,7 +38,6 @@ class CheckRows:
         pose_columns: Derivatives by what is unknown of its pose, (n, 3, 9).
         pose_variance: Variances of that where no check has been, (n, 9).
         fixed: By how much fixed points lie beside where the survey had them, (f, 3).
-        points: Names of these.
         noise: Covariance of all readings, arm before fixed points, (m, m) [m^2].
         placing: Derivatives by the place of the tracker, (m, 6); (m, 0) where it is
             known.
@@ -53,7 +51,6 @@ class CheckRows:
     pose_columns: Floats
     pose_variance: Floats
     fixed: Floats
-    points: tuple[str, ...]
     noise: Floats
     placing: Floats
 
@@ -69,7 +66,7 @@ class CheckRows:
             tuple(n for n, kept in zip(self.ids, rows, strict=True) if kept),
             self.position[rows], self.pose[rows], self.arrival[rows],
             self.pose_columns[rows],
-            self.pose_variance[rows], self.fixed, self.points,
+            self.pose_variance[rows], self.fixed,
             self.noise[np.ix_(every, every)], self.placing[every],
         )  # fmt: skip
 
@@ -94,27 +91,29 @@ def place_check(rows: Measurements, arm: Arm, model: Model, frame: str) -> Check
         raise MeasurementError(
             rows.path, f"has {len(rows)} readings of the arm", "Read three at least"
         )
-    states = _on_survey_nests(rows, model)
-    seen, known, names = _common_points(rows, model)
+    if model.registration is not None:
+        rows = rows.with_states(on_survey_nests(rows, model.registration, CURE))
+    states, points = after_survey(rows.states), CommonPoints.of(rows, model.monuments)
+    points = points if points.are_enough else CommonPoints.of(rows, ())
     batch = ArmStates(arm, states)
     effects = model.effects
     expected = batch.walk.tcp + effects.error(batch, model.values)
     T, is_free = np.eye(4), True
-    if len(names):
-        T = rigid_fit(seen, known)
+    if points.names:
+        T = rigid_fit(points.here, points.there)
     elif frame == "tracker":
         T = rigid_fit(rows.position, expected)
     else:
         is_free = False
     position = rows.position @ T[:3, :3].T + T[:3, 3]
-    fixed = seen @ T[:3, :3].T + T[:3, 3] - known
-    placing = rigid_motions(np.concatenate([position, known]))
+    fixed = points.here @ T[:3, :3].T + T[:3, 3] - points.there
+    placing = rigid_motions(np.concatenate([position, points.there]))
     placing = placing.reshape(-1, 6)[:, : 6 if is_free else 0]
     at, pose = effects.at(batch, model.values), poses_of(states)
     return CheckRows(
         states, rows.ids, position, pose, _number_arrivals(pose, states),
-        _pose_columns(at), _pose_variance(model, at), fixed, names,
-        _noise(rows, model, at, position, known), placing,
+        _pose_columns(at), _pose_variance(model, at), fixed,
+        _noise(rows, model, at, position, points.there), placing,
     )  # fmt: skip
 
 
@@ -122,38 +121,6 @@ def _number_arrivals(pose: Ints, states: States) -> Ints:
     """Number poses by the side that joints come to them from as well, (n,)."""
     key = np.concatenate([pose[:, None], states.direction], axis=1)
     return np.asarray(np.unique(key, axis=0, return_inverse=True)[1].reshape(-1))
-
-
-def _on_survey_nests(rows: Measurements, model: Model) -> States:
-    """Put tools where the survey found its probe points, after all of its moments."""
-    later = np.arange(len(rows)) + LATER
-    states = rows.states.with_(order=later, time=np.full(len(rows), LATER))
-    if model.registration is None:
-        return states
-    try:
-        return model.registration.on_probes(states)
-    except KeyError as exc:
-        problem = f"tool_id {exc} is no probe point of the model's survey"
-        raise MeasurementError(rows.path, problem, CURE) from None
-
-
-def _common_points(
-    rows: Measurements, model: Model
-) -> tuple[Floats, Floats, tuple[str, ...]]:
-    """Return fixed points of both where three of them tell shift and turn.
-
-    Returns:
-        Places here and in the model's survey, (f, 3) [m], and names; none otherwise.
-    """
-    there, here = dict(model.monuments), places_of_points(rows)
-    names = tuple(sorted(set(here) & set(there)))
-    seen = np.array([here[n] for n in names]).reshape(-1, 3)
-    known = np.array([there[n] for n in names]).reshape(-1, 3)
-    if len(names) >= WHOLE:
-        size = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
-        if size[1] > APART:
-            return seen, known, names
-    return np.zeros((0, 3)), np.zeros((0, 3)), ()
 
 
 def _pose_columns(at: ArmStates) -> Floats:
