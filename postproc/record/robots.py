@@ -15,7 +15,7 @@ from postproc.model.model import Model, load_model
 from postproc.record.control import CheckVerdict
 from postproc.record.database import Record
 from postproc.record.events import OF_JOINTS
-from postproc.record.life import Life, moment, today
+from postproc.record.life import Life, today
 from postproc.record.refresh import Refresh, refresh
 from postproc.record.rows import (
     CHECK,
@@ -32,7 +32,7 @@ from postproc.record.rows import (
     VerdictRow,
 )
 from postproc.record.stale import StaleProgram, find_stale
-from postproc.robot.cell import load_cell
+from postproc.robot.cell import Cell, load_cell
 
 UNTOLD = "no event is recorded"
 
@@ -150,7 +150,7 @@ def check_robot(
     verdict, _ = watch.judge(rows)
     if not known:
         with record.writing():
-            number = record.add(_survey_of(serial, given, content, life))
+            number = record.add(_survey_of(serial, given, content, cell))
             record.add(_row_of(serial, number, given.date, verdict))
     return verdict, known
 
@@ -159,8 +159,8 @@ def _name(given: CheckFile) -> str:
     return "" if given.program is None else str(given.program.absolute())
 
 
-def _survey_of(serial: str, given: CheckFile, content: bytes, life: Life) -> SurveyRow:
-    instrument = life.cell().measurements.instrument or ""
+def _survey_of(serial: str, given: CheckFile, content: bytes, cell: Cell) -> SurveyRow:
+    instrument = cell.measurements.instrument or ""
     return SurveyRow(
         None, serial, given.date, CHECK, given.operator, instrument, given.file.name,
         sha256(content), content, _name(given),
@@ -237,9 +237,10 @@ def refresh_robot(
     why = _events_since(life, current.date, given.date)
     found = refresh(known, rows, life.model(current), sha256(content), why)
     progress("by how much programs would move")
-    stale = find_stale(life, found.model)
+    stale = find_stale(life, cell, found.model)
     found.model.save(output)
-    _record_refresh(record, serial, given, output, found, life, stale)
+    check = _survey_of(serial, given, content, cell)
+    _record_refresh(record, check, output, found, stale)
     return Refreshed(found, why, tuple(stale))
 
 
@@ -250,19 +251,19 @@ def _events_since(life: Life, begin: str, until: str) -> str:
 
 
 def _record_refresh(
-    record: Record, serial: str, given: CheckFile, output: Path, found: Refresh,
-    life: Life, stale: list[StaleProgram],
+    record: Record, check: SurveyRow, output: Path, found: Refresh,
+    stale: list[StaleProgram],
 ) -> None:  # fmt: skip
+    """Record the readings, the model that was made of them, and what it would move."""
+    model, made = found.model, read_input(output)
     with record.writing():
-        number = record.add(_survey_of(serial, given, read_input(given.file), life))
-        _retire_model(record, serial)
-        record.add(
-            ModelRow(
-                found.model.id, serial, given.date, found.model.parent or "", number,
-                REFRESHED, output.name, found.after.mean_mm, CURRENT,
-                read_input(output),
-            )
+        number = record.add(check)
+        _retire_model(record, check.serial)
+        row = ModelRow(
+            model.id, check.serial, check.date, model.parent or "", number, REFRESHED,
+            output.name, found.after.mean_mm, CURRENT, made,
         )  # fmt: skip
+        record.add(row)
         for program in stale:
             known = program.moves_mm if program.moves_mm >= 0 else None
             record.set_state(program.row, moves_mm=known)
@@ -325,16 +326,3 @@ def tell_outdated(record: Record, releases: Iterable[Release]) -> list[str]:
         for serial, model in pairs
         if serial in current and current[serial].id != model
     ]
-
-
-__all__ = [
-    "CheckFile",
-    "Refreshed",
-    "add_robot",
-    "check_robot",
-    "moment",
-    "note_event",
-    "note_releases",
-    "refresh_robot",
-    "tell_outdated",
-]  # fmt: skip

@@ -46,14 +46,15 @@ def newest(rows: list[ProgramRow]) -> list[ProgramRow]:
     return list({row.path: row for row in rows}.values())
 
 
-def find_stale(life: Life, model: Model) -> list[StaleProgram]:
+def find_stale(life: Life, cell: Cell, model: Model) -> list[StaleProgram]:
     """Say of every program by how much it would move with a model, worst first.
 
     Args:
         life: The robot.
+        cell: Its cell.
         model: The new model.
     """
-    cell, known = life.cell(), {m.id: m for m in life.models}
+    known = {m.id: m for m in life.models}
     found = []
     for row in newest(life.record.rows(ProgramRow, life.robot.serial)):
         if row.model == model.id:
