@@ -171,24 +171,54 @@ def project(cause: Change, expected: Expected) -> tuple[Floats, Floats]:
     return known @ expected.left, known @ C
 
 
-def least_found(cause: Change, expected: Expected, limit: float, scale: float) -> float:
-    """Return the least change, in sizes of its kind, that is found in 95 %.
+@dataclass(frozen=True, eq=False)
+class Power:
+    """What a check can tell, whatever it reads.
+
+    Attributes:
+        found: Least change of every cause that is found in 95 %, in sizes of its kind;
+            infinite where the check is blind to it.
+        alike: Pairs of causes that it hardly tells apart.
+    """
+
+    found: dict[str, float]
+    alike: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def of(
+        cls, causes: Sequence[Change], expected: Expected, limit: float, scale: float
+    ) -> Power:
+        """Work it out.
+
+        Args:
+            causes: The causes.
+            expected: The readings of a check, whatever they are.
+            limit: Of T2 with which an alarm is raised.
+            scale: Variance of the readings over what is expected of it.
+        """
+        needed = noncentrality(limit, expected.free) * scale
+        found = {c.name: _least_found(c, expected, needed) for c in causes}
+        return cls(found, _list_alike(causes, expected))
+
+    @property
+    def blind(self) -> tuple[str, ...]:
+        """Causes that it cannot see."""
+        return tuple(n for n, least in self.found.items() if not np.isfinite(least))
+
+
+def _least_found(cause: Change, expected: Expected, needed: float) -> float:
+    """Return the least change that is found, see `Power`.
 
     Of several parameters: a change along the direction that shows least but for those
     that do not show at all.
 
     Args:
         cause: The cause.
-        expected: The readings of a check, whatever they are.
-        limit: Of T2 with which an alarm is raised.
-        scale: Variance of the readings over what is expected of it.
-
-    Returns:
-        Infinite where the check is blind to the cause.
+        expected: The readings.
+        needed: What T2 is to grow by.
     """
     _, B = project(cause, expected)
-    shows = np.linalg.eigvalsh(B / scale)
-    needed = noncentrality(limit, expected.free)
+    shows = np.linalg.eigvalsh(B)
     seen = shows[shows > needed / BLIND**2]
     return float(np.sqrt(needed / seen.min())) if len(seen) else float("inf")
 
@@ -214,7 +244,20 @@ def limit_of(free: int, false_alarms: float, sure: float) -> float:
     return float(free * f.isf(false_alarms, free, sure))
 
 
-def alike(one: Change, other: Change, expected: Expected) -> bool:
+def _list_alike(
+    causes: Sequence[Change], expected: Expected
+) -> tuple[tuple[str, str], ...]:
+    """List pairs of single causes that a check cannot tell apart."""
+    single = [c for c in causes if "motor" not in c.name and "gear" not in c.name]
+    return tuple(
+        (one.name, other.name)
+        for k, one in enumerate(single)
+        for other in single[k + 1 :]
+        if _are_alike(one, other, expected)
+    )
+
+
+def _are_alike(one: Change, other: Change, expected: Expected) -> bool:
     """Return True if a check can hardly tell two causes apart.
 
     All that the smaller one of them does, the other does as well.

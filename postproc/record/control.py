@@ -7,7 +7,6 @@ share the false alarms: Hotelling's T2 of one check, and `Averages` over checks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,10 +15,9 @@ from postproc.arrays import Bools, Floats
 from postproc.record.averages import NO_AVERAGES, Averages
 from postproc.record.causes import (
     Change,
+    Power,
     Shown,
-    alike,
     causes_of,
-    least_found,
     limit_of,
     readings_of,
     weigh,
@@ -45,9 +43,7 @@ class CheckVerdict:
             odds that chance exceeds it, and its limit.
         errors: Lengths of what is left of the readings of the arm, (n,) [m].
         shown: Causes, the likeliest first, with readings that may have gone wrong.
-        found: Least change of every cause that is found in 95 %, in sizes of its kind.
-        blind: Causes that this check cannot see.
-        alike: Pairs of causes that it cannot tell apart.
+        power: What the check can tell.
     """
 
     statistic: float
@@ -57,9 +53,7 @@ class CheckVerdict:
     drift_limit: float
     errors: Floats
     shown: tuple[Shown, ...]
-    found: dict[str, float]
-    blind: tuple[str, ...]
-    alike: tuple[tuple[str, str], ...]
+    power: Power
 
     @property
     def in_control(self) -> bool:
@@ -122,34 +116,47 @@ class Watch:
     def judge(self, rows: CheckRows) -> tuple[CheckVerdict, Watch]:
         """Judge a check, and take it in where it is in control."""
         expected = self.knowledge.visiting(rows).expect(rows)
-        after = self._take_in(rows, expected)
-        causes = causes_of(self.knowledge.model)
-        drift, drift_limit = after.averages.test(
+        causes, averages = self._average(expected)
+        drift, drift_limit = averages.test(
             causes, expected, self.certainty, FALSE_ALARMS / 2
         )
-        limit = limit_of(expected.free, FALSE_ALARMS / 2, self.certainty)
+        limit = self._limit(expected)
         ranked = weigh([*causes, *readings_of(rows.ids)], expected, self.scale)
-        found = {c.name: least_found(c, expected, limit, self.scale) for c in causes}
         verdict = CheckVerdict(
             expected.statistic / self.scale, limit, expected.free, drift, drift_limit,
-            errors_of(expected, rows), tuple(ranked), found,
-            tuple(name for name, least in found.items() if not np.isfinite(least)),
-            _confusable(causes, expected),
+            errors_of(expected, rows), tuple(ranked),
+            Power.of(causes, expected, limit, self.scale),
         )  # fmt: skip
-        return verdict, after if verdict.in_control else self
+        if not verdict.in_control:
+            return verdict, self
+        return verdict, self._with(rows, expected, averages)
+
+    def foresee(self, rows: CheckRows) -> Power:
+        """Say what a check can tell, whatever its readings are."""
+        expected = self.knowledge.visiting(rows).expect(rows)
+        causes = causes_of(self.knowledge.model)
+        return Power.of(causes, expected, self._limit(expected), self.scale)
 
     def take_in(self, rows: CheckRows) -> Watch:
         """Take in a check that is in control, or was read for a new model."""
-        return self._take_in(rows, self.knowledge.visiting(rows).expect(rows))
+        expected = self.knowledge.visiting(rows).expect(rows)
+        return self._with(rows, expected, self._average(expected)[1])
 
-    def _take_in(self, rows: CheckRows, expected: Expected) -> Watch:
+    def _limit(self, expected: Expected) -> float:
+        """Return the limit of T2."""
+        return limit_of(expected.free, FALSE_ALARMS / 2, self.certainty)
+
+    def _average(self, expected: Expected) -> tuple[tuple[Change, ...], Averages]:
+        """Return the causes, and the averages of what they explain up to a check."""
         causes = causes_of(self.knowledge.model)
+        return causes, self.averages.add(causes, expected, self.scale)
+
+    def _with(self, rows: CheckRows, expected: Expected, averages: Averages) -> Watch:
+        """Return it with a check."""
         return Watch(
-            self.knowledge.update(rows),
-            self.averages.add(causes, expected, self.scale),
-            self.squares + expected.statistic,
+            self.knowledge.update(rows), averages, self.squares + expected.statistic,
             self.free + expected.free,
-        )
+        )  # fmt: skip
 
 
 def errors_of(
@@ -172,16 +179,3 @@ def errors_of(
         placed = np.linalg.lstsq(G * weight[:, None], left * weight)[0]
         left = left - G @ placed
     return np.asarray(np.linalg.norm(left[: 3 * len(rows)].reshape(-1, 3), axis=1))
-
-
-def _confusable(
-    causes: Sequence[Change], expected: Expected
-) -> tuple[tuple[str, str], ...]:
-    """List pairs of single causes that a check cannot tell apart."""
-    single = [c for c in causes if "motor" not in c.name and "gear" not in c.name]
-    return tuple(
-        (one.name, other.name)
-        for k, one in enumerate(single)
-        for other in single[k + 1 :]
-        if alike(one, other, expected)
-    )

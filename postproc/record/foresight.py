@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +11,9 @@ from postproc.calibration.measurements import Measurements
 from postproc.calibration.monuments import ReferenceRows
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
+from postproc.record.causes import Power
 from postproc.record.check_rows import CheckRows, place_check
-from postproc.record.control import CheckVerdict, Watch
+from postproc.record.control import Watch
 from postproc.record.knowledge import Knowledge
 from postproc.robot.cell import Cell
 from postproc.robot.state import make_states
@@ -21,35 +21,16 @@ from postproc.robot.state import make_states
 _PLACE = Path("check")  # that was not read yet
 
 
-@dataclass(frozen=True)
-class Foreseen:
-    """What a check finds and what it cannot see.
-
-    Attributes:
-        found: Least change of every cause that is found in 95 %, in sizes of its kind.
-        blind: Causes that it cannot see.
-        alike: Pairs of causes that it hardly tells apart.
-    """
-
-    found: dict[str, float]
-    blind: tuple[str, ...]
-    alike: tuple[tuple[str, str], ...]
-
-
-def foresee(cell: Cell, model: Model, design: CheckDesign) -> Foreseen:
-    """Say what a check will tell of an arm whose survey is all that is known.
+def foresee(cell: Cell, model: Model, design: CheckDesign) -> Power:
+    """Say what a check can tell of an arm whose survey is all that is known.
 
     Args:
         cell: The cell.
         model: The model of the survey.
         design: The check.
     """
-    verdict = _judge(cell, model, _readings(cell, model, design))
-    return Foreseen(verdict.found, verdict.blind, verdict.alike)
-
-
-def _judge(cell: Cell, model: Model, rows: CheckRows) -> CheckVerdict:
-    return Watch(Knowledge.of(model, cell.arm)).judge(rows)[0]
+    rows = _readings(cell, model, design)
+    return Watch(Knowledge.of(model, cell.arm)).foresee(rows)
 
 
 def _readings(cell: Cell, model: Model, design: CheckDesign) -> CheckRows:

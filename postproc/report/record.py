@@ -8,10 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from postproc.files import schema
-from postproc.record.causes import BASE, TOOL, ZERO
+from postproc.record.causes import BASE, TOOL, ZERO, Power
 from postproc.record.control import CheckVerdict
 from postproc.record.database import Record
-from postproc.record.foresight import Foreseen
 from postproc.record.life import Life
 from postproc.record.replacement import ReplacedProgram
 from postproc.record.robots import UNTOLD, Refreshed
@@ -87,7 +86,7 @@ def tell_check(serial: str, verdict: CheckVerdict, known: bool) -> str:
         f"95 % {verdict.within_mm:.3f}, max {verdict.worst_mm:.3f}",
         f"T2 {verdict.statistic:.1f} (limit {verdict.limit:.1f}), moving average "
         f"{verdict.drift:.1f} (limit {verdict.drift_limit:.1f})",
-        *_power(verdict),
+        *_power(verdict.power),
     ]
     if known:
         lines.append("the record had these readings: nothing was added")
@@ -98,7 +97,9 @@ def tell_check(serial: str, verdict: CheckVerdict, known: bool) -> str:
 
 def _headline(serial: str, verdict: CheckVerdict) -> str:
     if verdict.in_control:
-        but = f", but for {', '.join(verdict.blind)}" if verdict.blind else ""
+        but = (
+            f", but for {', '.join(verdict.power.blind)}" if verdict.power.blind else ""
+        )
         return f"{serial}: in control{but}"
     best, *others = verdict.likely
     if best.nats < 0.0:
@@ -120,12 +121,12 @@ def _words(nats: float) -> str:
     return f"{word} ({nats:.0f} nats)"
 
 
-def tell_foreseen(foreseen: Foreseen) -> str:
+def tell_foreseen(foreseen: Power) -> str:
     """Say what a check will tell, on lines of its own."""
     return "".join(f"\n{line}" for line in _power(foreseen))
 
 
-def _power(check: CheckVerdict | Foreseen) -> list[str]:
+def _power(check: Power) -> list[str]:
     """Say what a check finds, what it cannot see, and what it hardly tells apart."""
     lines = [f"found in 95 %: {_least(check.found)}"]
     if check.blind:
@@ -173,7 +174,8 @@ def check_json(serial: str, verdict: CheckVerdict) -> str:
         "p95_mm": verdict.within_mm, "max_mm": verdict.worst_mm,
         "t2": verdict.statistic, "t2_limit": verdict.limit,
         "average": verdict.drift, "average_limit": verdict.drift_limit,
-        "blind": list(verdict.blind), "alike": [list(p) for p in verdict.alike],
+        "blind": list(verdict.power.blind),
+        "alike": [list(pair) for pair in verdict.power.alike],
         "causes": causes,
     }  # fmt: skip
     return json.dumps(schema("robot-check") | told, indent=1)

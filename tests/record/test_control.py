@@ -125,8 +125,8 @@ def test_without_fixed_points_the_base_is_not_seen(drawn: Drawn) -> None:
     rows = measure(drawn.robot, *drawn.poses, rng)
     placed = place_check(rows, NJ, blind, "tracker")
     verdict, _ = Watch(Knowledge.of(blind, NJ)).judge(placed)
-    assert {"base", "zero of joint 1"} <= set(verdict.blind)
-    assert "zero of joint 2" not in verdict.blind
+    assert {"base", "zero of joint 1"} <= set(verdict.power.blind)
+    assert "zero of joint 2" not in verdict.power.blind
 
 
 def test_causes_are_listed_once_with_all_their_names(drawn: Drawn) -> None:

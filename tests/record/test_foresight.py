@@ -26,7 +26,7 @@ def test_what_is_foreseen_is_what_the_check_finds(drawn: Drawn) -> None:
     )
     for name in ("zero of joint 2", "zero of joint 3", "zero of joint 5"):
         # other nests are read here and there: the same within a half
-        assert 0.5 < foreseen.found[name] / verdict.found[name] < 2.0
+        assert 0.5 < foreseen.found[name] / verdict.power.found[name] < 2.0
 
 
 def test_a_check_without_fixed_points_says_what_it_cannot_see(drawn: Drawn) -> None:

@@ -152,7 +152,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         watch, verdicts = watch_months(robot, model, poses, given.months, rng)
         own = sum(not v.in_control for v in verdicts)
         alarms, checks, worst = alarms + own, checks + len(verdicts), max(worst, own)
-        least = verdicts[-1].found
+        least = verdicts[-1].power.found
         print(
             f"{seed}: fit {fitted - begun:.1f} s, left {left_mm(robot, model, rng):.4f}"
             f" mm, {own} alarms of {len(verdicts)}, scale {watch.scale:.2f}, found "
@@ -160,7 +160,7 @@ def main(argv: Sequence[str] | None = None) -> None:
                         if "motor" not in k and "gear" not in k),
             flush=True,
         )  # fmt: skip
-        print("   blind:", verdicts[-1].blind, "alike:", verdicts[-1].alike)
+        print("   blind:", verdicts[-1].power.blind, "alike:", verdicts[-1].power.alike)
         for kind in KINDS:
             for factor in (1.0, 2.0):
                 changed, event, name = happen(robot, kind, factor, least, rng)
