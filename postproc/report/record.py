@@ -132,7 +132,7 @@ def _power(check: Power) -> list[str]:
     if check.blind:
         lines.append(f"this check cannot see: {', '.join(check.blind)}")
     if pairs := [" from ".join(pair) for pair in check.alike]:
-        lines.append(f"and it hardly tells {', '.join(pairs)}")
+        lines.append(f"this check can hardly tell {', '.join(pairs)}")
     return lines
 
 
@@ -195,8 +195,9 @@ def tell_refresh(serial: str, found: Refreshed, output: str) -> str:
             "as far as the survey was unsure alone"
         )
     lines += tell_stale(found.stale)
-    lines.append(f"next: compensate with {output}; postproc batch --stale makes the "
-                 "stale ones again")  # fmt: skip
+    again = "; postproc batch --stale makes the stale programs again"
+    stale = any(program.is_stale() for program in found.stale)
+    lines.append(f"next: compensate with {output}{again if stale else ''}")
     return "\n".join(lines)
 
 
