@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from postproc.diagnostics import Code, Reason
+from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.assigned_points import Scope
-from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import (
     NOWHERE,
     Arrived,
-    CallContext,
     TaskMachine,
 )
 from postproc.language.krl import syntax as said
@@ -97,8 +97,9 @@ class KrlMachine(TaskMachine):
         modes = modes.beside(self.task)
         first = self.task.files[0]
         here = Arrived(frozenset([START]), modes)
-        self.call(0, first.name, first.routines[0], None, -1, here)
-        self.follow_all()
+        main = 0, first.name, first.routines[0]
+        self.call_routine(main, self.root, -1, here)
+        self.follow()
         for name, (file, row) in self._assumed.items():
             self.say(
                 file, row, Code.ROUTINE_ASSUMED_MOTIONLESS, f"{name.upper()} {ASSUMED}"
@@ -110,12 +111,12 @@ class KrlMachine(TaskMachine):
         """Return X to C of a line to numbers, see `TaskMachine.places_of`."""
         return own_numbers(one) if isinstance(one, said.KrlMove) else None
 
-    def apart(self, context: CallContext) -> set[int] | None:
+    def apart(self, context: Context) -> set[int] | None:
         """Return the points of splines; all where an interrupt may end any move.
 
         All of a system file, too, where numbers stay.
         """
-        file = self.task.files[context.scope.file]
+        file = self.task.files[context.place.scope.file]
         if self._has_interrupts or file.is_system:
             return None
         blocks = file.splines
@@ -137,27 +138,27 @@ class KrlMachine(TaskMachine):
         """Return where the statements of a routine stand."""
         return self.task.scope_of(file, module, routine)
 
-    def counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
+    def counts_alone(self, context: Context, row: int, one: said.ForLoop) -> bool:
         """Return True if only the loop changes its variable, see `TaskMachine`.
 
         A variable that is not the routine's own may be changed by routines that the
         loop calls, and by what runs beside it.
         """
-        key = context.scope.file, row
+        key = context.place.scope.file, row
         if key not in self._alone:
             self._alone[key] = self._counts_alone(context, row, one)
         return self._alone[key]
 
-    def _counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
+    def _counts_alone(self, context: Context, row: int, one: said.ForLoop) -> bool:
         """Read a loop once for `counts_alone`."""
-        rows = range(row + 1, context.flow.loops.get(row, row))
-        text = self.texts[context.scope.file]
+        rows = range(row + 1, context.place.flow.loops.get(row, row))
+        text = self.texts[context.place.scope.file]
         inside = [text.statement(k) for k in rows]
         if any(one.name in self._sets(other) for other in inside):
             return False
         if one.name in self.task.odd_words:
             return False
-        scope = context.scope
+        scope = context.place.scope
         if self.task.place(one.name, scope) == (scope.module, scope.routine):
             return True
         if one.name in self.task.beside:
@@ -192,24 +193,24 @@ class KrlMachine(TaskMachine):
 
     # What it does.
 
-    def act(
-        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+    def carry_out(
+        self, context: Context, row: int, one: said.SourceStatement, here: Arrived
     ) -> Arrived | None:
         """Carry a statement out; None where it goes on in a routine.
 
         Behind ON_ERROR_PROCEED an error skips it: both ways go on then.
         """
         if not here.modes.perhaps:
-            return self._carry_out(context, row, one, here)
+            return self._run_once(context, row, one, here)
         here = replace(here, modes=here.modes.with_(perhaps=False))
-        after = self._carry_out(context, row, one, here)
+        after = self._run_once(context, row, one, here)
         if after is None:
-            self.enter(context, row + 1, here)
+            self.go_on(context, row + 1, here)
             return None
         return after.join(here)
 
-    def _carry_out(
-        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+    def _run_once(
+        self, context: Context, row: int, one: said.SourceStatement, here: Arrived
     ) -> Arrived | None:
         """Carry a statement out without an error."""
         here = self.after_functions(context, row, one, here)
@@ -235,7 +236,7 @@ class KrlMachine(TaskMachine):
                 return here
 
     def _forget(
-        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+        self, context: Context, row: int, one: said.SourceStatement, here: Arrived
     ) -> Arrived:
         """Forget what a routine may change of what is handed over to it."""
         if isinstance(one, said.InterruptDeclared | said.PathTrigger):
@@ -255,21 +256,21 @@ class KrlMachine(TaskMachine):
         return replace(here, modes=here.modes.with_(store=store))
 
     def _move(
-        self, context: CallContext, row: int, one: said.KrlMove, here: Arrived
+        self, context: Context, row: int, one: said.KrlMove, here: Arrived
     ) -> Arrived:
         """Record the visits of a move."""
-        scope = context.scope
+        scope = context.place.scope
         after = self.arrive(
             context, row, here,
             lambda: [*self.goals.visits(one, row, scope, here.modes, here.points)],
         )  # fmt: skip
         return replace(after, modes=replace(after.modes, halted=False, goes_on=False))
 
-    def _modes(self, context: CallContext, row: int) -> ModeReader:
-        return ModeReader(self.task, row, context.scope)
+    def _modes(self, context: Context, row: int) -> ModeReader:
+        return ModeReader(self.task, row, context.place.scope)
 
     def _assign(
-        self, context: CallContext, row: int, one: said.Assignment, here: Arrived
+        self, context: Context, row: int, one: said.Assignment, here: Arrived
     ) -> Arrived:
         """Give a value to data, or change how moves are made."""
         name = one.target.name
@@ -290,10 +291,10 @@ class KrlMachine(TaskMachine):
         return replace(here, modes=modes)
 
     def _call(
-        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+        self, context: Context, row: int, one: said.Instruction, here: Arrived
     ) -> Arrived | None:
         name = one.name
-        found = self.task.routine(name, context.scope)
+        found = self.task.routine(name, context.place.scope)
         if found is not None:
             return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
@@ -315,7 +316,7 @@ class KrlMachine(TaskMachine):
         if name in package_routines() and not self._is_overruled(name):
             if package_routines()[name] == AHEAD:
                 return here
-            place = context.scope.file, row
+            place = context.place.scope.file, row
             self._assumed[name] = min(self._assumed.get(name, place), place)
             return _halt(here, None)
         return self.outside(context, row, name, here)
@@ -325,7 +326,7 @@ class KrlMachine(TaskMachine):
         return self.start.assume_motion or name in self.start.routines
 
     def after_functions(
-        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+        self, context: Context, row: int, one: said.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what a statement reads, and for what its functions do."""
         for part in parts_of(operands_of(one)):
@@ -340,10 +341,10 @@ class KrlMachine(TaskMachine):
         return here
 
     def _function(
-        self, context: CallContext, row: int, name: str, here: Arrived
+        self, context: Context, row: int, name: str, here: Arrived
     ) -> Arrived:
         """Allow for what a function does."""
-        found = self.task.routine(name, context.scope)
+        found = self.task.routine(name, context.place.scope)
         if found is not None:
             if not self.may_act(found[0], found[2]):
                 return _halt(here, None)
@@ -358,12 +359,12 @@ class KrlMachine(TaskMachine):
     # Interrupts and triggers.
 
     def _declare(
-        self, context: CallContext, row: int, one: said.InterruptDeclared, here: Arrived
+        self, context: Context, row: int, one: said.InterruptDeclared, here: Arrived
     ) -> Arrived:
         """Declare an interrupt; one that nothing switches on may be on already."""
-        self._met.add((context.scope.file, row))
-        effects = self._effects_of(context.scope.file, one.action)
-        self._call_beside(context.scope.file, one.action)
+        self._met.add((context.place.scope.file, row))
+        effects = self._effects_of(context.place.scope.file, one.action)
+        self._call_beside(context.place.scope.file, one.action)
         modes, number = here.modes, self._number_of(context, row, one.number)
         others = frozenset(d for d in modes.declared if d[0] != number)
         modes = replace(modes, declared=others)
@@ -435,11 +436,11 @@ class KrlMachine(TaskMachine):
                 for row in rows:
                     yield file, routine, row, text.statement(row)
 
-    def at_return(self, context: CallContext, here: Arrived) -> Arrived:
+    def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Allow for a RESUME in the routine, see `TaskMachine.at_return`."""
         ending = {own for own in here.modes.declared if own[1] == _ENDED}
         numbers = {number for number, _ in ending}
-        at = context.scope.file, context.routine
+        at = context.place.scope.file, context.place.routine
         active = bool(ending & here.modes.active)
         if not ending or not (active or self._may_switch(*at, numbers)):
             return here
@@ -488,9 +489,9 @@ class KrlMachine(TaskMachine):
         return False
 
     def _switch(
-        self, context: CallContext, row: int, one: said.InterruptSwitched, here: Arrived
+        self, context: Context, row: int, one: said.InterruptSwitched, here: Arrived
     ) -> Arrived:
-        self._met.add((context.scope.file, row))
+        self._met.add((context.place.scope.file, row))
         modes, number = here.modes, self._number_of(context, row, one.number)
         if one.word == "on":
             meant = {
@@ -532,10 +533,10 @@ class KrlMachine(TaskMachine):
         return found
 
     def _number_of(
-        self, context: CallContext, row: int, operand: said.Operand | None
+        self, context: Context, row: int, operand: said.Operand | None
     ) -> int:
         """Return the number of an interrupt, EVERY where it is not known."""
-        number = whole(self.number(operand, row, context.scope))
+        number = whole(self.number(operand, row, context.place.scope))
         return EVERY if number is None else number
 
     @cached_property
@@ -552,15 +553,15 @@ class KrlMachine(TaskMachine):
         return found
 
     def _trigger(
-        self, context: CallContext, one: said.PathTrigger, here: Arrived
+        self, context: Context, one: said.PathTrigger, here: Arrived
     ) -> Arrived:
         """Leave what comes behind a trigger that may set what moves need.
 
         What it does comes at some time in the next move, when the program is ahead.
         """
-        if not self._effects_of(context.scope.file, one.action):
+        if not self._effects_of(context.place.scope.file, one.action):
             return here
-        self._call_beside(context.scope.file, one.action)
+        self._call_beside(context.place.scope.file, one.action)
         return replace(
             here, modes=here.modes.with_(blocked=here.modes.blocked | {_INTERRUPT})
         )

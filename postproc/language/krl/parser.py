@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from postproc.language.control_flow import EXIT
+from postproc.language.analysis.control_flow import EXIT
 from postproc.language.krl import syntax as said
 from postproc.language.template_parser import Children, FormParser, Word
 

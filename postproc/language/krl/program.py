@@ -8,8 +8,8 @@ from functools import cached_property
 
 from postproc.diagnostics import Code
 from postproc.files import base_name
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.blocks import BlockWords, Outline
-from postproc.language.control_flow import HeadedRows
 from postproc.language.krl import syntax as said
 from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.statements import KrlText, read_krl_statements

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.diagnostics import Code
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.assigned_points import (
     AssignedPoint,
     FunctionBody,
@@ -20,7 +21,6 @@ from postproc.language.assigned_points import (
     TaskSymbols,
     is_point,
 )
-from postproc.language.control_flow import HeadedRows
 from postproc.language.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.krl import syntax as said

@@ -240,6 +240,11 @@ class Store:
         """Change frames or motion variables (names without ``$``)."""
         self.settings = {**self.settings, **settings}
 
+    def join(self, other: Store) -> Store:
+        """Return what may hold on either way; itself where the other adds nothing."""
+        both = self.copy()
+        return both if both.merge(other) else self
+
     def merge(self, other: Store) -> bool:
         """Take in what may hold too; tell whether anything changed."""
         changed = False

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import get_args
 
 import numpy as np
 
@@ -45,7 +44,6 @@ NODES = frozenset({"node_app", "node_del", "node_ins"})
 
 
 FRAMES = ("tool", "base", "uframe")
-CANCELLING = (ast.CancelMove, ast.ExitCycle)
 
 # What text may do that is not understood.
 
@@ -112,47 +110,24 @@ class Effects:
     assigned: frozenset[str]
     read: frozenset[str]
     calls: frozenset[str]
-    cancels: frozenset[ast.CancelMove | ast.ExitCycle] = frozenset()
+    cancels: frozenset[ast.SourceStatement] = frozenset()
 
 
-def invocations(node: object) -> Iterator[ast.Invoke]:
-    """Yield the function calls in a statement or expression, inner ones first."""
-    return (part for part in _parts(node) if isinstance(part, ast.Invoke))
+def invocations(*nodes: ast.Node | None) -> Iterator[ast.FunctionCall]:
+    """Yield the function calls in statements or values, inner ones first."""
+    return (part for part in ast.walk(*nodes) if isinstance(part, ast.FunctionCall))
 
 
-def references(node: object) -> Iterator[ast.Reference]:
-    """Yield the variables in a statement or expression."""
-    return (part for part in _parts(node) if isinstance(part, ast.Reference))
-
-
-_LEAVES = (str, int, float, type(None))
-_NODES = (ast.Statement, *get_args(ast.Expression), ast.Index)
-
-
-def _parts(node: object) -> list[object]:
-    """List a statement or expression with all that is in it, inner ones first."""
-    found: list[object] = []
-    _add_parts(node, found)
-    return found
-
-
-def _add_parts(node: object, found: list[object]) -> None:
-    if isinstance(node, tuple):
-        for part in node:
-            _add_parts(part, found)
-    elif isinstance(node, _NODES):
-        for name in node.__slots__:
-            part = getattr(node, name)
-            if not isinstance(part, _LEAVES):
-                _add_parts(part, found)
-        found.append(node)
+def references(*nodes: ast.Node | None) -> Iterator[ast.DataObject]:
+    """Yield the variables in statements or values."""
+    return (part for part in ast.walk(*nodes) if isinstance(part, ast.DataObject))
 
 
 def list_changed_arguments(
-    arguments: tuple[ast.Expression | None, ...],
-) -> list[ast.Reference]:
+    arguments: tuple[ast.Operand | None, ...],
+) -> list[ast.DataObject]:
     """Return the arguments that go by reference: variables by themselves."""
-    return [a for a in arguments if isinstance(a, ast.Reference)]
+    return [a for a in arguments if isinstance(a, ast.DataObject)]
 
 
 def rows_effects(program: Program, first: int, last: int) -> Effects:
@@ -203,36 +178,36 @@ def _reach(
 
 
 @lru_cache(maxsize=8192)
-def _direct(statement: ast.Statement) -> Effects:
+def _direct(statement: ast.SourceStatement) -> Effects:
     assigned: set[str] = set()
     calls = {i.name for i in invocations(statement)}
     moves = False
     action = ast.action(statement)
-    cancels = frozenset([action] if isinstance(action, CANCELLING) else [])
+    cancels = frozenset([action] if action and _cancels(action) else [])
+    if then := ast.behind(statement):
+        inner = _direct(then)
+        moves, assigned = inner.moves, set(inner.assigned)
+        calls |= inner.calls
     match statement:
-        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
-            if then is not None:
-                inner = _direct(then)
-                moves, assigned = inner.moves, set(inner.assigned)
-                calls |= inner.calls
         case ast.Move():
             moves = True
-        case ast.Unknown(text):
+        case ast.NotUnderstood(text):
             moves, assigned = True, set(words_in(text))
             if not is_harmless(text):
                 assigned |= {f"${frame}" for frame in FRAMES}
-        case ast.Assign(target):
+        case ast.Assignment(target):
             assigned.add(_name_assigned(target))
-        case ast.For(name):
+        case ast.ForLoop(name):
             assigned.add(name)
         case ast.Transfer(word, operands) if word != "WRITE":
             assigned |= {_name_assigned(o) for o in list_changed_arguments(operands)}
-        case ast.Call(name, arguments):
+        case ast.Instruction(name):
             calls.add(name)
-            assigned |= {_name_assigned(a) for a in list_changed_arguments(arguments)}
+            changed = list_changed_arguments(statement.values)
+            assigned |= {_name_assigned(a) for a in changed}
     for call in invocations(statement):
         if call.name not in PURE:
-            changed = list_changed_arguments(call.arguments)
+            changed = list_changed_arguments(call.values)
             assigned |= {_name_assigned(a) for a in changed}
     if TRACKING in calls:
         assigned.add(f"${TRACKING}")
@@ -241,7 +216,12 @@ def _direct(statement: ast.Statement) -> Effects:
     return Effects(moves, frozenset(assigned), read, called, cancels)
 
 
-def _name_assigned(reference: ast.Reference) -> str:
+def _cancels(one: ast.SourceStatement) -> bool:
+    """Tell whether a statement ends moves on their way."""
+    return isinstance(one, ast.CancelMove) or one == ast.Leave("exitcycle")
+
+
+def _name_assigned(reference: ast.DataObject) -> str:
     if reference.name == "$arm_data" and len(reference.steps) >= 2:
         return f"${str(reference.steps[1]).lstrip('$')}"
     return reference.name
@@ -278,7 +258,7 @@ class CallGraph:
     frames: bool
 
     @property
-    def cancels(self) -> frozenset[ast.CancelMove | ast.ExitCycle]:
+    def cancels(self) -> frozenset[ast.SourceStatement]:
         """Statements that end moves on their way."""
         return frozenset().union(*(part.effects.cancels for part in self.parts))
 
@@ -354,7 +334,9 @@ def circles(world: World) -> frozenset[int]:
     calls: dict[int, set[int]] = {}
     for program in world.programs():
         for body in filter(None, (program.main, *program.routines.values())):
-            called = _list_called(world, Place(program, body), body.first, body.last)
+            called = _list_called(
+                world, world.place(program, body), body.first, body.last
+            )
             calls[id(body)] = {id(one.body) for one in called}
     callers = _reverse_edges(_without_sinks(calls))
     return frozenset(_without_sinks(callers))
@@ -384,14 +366,12 @@ def _reverse_edges(edges: Mapping[int, set[int]]) -> dict[int, set[int]]:
     return back
 
 
-def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
+def _names(statement: ast.SourceStatement) -> Iterator[tuple[str, bool]]:
     """Yield names that may be called, and whether each is that of a program."""
-    match statement:
-        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
-            if then is not None:
-                yield from _names(then)
-        case ast.Call(name, _, program):
-            yield name, program
+    if then := ast.behind(statement):
+        yield from _names(then)
+    if isinstance(statement, ast.Instruction):
+        yield statement.name, isinstance(statement, ast.ProgramCall)
     for call in invocations(statement):
         yield call.name, False
     for reference in references(statement):
@@ -421,7 +401,7 @@ def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
     return found
 
 
-def _has_target(statement: ast.Statement) -> bool:
+def _has_target(statement: ast.SourceStatement) -> bool:
     """Tell whether a line moves to a target, and not to a system variable.
 
     A move that names its arm may be one of another arm, and does not count.
@@ -435,4 +415,4 @@ def goes_to_target(move: ast.Move) -> bool:
     if move.how != "TO":
         return False
     where = move.where[0] if move.where else None
-    return not (isinstance(where, ast.Reference) and where.name.startswith("$"))
+    return not (isinstance(where, ast.DataObject) and where.name.startswith("$"))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
 
-from postproc.language.control_flow import CLOSING, RoutineFlow
+from postproc.language.analysis.control_flow import CLOSING, ControlFlow
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.symbols import SHIFTS, functions_in, inside
 from postproc.language.rapid.targets import operands_of
@@ -120,7 +120,7 @@ def numbers_of(
 
 
 def clauses_of(
-    text: StatementText[said.RapidStatement], flow: RoutineFlow, read: ReadNumber
+    text: StatementText[said.RapidStatement], flow: ControlFlow, read: ReadNumber
 ) -> tuple[ErrorClause, ...]:
     """Read the error handlers of a routine.
 

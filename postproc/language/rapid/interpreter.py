@@ -10,12 +10,12 @@ from functools import cached_property, partial
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
+from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.assigned_points import Scope
-from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import (
     NOWHERE,
     Arrived,
-    CallContext,
     TaskMachine,
 )
 from postproc.language.language import Start
@@ -88,7 +88,7 @@ class RapidMachine(TaskMachine):
     ends: list[Arrived] = field(default_factory=list)
     restarts: list[Arrived] = field(default_factory=list)
     _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
-    _exits: dict[CallContext, tuple[ErrorExit, ...]] = field(default_factory=dict)
+    _exits: dict[Context, tuple[ErrorExit, ...]] = field(default_factory=dict)
     _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
     _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
     _direct: dict[tuple[int, int], tuple[bool, list[_Place]]] = field(
@@ -126,12 +126,12 @@ class RapidMachine(TaskMachine):
         if any(self._moves(*trap) for trap in traps):
             here = replace(here, modes=replace(here.modes, blocked=frozenset([_TRAP])))
         for file, module, routine in found:
-            self.call(file, module, routine, None, -1, here)
-        self.follow_all()
+            self.call_routine((file, module, routine), self.root, -1, here)
+        self.follow()
         again = self._next_cycle(here)
         if len(mains) == 1 and again != here:
-            self.call(*mains[0], None, -1, again)
-            self.follow_all()
+            self.call_routine(mains[0], self.root, -1, again)
+            self.follow()
 
     def _next_cycle(self, here: Arrived) -> Arrived:
         """Return how main begins again: from where, and with what, a cycle ends.
@@ -187,7 +187,7 @@ class RapidMachine(TaskMachine):
 
     is_plain = staticmethod(are_targets)
 
-    def apart(self, context: CallContext) -> set[int] | None:
+    def apart(self, context: Context) -> set[int] | None:
         """Return all (None) where an error may lead to any statement."""
         return None if self._exits_of(context) else set()
 
@@ -200,18 +200,18 @@ class RapidMachine(TaskMachine):
         return self.task.scope_of(file, module, routine)
 
     def bind_arguments(
-        self, scope: Scope, routine: HeadedRows, caller: CallContext, row: int
+        self, scope: Scope, routine: HeadedRows, caller: Context, row: int
     ) -> Scope:
         """Add what a routine is called with, see `TaskMachine.bind_arguments`.
 
         One that calls itself has other values the next time.
         """
-        call = inside(self.texts[caller.scope.file].statement(row))
+        call = inside(self.texts[caller.place.scope.file].statement(row))
         known = isinstance(call, said.Instruction) and call.name == routine.head.name
         if not known or self._is_recursive(scope.file, routine):
             return scope
         assert isinstance(call, said.Instruction)
-        return self.task.bind(scope, routine, call, row, caller.scope)
+        return self.task.bind(scope, routine, call, row, caller.place.scope)
 
     def _is_recursive(self, file: int, routine: HeadedRows) -> bool:
         """Return True if a routine has parameters and may come to call itself."""
@@ -242,7 +242,7 @@ class RapidMachine(TaskMachine):
             isinstance(one, said.BlockWord) and one.word in HANDLERS
         )
 
-    def at_call(self, context: CallContext, here: Arrived) -> Arrived:
+    def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
         if self._handlers_of(context).moves:
             here = replace(
@@ -251,40 +251,40 @@ class RapidMachine(TaskMachine):
             )
         return here
 
-    def at_return(self, context: CallContext, here: Arrived) -> Arrived:
+    def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Note the end of a cycle; forget what a handler may have changed."""
-        if context.caller is None:
+        if context.outer is self.root:
             self.ends.append(here)
         return here.forget() if self._handlers_of(context).moves else here
 
     # Errors.
 
-    def _handlers_of(self, context: CallContext) -> ErrorHandlers:
+    def _handlers_of(self, context: Context) -> ErrorHandlers:
         """Read the error handlers of a routine once."""
-        key = context.scope.file, context.routine.first
+        key = context.place.scope.file, context.place.routine.first
         if key not in self._handlers:
-            scope = replace(context.scope, given=(), loops=())
+            scope = replace(context.place.scope, given=(), loops=())
             text = self.texts[scope.file]
 
             def read(operand: said.Operand | None, row: int) -> str:
                 return key_of(operand, self.task.number(operand, row, scope))
 
-            clauses = clauses_of(text, context.flow, read)
-            rows = context.flow.handlers
+            clauses = clauses_of(text, context.place.flow, read)
+            rows = context.place.flow.handlers
             moves, called = self._read_rows(scope, rows, (EXIT_CYCLE,))
             if moves := moves or self._reach_moves(called):
                 self.beside.add((scope.file, rows.start, rows.stop))
             self._handlers[key] = ErrorHandlers(clauses, moves)
         return self._handlers[key]
 
-    def _exits_of(self, context: CallContext) -> tuple[ErrorExit, ...]:
+    def _exits_of(self, context: Context) -> tuple[ErrorExit, ...]:
         """Find where the program goes on behind errors raised in a routine."""
         if context not in self._exits:
             self._exits[context] = tuple(exits_of(context, self._handlers_of))
         return self._exits[context]
 
     def _fail(
-        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
+        self, context: Context, row: int, one: said.RapidStatement, here: Arrived
     ) -> None:
         """Allow for an error that a statement raises and another routine handles.
 
@@ -304,7 +304,7 @@ class RapidMachine(TaskMachine):
         return may_raise(one, numbers, self.task.routines, self.task.declared)
 
     def _interrupt(
-        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+        self, context: Context, row: int, one: said.Instruction, here: Arrived
     ) -> None:
         """Allow for an error that ends a move on its way."""
         always = (
@@ -316,24 +316,26 @@ class RapidMachine(TaskMachine):
                 self._handle(context, row, way, replace(here, origins=NOWHERE))
 
     def _handle(
-        self, context: CallContext, row: int, way: ErrorExit, here: Arrived
+        self, context: Context, row: int, way: ErrorExit, here: Arrived
     ) -> None:
         """Go on behind an error."""
         here = here.forget() if way.lost else here
         if way.context is context and way.own:
-            self.enter(context, row + way.row, here)
+            self.go_on(context, row + way.row, here)
         elif way.context is not None:
-            self.enter(way.context, way.row, here)
+            self.go_on(way.context, way.row, here)
         elif way.restarts:
             self.restarts.append(here)
         else:
             self.ends.append(here)
 
-    def raise_error(
-        self, context: CallContext, row: int, one: said.Leave, here: Arrived
+    def leave_otherwise(
+        self, context: Context, row: int, one: said.Leave, here: Arrived
     ) -> None:
-        """Go on behind ``RAISE``, see `TaskMachine.raise_error`."""
-        number = self.task.number(one.value, row, context.scope)
+        """Go on behind ``RAISE``; behind ``EXIT`` the program stops."""
+        if one.word != "raise":
+            return
+        number = self.task.number(one.value, row, context.place.scope)
         raised = numbers_of([one.value], lambda value: key_of(value, number))
         for way in self._exits_of(context):
             shared = common(way.numbers, raised)
@@ -341,20 +343,19 @@ class RapidMachine(TaskMachine):
                 self._handle(context, row, way, here)
 
     def part_otherwise(
-        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
-    ) -> None:
+        self, context: Context, row: int, one: said.RapidStatement, here: Arrived
+    ) -> Arrived | None:
         """Go on behind ``IF condition statement;``."""
         if isinstance(one, said.CompactIf):
-            self.enter(context, row + 1, here)
-            self._compact(context, row, one.statement, here)
-        else:
-            self._bind_late(one)
-            super().part_otherwise(context, row, one, here)
+            after = self._compact(context, row, one.statement, here)
+            return here if after is None else here.join(after)
+        self._bind_late(one)
+        return super().part_otherwise(context, row, one, here)
 
-    def may_jump(self, context: CallContext, row: int, here: Arrived) -> None:
+    def may_jump(self, context: Context, row: int, here: Arrived) -> None:
         """Begin a cycle as well, see `TaskMachine.may_jump`."""
         super().may_jump(context, row, here)
-        if EXIT_CYCLE in self.texts[context.scope.file].words([row]):
+        if EXIT_CYCLE in self.texts[context.place.scope.file].words([row]):
             self.restarts.append(here)
 
     def _bind_late(self, one: said.RapidStatement) -> None:
@@ -458,29 +459,23 @@ class RapidMachine(TaskMachine):
         return found
 
     def _compact(
-        self, context: CallContext, row: int, inside: said.RapidStatement, here: Arrived
-    ) -> None:
+        self, context: Context, row: int, inside: said.RapidStatement, here: Arrived
+    ) -> Arrived | None:
         """Run the statement behind a condition."""
-        if isinstance(inside, said.Instruction):
-            after = self.act(context, row, inside, here)
-            if after is not None:
-                self.enter(context, row + 1, after)
-        elif isinstance(inside, said.JumpTo | said.Leave | said.CompactIf):
-            self.part(context, row, inside, here)
-        elif isinstance(inside, said.Assignment):
-            self.enter(context, row + 1, self.assign_point(context, row, inside, here))
-        elif type(inside) not in _PASSED:
-            self._bind_late(inside)
-            super().part_otherwise(context, row, inside, here)
+        if isinstance(inside, said.Assignment):
+            return self.assign_point(context, row, inside, here)
+        if type(inside) in _PASSED:
+            return here
+        return self.run_one(context, row, inside, here)
 
     # What instructions do.
 
-    def act(
-        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+    def carry_out(
+        self, context: Context, row: int, one: said.Instruction, here: Arrived
     ) -> Arrived | None:
         """Run an instruction; None where it goes on in a routine."""
         here = self.after_functions(context, row, one, here)
-        name, scope = one.name, context.scope
+        name, scope = one.name, context.place.scope
         found = self.task.routine(name, scope)
         if name in MOTIONS and name not in self.task.routines:
             return self._move(context, row, one, here)
@@ -524,10 +519,10 @@ class RapidMachine(TaskMachine):
         )  # fmt: skip
 
     def _move(
-        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+        self, context: Context, row: int, one: said.Instruction, here: Arrived
     ) -> Arrived:
         """Record the visits of a move."""
-        signature, scope = MOTIONS[one.name], context.scope
+        signature, scope = MOTIONS[one.name], context.place.scope
         self._interrupt(context, row, one, here)
         after = self.arrive(
             context, row, here,
@@ -545,7 +540,7 @@ class RapidMachine(TaskMachine):
         return after
 
     def _synchronous(
-        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+        self, context: Context, row: int, one: said.Instruction, here: Arrived
     ) -> Arrived:
         """Allow for the procedure that a move calls while the program runs ahead."""
         placed = [argument.value for argument in one.arguments if not argument.name]
@@ -553,7 +548,7 @@ class RapidMachine(TaskMachine):
         name = _name_procedure(called) if _is_text(called) else ""
         if self.declares_motionless(name) and name not in self.task.routines:
             return here
-        found = self.task.routine(name, context.scope)
+        found = self.task.routine(name, context.place.scope)
         given = None if found is None else self._list_set_modes(*found)
         if given is None:
             self._run_named_beside(name)
@@ -591,7 +586,7 @@ class RapidMachine(TaskMachine):
         return frozenset(found)
 
     def after_functions(
-        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
+        self, context: Context, row: int, one: said.RapidStatement, here: Arrived
     ) -> Arrived:
         """Allow for what the functions of a statement do, and for its errors."""
         here = self._after_functions(context, row, one, here)
@@ -599,10 +594,10 @@ class RapidMachine(TaskMachine):
         return here
 
     def _after_functions(
-        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
+        self, context: Context, row: int, one: said.RapidStatement, here: Arrived
     ) -> Arrived:
         for name in functions_in(one):
-            found = self.task.routine(name, context.scope)
+            found = self.task.routine(name, context.place.scope)
             own = name in self.task.routines
             if not own and name in WAITING:
                 self.pause(here)

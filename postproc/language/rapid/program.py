@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from postproc.diagnostics import Code
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.blocks import BlockWords, Outline
-from postproc.language.control_flow import HeadedRows
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import (
     MOTIONS,

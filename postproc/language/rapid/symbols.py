@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.assigned_points import (
     AssignedPoint,
     FunctionBody,
@@ -21,7 +22,6 @@ from postproc.language.assigned_points import (
     is_point,
     source_of,
 )
-from postproc.language.control_flow import HeadedRows
 from postproc.language.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said

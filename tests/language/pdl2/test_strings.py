@@ -21,7 +21,9 @@ def test_two_quotes_are_an_apostrophe(text):
         "a.pdl", f"PROGRAM a\nBEGIN\n  s := {text} -- it's\nEND a\n".encode()
     )
     found = parse(source).statement(2)
-    assert isinstance(found, ast.Assign) and found.value == ast.Text(STRINGS[text])
+    assert isinstance(found, ast.Assignment) and found.value == ast.StringLiteral(
+        STRINGS[text]
+    )
 
 
 @pytest.mark.parametrize("text", STRINGS)
