@@ -14,8 +14,9 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, all_in_rows
 from postproc.diagnostics import Code
-from postproc.language import ir as said
+from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, Context
+from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import (
     ControlFlow,
     HeadedRows,
@@ -112,7 +113,7 @@ JUMPS = frozenset("goto return exit exitcycle raise retry trynext".split())
 """Words with which a statement leads to another place."""
 RECURSIVE = "calls itself: it is not followed"
 NOT_FOLLOWED = "is not followed, and may move the arm"
-_PLAIN = (said.SourceStatement, said.LabelMark)
+_PLAIN = (ir.SourceStatement, ir.LabelMark)
 M = TypeVar("M", bound="TaskMachine")
 
 
@@ -158,7 +159,7 @@ class TaskMachine(Interpreter[Arrived]):
         """Follow every way from where the task begins."""
 
     @abstractmethod
-    def acts(self, one: said.SourceStatement) -> bool:
+    def acts(self, one: ir.SourceStatement) -> bool:
         """Tell whether a statement moves, calls, or changes what moves are made with.
 
         It leads to the next statement or into a routine.
@@ -171,17 +172,17 @@ class TaskMachine(Interpreter[Arrived]):
         """Carry such a statement out; None where it goes on in a routine."""
 
     @abstractmethod
-    def goes_on(self, one: said.SourceStatement) -> bool:
+    def goes_on(self, one: ir.SourceStatement) -> bool:
         """Tell whether a statement leads to the next one and does nothing."""
 
     @abstractmethod
     def after_functions(
-        self, context: Context, row: int, one: said.SourceStatement, here: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what the functions of a statement do."""
 
     @abstractmethod
-    def number(self, operand: said.Operand | None, row: int, scope: Scope) -> float:
+    def number(self, operand: ir.Operand | None, row: int, scope: Scope) -> float:
         """Evaluate a number, NaN where it is not known before the program runs."""
 
     @abstractmethod
@@ -190,7 +191,7 @@ class TaskMachine(Interpreter[Arrived]):
 
     @abstractmethod
     def calls_of(
-        self, file: int, one: said.SourceStatement
+        self, file: int, one: ir.SourceStatement
     ) -> Iterable[tuple[int, HeadedRows]]:
         """Yield the routines that a statement calls: their files and places."""
 
@@ -228,11 +229,11 @@ class TaskMachine(Interpreter[Arrived]):
         return scope
 
     def part_otherwise(
-        self, context: Context, row: int, one: said.SourceStatement, here: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived | None:
         """Go on behind a statement that only this language has."""
         after = self.unknown(context, row, here)
-        if said.is_odd(one):
+        if ir.is_odd(one):
             self.may_jump(context, row, after)
         return after
 
@@ -245,17 +246,17 @@ class TaskMachine(Interpreter[Arrived]):
             self.go_on(context, to, here)
         self.leave(context, here)
 
-    def counts_alone(self, context: Context, row: int, one: said.ForLoop) -> bool:
+    def counts_alone(self, context: Context, row: int, one: ir.ForLoop) -> bool:
         """Return True if nothing but the loop itself changes its variable."""
         return True
 
-    def handles(self, one: said.SourceStatement) -> bool:
+    def handles(self, one: ir.SourceStatement) -> bool:
         """Tell whether the handlers of a routine begin with a statement."""
         return False
 
-    def changes_of(self, one: said.SourceStatement) -> Iterable[str]:
+    def changes_of(self, one: ir.SourceStatement) -> Iterable[str]:
         """Yield the names of data that a statement changes."""
-        return [one.target.name] if isinstance(one, said.Assignment) else []
+        return [one.target.name] if isinstance(one, ir.Assignment) else []
 
     def routines_beside(self) -> Iterable[tuple[int, int, int]]:
         """Yield statements that run otherwise than they are followed, as `beside`."""
@@ -272,7 +273,7 @@ class TaskMachine(Interpreter[Arrived]):
     # From statement to statement, see `Interpreter`.
 
     def act(
-        self, context: Context, row: int, one: said.SourceStatement, state: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, state: Arrived
     ) -> Arrived | None:
         """Carry out a statement that leads to the next one."""
         if self.acts(one):
@@ -298,19 +299,19 @@ class TaskMachine(Interpreter[Arrived]):
         return behind, after
 
     def before(
-        self, context: Context, row: int, one: said.SourceStatement, state: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, state: Arrived
     ) -> Arrived:
         """Allow for what the functions of a statement do."""
         return self.after_functions(context, row, one, state)
 
     def lose_way(
-        self, context: Context, row: int, one: said.SourceStatement, state: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, state: Arrived
     ) -> Arrived | None:
         """Go on behind a statement that leads to no place that is known."""
         return self.unknown(context, row, state)
 
     def count(
-        self, context: Context, row: int, loop: said.ForLoop, state: Arrived
+        self, context: Context, row: int, loop: ir.ForLoop, state: Arrived
     ) -> Counting | None:
         """Return the rounds of a loop, None where they are not known."""
         if not self.counts_alone(context, row, loop):
@@ -323,7 +324,7 @@ class TaskMachine(Interpreter[Arrived]):
         return Counting.of(first, last, step)
 
     def begin_round(
-        self, outer: Context, row: int, loop: said.ForLoop, value: float, state: Arrived
+        self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: Arrived
     ) -> tuple[TaskPlace, Arrived]:
         """Return where the statements of a round stand, with the loop's variable."""
         place = outer.place
@@ -488,10 +489,10 @@ class TaskMachine(Interpreter[Arrived]):
         return replace(here, origins=frozenset([known[-1]]))
 
     def assign_point(
-        self, context: Context, row: int, one: said.SourceStatement, here: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Note what an assignment gives to a point, or to a component of it."""
-        if not isinstance(one, said.Assignment):
+        if not isinstance(one, ir.Assignment):
             return here
         points = self.task.assign(here.points, one, row, context.place.scope)
         return here.with_points(points)
@@ -547,16 +548,15 @@ class TaskMachine(Interpreter[Arrived]):
 
     def _rows_of(self, parts: set[tuple[int, int, int]]) -> Iterator[tuple[int, int]]:
         """Yield statements, and those of the routines that they call."""
-        waiting, seen = sorted(parts), set(parts)
-        while waiting:
-            file, first, behind = waiting.pop()
-            for row in range(first, behind):
-                yield file, row
-                for at, one in self.calls_of(file, self.texts[file].statement(row)):
-                    key = at, one.first, one.last
-                    if key not in seen:
-                        seen.add(key)
-                        waiting.append(key)
+        for file, first, behind in reach(sorted(parts), self._list_calls, tuple):
+            yield from ((file, row) for row in range(first, behind))
+
+    def _list_calls(self, part: tuple[int, int, int]) -> Iterator[tuple[int, int, int]]:
+        """Yield the routines that some statements call."""
+        file, first, behind = part
+        for row in range(first, behind):
+            for at, one in self.calls_of(file, self.texts[file].statement(row)):
+                yield at, one.first, one.last
 
     def find_unreached(self, moves: Mapping[int, Iterable[int]]) -> dict[str, Ints]:
         """Return the lines of moves that no way leads to, by file.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.diagnostics import Code, Reason
+from postproc.language import ir
 from postproc.language.language import Record
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Store
@@ -68,7 +69,7 @@ def summarise_call(
     here: Execution,
     name: str,
     reach: CallGraph,
-    arguments: tuple[ast.Operand | None, ...] = (),
+    arguments: tuple[ir.Operand | None, ...] = (),
 ) -> None:
     """Take in what a call may do without following it; list the moves it may make."""
     for argument in list_changed_arguments(arguments):
@@ -110,7 +111,7 @@ def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> No
 # Calls: routines of the job are run, others are taken at their word.
 
 
-def call_statement(machine: Machine, here: Execution, call: ast.Instruction) -> bool:
+def call_statement(machine: Machine, here: Execution, call: ir.Instruction) -> bool:
     """Run a call; tell whether control went into a routine of the job."""
     whole = isinstance(call, ast.ProgramCall)
     find = here.world.find_program if whole else here.world.find_routine
@@ -129,7 +130,7 @@ def call_statement(machine: Machine, here: Execution, call: ast.Instruction) -> 
 
 
 def calls_in_expressions(
-    machine: Machine, here: Execution, statement: ast.SourceStatement
+    machine: Machine, here: Execution, statement: ir.SourceStatement
 ) -> None:
     """Let the function calls inside of a statement have their effects."""
     for call in machine.find_calls(here.place, statement):
@@ -144,7 +145,7 @@ def _apply_summary(
     machine: Machine,
     here: Execution,
     inside: Place,
-    arguments: tuple[ast.Operand | None, ...],
+    arguments: tuple[ir.Operand | None, ...],
 ) -> None:
     """Take a function's effects from its text instead of running it."""
     name, reach = inside.body.name, call_graph_of(here.world, inside)
@@ -175,7 +176,7 @@ def _refuse_recursion(machine: Machine, here: Execution, inside: Place) -> None:
 
 
 def _bind(
-    here: Execution, inside: Place, arguments: tuple[ast.Operand | None, ...]
+    here: Execution, inside: Place, arguments: tuple[ir.Operand | None, ...]
 ) -> None:
     """Give the parameters their values; variables go by reference."""
     prefix = f"{inside.program.name}:{inside.body.name}/"
@@ -187,7 +188,7 @@ def _bind(
             here.world.pin(here.value(argument), f"arm {other} goes to it too")
             here.store.write(key, Nothing(points_of(other)))
             continue
-        if isinstance(argument, ast.DataObject) and not argument.name.startswith("$"):
+        if isinstance(argument, ir.DataObject) and not argument.name.startswith("$"):
             target = here.locate(argument)
             if target.component == ():
                 here.store.write(key, Alias(target.keys, target.exact))
@@ -208,7 +209,7 @@ def _bind(
 
 
 def opaque_call(
-    here: Execution, name: str, arguments: tuple[ast.Operand | None, ...]
+    here: Execution, name: str, arguments: tuple[ir.Operand | None, ...]
 ) -> None:
     """Take in what a routine that the job does not hold is said, or assumed, to do."""
     built_in = name in CHANGING or name in PURE
@@ -266,7 +267,7 @@ def forget_surroundings(here: Execution, why: str) -> None:
 
 
 def _frames_from_table(
-    here: Execution, name: str, arguments: tuple[ast.Operand | None, ...]
+    here: Execution, name: str, arguments: tuple[ir.Operand | None, ...]
 ) -> None:
     table = here.world.start.frame_tables[name]
     values = [here.value(a) for a in arguments]
@@ -298,7 +299,7 @@ def frame_value(record: Record, why: str) -> Position | Nothing:
 # Assignments: what a variable, a component or a setting holds afterwards.
 
 
-def assign(here: Execution, statement: ast.Assignment, taught: bool) -> None:
+def assign(here: Execution, statement: ir.Assignment, taught: bool) -> None:
     """Let an assignment have its effect; `taught` marks the literal in it."""
     other = here.world.other_arm(here.place, statement.target.name)
     if other:
@@ -338,7 +339,7 @@ def assign(here: Execution, statement: ast.Assignment, taught: bool) -> None:
 
 
 def _assign_component(
-    here: Execution, reference: ast.DataObject, value: ast.Operand
+    here: Execution, reference: ir.DataObject, value: ir.Operand
 ) -> bool:
     """Replace a number of a position; return False where a reference is none."""
     if reference.name.startswith("$"):
@@ -355,7 +356,7 @@ def _assign_component(
     return True
 
 
-def _setting(here: Execution, reference: ast.DataObject, value: Value) -> None:
+def _setting(here: Execution, reference: ir.DataObject, value: Value) -> None:
     """Change a frame or motion variable of our arm."""
     name = here.setting_name(reference)
     if name is None:
@@ -402,16 +403,16 @@ def _frame_part(
     here.store.set(**{name: new})
 
 
-def _whose(here: Execution, reference: ast.DataObject) -> int | None:
+def _whose(here: Execution, reference: ir.DataObject) -> int | None:
     """Return the arm that ``$ARM_DATA[n]`` names, None where it is not known."""
     first = reference.steps[0] if reference.steps else None
-    if isinstance(first, ast.ElementStep):
+    if isinstance(first, ir.ElementStep):
         return here.integer(first.subscripts[0])
     return 0
 
 
 def _new_value(
-    here: Execution, statement: ast.Assignment, target: Location, value: Value
+    here: Execution, statement: ir.Assignment, target: Location, value: Value
 ) -> Value:
     if target.component == ():
         return value

@@ -9,6 +9,7 @@ from typing import cast
 
 import numpy as np
 
+from postproc.language import ir
 from postproc.language.language import Cloner, NamedPoint
 from postproc.language.lexer import scan_lines
 from postproc.language.logical_lines import read_lines
@@ -82,7 +83,7 @@ def find_clone_target(
     where = None
     if isinstance(move, ast.Move) and move.how == "TO":
         where = move.via if via else move.where[0]
-    if not isinstance(where, ast.DataObject):
+    if not isinstance(where, ir.DataObject):
         raise CloneError("the numbers stand in the move itself, or are computed")
     if where.steps:
         raise CloneError("elements of arrays, records and paths are not cloned")
@@ -284,9 +285,9 @@ def _assign_clone(
     statement = program.statement(row)
     old = named.variable.name
     own = (
-        isinstance(statement, ast.Assignment)
-        and statement.target == ast.DataObject(old.lower())
-        and isinstance(statement.value, ast.Composite | ast.FunctionCall)
+        isinstance(statement, ir.Assignment)
+        and statement.target == ir.DataObject(old.lower())
+        and isinstance(statement.value, ir.Composite | ir.FunctionCall)
     )
     if not own or not _means(program, row, named):
         raise CloneError(f"line {line} is no plain assignment of its value")

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.language import ir
 from postproc.language.insert_moves import LayoutSplitter, MoveLayout, spell
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.clones import code_of
@@ -76,7 +77,7 @@ class Pdl2Splitter(LayoutSplitter):
         program = self.programs[file]
         row = int(np.searchsorted(program.lines.line, line)) - 1
         for one in map(program.statement, range(row, -1, -1)):
-            if not isinstance(one, ast.Assignment) or one.target.name not in _MOTION:
+            if not isinstance(one, ir.Assignment) or one.target.name not in _MOTION:
                 return isinstance(one, ast.Move)
         return False
 

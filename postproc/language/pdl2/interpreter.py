@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.diagnostics import Code, Reason
+from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, Context
 from postproc.language.analysis.interpreter import MOST_STEPS, Counting
 from postproc.language.language import Start
@@ -109,25 +110,25 @@ class Pdl2Machine(Machine):
         return (here.row, state) if self.blocks.run(here) else None
 
     def act(
-        self, context: Context, row: int, one: ast.SourceStatement, state: Store
+        self, context: Context, row: int, one: ir.SourceStatement, state: Store
     ) -> Store | None:
         """Run one statement that leads to the next row, or into a routine."""
         if isinstance(one, ast.When):
             then = one.then
             return state if then is None else self.run_one(context, row, then, state)
         here = self.at(context, row, state)
-        text = one.text if isinstance(one, ast.NotUnderstood) else ""
+        text = one.text if isinstance(one, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
         return state if step(self, here, one) else None
 
     def before(
-        self, context: Context, row: int, one: ast.SourceStatement, state: Store
+        self, context: Context, row: int, one: ir.SourceStatement, state: Store
     ) -> Store:
         """Allow for what a line does besides leading elsewhere."""
         here = self.at(context, row, state)
         written = here.place.program.statement(row)
-        odd = isinstance(written, ast.NotUnderstood)
-        text = written.text if isinstance(written, ast.NotUnderstood) else ""
+        odd = isinstance(written, ir.NotUnderstood)
+        text = written.text if isinstance(written, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
         if odd:
             invalidate_names(here, words_in(text), _why_unknown(here))
@@ -136,23 +137,23 @@ class Pdl2Machine(Machine):
         return state
 
     def truth(
-        self, context: Context, row: int, condition: ast.Operand, state: Store
+        self, context: Context, row: int, condition: ir.Operand, state: Store
     ) -> bool | None:
         """Tell whether a condition holds, None where only the run tells."""
         found = self.at(context, row, state).value(condition)
         return found if isinstance(found, bool) else None
 
     def fits(
-        self, context: Context, row: int, case: ast.Branch, head: int, state: Store
+        self, context: Context, row: int, case: ir.Branch, head: int, state: Store
     ) -> bool | None:
         """Tell whether a CASE means the value that SELECT names."""
         select = ast.action(context.place.statement(head))
-        tested = select.values if isinstance(select, ast.Branch) else ()
+        tested = select.values if isinstance(select, ir.Branch) else ()
         value = self.at(context, head, state).value(tested[0] if tested else None)
         return _fits(self.at(context, row, state), case, value)
 
     def count(
-        self, context: Context, row: int, loop: ast.ForLoop, state: Store
+        self, context: Context, row: int, loop: ir.ForLoop, state: Store
     ) -> Counting | None:
         """Return the rounds of a loop, None where they are not known."""
         here = self.at(context, row, state)
@@ -166,7 +167,7 @@ class Pdl2Machine(Machine):
         return Counting.of(first, last, -by if loop.down and by > 0 else by)
 
     def unrolls(
-        self, context: Context, row: int, loop: ast.ForLoop, counting: Counting
+        self, context: Context, row: int, loop: ir.ForLoop, counting: Counting
     ) -> bool:
         """Tell whether a loop is followed round by round."""
         program, end = context.place.program, context.place.flow.end[row]
@@ -188,19 +189,19 @@ class Pdl2Machine(Machine):
         return False
 
     def begin_round(
-        self, outer: Context, row: int, loop: ast.ForLoop, value: float, state: Store
+        self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: Store
     ) -> tuple[Place, Store]:
         """Give the variable of a loop its value."""
-        key = self.at(outer, row, state).locate(ast.DataObject(loop.name)).key
+        key = self.at(outer, row, state).locate(ir.DataObject(loop.name)).key
         state.write(key, value)
         return outer.place, state
 
     def forget_counter(
-        self, context: Context, row: int, loop: ast.ForLoop, ended: bool, state: Store
+        self, context: Context, row: int, loop: ir.ForLoop, ended: bool, state: Store
     ) -> Store:
         """Forget the variable of a loop."""
         why = "it counted a loop that has ended" if ended else "it counts a loop"
-        invalidate(self.at(context, row, state), ast.DataObject(loop.name), why)
+        invalidate(self.at(context, row, state), ir.DataObject(loop.name), why)
         return state
 
     def leave(self, context: Context, state: Store, by_return: bool = False) -> None:
@@ -215,7 +216,7 @@ class Pdl2Machine(Machine):
             self.return_to_caller(call, state)
 
     def leave_otherwise(
-        self, context: Context, row: int, one: ast.Leave, state: Store
+        self, context: Context, row: int, one: ir.Leave, state: Store
     ) -> Store | None:
         """Begin the next cycle (EXIT CYCLE); without one the program goes on."""
         _cancel(self.at(context, row, state))
@@ -226,7 +227,7 @@ class Pdl2Machine(Machine):
 
 
 def prepare(
-    machine: Machine, here: Execution, statement: ast.SourceStatement, text: str
+    machine: Machine, here: Execution, statement: ir.SourceStatement, text: str
 ) -> None:
     """Allow for what may happen at a statement, and for the functions that it calls.
 
@@ -244,30 +245,30 @@ def prepare(
         machine.paused |= here.store.last
     if _lets_others_run(statement) or text:
         let_others_run(here)
-    if ast.divides(statement):
-        values = statement.values if isinstance(statement, ast.Branch) else ()
-        statement = ast.Branch("case", values)
+    if ir.divides(statement):
+        values = statement.values if isinstance(statement, ir.Branch) else ()
+        statement = ir.Branch("case", values)
     calls_in_expressions(machine, here, statement)
 
 
-def _lets_others_run(one: ast.SourceStatement) -> bool:
+def _lets_others_run(one: ir.SourceStatement) -> bool:
     """Tell whether a statement takes time, or a program may wait with it."""
     words = ("condition", "while", "until", "cycle")
-    if isinstance(one, ast.Branch | ast.BlockWord):
+    if isinstance(one, ir.Branch | ir.BlockWord):
         return one.word in words
-    return isinstance(one, ast.Still | ast.Transfer | ast.JumpTo)
+    return isinstance(one, ast.Still | ast.Transfer | ir.JumpTo)
 
 
-def step(machine: Machine, here: Execution, statement: ast.SourceStatement) -> bool:
+def step(machine: Machine, here: Execution, statement: ir.SourceStatement) -> bool:
     """Run one statement; tell whether the next row follows."""
     match statement:
         case ast.Move():
             move(machine, here, statement)
-        case ast.Assignment():
+        case ir.Assignment():
             lines = here.place.program.lines
             taught = here.world.taught_lines[lines.source.name]
             assign(here, statement, int(lines.line[here.row]) in taught)
-        case ast.Instruction():
+        case ir.Instruction():
             return not call_statement(machine, here, statement)
         case ast.Transfer("WRITE", operands):
             for operand in operands:
@@ -275,7 +276,7 @@ def step(machine: Machine, here: Execution, statement: ast.SourceStatement) -> b
         case ast.Transfer(word, operands):
             for operand in list_changed_arguments(operands):
                 invalidate(here, operand, f"{word} changes it")
-        case ast.NotUnderstood():
+        case ir.NotUnderstood():
             _unknown(machine, here, statement)
         case ast.CancelMove(arms):
             if not arms or any(here.is_ours(arm) is not False for arm in arms):
@@ -283,7 +284,7 @@ def step(machine: Machine, here: Execution, statement: ast.SourceStatement) -> b
     return True
 
 
-def _waits(statement: ast.SourceStatement) -> bool:
+def _waits(statement: ir.SourceStatement) -> bool:
     """Tell whether a statement takes time that only the run tells."""
     if isinstance(statement, ast.Transfer):
         return statement.word == "READ"
@@ -303,12 +304,12 @@ def _cancel(here: Execution) -> None:
         here.store.last |= {ELSEWHERE}
 
 
-def _fits(at: Execution, case: ast.Branch, value: Value) -> bool | None:
+def _fits(at: Execution, case: ir.Branch, value: Value) -> bool | None:
     """Tell whether a CASE means a value, None where it is not known."""
     found: bool | None = not case.values and None
     for choice in case.values:
         low, high = choice, choice
-        if isinstance(choice, ast.Interval):
+        if isinstance(choice, ir.Interval):
             low, high = choice.low, choice.high
         a, b = at.value(low), at.value(high)
         known = type(a) is type(value) and type(b) is type(value)
@@ -319,7 +320,7 @@ def _fits(at: Execution, case: ast.Branch, value: Value) -> bool | None:
     return found
 
 
-def _unknown(machine: Machine, here: Execution, statement: ast.NotUnderstood) -> None:
+def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> None:
     """Forget all that unknown text could influence."""
     why = _why_unknown(here)
     invalidate_names(here, words_in(statement.text), why)
@@ -673,7 +674,7 @@ def _cancelling_handler(
     machine: Machine, place: Place, row: int, reach: CallGraph
 ) -> None:
     """Allow for a handler that ends moves on their way."""
-    cycles = any(isinstance(one, ast.Leave) for one in reach.cancels)
+    cycles = any(isinstance(one, ir.Leave) for one in reach.cancels)
     if not cycles and not _ends_ours(machine.world, place, row, reach):
         return
     machine.interrupted = True

@@ -12,6 +12,7 @@ import numpy as np
 from postproc.arrays import Bools, Ints, release_memory
 from postproc.diagnostics import Code
 from postproc.files import base_name
+from postproc.language import ir
 from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
@@ -203,7 +204,7 @@ class Place:
         """The blocks of the body."""
         return self.body.flow
 
-    def statement(self, row: int) -> ast.SourceStatement:
+    def statement(self, row: int) -> ir.SourceStatement:
         """Return what a row says; of what is not understood, which block it opens."""
         return recover_block(self.program.statement(row))
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language import ir
 from postproc.language.analysis.call_context import Context
 from postproc.language.analysis.interpreter import Interpreter, calls_around
-from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import (
     MANY,
     MOST_ORIGINS,
@@ -178,7 +178,7 @@ class Machine(Interpreter[Store]):
     paused: set[int] = field(default_factory=set)
     lost: set[int] = field(default_factory=set)
     given: GivenValues = field(default_factory=GivenValues)
-    _called: dict[int, tuple[ast.FunctionCall, ...]] = field(default_factory=dict)
+    _called: dict[int, tuple[ir.FunctionCall, ...]] = field(default_factory=dict)
     next_id: int = 0
 
     def visit_id(self, key: Key, count: int = 1) -> int:
@@ -206,8 +206,8 @@ class Machine(Interpreter[Store]):
         return last | {ELSEWHERE} if self.interrupted else last
 
     def find_calls(
-        self, place: Place, statement: ast.SourceStatement
-    ) -> tuple[ast.FunctionCall, ...]:
+        self, place: Place, statement: ir.SourceStatement
+    ) -> tuple[ir.FunctionCall, ...]:
         """Return the calls in a statement's expressions that may have effects.
 
         A function without arguments is called by its name alone.
@@ -217,7 +217,7 @@ class Machine(Interpreter[Store]):
             found = [c for c in invocations(statement) if c.name not in PURE]
             names = {r.name for r in references(statement) if not r.steps}
             alone = [n for n in names if self.world.is_function(place, n)]
-            found += [ast.FunctionCall(name, ()) for name in sorted(alone)]
+            found += [ir.FunctionCall(name, ()) for name in sorted(alone)]
             known = self._called[id(statement)] = tuple(found)
         return known
 
@@ -264,14 +264,14 @@ def invalidate_names(here: Execution, names: frozenset[str], why: str) -> None:
         if name.startswith("$"):
             here.store.set(**{name[1:]: Nothing(why)})
         elif name:
-            invalidate(here, ast.DataObject(name), why)
+            invalidate(here, ir.DataObject(name), why)
 
 
 def escape_names(here: Execution, names: frozenset[str], why: str) -> None:
     """Keep the numbers of variables that something not followed may depend on."""
     for name in sorted(names):
         if not name.startswith("$"):
-            for key in here.locate(ast.DataObject(name)).keys:
+            for key in here.locate(ir.DataObject(name)).keys:
                 for part in (key, *parts_under(here, key)):
                     here.world.pin(here.store.read(part), why)
 
@@ -283,7 +283,7 @@ def let_others_run(here: Execution) -> None:
     here.store.exposed = frozenset()
 
 
-def invalidate(here: Execution, reference: ast.DataObject, why: str) -> None:
+def invalidate(here: Execution, reference: ir.DataObject, why: str) -> None:
     """Forget what a variable holds, unless it is a constant."""
     declared = here.world.find_declaration(here.place, reference.name)
     if declared is not None and declared.constant:

@@ -9,6 +9,7 @@ from itertools import islice
 import numpy as np
 
 from postproc.arrays import Bools, Ints
+from postproc.language import ir
 from postproc.language.logical_lines import Lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import call_statement, calls_in_expressions
@@ -81,7 +82,7 @@ class PlainMoves:
 
     first: int
     variant: Ints
-    statements: tuple[ast.SourceStatement, ...]
+    statements: tuple[ir.SourceStatement, ...]
     forms: tuple[MoveForm | None, ...]
     calls: tuple[bool, ...]
     named: tuple[bool, ...]
@@ -133,7 +134,7 @@ def find_plain_moves(
         tuple(_form(one) if isinstance(one, ast.Move) else None for one in said),
         tuple(any(_calls(world, place, one)) for one in said),
         tuple(
-            isinstance(one, ast.Move) and isinstance(one.where[0], ast.DataObject)
+            isinstance(one, ast.Move) and isinstance(one.where[0], ir.DataObject)
             for one in said
         ),
         variants.points,
@@ -145,8 +146,8 @@ def find_plain_moves(
     )
 
 
-def _may_be_plain(said: ast.SourceStatement) -> bool:
-    if isinstance(said, ast.Instruction):
+def _may_be_plain(said: ir.SourceStatement) -> bool:
+    if isinstance(said, ir.Instruction):
         return not isinstance(said, ast.ProgramCall)
     return isinstance(said, ast.Move) and _is_plain(said)
 
@@ -160,17 +161,17 @@ def _is_plain(move: ast.Move) -> bool:
     for one in move.settings:
         reference, value = one.target, one.value
         plain = reference.name.startswith("$") and not reference.steps
-        if not (plain and isinstance(value, ast.Num)) or reference.name in _NOT_WITH:
+        if not (plain and isinstance(value, ir.Num)) or reference.name in _NOT_WITH:
             return False
     match move.where[0]:
-        case ast.FunctionCall("pos") as call:
+        case ir.FunctionCall("pos") as call:
             *items, last = call.values
             return _six_numbers(
-                items if isinstance(last, ast.StringLiteral) else call.values
+                items if isinstance(last, ir.StringLiteral) else call.values
             )
-        case ast.Composite(items):
+        case ir.Composite(items):
             return _six_numbers(items)
-        case ast.DataObject(name, () | (ast.ElementStep(_),)):
+        case ir.DataObject(name, () | (ir.ElementStep(_),)):
             return not name.startswith("$")
     return False
 
@@ -178,32 +179,32 @@ def _is_plain(move: ast.Move) -> bool:
 def _form(move: ast.Move) -> MoveForm:
     """Return what moves of a variant have in common, but for their trajectory."""
     slots: tuple[int, ...] = ()
-    items: tuple[ast.Operand | None, ...] = ()
+    items: tuple[ir.Operand | None, ...] = ()
     where = move.where[0]
-    if isinstance(where, ast.Composite):
+    if isinstance(where, ir.Composite):
         items = where.items
-    elif isinstance(where, ast.FunctionCall):
+    elif isinstance(where, ir.FunctionCall):
         items = where.values
-    if not isinstance(where, ast.DataObject):
-        slots = tuple(i.slot for i in items[:6] if isinstance(i, ast.Num))
+    if not isinstance(where, ir.DataObject):
+        slots = tuple(i.slot for i in items[:6] if isinstance(i, ir.Num))
     config = items[6] if len(items) > 6 else None
     return MoveForm(
         Motion.JOINT,
         fly=move.fly,
         slots=slots,
-        joints=isinstance(where, ast.Composite),
-        config=config.text if isinstance(config, ast.StringLiteral) else None,
+        joints=isinstance(where, ir.Composite),
+        config=config.text if isinstance(config, ir.StringLiteral) else None,
         overrides=tuple(
             (one.target.name.lstrip("$"), one.value.slot)
             for one in move.settings
-            if isinstance(one.value, ast.Num)
+            if isinstance(one.value, ir.Num)
         ),
     )
 
 
 def _six_numbers(items: object) -> bool:
     assert isinstance(items, tuple | list)
-    return len(items) == 6 and all(isinstance(i, ast.Num) for i in items)
+    return len(items) == 6 and all(isinstance(i, ir.Num) for i in items)
 
 
 @dataclass
@@ -216,7 +217,7 @@ class _Variants:
     shapes: Ints  # of the body, ascending
 
     def __post_init__(self) -> None:
-        self.statements: list[ast.SourceStatement] = []
+        self.statements: list[ir.SourceStatement] = []
         self.points: dict[int, PointVariable] = {}
         self._known: dict[tuple[int, tuple[str, ...]], int] = {}
         self._parameters = {p.name for p in self.place.body.parameters}
@@ -232,7 +233,7 @@ class _Variants:
         if len(shapes) == 1:
             return np.array([self._add_one(int(shapes[0]), where)])
         names = said.shapes.names_at(shapes)
-        if not isinstance(where, ast.DataObject):
+        if not isinstance(where, ir.DataObject):
             return self._variants(shapes, names)
         index, at = _number_slots(where.steps), name_index(where.name)
         variants = np.full(len(shapes), -1)
@@ -247,10 +248,10 @@ class _Variants:
         variants[quiet] = self._variants(shapes[quiet], names[quiet])
         return variants
 
-    def _add_one(self, shape: int, where: ast.Operand | None) -> int:
+    def _add_one(self, shape: int, where: ir.Operand | None) -> int:
         """Return the variant of the one shape of a form: not worth an array pass."""
         names = self.place.program.lines.shapes.names_of(shape)
-        if isinstance(where, ast.DataObject):
+        if isinstance(where, ir.DataObject):
             index, at = _number_slots(where.steps), name_index(where.name)
             name = names[at].lower() if at >= 0 else where.name
             if index is None or not self._is_point(name, array=bool(where.steps)):
@@ -325,7 +326,7 @@ class _Variants:
             return False
         return _is_point(self.world.type_of(self.place, name), array)
 
-    def _does_nothing(self, call: ast.FunctionCall) -> bool:
+    def _does_nothing(self, call: ir.FunctionCall) -> bool:
         """Tell whether a call neither moves the arm nor sets what moves depend on."""
         name = call.name
         if self.world.find_routine(self.place.program, name) is not None:
@@ -335,14 +336,12 @@ class _Variants:
             return False
         return all(self._keeps(a, bare) for a in call.values)
 
-    def _keeps(self, argument: ast.Operand | None, bare: bool) -> bool:
+    def _keeps(self, argument: ir.Operand | None, bare: bool) -> bool:
         """Tell whether nothing that moves depend on is known by an argument's name."""
         match argument:
-            case (
-                None | ast.Num() | ast.StringLiteral() | ast.Operation(_, (ast.Num(),))
-            ):
+            case None | ir.Num() | ir.StringLiteral() | ir.Operation(_, (ir.Num(),)):
                 return True
-            case ast.DataObject(name, ()):
+            case ir.DataObject(name, ()):
                 type_ = self.world.type_of(self.place, name)
                 safe = type_ is None or (
                     type_.name not in _POINTS and not type_.array and not type_.path
@@ -359,27 +358,24 @@ def _is_point(type_: ast.Type | None, array: bool) -> bool:
     return type_.array == array
 
 
-def _number_slots(steps: tuple[str | ast.ElementStep, ...]) -> tuple[int, ...] | None:
+def _number_slots(steps: tuple[str | ir.ElementStep, ...]) -> tuple[int, ...] | None:
     """Return the slots of an index that is written in numbers, None for any other."""
     index = [
-        i
-        for step in steps
-        if isinstance(step, ast.ElementStep)
-        for i in step.subscripts
+        i for step in steps if isinstance(step, ir.ElementStep) for i in step.subscripts
     ]
-    slots = tuple(i.slot for i in index if isinstance(i, ast.Num))
+    slots = tuple(i.slot for i in index if isinstance(i, ir.Num))
     return slots if len(slots) == len(index) else None
 
 
 def _calls(
-    world: World, place: Place, said: ast.SourceStatement
-) -> list[ast.FunctionCall]:
+    world: World, place: Place, said: ir.SourceStatement
+) -> list[ir.FunctionCall]:
     """List the calls in a line, those by a function's name alone too."""
     found = [c for c in invocations(said) if c.name not in PURE]
     names = {r.name for r in references(said) if not r.steps}
-    found += [ast.FunctionCall(n, ()) for n in names if world.is_function(place, n)]
-    if isinstance(said, ast.Instruction):
-        found.append(ast.FunctionCall(said.name, said.arguments))
+    found += [ir.FunctionCall(n, ()) for n in names if world.is_function(place, n)]
+    if isinstance(said, ir.Instruction):
+        found.append(ir.FunctionCall(said.name, said.arguments))
     return found
 
 
@@ -463,7 +459,7 @@ class MoveBlocks:
             statement, form = quiet.statements[number], quiet.forms[number]
             if quiet.calls[number]:
                 calls_in_expressions(self.machine, here, statement)
-            if isinstance(statement, ast.Instruction):
+            if isinstance(statement, ir.Instruction):
                 call_statement(self.machine, here, statement)
             elif isinstance(statement, ast.Move) and form is not None:
                 motion, reason = motion_of(here, statement, here.store.settings)

@@ -11,10 +11,11 @@ from typing import Any
 
 import lark
 
+from postproc.language import ir
 from postproc.language.grammars import line_parser
+from postproc.language.ir import Num
 from postproc.language.lexer import NAME_MARK, UNREADABLE
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.syntax import Num
 from postproc.language.templates import open_name
 
 # Parts of a line on their way from tree to statement, told apart by type.
@@ -89,8 +90,8 @@ def _of(children: Children, kind: type) -> tuple[Any, ...]:
     return tuple(c for c in children if isinstance(c, kind) and type(c) is not Mark)
 
 
-def _statement(children: Children) -> ast.SourceStatement | None:
-    found = _of(children, ast.SourceStatement)
+def _statement(children: Children) -> ir.SourceStatement | None:
+    found = _of(children, ir.SourceStatement)
     return found[0] if found else None
 
 
@@ -109,7 +110,7 @@ def _read_attributes(children: Children, first: int) -> tuple[str, tuple[str, ..
 
 def _program_attribute(c: Children) -> int:
     """Return the slot of ``PROG_ARM=n``, -1 for any other attribute."""
-    arm = len(c) == 2 and _name(c[0]) == "prog_arm" and isinstance(c[1], ast.Num)
+    arm = len(c) == 2 and _name(c[0]) == "prog_arm" and isinstance(c[1], ir.Num)
     return c[1].slot if arm else -1
 
 
@@ -128,7 +129,7 @@ def _routine(c: Children) -> ast.Routine:
 
 
 def _variables(c: Children) -> ast.Declare:
-    initial = c[2] if len(c) > 2 and isinstance(c[2], ast.Operand) else None
+    initial = c[2] if len(c) > 2 and isinstance(c[2], ir.Operand) else None
     exported, words = _read_attributes(c, 2)
     return ast.Declare(tuple(c[0]), c[1], initial, exported, words)
 
@@ -158,7 +159,7 @@ def _move(fly: bool, c: Children) -> ast.Move:
         where=where,
         via=via,
         frame=frame,
-        settings=tuple(ast.Assignment(s[0], s[1]) for s in _of(c, SettingPart)),
+        settings=tuple(ir.Assignment(s[0], s[1]) for s in _of(c, SettingPart)),
         conditions=tuple(b[0] for b in _of(c, BesidePart)),
         til=(_of(c, TilPart) or (None,))[0],
         sync=tuple(replace(s[0], fly=fly) for s in _of(c, SyncPart)),
@@ -189,70 +190,70 @@ _CONDITION_WORDS = frozenset(
 """Words of the language that brackets may follow without being called."""
 
 
-def _terms(c: Children) -> tuple[ast.DataObject | ast.FunctionCall, ...]:
+def _terms(c: Children) -> tuple[ir.DataObject | ir.FunctionCall, ...]:
     """Return the names in text that is not understood; those with arguments call."""
-    found: list[ast.DataObject | ast.FunctionCall] = []
+    found: list[ir.DataObject | ir.FunctionCall] = []
     for part, after in zip_longest(c, c[1:]):
-        if isinstance(part, ast.DataObject):
+        if isinstance(part, ir.DataObject):
             calls = type(after) is RoundPart and part.name not in _CONDITION_WORDS
-            found.append(ast.FunctionCall(part.name, ()) if calls else part)
+            found.append(ir.FunctionCall(part.name, ()) if calls else part)
         elif isinstance(part, GroupPart):
             found += _terms(part)
     return tuple(found)
 
 
-def _soup_word(c: Children) -> ast.DataObject | None:
+def _soup_word(c: Children) -> ir.DataObject | None:
     name = type(c[0]) is Mark and c[0].kind == "NAME" if c else False
-    return ast.DataObject(_name(c[0])) if name else None
+    return ir.DataObject(_name(c[0])) if name else None
 
 
-def _reference(c: Children) -> ast.DataObject:
+def _reference(c: Children) -> ir.DataObject:
     steps = tuple(_name(s) if isinstance(s, str) else s for s in c[1:])
-    return ast.DataObject(_name(c[0]), steps)
+    return ir.DataObject(_name(c[0]), steps)
 
 
-def _one_or_pair(c: Children) -> ast.Operand:
-    return c[0] if len(c) == 1 else ast.Interval(c[0], c[1])
+def _one_or_pair(c: Children) -> ir.Operand:
+    return c[0] if len(c) == 1 else ir.Interval(c[0], c[1])
 
 
-def _for(c: Children) -> ast.ForLoop:
+def _for(c: Children) -> ir.ForLoop:
     step = c[4] if len(c) > 4 else None
-    return ast.ForLoop(_name(c[0]), c[1], c[3], step, c[2].kind == "DOWNTO")
+    return ir.ForLoop(_name(c[0]), c[1], c[3], step, c[2].kind == "DOWNTO")
 
 
 def _beside(c: Children) -> BesidePart:
-    inside = c[0] if len(c) == 1 else ast.FunctionCall(_name(c[0]), c[1])
+    inside = c[0] if len(c) == 1 else ir.FunctionCall(_name(c[0]), c[1])
     return BesidePart((inside,))
 
 
-def _case(c: Children) -> ast.Branch:
-    choices = tuple(x for x in c if not isinstance(x, ast.SourceStatement))
-    return ast.Branch("case", choices, _statement(c))
+def _case(c: Children) -> ir.Branch:
+    choices = tuple(x for x in c if not isinstance(x, ir.SourceStatement))
+    return ir.Branch("case", choices, _statement(c))
 
 
-def _call(make: type[ast.Instruction]) -> Rule:
+def _call(make: type[ir.Instruction]) -> Rule:
     return lambda c: make(_name(c[0]), c[1] if len(c) > 1 else ())
 
 
 def _branch(word: str) -> Rule:
-    return lambda c: ast.Branch(word, tuple(c))
+    return lambda c: ir.Branch(word, tuple(c))
 
 
 def _word(word: str) -> Rule:
-    return lambda c: ast.BlockWord(word, _statement(c))
+    return lambda c: ir.BlockWord(word, _statement(c))
 
 
-def _assign(c: Children) -> ast.Assignment:
+def _assign(c: Children) -> ir.Assignment:
     """Return what ``:=`` does, and ``+=`` and ``-=``, which compute with the target."""
     target, operator, value = c[0], str(c[1]), c[2]
     if operator != ":=":
-        value = ast.Operation(operator[0], (target, value))
-    return ast.Assignment(target, value)
+        value = ir.Operation(operator[0], (target, value))
+    return ir.Assignment(target, value)
 
 
 RULES: dict[str, Rule] = {
     "line": _statement,
-    "labelled": lambda c: ast.LabelMark(_name(c[0]).rstrip(": "), _statement(c)),
+    "labelled": lambda c: ir.LabelMark(_name(c[0]).rstrip(": "), _statement(c)),
     "program": lambda c: ast.ProgramHead(_name(c[0]), max([-1, *_of(c, int)])),
     "program_attribute": _program_attribute,
     "import": lambda c: ast.Import(_unquote(c[0])),
@@ -289,10 +290,10 @@ RULES: dict[str, Rule] = {
     "repeat": _branch("repeat"),
     "until": _branch("until"),
     "cycle": _word("cycle"),
-    "exit_cycle": lambda c: ast.Leave("exitcycle"),
-    "goto": lambda c: ast.JumpTo(_name(c[0])),
-    "return": lambda c: ast.Leave("return", *c),
-    "condition": lambda c: ast.Branch("condition"),
+    "exit_cycle": lambda c: ir.Leave("exitcycle"),
+    "goto": lambda c: ir.JumpTo(_name(c[0])),
+    "return": lambda c: ir.Leave("return", *c),
+    "condition": lambda c: ir.Branch("condition"),
     "when": lambda c: ast.When(_statement(c[1:]), c[0].terms),
     "endcondition": _word("endcondition"),
     "motion": _motion,
@@ -307,7 +308,7 @@ RULES: dict[str, Rule] = {
     "item": SettingPart,
     "item_condition": _beside,
     "assign": _assign,
-    "call": _call(ast.Instruction),
+    "call": _call(ir.Instruction),
     "call_program": _call(ast.ProgramCall),
     "io": lambda c: ast.Transfer(str(c[0]).upper(), tuple(c[1:])),
     "format": lambda c: c[0],
@@ -321,21 +322,21 @@ RULES: dict[str, Rule] = {
     "soup_word": _soup_word,
     "group": GroupPart,
     "round_group": RoundPart,
-    "binary": lambda c: ast.Operation(str(c[1]).upper(), (c[0], c[2])),
-    "unary": lambda c: ast.Operation(str(c[0]).upper(), (c[1],)),
+    "binary": lambda c: ir.Operation(str(c[1]).upper(), (c[0], c[2])),
+    "unary": lambda c: ir.Operation(str(c[0]).upper(), (c[1],)),
     "parenthesised": lambda c: (
-        ast.Operation("()", (c[0],)) if isinstance(c[0], ast.DataObject) else c[0]
+        ir.Operation("()", (c[0],)) if isinstance(c[0], ir.DataObject) else c[0]
     ),
     "number": lambda c: c[0],
-    "string": lambda c: ast.StringLiteral(_unquote(c[0])),
-    "aggregate": lambda c: ast.Composite(tuple(c)),
-    "invoke": lambda c: ast.FunctionCall(_name(c[0]), c[1]),
+    "string": lambda c: ir.StringLiteral(_unquote(c[0])),
+    "aggregate": lambda c: ir.Composite(tuple(c)),
+    "invoke": lambda c: ir.FunctionCall(_name(c[0]), c[1]),
     "arguments": tuple,
-    "argument": lambda c: ast.Argument(c[0] if c else None),
+    "argument": lambda c: ir.Argument(c[0] if c else None),
     "reference": _reference,
     "step": lambda c: c[0],
     "field": lambda c: _name(c[0]),
-    "index": lambda c: ast.ElementStep(tuple(c)),
+    "index": lambda c: ir.ElementStep(tuple(c)),
     "subscript": _one_or_pair,
 }
 
@@ -470,14 +471,14 @@ class _TooDeepError(Exception):
 
 
 @lru_cache(maxsize=8192)
-def parse_form(form: str) -> ast.SourceStatement:
+def parse_form(form: str) -> ir.SourceStatement:
     """Parse the form of a logical line of PDL2, `Unknown` where the grammar cannot."""
     found = _parse("pdl2", form, RULES)
     if found is _FAILED:
         numbered = count()
         text = re.sub(NAME_MARK, lambda _: open_name(next(numbered)), form)
-        return ast.NotUnderstood(text if form[:2] != UNREADABLE else form[2:])
-    return found if isinstance(found, ast.SourceStatement) else ast.SourceStatement()
+        return ir.NotUnderstood(text if form[:2] != UNREADABLE else form[2:])
+    return found if isinstance(found, ir.SourceStatement) else ir.SourceStatement()
 
 
 @lru_cache(maxsize=8192)
@@ -506,7 +507,7 @@ def _build(tree: lark.Tree[lark.Token], rules: Mapping[str, Rule]) -> object:
             raise _TooDeepError
         if isinstance(node, lark.Token):
             if node.type == "NUMBER":
-                return ast.Num(next(slots))
+                return ir.Num(next(slots))
             text = open_name(next(names)) if node == NAME_MARK else str(node)
             return Mark(text, node.type)
         return rules[str(node.data)](

@@ -13,6 +13,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Indices, Ints
 from postproc.diagnostics import Code
+from postproc.language import ir
 from postproc.language.analysis.control_flow import ControlFlow, FlowReader
 from postproc.language.logical_lines import Lines, read_lines, reread_lines
 from postproc.language.pdl2 import syntax as ast
@@ -25,14 +26,14 @@ from postproc.language.visits import Diagnostic
 
 # Block structure of one body: which line closes which, and where jumps lead.
 
-_UNKNOWN_OPENERS: tuple[tuple[str, ast.SourceStatement], ...] = (
-    (r"IF\b(?!.*\bENDIF\b)", ast.Branch("if")),
-    (r"SELECT\b(?!.*\bENDSELECT\b)", ast.Branch("test")),
-    (r"FOR\b(?!.*\bENDFOR\b)", ast.ForLoop("", None, None)),
-    (r"WHILE\b(?!.*\bENDWHILE\b)", ast.Branch("while")),
-    (r"UNTIL\b", ast.Branch("until")),
-    (r"CASE\b", ast.Branch("case")),
-    (r"CONDITION\b(?!.*\bENDCONDITION\b)", ast.Branch("condition")),
+_UNKNOWN_OPENERS: tuple[tuple[str, ir.SourceStatement], ...] = (
+    (r"IF\b(?!.*\bENDIF\b)", ir.Branch("if")),
+    (r"SELECT\b(?!.*\bENDSELECT\b)", ir.Branch("test")),
+    (r"FOR\b(?!.*\bENDFOR\b)", ir.ForLoop("", None, None)),
+    (r"WHILE\b(?!.*\bENDWHILE\b)", ir.Branch("while")),
+    (r"UNTIL\b", ir.Branch("until")),
+    (r"CASE\b", ir.Branch("case")),
+    (r"CONDITION\b(?!.*\bENDCONDITION\b)", ir.Branch("condition")),
 )
 _STRING = re.compile(r"'[^']*'")
 _JUMP = re.compile(r"\b(?:GOTO|RETURN|EXIT)\b", re.I)
@@ -42,9 +43,9 @@ _LEADS = (
 )
 
 
-def recover_block(statement: ast.SourceStatement) -> ast.SourceStatement:
+def recover_block(statement: ir.SourceStatement) -> ir.SourceStatement:
     """Return the block that an unknown line opens, or the statement itself."""
-    if isinstance(statement, ast.NotUnderstood):
+    if isinstance(statement, ir.NotUnderstood):
         for pattern, opener in _UNKNOWN_OPENERS:
             if re.match(pattern, statement.text, re.I):
                 return opener
@@ -53,7 +54,7 @@ def recover_block(statement: ast.SourceStatement) -> ast.SourceStatement:
 
 def read_flow(
     lines: Lines,
-    statements: ParsedShapes[ast.SourceStatement],
+    statements: ParsedShapes[ir.SourceStatement],
     rows: Ints,
     first: int,
     last: int,
@@ -71,7 +72,7 @@ def read_flow(
     for row in rows.tolist():
         written = statements[int(lines.shape[row])]
         odd = ast.action(written)
-        text = odd.text if isinstance(odd, ast.NotUnderstood) else ""
+        text = odd.text if isinstance(odd, ir.NotUnderstood) else ""
         if _JUMP.search(_STRING.sub("", text)):  # it may lead to another place
             reader.problems.append((row, _LEADS))
         reader.take(row, recover_block(written))
@@ -104,7 +105,7 @@ class Variable:
     name: str
     row: int
     type: ast.Type | None = None
-    initial: ast.Operand | None = None
+    initial: ir.Operand | None = None
     exported: str = ""
     constant: bool = False
     taught: bool = False
@@ -282,7 +283,7 @@ class Program:
 
     name: str
     lines: Lines
-    statements: ParsedShapes[ast.SourceStatement]
+    statements: ParsedShapes[ir.SourceStatement]
     main: Body | None
     routines: Mapping[str, Body]
     outside: Mapping[str, str]
@@ -292,7 +293,7 @@ class Program:
     diagnostics: tuple[Diagnostic, ...]
     nodes: Mapping[str, frozenset[str]]
 
-    def statement(self, row: int) -> ast.SourceStatement:
+    def statement(self, row: int) -> ir.SourceStatement:
         """Return what a logical line says."""
         return self.statements[int(self.lines.shape[row])]
 
@@ -307,7 +308,7 @@ class Program:
 # Programs from lines: declarations, routines, blocks, and where each jump leads.
 
 _PLAIN = (
-    ast.Move, ast.Assignment, ast.Instruction, ast.Transfer, ast.Still, ast.CancelMove
+    ast.Move, ir.Assignment, ir.Instruction, ast.Transfer, ast.Still, ast.CancelMove
 )  # fmt: skip
 
 
@@ -326,7 +327,7 @@ class _Reader:
     """Collects the parts of a program, one structural line after the other."""
 
     lines: Lines
-    statements: ParsedShapes[ast.SourceStatement]
+    statements: ParsedShapes[ir.SourceStatement]
     taught: frozenset[int]
     structural: Ints  # rows of other statements than plain ones, ascending
     name: str = ""
@@ -345,7 +346,7 @@ class _Reader:
         line = int(self.lines.line[row])
         self.diagnostics.append(Diagnostic(name, line, code, message))
 
-    def take(self, row: int, statement: ast.SourceStatement) -> None:
+    def take(self, row: int, statement: ir.SourceStatement) -> None:
         scope = self.scopes[-1]
         match statement:
             case ast.DeclarationSection(then) if then is not None:
@@ -473,7 +474,7 @@ def parse(source: Source) -> Program:
     reader = _Reader(lines, statements, taught, rows)
     for row in rows.tolist():
         statement = statements.once(int(lines.shape[row]))
-        if isinstance(statement, ast.NotUnderstood):
+        if isinstance(statement, ir.NotUnderstood):
             line = int(reader.lines.line[row])
             text = reader.lines.source.line_text(line).strip()
             reader.report(
@@ -518,7 +519,7 @@ def parse_again(source: Source, before: Program) -> Program:
     return replace(before, lines=found.lines, diagnostics=told)
 
 
-def _structural(statements: ParsedShapes[ast.SourceStatement], lines: Lines) -> Ints:
+def _structural(statements: ParsedShapes[ir.SourceStatement], lines: Lines) -> Ints:
     """List the rows of other statements than plain ones, ascending."""
     structural = statements.which(lambda said: not isinstance(said, _PLAIN))
     return np.flatnonzero(structural[lines.shape])

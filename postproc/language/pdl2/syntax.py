@@ -5,56 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from postproc.language.ir import (
-    Argument,
     Assignment,
     BlockWord,
     Branch,
-    Composite,
     DataObject,
     ElementStep,
-    ForLoop,
     FunctionCall,
     Instruction,
-    Interval,
-    JumpTo,
     LabelMark,
-    Leave,
-    Node,
-    NotUnderstood,
-    Num,
     Operand,
-    Operation,
     SourceStatement,
-    StringLiteral,
     divides,
-    walk,
 )
-
-__all__ = [
-    "Argument",
-    "Assignment",
-    "BlockWord",
-    "Branch",
-    "Composite",
-    "DataObject",
-    "ElementStep",
-    "ForLoop",
-    "FunctionCall",
-    "Instruction",
-    "Interval",
-    "JumpTo",
-    "LabelMark",
-    "Leave",
-    "Node",
-    "NotUnderstood",
-    "Num",
-    "Operand",
-    "Operation",
-    "SourceStatement",
-    "StringLiteral",
-    "divides",
-    "walk",
-]
 
 # Statements that declare: programs, routines, variables, types.
 

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 import pytest
 
 from postproc.compensation.program import read_program
+from postproc.language import ir
 from postproc.language.pdl2 import parser
-from postproc.language.pdl2 import syntax as ast
 from postproc.language.visits import ELSEWHERE
 from tests.bench.growth import KINDS, Files, chain, routines, terms, tree
 
@@ -76,7 +76,7 @@ def test_a_line_of_more_terms_than_are_followed_is_listed(n, job_cell):
 def test_a_line_that_no_program_has_is_not_even_parsed(monkeypatch):
     monkeypatch.setattr(parser, "line_parser", lambda name, start: pytest.fail())
     text = "n := " + "n + " * (parser.LONGEST // 4) + "n"
-    assert isinstance(parser.parse_form(text), ast.NotUnderstood)
+    assert isinstance(parser.parse_form(text), ir.NotUnderstood)
 
 
 def test_a_program_beyond_the_limit_is_listed_once_and_left(job_cell, monkeypatch):

@@ -2,9 +2,9 @@
 
 import pytest
 
+from postproc.language.analysis.interpreter import Interpreter
 from postproc.language.pdl2.abstract_state import MOST_ORIGINS
 from postproc.language.pdl2.interpreter import Resolved, resolve
-from postproc.language.analysis.interpreter import Interpreter
 from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
 from postproc.language.visits import ELSEWHERE, START
