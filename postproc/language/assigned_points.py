@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from postproc.language import ir
+from postproc.language.analysis.shared_map import SharedMap
 
-MOST_POINTS = 5_000  # held at once; those that were given first are forgotten
 Place = tuple[int, str, str, str]
 """File, module and routine that declare data, "" for none, and their name."""
 Key = tuple[Place, tuple[int, ...]]
@@ -91,21 +91,26 @@ class Points:
         held: What they are given, by key.
         used: What of it has been asked for, by everybody who wants to know that.
         places: Places of all points in it, and maybe of others.
+        routines: File, module and routine of these.
     """
 
-    held: Mapping[Key, AssignedPoint] = field(default_factory=dict, hash=False)
+    held: SharedMap[Key, AssignedPoint] = field(default_factory=SharedMap, hash=False)
     used: tuple[set[Key], ...] = field(default=(), compare=False)
-    places: frozenset[Place] = field(default=frozenset(), compare=False)
+    places: SharedMap[Place, bool] = field(default_factory=SharedMap, compare=False)
+    routines: frozenset[tuple[int, str, str]] = field(
+        default=frozenset(), compare=False
+    )
 
     def watch(self) -> Points:
         """Return the same, which notes what is asked for from now on."""
-        return replace(self, used=(*self.used, set())) if self.held else self
+        return replace(self, used=(*self.used, set())) if self.routines else self
 
     @property
     def given(self) -> frozenset[AssignedPoint]:
         """What has been asked for since it is watched."""
         used = self.used[-1] if self.used else ()
-        return frozenset(self.held[key] for key in used if key in self.held)
+        found = (self.held.get(key) for key in used)
+        return frozenset(point for point in found if point is not None)
 
     def find(self, key: Key) -> AssignedPoint | None:
         """Return what a point holds, None where that is not known."""
@@ -113,41 +118,52 @@ class Points:
             used.add(key)
         return self.held.get(key)
 
+    def __contains__(self, place: Place) -> bool:
+        """Tell whether anything may be known of a point or an array."""
+        return self.places.get(place) is not None
+
     def give(self, point: AssignedPoint) -> Points:
         """Return it with what an assignment gives to a point."""
-        held = {**self.held}
-        held.pop(point.key, None)
-        if len(held) >= MOST_POINTS:
-            del held[next(iter(held))]
+        held, places, routines = self.held.copy(), self.places, self.routines
         held[point.key] = point
-        return Points(held, self.used, self.places | {point.place})
+        if point.place not in self:
+            places = places.copy()
+            places[point.place] = True
+            routines |= {point.place[:3]}
+        return Points(held, self.used, places, routines)
 
     def forget(self, place: Place) -> Points:
         """Return it without any element of an array, or without a point."""
+        if place not in self:
+            return self
         return self._without(lambda key: key[0] == place)
 
     def leave(self, routine: tuple[int, str, str]) -> Points:
         """Return it without the points that a routine declares, by its place."""
+        if routine not in self.routines:
+            return self
         return self._without(lambda key: key[0][:3] == routine)
 
     def join(self, other: Points) -> Points:
         """Keep what is the same on another way here."""
-        if self.held is other.held or self.held == other.held:
-            return self
-        theirs = other.held
-        same = {
-            key: point for key, point in self.held.items()
-            if (found := theirs.get(key)) is point or found == point
-        }  # fmt: skip
-        return Points(same, self.used, self.places)
+        lost = [
+            key for key in self.held.differing(other.held)
+            if self.held.get(key) != other.held.get(key)
+        ]  # fmt: skip
+        return self._drop(lost)
 
     def agree(self, given: Iterable[AssignedPoint]) -> bool:
         """Return True if points hold what is given."""
         return all(self.held.get(point.key) == point for point in given)
 
     def _without(self, lost: Callable[[Key], bool]) -> Points:
-        rest = {key: point for key, point in self.held.items() if not lost(key)}
-        return self if len(rest) == len(self.held) else replace(self, held=rest)
+        return self._drop([key for key in self.held if lost(key)])
+
+    def _drop(self, lost: Sequence[Key]) -> Points:
+        held = self.held.copy()
+        for key in lost:
+            del held[key]
+        return replace(self, held=held) if lost else self
 
 
 NO_POINTS = Points()
@@ -293,7 +309,7 @@ class TaskSymbols(ABC):
         self, operand: ir.Operand | None, row: int, here: Scope
     ) -> AssignedPoint | None:
         """Return what assignments gave to the point that an operand names."""
-        if not (here.points.held and isinstance(operand, ir.DataObject)):
+        if not (here.points.routines and isinstance(operand, ir.DataObject)):
             return None
         part = self.locate(operand, row, here)
         if part is None or part.index is None or part.component:
@@ -392,11 +408,11 @@ class TaskSymbols(ABC):
 
     def _takes_held(self, value: ir.Operand, row: int, here: Scope) -> bool:
         """Return True if a value may be made from what assigned points hold."""
-        if not here.points.held:
+        if not here.points.routines:
             return False
         if self.calls_routine(value):
             return True
         parts = (
             self.locate(ir.DataObject(name), row, here) for name in self.names_of(value)
         )
-        return any(part and part.place in here.points.places for part in parts)
+        return any(part and part.place in here.points for part in parts)

@@ -24,6 +24,7 @@ from postproc.language.analysis.control_flow import (
     is_structural,
 )
 from postproc.language.analysis.interpreter import (
+    NOT_UNROLLED,
     Counting,
     Interpreter,
     calls_around,
@@ -246,10 +247,6 @@ class TaskMachine(Interpreter[Arrived]):
             self.go_on(context, to, here)
         self.leave(context, here)
 
-    def counts_alone(self, context: Context, row: int, one: ir.ForLoop) -> bool:
-        """Return True if nothing but the loop itself changes its variable."""
-        return True
-
     def handles(self, one: ir.SourceStatement) -> bool:
         """Tell whether the handlers of a routine begin with a statement."""
         return False
@@ -306,16 +303,31 @@ class TaskMachine(Interpreter[Arrived]):
 
     def lose_way(
         self, context: Context, row: int, one: ir.SourceStatement, state: Arrived
-    ) -> Arrived | None:
+    ) -> Arrived:
         """Go on behind a statement that leads to no place that is known."""
         return self.unknown(context, row, state)
+
+    def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
+        """Say that a loop runs too often to be followed round by round."""
+        file = context.place.scope.file
+        self.say(file, row, Code.LOOP_NOT_UNROLLED, NOT_UNROLLED.format(rounds))
+
+    def truth(
+        self, context: Context, row: int, condition: ir.Operand, state: Arrived
+    ) -> bool | None:
+        """Tell that ``WHILE TRUE`` goes on for ever; all else only the run tells.
+
+        What is switched off by a condition that never holds stays in the program as
+        if it ran: somebody may switch it on.
+        """
+        one = context.place.statement(row)
+        endless = isinstance(one, ir.Branch) and one.word == "while"
+        return True if endless and condition == ir.DataObject("true") else None
 
     def count(
         self, context: Context, row: int, loop: ir.ForLoop, state: Arrived
     ) -> Counting | None:
         """Return the rounds of a loop, None where they are not known."""
-        if not self.counts_alone(context, row, loop):
-            return None
         scope = context.place.scope
         first, last = (self.number(x, row, scope) for x in (loop.first, loop.last))
         step = self.usual_step(first, last)

@@ -14,7 +14,12 @@ from postproc.language.analysis.call_context import CALLED, Context, Point
 from postproc.language.analysis.control_flow import EXIT, ControlFlow
 
 MOST_ROUNDS = 10_000  # rounds of loops within each other, followed one by one
+MOST_ROWS = 400_000  # of loops that are followed so, all in all
 MOST_STEPS = 4_000_000  # statements run one by one, all in all
+NOT_UNROLLED = (
+    "the loop runs {:,} times: too often to be followed round by round; targets that "
+    "depend on its counter are not compensated"
+)
 _CONTROL = (ir.Branch, ir.BlockWord, ir.ForLoop, ir.JumpTo, ir.Leave)
 
 
@@ -89,7 +94,8 @@ class Interpreter(ABC, Generic[S]):
         entries: The state of each configuration.
         counted: Loops that are followed round by round, by context and row.
         widened: Loops that are not.
-        steps: Statements that have been run, and rounds that were planned.
+        unrolled: Rows of loops that are followed round by round, all rounds together.
+        steps: Statements that have been run.
         exhausted: The program has too many ways to be followed to the end.
     """
 
@@ -97,6 +103,7 @@ class Interpreter(ABC, Generic[S]):
     entries: dict[tuple[Context, int], S] = field(default_factory=dict)
     counted: dict[tuple[Context, int], Counting] = field(default_factory=dict)
     widened: set[tuple[Context, int]] = field(default_factory=set)
+    unrolled: int = 0
     steps: int = 0
     exhausted: bool = False
     _heap: list[tuple[Point, int]] = field(default_factory=list)
@@ -145,11 +152,12 @@ class Interpreter(ABC, Generic[S]):
     ) -> Counting | None:
         """Return the rounds of a loop, None where they are not known."""
 
-    def unrolls(
-        self, context: Context, row: int, loop: ir.ForLoop, counting: Counting
-    ) -> bool:
-        """Tell whether there are so few rounds that each is followed by itself."""
-        return counting.rounds * self.rounds_around(context) <= MOST_ROUNDS
+    def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
+        """Tell whether nothing but a loop itself changes its variable."""
+        return True
+
+    def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
+        """Say that a loop runs too often to be followed round by round."""
 
     @abstractmethod
     def begin_round(
@@ -175,7 +183,7 @@ class Interpreter(ABC, Generic[S]):
 
     def lose_way(
         self, context: Context, row: int, one: ir.SourceStatement, state: S
-    ) -> S | None:
+    ) -> S:
         """Go on behind a statement that leads to no place that is known."""
         return state
 
@@ -356,10 +364,23 @@ class Interpreter(ABC, Generic[S]):
         if config in self.widened:
             return False
         if config not in self.counted:
-            if not self.unrolls(context, row, loop, counting):
+            if not self.counts_alone(context, row, loop):
+                return False
+            if not self._afford(context, row, counting.rounds):
+                self.say_not_unrolled(context, row, counting.rounds)
                 return False
             self.counted[config] = counting
         return self.counted[config] == counting
+
+    def _afford(self, context: Context, row: int, rounds: int) -> bool:
+        """Tell whether there are so few rounds that each is followed by itself."""
+        rows = rounds * (context.place.flow.behind(row) - row)
+        if rounds * self.rounds_around(context) > MOST_ROUNDS:
+            return False
+        if self.unrolled + rows > MOST_ROWS:
+            return False
+        self.unrolled += rows
+        return True
 
     def _round(
         self, outer: Context, row: int, loop: ir.ForLoop, number: int, state: S

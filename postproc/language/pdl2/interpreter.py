@@ -11,7 +11,7 @@ import numpy as np
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, Context
-from postproc.language.analysis.interpreter import MOST_STEPS, Counting
+from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED, Counting
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Store, root_of
@@ -75,7 +75,6 @@ from postproc.language.visits import (
 )
 from postproc.robot.trajectory import Motion
 
-MAX_ROWS = 20_000  # rows of unrolled loops
 _MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
 
 
@@ -85,11 +84,9 @@ class Pdl2Machine(Machine):
 
     Attributes:
         blocks: Moves that are run at once.
-        unrolled: Rows of loops that are followed round by round.
     """
 
     blocks: MoveBlocks = field(init=False)
-    unrolled: int = 0
 
     def __post_init__(self) -> None:
         """Find blocks with what is known of the job."""
@@ -166,27 +163,17 @@ class Pdl2Machine(Machine):
             return None
         return Counting.of(first, last, -by if loop.down and by > 0 else by)
 
-    def unrolls(
-        self, context: Context, row: int, loop: ir.ForLoop, counting: Counting
-    ) -> bool:
-        """Tell whether a loop is followed round by round."""
+    def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
+        """Tell whether nothing but a loop itself changes its variable."""
         program, end = context.place.program, context.place.flow.end[row]
         changed = rows_effects(program, row + 1, end).assigned | self.volatile
-        if loop.name in changed:
-            return False
-        rows = counting.rounds * (end - row)
-        if self.unrolled + rows <= MAX_ROWS:
-            self.unrolled += rows
-            return True
-        self.world.report_once(
-            program,
-            row,
-            Code.LOOP_NOT_UNROLLED,
-            str(row),
-            f"the loop runs {counting.rounds} times: too often to be followed round by "
-            "round; targets that depend on its counter are not compensated",
-        )
-        return False
+        return loop.name not in changed
+
+    def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
+        """Say that a loop runs too often to be followed round by round."""
+        text = NOT_UNROLLED.format(rounds)
+        program = context.place.program
+        self.world.report_once(program, row, Code.LOOP_NOT_UNROLLED, str(row), text)
 
     def begin_round(
         self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: Store
