@@ -259,6 +259,11 @@ def test_the_second_opinion_loads_its_libraries_where_it_needs_them() -> None:
     assert not {"pinocchio", "toppra", "ruckig", "matplotlib"} & set(loaded)
 
 
+LANGUAGE_FOLDERS = {
+    f"language.{path.parent.name}" for path in PACKAGE.glob("language/*/language.py")
+}
+
+
 def test_a_language_knows_no_other() -> None:
     """What two languages need is neutral."""
     found = set()
@@ -266,16 +271,14 @@ def test_a_language_knows_no_other() -> None:
         own = name.removeprefix("language.").split(".")[0]
         if name.startswith("language.") and (PACKAGE / "language" / own).is_dir():
             for other in ours(name, path):
-                folder = other.removeprefix("language.").split(".")[0]
-                if other.startswith("language.") and folder != own:
-                    if (PACKAGE / "language" / folder).is_dir():
-                        found.add((own, other))
+                if within(other, LANGUAGE_FOLDERS - {f"language.{own}"}):
+                    found.add((own, other))
     assert not found
 
 
 def test_languages_are_known_by_their_interface_alone() -> None:
     """Outside of its folder nobody imports a language, not even the list of them."""
-    folders = {f"language.{p.parent.name}" for p in PACKAGE.glob("language/*/*.py")}
+    folders = LANGUAGE_FOLDERS
     wrong = [
         f"{name} imports {other}"
         for name, path in modules()
@@ -315,7 +318,7 @@ def words_of(path: Path, for_people: bool) -> Iterator[str]:
 
 def test_nothing_outside_of_its_folder_names_a_language() -> None:
     """Neither by its name nor by the suffixes of its files."""
-    folders = {f"language.{p.parent.name}" for p in PACKAGE.glob("language/*/*.py")}
+    folders = LANGUAGE_FOLDERS
     found = [
         f"{name}: {word}"
         for name, path in modules()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from postproc.language import ir as said
+from postproc.language import ir
+from postproc.language.analysis.shared_map import SharedMap
 
-MOST_POINTS = 5_000  # held at once; those that were given first are forgotten
 Place = tuple[int, str, str, str]
 """File, module and routine that declare data, "" for none, and their name."""
 Key = tuple[Place, tuple[int, ...]]
@@ -46,7 +46,7 @@ class AssignedPoint:
     """
 
     place: Place
-    operand: said.Operand | None
+    operand: ir.Operand | None
     row: int
     scope: Scope
     index: tuple[int, ...] = ()
@@ -91,21 +91,26 @@ class Points:
         held: What they are given, by key.
         used: What of it has been asked for, by everybody who wants to know that.
         places: Places of all points in it, and maybe of others.
+        routines: File, module and routine of these.
     """
 
-    held: Mapping[Key, AssignedPoint] = field(default_factory=dict, hash=False)
+    held: SharedMap[Key, AssignedPoint] = field(default_factory=SharedMap, hash=False)
     used: tuple[set[Key], ...] = field(default=(), compare=False)
-    places: frozenset[Place] = field(default=frozenset(), compare=False)
+    places: SharedMap[Place, bool] = field(default_factory=SharedMap, compare=False)
+    routines: frozenset[tuple[int, str, str]] = field(
+        default=frozenset(), compare=False
+    )
 
     def watch(self) -> Points:
         """Return the same, which notes what is asked for from now on."""
-        return replace(self, used=(*self.used, set())) if self.held else self
+        return replace(self, used=(*self.used, set())) if self.routines else self
 
     @property
     def given(self) -> frozenset[AssignedPoint]:
         """What has been asked for since it is watched."""
         used = self.used[-1] if self.used else ()
-        return frozenset(self.held[key] for key in used if key in self.held)
+        found = (self.held.get(key) for key in used)
+        return frozenset(point for point in found if point is not None)
 
     def find(self, key: Key) -> AssignedPoint | None:
         """Return what a point holds, None where that is not known."""
@@ -113,41 +118,52 @@ class Points:
             used.add(key)
         return self.held.get(key)
 
+    def __contains__(self, place: Place) -> bool:
+        """Tell whether anything may be known of a point or an array."""
+        return self.places.get(place) is not None
+
     def give(self, point: AssignedPoint) -> Points:
         """Return it with what an assignment gives to a point."""
-        held = {**self.held}
-        held.pop(point.key, None)
-        if len(held) >= MOST_POINTS:
-            del held[next(iter(held))]
+        held, places, routines = self.held.copy(), self.places, self.routines
         held[point.key] = point
-        return Points(held, self.used, self.places | {point.place})
+        if point.place not in self:
+            places = places.copy()
+            places[point.place] = True
+            routines |= {point.place[:3]}
+        return Points(held, self.used, places, routines)
 
     def forget(self, place: Place) -> Points:
         """Return it without any element of an array, or without a point."""
+        if place not in self:
+            return self
         return self._without(lambda key: key[0] == place)
 
     def leave(self, routine: tuple[int, str, str]) -> Points:
         """Return it without the points that a routine declares, by its place."""
+        if routine not in self.routines:
+            return self
         return self._without(lambda key: key[0][:3] == routine)
 
     def join(self, other: Points) -> Points:
         """Keep what is the same on another way here."""
-        if self.held is other.held or self.held == other.held:
-            return self
-        theirs = other.held
-        same = {
-            key: point for key, point in self.held.items()
-            if (found := theirs.get(key)) is point or found == point
-        }  # fmt: skip
-        return Points(same, self.used, self.places)
+        lost = [
+            key for key in self.held.differing(other.held)
+            if self.held.get(key) != other.held.get(key)
+        ]  # fmt: skip
+        return self._drop(lost)
 
     def agree(self, given: Iterable[AssignedPoint]) -> bool:
         """Return True if points hold what is given."""
         return all(self.held.get(point.key) == point for point in given)
 
     def _without(self, lost: Callable[[Key], bool]) -> Points:
-        rest = {key: point for key, point in self.held.items() if not lost(key)}
-        return self if len(rest) == len(self.held) else replace(self, held=rest)
+        return self._drop([key for key in self.held if lost(key)])
+
+    def _drop(self, lost: Sequence[Key]) -> Points:
+        held = self.held.copy()
+        for key in lost:
+            del held[key]
+        return replace(self, held=held) if lost else self
 
 
 NO_POINTS = Points()
@@ -172,7 +188,7 @@ class Scope:
     routine: str
     parameters: frozenset[str] = frozenset()
     loops: tuple[tuple[str, float], ...] = ()
-    given: tuple[tuple[str, said.Operand, int, Scope], ...] = ()
+    given: tuple[tuple[str, ir.Operand, int, Scope], ...] = ()
     points: Points = NO_POINTS
 
 
@@ -202,19 +218,19 @@ class FunctionBody:
     """
 
     scope: Scope
-    statements: Sequence[tuple[int, said.SourceStatement]]
+    statements: Sequence[tuple[int, ir.SourceStatement]]
 
 
-def source_of(operand: said.Operand | None) -> said.DataObject | None:
+def source_of(operand: ir.Operand | None) -> ir.DataObject | None:
     """Return the point that an operand names, or shifts, None where it does neither."""
-    while isinstance(operand, said.FunctionCall) and operand.arguments:
+    while isinstance(operand, ir.FunctionCall) and operand.arguments:
         operand = operand.arguments[0].value
-    return operand if isinstance(operand, said.DataObject) else None
+    return operand if isinstance(operand, ir.DataObject) else None
 
 
-def is_point(data: said.DataObject) -> bool:
+def is_point(data: ir.DataObject) -> bool:
     """Return True if data are named whole, or an element of them is."""
-    return all(isinstance(step, said.ElementStep) for step in data.steps)
+    return all(isinstance(step, ir.ElementStep) for step in data.steps)
 
 
 @dataclass
@@ -245,7 +261,7 @@ class NamesUsed:
 class TaskSymbols(ABC):
     """What the names of a task mean, as far as ways through it ask."""
 
-    _names: dict[int, tuple[said.Operand, frozenset[str]]] = field(
+    _names: dict[int, tuple[ir.Operand, frozenset[str]]] = field(
         default_factory=dict, init=False
     )
 
@@ -260,12 +276,12 @@ class TaskSymbols(ABC):
         """The names that statements change and take."""
 
     @abstractmethod
-    def locate(self, data: said.DataObject, row: int, here: Scope) -> PointPart | None:
+    def locate(self, data: ir.DataObject, row: int, here: Scope) -> PointPart | None:
         """Find the point that only assignments change, None for all other data."""
 
     @abstractmethod
     def evaluate_components(
-        self, part: PointPart, value: said.Operand, row: int, here: Scope
+        self, part: PointPart, value: ir.Operand, row: int, here: Scope
     ) -> Sequence[tuple[str, float | None]]:
         """Return the components that an assignment sets, and what it gives to them.
 
@@ -276,28 +292,24 @@ class TaskSymbols(ABC):
             here: Where it stands.
         """
 
-    @abstractmethod
-    def parts_of(self, operand: said.Operand) -> Iterable[said.Operand]:
-        """Return all data and functions in an operand, and maybe more of it."""
-
-    def names_of(self, operand: said.Operand) -> frozenset[str]:
+    def names_of(self, operand: ir.Operand) -> frozenset[str]:
         """Return the names of all data and functions in an operand."""
         key = id(operand)
         if key not in self._names:
-            named = said.DataObject | said.FunctionCall
-            parts = (x for x in self.parts_of(operand) if isinstance(x, named))
+            named = ir.DataObject | ir.FunctionCall
+            parts = (x for x in ir.walk(operand) if isinstance(x, named))
             self._names[key] = operand, frozenset(one.name for one in parts)
         return self._names[key][1]
 
-    def calls_routine(self, operand: said.Operand) -> bool:
+    def calls_routine(self, operand: ir.Operand) -> bool:
         """Return True if an operand calls a function of the task."""
         return not self.names_of(operand).isdisjoint(self.routines)
 
     def find_held(
-        self, operand: said.Operand | None, row: int, here: Scope
+        self, operand: ir.Operand | None, row: int, here: Scope
     ) -> AssignedPoint | None:
         """Return what assignments gave to the point that an operand names."""
-        if not (here.points.held and isinstance(operand, said.DataObject)):
+        if not (here.points.routines and isinstance(operand, ir.DataObject)):
             return None
         part = self.locate(operand, row, here)
         if part is None or part.index is None or part.component:
@@ -305,7 +317,7 @@ class TaskSymbols(ABC):
         return here.points.find((part.place, part.index))
 
     def assign(
-        self, points: Points, one: said.Assignment, row: int, here: Scope
+        self, points: Points, one: ir.Assignment, row: int, here: Scope
     ) -> Points:
         """Return what points hold behind an assignment.
 
@@ -324,7 +336,7 @@ class TaskSymbols(ABC):
         return points.give(self._give_value(part, part.index, one.value, row, there))
 
     def _give_value(
-        self, part: PointPart, index: tuple[int, ...], value: said.Operand, row: int,
+        self, part: PointPart, index: tuple[int, ...], value: ir.Operand, row: int,
         here: Scope,
     ) -> AssignedPoint:  # fmt: skip
         """Return what a point holds that is given a value, or a component of it."""
@@ -359,13 +371,13 @@ class TaskSymbols(ABC):
 
     @abstractmethod
     def open_function(
-        self, call: said.FunctionCall, row: int, here: Scope
+        self, call: ir.FunctionCall, row: int, here: Scope
     ) -> FunctionBody | None:
         """Return the statements of the function that a call means, None if unknown."""
 
     def find_returned(
-        self, call: said.FunctionCall, row: int, here: Scope
-    ) -> tuple[said.Operand, int, Scope] | None:
+        self, call: ir.FunctionCall, row: int, here: Scope
+    ) -> tuple[ir.Operand, int, Scope] | None:
         """Return what a function returns, its row and where that stands.
 
         None for functions that do more than to set points of their own, or call others.
@@ -382,11 +394,11 @@ class TaskSymbols(ABC):
         own = scope.file, scope.module, scope.routine
         for at, one in body.statements:
             scope = replace(scope, points=points)
-            if not isinstance(one, said.Assignment | said.Leave) or one.value is None:
+            if not isinstance(one, ir.Assignment | ir.Leave) or one.value is None:
                 return None
             if self.calls_routine(one.value):
                 return None
-            if isinstance(one, said.Leave):
+            if isinstance(one, ir.Leave):
                 return (one.value, at, scope) if one.word == "return" else None
             part = self.locate(one.target, at, scope)
             if part is None or part.place[:3] != own:
@@ -394,14 +406,13 @@ class TaskSymbols(ABC):
             points = self.assign(points, one, at, scope)
         return None
 
-    def _takes_held(self, value: said.Operand, row: int, here: Scope) -> bool:
+    def _takes_held(self, value: ir.Operand, row: int, here: Scope) -> bool:
         """Return True if a value may be made from what assigned points hold."""
-        if not here.points.held:
+        if not here.points.routines:
             return False
         if self.calls_routine(value):
             return True
         parts = (
-            self.locate(said.DataObject(name), row, here)
-            for name in self.names_of(value)
+            self.locate(ir.DataObject(name), row, here) for name in self.names_of(value)
         )
-        return any(part and part.place in here.points.places for part in parts)
+        return any(part and part.place in here.points for part in parts)

@@ -8,7 +8,7 @@ from typing import Any, Protocol, TypeVar
 
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
-from postproc.language.control_flow import HeadedRows
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.ir import SourceStatement
 from postproc.language.source import Source
 from postproc.language.statement_table import StatementText

@@ -1,17 +1,53 @@
-"""What statements say in languages of one statement a time: values and control flow."""
+"""What statements say in every language: values, control flow, calls, assignments.
+
+Names are lower case (no language here tells cases apart). Languages add statements and
+values of their own, as nodes too: what only asks for parts need not know them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-
-# Expressions, with number slots.
-#
-# Names are lower case (no language here tells cases apart). A `Num` knows only which
-# number of its statement it is, so that one expression serves all of its form.
 
 
 @dataclass(frozen=True, slots=True)
-class Operand:
+class Node:
+    """A value, a statement, or a part of one."""
+
+    def children(self) -> Iterator[Node]:
+        """Yield the nodes in it, in the order of its fields."""
+        name: str
+        for name in self.__match_args__:
+            part = getattr(self, name)
+            if isinstance(part, Node):
+                yield part
+            elif isinstance(part, tuple):
+                yield from (one for one in part if isinstance(one, Node))
+
+
+def walk(*nodes: Node | None) -> list[Node]:
+    """List nodes with all that is in them, inner ones first."""
+    found: list[Node] = []
+    for one in nodes:
+        if one is not None:
+            _add(one, found)
+    return found
+
+
+def _add(node: Node, found: list[Node]) -> None:
+    for part in node.children():
+        _add(part, found)
+    found.append(node)
+
+
+# Expressions, with number slots.
+#
+# A `Num` knows only which number of its statement it is, so that one expression serves
+# all of its form.
+
+
+@dataclass(frozen=True, slots=True)
+class Operand(Node):
     """A value; a language adds its own kinds."""
 
 
@@ -24,13 +60,21 @@ class Num(Operand):
 
 @dataclass(frozen=True, slots=True)
 class StringLiteral(Operand):
-    """A string, with its quotes and as it is written."""
+    """A string as it is written; quotes stay where they tell it from words."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
-class ElementStep:
+class Interval(Operand):
+    """``low..high``: a range of indices, or of the values of a case."""
+
+    low: Operand
+    high: Operand
+
+
+@dataclass(frozen=True, slots=True)
+class ElementStep(Node):
     """``{i, j}`` behind the name of an array."""
 
     subscripts: tuple[Operand, ...]
@@ -45,16 +89,39 @@ class DataObject(Operand):
 
 
 @dataclass(frozen=True, slots=True)
+class Argument(Node):
+    r"""An argument of an instruction or function.
+
+    Attributes:
+        value: What is given; None for a switch, or where it is left out.
+        name: Of an optional argument (``\WObj``), "" where it goes by its place.
+        passed_on: It is there where a parameter of the routine is (``\a?b``).
+    """
+
+    value: Operand | None
+    name: str = ""
+    passed_on: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class FunctionCall(Operand):
     """A call that returns a value."""
 
     name: str
     arguments: tuple[Argument, ...]
 
+    @property
+    def values(self) -> tuple[Operand | None, ...]:
+        """What is given, in the order in which it is written."""
+        return tuple([one.value for one in self.arguments])
+
 
 @dataclass(frozen=True, slots=True)
 class Operation(Operand):
-    """An operator and one operand or two."""
+    """An operator and one operand or two.
+
+    The operator ``()`` is data in parentheses: their value, not the data themselves.
+    """
 
     operator: str
     operands: tuple[Operand, ...]
@@ -67,32 +134,19 @@ class Composite(Operand):
     items: tuple[Operand, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Argument:
-    r"""An argument of an instruction or function.
-
-    Attributes:
-        value: What is given; None for a switch.
-        name: Of an optional argument (``\WObj``), "" where it goes by its place.
-        passed_on: It is there where a parameter of the routine is (``\a?b``).
-    """
-
-    value: Operand | None
-    name: str = ""
-    passed_on: bool = False
-
-
 # Statements.
 
 
 @dataclass(frozen=True, slots=True)
-class SourceStatement:
+class SourceStatement(Node):
     """A statement; by itself: one that says nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class NotUnderstood(SourceStatement):
-    """Text that the grammar has no rule for."""
+    """Text that the grammar has no rule for, where a language keeps it."""
+
+    text: str = ""
 
 
 def is_odd(one: SourceStatement) -> bool:
@@ -102,9 +156,10 @@ def is_odd(one: SourceStatement) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class BlockWord(SourceStatement):
-    """A word that is a statement: else, endif, .."""
+    """A word that is a statement: else, endif, .., and what follows it on its line."""
 
     word: str
+    then: SourceStatement | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,27 +169,48 @@ class Branch(SourceStatement):
     Attributes:
         word: if, elseif, while, test, case, default, loop, repeat or until.
         values: The condition, what is tested, or the values of a case.
+        then: What follows a case on its line.
     """
 
     word: str
     values: tuple[Operand, ...] = ()
+    then: SourceStatement | None = None
+
+
+DIVISIONS = ("elseif", "case", "default")
+
+
+def divides(one: Node | None) -> bool:
+    """Tell whether a statement divides a block: else, elseif, case, default."""
+    if isinstance(one, BlockWord):
+        return one.word == "else"
+    return isinstance(one, Branch) and one.word in DIVISIONS
 
 
 @dataclass(frozen=True, slots=True)
 class ForLoop(SourceStatement):
-    """A loop that counts."""
+    """A loop that counts.
+
+    Attributes:
+        name: Of its variable, "" where only a part of the line is understood.
+        first, last: Values that it begins and ends with.
+        step: What it counts by, None where that is not said.
+        down: ``DOWNTO``: it counts down.
+    """
 
     name: str
-    first: Operand
-    last: Operand
+    first: Operand | None
+    last: Operand | None
     step: Operand | None = None
+    down: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class LabelMark(SourceStatement):
-    """``name:``."""
+    """``name:``, and what follows it on its line."""
 
     name: str
+    then: SourceStatement | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,3 +242,8 @@ class Instruction(SourceStatement):
 
     name: str
     arguments: tuple[Argument, ...] = ()
+
+    @property
+    def values(self) -> tuple[Operand | None, ...]:
+        """What is given, in the order in which it is written."""
+        return tuple([one.value for one in self.arguments])

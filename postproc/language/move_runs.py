@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, slim
-from postproc.language.control_flow import RoutineFlow
+from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.statement_table import StatementText
 from postproc.language.visits import Visits
 
@@ -24,7 +24,7 @@ _NO_COLUMNS = ("frames", "frame_taught", "pred_start", "pred", "loads")
 
 def find_runs(
     text: StatementText[Any],
-    flow: RoutineFlow,
+    flow: ControlFlow,
     apart: Collection[int],
     places_of: Callable[[Any], Sequence[int] | None],
     plain: Callable[[Floats], Bools],
@@ -59,7 +59,7 @@ def find_runs(
 
 
 def _alike(
-    text: StatementText[Any], flow: RoutineFlow, apart: Collection[int]
+    text: StatementText[Any], flow: ControlFlow, apart: Collection[int]
 ) -> Iterator[tuple[int, int]]:
     """Yield the rows of statements of one shape on one way: first, and behind."""
     shape = text.shape[flow.first : flow.last]

@@ -22,6 +22,7 @@ import numpy as np
 
 from postproc.arrays import Floats, Interned, Ints, slim
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language.analysis.call_context import in_program_order
 from postproc.language.assigned_points import AssignedPoint, Scope
 from postproc.language.comment_directives import MEASURE, Comments
 from postproc.language.interpreter import TaskMachine
@@ -360,7 +361,7 @@ def visits_of(
         comments: How the language writes them.
         moves: Rows of statements that move, by file.
     """
-    order = sorted(range(len(machine.visits)), key=machine.order.__getitem__)
+    order = in_program_order(machine.keys)
     found = [machine.visits[k] for k in order]
     held = [conditions(v) for v in found]
     texts, n = machine.texts, len(found)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.language import assigned_points
 from postproc.language.assigned_points import (
     NO_POINTS,
     AssignedPoint,
@@ -14,7 +13,7 @@ from postproc.language.assigned_points import (
 )
 from postproc.language.visits import Meaning
 from tests.language.krl.test_visits import DATA, job
-from tests.language.rapid.test_visits import L, reasons, task
+from tests.language.rapid.test_visits import L, task
 
 HERE = Scope(0, "m", "main")
 
@@ -57,14 +56,12 @@ def test_who_asks_knows_what_the_answer_depends_on():
     assert {one.name for one in outer.given} == {"q", "r"}
 
 
-def test_the_first_of_too_many_points_is_forgotten(monkeypatch):
-    monkeypatch.setattr(assigned_points, "MOST_POINTS", 3)
-    lines = ["FOR i FROM 1 TO 4 DO", "big{i}:=Offs(p1,0,0,i);", "ENDFOR"]
-    moves = [L.format(f"big{{{k}}}") for k in range(1, 5)]
-    found = task(*lines, *moves, more="VAR robtarget big{4};")
-    known = [Meaning.POSE] * 3
-    assert found.visits.target.tolist() == [Meaning.UNKNOWN, *known]
-    assert reasons(found)[0]
+def test_as_many_points_as_a_program_assigns_are_known():
+    lines = ["FOR i FROM 1 TO 8000 DO", "big{i}:=Offs(p1,0,0,i);", "ENDFOR"]
+    moves = [L.format(f"big{{{k}}}") for k in (1, 4000, 8000)]
+    found = task(*lines, *moves, more="VAR robtarget big{8000};")
+    assert found.visits.target.tolist() == [Meaning.POSE] * 3
+    assert np.diff(found.visits.values[:, 2]).tolist() == [3999, 4000]
 
 
 @pytest.mark.parametrize("rounds", [3, 3000])

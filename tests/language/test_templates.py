@@ -4,6 +4,7 @@ from typing import cast
 
 import pytest
 
+from postproc.language import ir
 from postproc.language.lexer import form_of
 from postproc.language.logical_lines import read_lines
 from postproc.language.pdl2 import syntax as ast
@@ -12,12 +13,12 @@ from postproc.language.source import source_from_bytes
 from postproc.language.templates import filler, parse_shapes
 
 
-def parse_line(mask: str) -> ast.Statement:
+def parse_line(mask: str) -> ir.SourceStatement:
     """Parse the mask of one logical line of PDL2."""
     form, names = form_of(mask)
     said = parse_form(form)
     fill = filler(said)
-    return said if fill is None else cast(ast.Statement, fill(names))
+    return said if fill is None else cast(ir.SourceStatement, fill(names))
 
 
 @pytest.mark.parametrize(
@@ -43,7 +44,7 @@ def test_case_is_kept_where_it_is_shown_only() -> None:
     declared = parse_line("Wp1, WP2 : POSITION")
     assert isinstance(declared, ast.Declare) and declared.names == ("Wp1", "WP2")
     moved = parse_line("MOVE TO Wp1")
-    assert isinstance(moved, ast.Move) and moved.where == (ast.Reference("wp1"),)
+    assert isinstance(moved, ast.Move) and moved.where == (ir.DataObject("wp1"),)
     lines = read_lines(source_from_bytes("job.lsv", b"Wp1 XTND Arm: 1 Priv"))
     (entered,) = parse_shapes(lines.shapes, parse_value_form)
     assert entered is not None and entered.name == "Wp1"
@@ -51,4 +52,4 @@ def test_case_is_kept_where_it_is_shown_only() -> None:
 
 @pytest.mark.parametrize("mask", ["?? Wp1 ?? x2", "MOVE TO \x01", "\x01\x01 p1"])
 def test_what_is_not_understood_keeps_its_text(mask) -> None:
-    assert parse_line(mask) == ast.Unknown(mask)
+    assert parse_line(mask) == ir.NotUnderstood(mask)

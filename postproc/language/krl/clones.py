@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
+from postproc.language import ir
 from postproc.language.krl import syntax as said
 from postproc.language.krl.moves import HOMES
 from postproc.language.krl.program import KrlDatum, KrlFile
@@ -79,7 +80,7 @@ class KrlCloner(Cloner):
         """Find the data that a move goes to, as far as they can be cloned."""
         row, move = self._move(file, line)
         operand = move.via if via else move.to
-        if not isinstance(operand, said.DataObject):
+        if not isinstance(operand, ir.DataObject):
             raise CloneError("the numbers stand in the move itself, or are computed")
         if any(isinstance(step, str) for step in operand.steps):
             raise CloneError("parts of records are not cloned")

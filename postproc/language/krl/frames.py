@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language import ir
 from postproc.language.assigned_points import Scope
-from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import (
     CORRECTIONS,
     NOTHING_SET,
@@ -91,31 +91,31 @@ class FrameReader:
     base: KrlFrame
     store: KrlStore = NOTHING_SET
 
-    def frame(self, operand: said.Operand) -> KrlFrame:
+    def frame(self, operand: ir.Operand) -> KrlFrame:
         """Read a frame."""
         match operand:
-            case said.DataObject(name="$nullframe" | "$world", steps=()):
+            case ir.DataObject(name="$nullframe" | "$world", steps=()):
                 return ZERO
-            case said.DataObject(name="$tool", steps=()):
+            case ir.DataObject(name="$tool", steps=()):
                 return self.tool
-            case said.DataObject(name="$base", steps=()):
+            case ir.DataObject(name="$base", steps=()):
                 return self.base
-            case said.DataObject(
+            case ir.DataObject(
                 name="tool_data" | "base_data" as table,
-                steps=(said.ElementStep() as step,),
+                steps=(ir.ElementStep() as step,),
             ):
                 number = self.task.index(step, self.row, self.here)
                 if number is None or len(number) != 1:
                     return no_frame(_WHICH.format(table.upper()))
                 return self.entry(table, number[0])
-            case said.Operation(operator=":", operands=(first, second)):
+            case ir.Operation(operator=":", operands=(first, second)):
                 return self._product(self.frame(first), self.frame(second))
-            case said.FunctionCall(name=name, arguments=arguments):
+            case ir.FunctionCall(name=name, arguments=arguments):
                 return self._call(name, [one.value for one in arguments])
             case _:
                 return self._record(operand)
 
-    def _call(self, name: str, arguments: Sequence[said.Operand | None]) -> KrlFrame:
+    def _call(self, name: str, arguments: Sequence[ir.Operand | None]) -> KrlFrame:
         """Read a frame that one of the functions of modern inline forms gives."""
         first = arguments[0] if arguments else None
         value = self.task.value(first, self.row, self.here)
@@ -211,11 +211,11 @@ class FrameReader:
         where = f" ({CONFIG}.dat)" if code is Code.UNDECLARED_VARIABLE else ""
         return Reason(code, f"{shown} {text}{where}")
 
-    def _record(self, operand: said.Operand) -> KrlFrame:
+    def _record(self, operand: ir.Operand) -> KrlFrame:
         """Read a frame that is written or named."""
         value = self.task.value(operand, self.row, self.here)
         pose = pose_of(value)
-        if pose and isinstance(operand, said.DataObject):
+        if pose and isinstance(operand, ir.DataObject):
             taught, found = False, self.task.datum(operand.name, self.here)
             if found is not None:
                 taught = self.task.is_taught(operand.name, found[0], found[1].row)
@@ -223,7 +223,7 @@ class FrameReader:
         if pose:
             taught = self.task.is_taught("", self.here.file, self.row)
             return KrlFrame(pose, taught=taught)
-        if isinstance(operand, said.DataObject):
+        if isinstance(operand, ir.DataObject):
             return KrlFrame((), self._unknown(operand.name.upper(), operand.name))
         return no_frame("a frame is not written whole")
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from postproc.arrays import Floats
+from postproc.language import ir
 from postproc.language.insert_moves import (
     PASSED_MM,
     LayoutSplitter,
@@ -73,7 +74,7 @@ class KrlSplitter(LayoutSplitter):
                 return problem
         return ""
 
-    def _statements(self) -> Iterator[said.SourceStatement]:
+    def _statements(self) -> Iterator[ir.SourceStatement]:
         """Yield the statements of the user's files, one of each form."""
         for file in self.files:
             if not file.is_system:
@@ -154,11 +155,11 @@ def _row_of(file: KrlFile, line: int) -> int:
     return rows[0]
 
 
-def _is_setting(one: said.SourceStatement) -> bool:
+def _is_setting(one: ir.SourceStatement) -> bool:
     """Return True if a statement sets how moves are made, and does nothing else."""
-    if isinstance(one, said.Assignment):
+    if isinstance(one, ir.Assignment):
         return one.target.name in PLANNED or one.target.name in _ACTIVE
-    if not isinstance(one, said.Instruction) or one.name != "bas":
+    if not isinstance(one, ir.Instruction) or one.name != "bas":
         return False
     command = one.arguments[0].value if one.arguments else None
     return isinstance(command, said.EnumValue) and not command.name.startswith("#out_")

@@ -8,12 +8,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from postproc.diagnostics import Code, Reason
+from postproc.language import ir
+from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.call_graph import reach
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.assigned_points import Scope
-from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import (
     NOWHERE,
     Arrived,
-    CallContext,
     TaskMachine,
 )
 from postproc.language.krl import syntax as said
@@ -37,7 +39,6 @@ from postproc.language.krl.symbols import (
     KrlTask,
     list_changes,
     operands_of,
-    parts_of,
 )
 from postproc.language.language import Start
 from postproc.language.to_visits import FoundGoal, cell_pose
@@ -47,7 +48,7 @@ _PASSED = (
     said.AccessHeader, said.KrlDeclaration, said.OutsideName, said.SpeedPart,
 )  # fmt: skip
 _ACTING = (
-    said.Assignment, said.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
+    ir.Assignment, ir.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
     said.ContinueWord, said.InterruptSwitched, said.PathTrigger, said.InterruptDeclared,
 )  # fmt: skip
 _INTERRUPT = Reason(
@@ -97,8 +98,9 @@ class KrlMachine(TaskMachine):
         modes = modes.beside(self.task)
         first = self.task.files[0]
         here = Arrived(frozenset([START]), modes)
-        self.call(0, first.name, first.routines[0], None, -1, here)
-        self.follow_all()
+        main = 0, first.name, first.routines[0]
+        self.call_routine(main, self.root, -1, here)
+        self.follow()
         for name, (file, row) in self._assumed.items():
             self.say(
                 file, row, Code.ROUTINE_ASSUMED_MOTIONLESS, f"{name.upper()} {ASSUMED}"
@@ -106,30 +108,30 @@ class KrlMachine(TaskMachine):
 
     # What a statement is.
 
-    def places_of(self, one: said.SourceStatement) -> Sequence[int] | None:
+    def places_of(self, one: ir.SourceStatement) -> Sequence[int] | None:
         """Return X to C of a line to numbers, see `TaskMachine.places_of`."""
         return own_numbers(one) if isinstance(one, said.KrlMove) else None
 
-    def apart(self, context: CallContext) -> set[int] | None:
+    def apart(self, context: Context) -> set[int] | None:
         """Return the points of splines; all where an interrupt may end any move.
 
         All of a system file, too, where numbers stay.
         """
-        file = self.task.files[context.scope.file]
+        file = self.task.files[context.place.scope.file]
         if self._has_interrupts or file.is_system:
             return None
         blocks = file.splines
         return {row for rows in blocks for row in rows}
 
-    def acts(self, one: said.SourceStatement) -> bool:
+    def acts(self, one: ir.SourceStatement) -> bool:
         """Tell what moves, calls or sets, see `TaskMachine.acts`."""
         return isinstance(one, _ACTING)
 
-    def goes_on(self, one: said.SourceStatement) -> bool:
+    def goes_on(self, one: ir.SourceStatement) -> bool:
         """Tell what does nothing, see `TaskMachine.goes_on`."""
         return isinstance(one, _PASSED)
 
-    def number(self, operand: said.Operand | None, row: int, scope: Scope) -> float:
+    def number(self, operand: ir.Operand | None, row: int, scope: Scope) -> float:
         """Evaluate a number, see `TaskMachine.number`."""
         return self.task.number(operand, row, scope)
 
@@ -137,27 +139,27 @@ class KrlMachine(TaskMachine):
         """Return where the statements of a routine stand."""
         return self.task.scope_of(file, module, routine)
 
-    def counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
+    def counts_alone(self, context: Context, row: int, one: ir.ForLoop) -> bool:
         """Return True if only the loop changes its variable, see `TaskMachine`.
 
         A variable that is not the routine's own may be changed by routines that the
         loop calls, and by what runs beside it.
         """
-        key = context.scope.file, row
+        key = context.place.scope.file, row
         if key not in self._alone:
             self._alone[key] = self._counts_alone(context, row, one)
         return self._alone[key]
 
-    def _counts_alone(self, context: CallContext, row: int, one: said.ForLoop) -> bool:
+    def _counts_alone(self, context: Context, row: int, one: ir.ForLoop) -> bool:
         """Read a loop once for `counts_alone`."""
-        rows = range(row + 1, context.flow.loops.get(row, row))
-        text = self.texts[context.scope.file]
+        rows = range(row + 1, context.place.flow.loops.get(row, row))
+        text = self.texts[context.place.scope.file]
         inside = [text.statement(k) for k in rows]
         if any(one.name in self._sets(other) for other in inside):
             return False
         if one.name in self.task.odd_words:
             return False
-        scope = context.scope
+        scope = context.place.scope
         if self.task.place(one.name, scope) == (scope.module, scope.routine):
             return True
         if one.name in self.task.beside:
@@ -165,16 +167,16 @@ class KrlMachine(TaskMachine):
         others = self.task.counted[one.name] > 1 or one.name in self.task.assigned
         return not (others and (self._has_interrupts or self._calls_own(inside)))
 
-    def _sets(self, one: said.SourceStatement) -> set[str]:
+    def _sets(self, one: ir.SourceStatement) -> set[str]:
         """Return the names of data that a statement sets, also as a loop."""
-        named = {one.name} if isinstance(one, said.ForLoop) else set()
+        named = {one.name} if isinstance(one, ir.ForLoop) else set()
         return named | {data.name for data in list_changes(one, self.task.routines)}
 
-    def _calls_own(self, statements: Sequence[said.SourceStatement]) -> bool:
+    def _calls_own(self, statements: Sequence[ir.SourceStatement]) -> bool:
         """Return True if a statement calls a routine of the files."""
-        called = {one.name for one in statements if isinstance(one, said.Instruction)}
-        for part in parts_of([x for one in statements for x in operands_of(one)]):
-            if isinstance(part, said.FunctionCall):
+        called = {one.name for one in statements if isinstance(one, ir.Instruction)}
+        for part in ir.walk(*(x for one in statements for x in operands_of(one))):
+            if isinstance(part, ir.FunctionCall):
                 called.add(part.name)
         return not called.isdisjoint(self.task.routines)
 
@@ -192,24 +194,24 @@ class KrlMachine(TaskMachine):
 
     # What it does.
 
-    def act(
-        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+    def carry_out(
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived | None:
         """Carry a statement out; None where it goes on in a routine.
 
         Behind ON_ERROR_PROCEED an error skips it: both ways go on then.
         """
         if not here.modes.perhaps:
-            return self._carry_out(context, row, one, here)
+            return self._run_once(context, row, one, here)
         here = replace(here, modes=here.modes.with_(perhaps=False))
-        after = self._carry_out(context, row, one, here)
+        after = self._run_once(context, row, one, here)
         if after is None:
-            self.enter(context, row + 1, here)
+            self.go_on(context, row + 1, here)
             return None
         return after.join(here)
 
-    def _carry_out(
-        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+    def _run_once(
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived | None:
         """Carry a statement out without an error."""
         here = self.after_functions(context, row, one, here)
@@ -217,9 +219,9 @@ class KrlMachine(TaskMachine):
         match one:
             case said.KrlMove():
                 return self._move(context, row, one, here)
-            case said.Assignment():
+            case ir.Assignment():
                 return self._assign(context, row, one, here)
-            case said.Instruction():
+            case ir.Instruction():
                 return self._call(context, row, one, here)
             case said.Waiting():
                 return _halt(here, True)
@@ -235,12 +237,12 @@ class KrlMachine(TaskMachine):
                 return here
 
     def _forget(
-        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Forget what a routine may change of what is handed over to it."""
         if isinstance(one, said.InterruptDeclared | said.PathTrigger):
             return here
-        own = one.target if isinstance(one, said.Assignment) else None
+        own = one.target if isinstance(one, ir.Assignment) else None
         store = here.modes.store
         for target in list_changes(one, self.task.routines):
             name = target.name
@@ -255,21 +257,21 @@ class KrlMachine(TaskMachine):
         return replace(here, modes=here.modes.with_(store=store))
 
     def _move(
-        self, context: CallContext, row: int, one: said.KrlMove, here: Arrived
+        self, context: Context, row: int, one: said.KrlMove, here: Arrived
     ) -> Arrived:
         """Record the visits of a move."""
-        scope = context.scope
+        scope = context.place.scope
         after = self.arrive(
             context, row, here,
             lambda: [*self.goals.visits(one, row, scope, here.modes, here.points)],
         )  # fmt: skip
         return replace(after, modes=replace(after.modes, halted=False, goes_on=False))
 
-    def _modes(self, context: CallContext, row: int) -> ModeReader:
-        return ModeReader(self.task, row, context.scope)
+    def _modes(self, context: Context, row: int) -> ModeReader:
+        return ModeReader(self.task, row, context.place.scope)
 
     def _assign(
-        self, context: CallContext, row: int, one: said.Assignment, here: Arrived
+        self, context: Context, row: int, one: ir.Assignment, here: Arrived
     ) -> Arrived:
         """Give a value to data, or change how moves are made."""
         name = one.target.name
@@ -283,17 +285,17 @@ class KrlMachine(TaskMachine):
             )
             return self.unknown(context, row, here, what)
         value = one.value
-        if isinstance(value, said.FunctionCall) and value.name in ("eb", "eb_abs"):
+        if isinstance(value, ir.FunctionCall) and value.name in ("eb", "eb_abs"):
             # The base follows a conveyor, which takes the arm along.
             here = replace(here, origins=NOWHERE)
         here = self.assign_point(context, row, one, here)
         return replace(here, modes=modes)
 
     def _call(
-        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+        self, context: Context, row: int, one: ir.Instruction, here: Arrived
     ) -> Arrived | None:
         name = one.name
-        found = self.task.routine(name, context.scope)
+        found = self.task.routine(name, context.place.scope)
         if found is not None:
             return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
@@ -315,7 +317,7 @@ class KrlMachine(TaskMachine):
         if name in package_routines() and not self._is_overruled(name):
             if package_routines()[name] == AHEAD:
                 return here
-            place = context.scope.file, row
+            place = context.place.scope.file, row
             self._assumed[name] = min(self._assumed.get(name, place), place)
             return _halt(here, None)
         return self.outside(context, row, name, here)
@@ -325,14 +327,14 @@ class KrlMachine(TaskMachine):
         return self.start.assume_motion or name in self.start.routines
 
     def after_functions(
-        self, context: CallContext, row: int, one: said.SourceStatement, here: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what a statement reads, and for what its functions do."""
-        for part in parts_of(operands_of(one)):
-            if isinstance(part, said.FunctionCall):
+        for part in ir.walk(*operands_of(one)):
+            if isinstance(part, ir.FunctionCall):
                 here = self._function(context, row, part.name, here)
-            elif isinstance(part, said.DataObject) and part.name.startswith("$"):
-                given = isinstance(one, said.Assignment) and part is one.target
+            elif isinstance(part, ir.DataObject) and part.name.startswith("$"):
+                given = isinstance(one, ir.Assignment) and part is one.target
                 known = part.name in PLANNED or isinstance(one, said.KrlMove)
                 if given or (known and part.name not in HALTING):
                     continue
@@ -340,10 +342,10 @@ class KrlMachine(TaskMachine):
         return here
 
     def _function(
-        self, context: CallContext, row: int, name: str, here: Arrived
+        self, context: Context, row: int, name: str, here: Arrived
     ) -> Arrived:
         """Allow for what a function does."""
-        found = self.task.routine(name, context.scope)
+        found = self.task.routine(name, context.place.scope)
         if found is not None:
             if not self.may_act(found[0], found[2]):
                 return _halt(here, None)
@@ -358,12 +360,12 @@ class KrlMachine(TaskMachine):
     # Interrupts and triggers.
 
     def _declare(
-        self, context: CallContext, row: int, one: said.InterruptDeclared, here: Arrived
+        self, context: Context, row: int, one: said.InterruptDeclared, here: Arrived
     ) -> Arrived:
         """Declare an interrupt; one that nothing switches on may be on already."""
-        self._met.add((context.scope.file, row))
-        effects = self._effects_of(context.scope.file, one.action)
-        self._call_beside(context.scope.file, one.action)
+        self._met.add((context.place.scope.file, row))
+        effects = self._effects_of(context.place.scope.file, one.action)
+        self._call_beside(context.place.scope.file, one.action)
         modes, number = here.modes, self._number_of(context, row, one.number)
         others = frozenset(d for d in modes.declared if d[0] != number)
         modes = replace(modes, declared=others)
@@ -427,7 +429,7 @@ class KrlMachine(TaskMachine):
 
     def _in_routines(
         self,
-    ) -> Iterator[tuple[int, HeadedRows, int, said.SourceStatement]]:
+    ) -> Iterator[tuple[int, HeadedRows, int, ir.SourceStatement]]:
         """Yield what routines say of interrupts: file, routine, row."""
         for file, text in self._robot_texts():
             for routine in self.task.files[file].routines:
@@ -435,11 +437,11 @@ class KrlMachine(TaskMachine):
                 for row in rows:
                     yield file, routine, row, text.statement(row)
 
-    def at_return(self, context: CallContext, here: Arrived) -> Arrived:
+    def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Allow for a RESUME in the routine, see `TaskMachine.at_return`."""
         ending = {own for own in here.modes.declared if own[1] == _ENDED}
         numbers = {number for number, _ in ending}
-        at = context.scope.file, context.routine
+        at = context.place.scope.file, context.place.routine
         active = bool(ending & here.modes.active)
         if not ending or not (active or self._may_switch(*at, numbers)):
             return here
@@ -450,17 +452,21 @@ class KrlMachine(TaskMachine):
 
     def _may_switch(self, file: int, routine: HeadedRows, numbers: set[int]) -> bool:
         """Return True if a routine, or one that it calls, switches interrupts."""
-        waiting, seen = [(file, routine)], set[tuple[int, int]]()
         numbers = numbers | {EVERY}
         switching = {(k, r.first) for k, r, own, _ in self._switches if own in numbers}
-        while waiting:
-            at, one = waiting.pop()
-            if (at, one.first) in switching:
-                return True
-            if (at, one.first) not in seen:
-                seen.add((at, one.first))
-                waiting += self._direct(at, one)[1]
-        return False
+        return any(
+            (at, one.first) in switching for at, one in self._reach(file, routine)
+        )
+
+    def _reach(
+        self, file: int, routine: HeadedRows
+    ) -> Iterator[tuple[int, HeadedRows]]:
+        """Yield a routine and all that it may come to call."""
+        return reach(
+            [(file, routine)],
+            lambda one: self._direct(*one)[1],
+            lambda one: (one[0], one[1].first),
+        )
 
     @cached_property
     def _still_enabled(self) -> set[int]:
@@ -488,9 +494,9 @@ class KrlMachine(TaskMachine):
         return False
 
     def _switch(
-        self, context: CallContext, row: int, one: said.InterruptSwitched, here: Arrived
+        self, context: Context, row: int, one: said.InterruptSwitched, here: Arrived
     ) -> Arrived:
-        self._met.add((context.scope.file, row))
+        self._met.add((context.place.scope.file, row))
         modes, number = here.modes, self._number_of(context, row, one.number)
         if one.word == "on":
             meant = {
@@ -531,11 +537,9 @@ class KrlMachine(TaskMachine):
                 found[k] = found.get(k, frozenset()) | {why}
         return found
 
-    def _number_of(
-        self, context: CallContext, row: int, operand: said.Operand | None
-    ) -> int:
+    def _number_of(self, context: Context, row: int, operand: ir.Operand | None) -> int:
         """Return the number of an interrupt, EVERY where it is not known."""
-        number = whole(self.number(operand, row, context.scope))
+        number = whole(self.number(operand, row, context.place.scope))
         return EVERY if number is None else number
 
     @cached_property
@@ -552,33 +556,33 @@ class KrlMachine(TaskMachine):
         return found
 
     def _trigger(
-        self, context: CallContext, one: said.PathTrigger, here: Arrived
+        self, context: Context, one: said.PathTrigger, here: Arrived
     ) -> Arrived:
         """Leave what comes behind a trigger that may set what moves need.
 
         What it does comes at some time in the next move, when the program is ahead.
         """
-        if not self._effects_of(context.scope.file, one.action):
+        if not self._effects_of(context.place.scope.file, one.action):
             return here
-        self._call_beside(context.scope.file, one.action)
+        self._call_beside(context.place.scope.file, one.action)
         return replace(
             here, modes=here.modes.with_(blocked=here.modes.blocked | {_INTERRUPT})
         )
 
-    def _call_beside(self, file: int, action: said.SourceStatement) -> None:
+    def _call_beside(self, file: int, action: ir.SourceStatement) -> None:
         """Note the routines that an interrupt or a trigger calls."""
         for called in self.calls_of(file, action):
             self.run_beside(*called)
 
     def calls_of(
-        self, file: int, one: said.SourceStatement
+        self, file: int, one: ir.SourceStatement
     ) -> list[tuple[int, HeadedRows]]:
         """Return the routines that a statement calls, see `TaskMachine`."""
         called = list[tuple[int, HeadedRows]]()
         self._own(file, one, called)
         return called
 
-    def changes_of(self, one: said.SourceStatement) -> Iterator[str]:
+    def changes_of(self, one: ir.SourceStatement) -> Iterator[str]:
         """Yield the names of data that a statement changes, see `TaskMachine`."""
         yield from (data.name for data in list_changes(one, self.task.routines))
 
@@ -642,16 +646,8 @@ class KrlMachine(TaskMachine):
 
     def _routine_effects(self, file: int, routine: HeadedRows) -> frozenset[str]:
         """Collect what a routine may do, and all that it calls."""
-        found: set[str] = set()
-        waiting, seen = [(file, routine)], set[tuple[int, int]]()
-        while waiting:
-            at, one = waiting.pop()
-            if (at, one.first) not in seen:
-                seen.add((at, one.first))
-                effects, called = self._direct(at, one)
-                found |= effects
-                waiting += called
-        return frozenset(found)
+        found = (self._direct(*one)[0] for one in self._reach(file, routine))
+        return frozenset().union(*found)
 
     def _direct(self, file: int, routine: HeadedRows) -> _Effects:
         """Collect what the statements of a routine do, and which routines they call."""
@@ -663,7 +659,7 @@ class KrlMachine(TaskMachine):
             self._known[key] = frozenset().union(*parts), called
         return self._known[key]
 
-    def _effects_of(self, file: int, one: said.SourceStatement) -> frozenset[str]:
+    def _effects_of(self, file: int, one: ir.SourceStatement) -> frozenset[str]:
         """Collect what a statement may do: move or set what moves need, end a move."""
         called = list[tuple[int, HeadedRows]]()
         found = [self._own(file, one, called)]
@@ -673,12 +669,12 @@ class KrlMachine(TaskMachine):
     def _own(
         self,
         file: int,
-        one: said.SourceStatement,
+        one: ir.SourceStatement,
         called: list[tuple[int, HeadedRows]],
     ) -> frozenset[str]:
         """Collect what a statement does itself, and note the routines that it calls."""
         match one:
-            case said.KrlMove() | said.SplineBlock() | said.NotUnderstood():
+            case said.KrlMove() | said.SplineBlock() | ir.NotUnderstood():
                 return frozenset([MOVES])
             case said.InterruptSwitched(word=word) if word in (BRAKES, RESUMES):
                 return frozenset([word])
@@ -688,9 +684,9 @@ class KrlMachine(TaskMachine):
         if any(_is_modal(target.name) for target in changed):
             return frozenset([MOVES])
         here = Scope(file, self.task.files[file].name, "")
-        parts = parts_of(operands_of(one))
-        names = [p.name for p in parts if isinstance(p, said.FunctionCall)]
-        if isinstance(one, said.Instruction):
+        parts = ir.walk(*operands_of(one))
+        names = [p.name for p in parts if isinstance(p, ir.FunctionCall)]
+        if isinstance(one, ir.Instruction):
             names.append(one.name)
         moves = False
         for name in names:
@@ -707,12 +703,12 @@ class KrlMachine(TaskMachine):
         return known or listed
 
 
-def _is_interrupt(one: said.SourceStatement) -> bool:
+def _is_interrupt(one: ir.SourceStatement) -> bool:
     """Return True if a statement declares or switches interrupts."""
     return isinstance(one, said.InterruptDeclared | said.InterruptSwitched)
 
 
-def _is_beside(one: said.SourceStatement) -> bool:
+def _is_beside(one: ir.SourceStatement) -> bool:
     """Return True if a statement says what is done at another time."""
     return isinstance(one, said.InterruptDeclared | said.PathTrigger)
 

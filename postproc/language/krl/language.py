@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing
+from postproc.language import ir
 from postproc.language.archive import Archive
 from postproc.language.blocks import read_once
 from postproc.language.grammars import line_parser
@@ -208,19 +209,19 @@ def _refuse_doubles(files: Sequence[KrlFile]) -> None:
                 raise ProgramError(name, problem, cure, line=lines[1])
 
 
-def _switches_on(one: said.SourceStatement) -> str:
+def _switches_on(one: ir.SourceStatement) -> str:
     """Name what a statement switches the accuracy model on with, "" if it does not."""
     match one:
         case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
             return _switches_on(action)
-        case said.Assignment(target=said.DataObject(name=name), value=value):
+        case ir.Assignment(target=ir.DataObject(name=name), value=value):
             if name in _ACCURACY and not _is_one_of(value, _ACCURACY[name]):
                 return name
     return ""
 
 
-def _is_one_of(value: said.Operand, words: Sequence[str]) -> bool:
+def _is_one_of(value: ir.Operand, words: Sequence[str]) -> bool:
     match value:
-        case said.EnumValue(name=word) | said.DataObject(name=word, steps=()):
+        case said.EnumValue(name=word) | ir.DataObject(name=word, steps=()):
             return word in words
     return False

@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any
 
 from postproc.diagnostics import Code, Reason
+from postproc.language import ir
 from postproc.language.assigned_points import Scope
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import (
@@ -34,7 +35,6 @@ from postproc.language.krl.symbols import (
     KrlTask,
     KrlValue,
     is_word,
-    parts_of,
 )
 from postproc.language.visits import OrientationLaw
 from postproc.robot.pose import MM
@@ -265,18 +265,18 @@ class ModeReader:
     row: int
     here: Scope
 
-    def assign(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
+    def assign(self, modes: KrlModes, one: ir.Assignment) -> KrlModes | None:
         """Carry out ``$name = value``, None where nobody knows what that does."""
         found = self._assign(modes, one)
         return None if found is None else found.beside(self.task)
 
-    def _assign(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
+    def _assign(self, modes: KrlModes, one: ir.Assignment) -> KrlModes | None:
         """Carry an assignment out where nothing runs beside the program."""
-        parts = parts_of([one.value])
-        called = [part.name for part in parts if isinstance(part, said.FunctionCall)]
+        parts = ir.walk(one.value)
+        called = [part.name for part in parts if isinstance(part, ir.FunctionCall)]
         own = next((name for name in called if name in self.task.routines), "")
         if own:  # it gives a value, and is not followed
-            one = replace(one, value=said.FunctionCall(f"{own} of the files", ()))
+            one = replace(one, value=ir.FunctionCall(f"{own} of the files", ()))
         name, value = one.target.name, one.value
         match name:
             case "$tool" | "$base":
@@ -318,7 +318,7 @@ class ModeReader:
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
 
-    def _frame(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+    def _frame(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``$TOOL = ..``, ``$BASE = ..``, or a component of them."""
         which = one.target.name[1:]
         if one.target.steps:
@@ -336,7 +336,7 @@ class ModeReader:
             self.task, self.row, self.here, modes.tool, modes.base, modes.store
         )
 
-    def _entry(self, modes: KrlModes, one: said.Assignment) -> KrlStore:
+    def _entry(self, modes: KrlModes, one: ir.Assignment) -> KrlStore:
         """``BASE_DATA[20] = {..}``: known where the entry and all of it are known."""
         table, store = one.target.name, modes.store
         index = None
@@ -357,14 +357,14 @@ class ModeReader:
         return store.with_(key, value)
 
     def _component(
-        self, held: object, parts: Sequence[str | said.ElementStep], value: said.Operand
+        self, held: object, parts: Sequence[str | ir.ElementStep], value: ir.Operand
     ) -> KrlFrame | KrlRecord | None:
         """Set a component of a frame, None where what it then is is not known."""
         if len(parts) != 1 or not isinstance(parts[0], str):
             return None
         return set_component(held, parts[0], self._number(value))
 
-    def _entry_value(self, modes: KrlModes, one: said.Assignment) -> object | None:
+    def _entry_value(self, modes: KrlModes, one: ir.Assignment) -> object | None:
         """Read the frame that an entry gets, or the mass of a load."""
         if one.target.name == "load_data":
             load = load_of(self._record(one.value))
@@ -372,7 +372,7 @@ class ModeReader:
         found = self.frames(modes).frame(one.value)
         return None if found.why or not found.pose else found
 
-    def _correction(self, modes: KrlModes, one: said.Assignment) -> KrlStore:
+    def _correction(self, modes: KrlModes, one: ir.Assignment) -> KrlStore:
         """``M_BASE_CORR = {..}``, ``M_BAS_COR_ON = TRUE``."""
         name, value = one.target.name, None
         if one.target.steps or not self.task.is_global(name, self.here):
@@ -383,7 +383,7 @@ class ModeReader:
         found = self.frames(modes).frame(one.value)
         return modes.store.with_(name, None if found.why else found)
 
-    def _hold_component(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+    def _hold_component(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``FDAT_ACT = FP1``; of a component: the others stay what they were."""
         name = one.target.name.removesuffix("_act")
         own = not self.task.is_global(one.target.name, self.here)
@@ -392,31 +392,31 @@ class ModeReader:
         found = self.task.value(one.value, self.row, self.here)
         return modes.with_(**{name: found})
 
-    def _number(self, operand: said.Operand | None) -> float:
+    def _number(self, operand: ir.Operand | None) -> float:
         return self.task.number(operand, self.row, self.here)
 
-    def _argument(self, operand: said.Operand, at: int = 0) -> said.Operand | None:
+    def _argument(self, operand: ir.Operand, at: int = 0) -> ir.Operand | None:
         """Return an argument of a function, None where it is not there."""
-        if not isinstance(operand, said.FunctionCall):
+        if not isinstance(operand, ir.FunctionCall):
             return None
         given = operand.arguments
         return given[at].value if at < len(given) else None
 
-    def _record(self, operand: said.Operand | None) -> KrlRecord:
+    def _record(self, operand: ir.Operand | None) -> KrlRecord:
         found = self.task.value(operand, self.row, self.here)
         return found if isinstance(found, KrlRecord) else KrlRecord((), whole=False)
 
-    def _word(self, operand: said.Operand, field: str) -> str:
+    def _word(self, operand: ir.Operand, field: str) -> str:
         """Read ``#BASE``, or what ``SIPO_MODE(FP1.IPO_FRAME)`` gives, "" if unknown."""
         found = self.task.value(operand, self.row, self.here)
-        if isinstance(operand, said.FunctionCall):
+        if isinstance(operand, ir.FunctionCall):
             inside = self._argument(operand)
             found = self.task.value(inside, self.row, self.here)
             if isinstance(found, KrlRecord):
                 found = found.get(field)
         return found.lower() if isinstance(found, str) else ""
 
-    def _goes_through(self, one: said.Assignment) -> bool:
+    def _goes_through(self, one: ir.Assignment) -> bool:
         """Tell whether both points of an arc have the orientation that they say."""
         found = self._record(one.value)
         if one.target.steps:
@@ -427,7 +427,7 @@ class ModeReader:
             for way in ways
         )
 
-    def _speed(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+    def _speed(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``$VEL.CP``, ``$VEL_AXIS[i]``, ``$APO.CDIS``, all of ``$VEL`` or ``$APO``."""
         name, step = one.target.name, (*one.target.steps, "")[0]
         number = number_or_unknown(self._number(one.value))
@@ -436,7 +436,7 @@ class ModeReader:
                 return replace(modes, speed=number)
             case "$vel", "":
                 return replace(modes, speed=self._path_speed(one.value))
-            case "$vel_axis", said.ElementStep():
+            case "$vel_axis", ir.ElementStep():
                 inside = self._argument(one.value)
                 percent = (
                     number
@@ -452,15 +452,15 @@ class ModeReader:
                 return self._blending(modes, one.value)
         return modes
 
-    def _path_speed(self, operand: said.Operand) -> float:
+    def _path_speed(self, operand: ir.Operand) -> float:
         """Read ``SVEL_CP(2, , LCPDAT1)`` or ``{CP 2.0, ..}`` [m/s]."""
-        if isinstance(operand, said.FunctionCall):
+        if isinstance(operand, ir.FunctionCall):
             return number_or_unknown(self._number(self._argument(operand)))
         return number_or_unknown(self._record(operand).number("cp"))
 
-    def _blending(self, modes: KrlModes, operand: said.Operand) -> KrlModes:
+    def _blending(self, modes: KrlModes, operand: ir.Operand) -> KrlModes:
         """Read ``SAPO(LCPDAT1)``, ``SAPO_PTP(PPDAT1)`` or ``{CDIS 5.0, ..}``."""
-        if isinstance(operand, said.FunctionCall):
+        if isinstance(operand, ir.FunctionCall):
             held = self._record(self._argument(operand))
             return replace(modes, distance=number_or_unknown(held.number("apo_dist")))
         found = self._record(operand)
@@ -470,9 +470,9 @@ class ModeReader:
             overlap=number_or_unknown(found.number("cptp")),
         )
 
-    def _load(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+    def _load(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``$LOAD = LOAD_DATA[n]``, ``$LOAD = SLOAD(n)``, ``$LOAD.M = 50``."""
-        operand: said.Operand | None = one.value
+        operand: ir.Operand | None = one.value
         match one.target.steps, operand:
             case ("m",), _:
                 mass, centre = self._number(operand), modes.load[1:]
@@ -484,11 +484,9 @@ class ModeReader:
                 return replace(modes, load=load)
             case ("cm", *_), _:
                 return replace(modes, load=LOST_LOAD)
-            case (), said.FunctionCall(name="sload"):
+            case (), ir.FunctionCall(name="sload"):
                 return self.take_load(modes, self._number(self._argument(operand)))
-            case (), said.DataObject(
-                name="load_data", steps=(said.ElementStep() as step,)
-            ):
+            case (), ir.DataObject(name="load_data", steps=(ir.ElementStep() as step,)):
                 index = self.task.index(step, self.row, self.here) or (math.nan,)
                 return self.take_load(modes, index[0])
             case (), _:
@@ -516,11 +514,11 @@ class ModeReader:
 
     # BAS(#command, value), as the controller's bas.src carries it out.
 
-    def bas(self, modes: KrlModes, arguments: Sequence[said.Argument]) -> KrlModes:
+    def bas(self, modes: KrlModes, arguments: Sequence[ir.Argument]) -> KrlModes:
         """Carry out ``BAS(#command, value)``."""
         return self._bas(modes, arguments).beside(self.task)
 
-    def _bas(self, modes: KrlModes, arguments: Sequence[said.Argument]) -> KrlModes:
+    def _bas(self, modes: KrlModes, arguments: Sequence[ir.Argument]) -> KrlModes:
         """Carry a command out where nothing runs beside the program."""
         command = arguments[0].value if arguments else None
         word = command.name if isinstance(command, said.EnumValue) else ""
@@ -583,11 +581,11 @@ class ModeReader:
     @property
     def _default_circle(self) -> str:
         """Return ``DEF_CIRC_TYP`` of ``$config.dat``, "" where it is not known."""
-        return self._word(said.DataObject("def_circ_typ"), "")
+        return self._word(ir.DataObject("def_circ_typ"), "")
 
     def _default(self, name: str) -> float:
         """Return a number of ``$config.dat``, NaN where it is not known."""
-        return self._number(said.DataObject(name))
+        return self._number(ir.DataObject(name))
 
     def _frames(self, modes: KrlModes) -> KrlModes:
         """Take the frames of FDAT_ACT, and the load of its tool."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language import ir
 from postproc.language.assigned_points import (
     NO_POINTS,
     AssignedPoint,
@@ -228,7 +229,7 @@ def own_numbers(move: said.KrlMove) -> list[int] | None:
     if not isinstance(to, said.KrlAggregate):
         return None
     slots = {one.name: one.value.slot for one in to.fields
-             if isinstance(one.value, said.Num)}  # fmt: skip
+             if isinstance(one.value, ir.Num)}  # fmt: skip
     if len(slots) != len(to.fields) or not slots.keys() >= {*PLACE}:
         return None
     return [slots[name] for name in PLACE]
@@ -251,29 +252,29 @@ class _Goal:
     def _by_joints(self) -> bool:
         return motion_of(self.move.word) == Motion.JOINT
 
-    def end(self, operand: said.Operand) -> FoundGoal:
+    def end(self, operand: ir.Operand) -> FoundGoal:
         """Read a destination."""
         if self.move.word.endswith("_rel"):
             return self._step(operand)
         match operand:
-            case said.DataObject(name=name) if name in PRESENT:
+            case ir.DataObject(name=name) if name in PRESENT:
                 return self._stay(name)
-            case said.DataObject(name=name) if name in BEFORE:
+            case ir.DataObject(name=name) if name in BEFORE:
                 return _unknown_goal(no_target(RUN_TIME), name=name)
-            case said.DataObject(name=name) if name in HOMES:
+            case ir.DataObject(name=name) if name in HOMES:
                 return self._home(operand)
-            case said.Operation(operator=":", operands=(first, second)):
+            case ir.Operation(operator=":", operands=(first, second)):
                 return self._product(first, second)
-            case said.KrlAggregate() | said.DataObject():
+            case said.KrlAggregate() | ir.DataObject():
                 return self._point(operand)
-            case said.FunctionCall():
+            case ir.FunctionCall():
                 return self._read_returned(operand)
             case _:
                 return _unknown_goal(AT_RUN_TIME)
 
     # Points.
 
-    def _read_returned(self, call: said.FunctionCall) -> FoundGoal:
+    def _read_returned(self, call: ir.FunctionCall) -> FoundGoal:
         """Read what a function of the files returns: its numbers stay."""
         returned = self.task.find_returned(call, self.row, self.here)
         if returned is None:
@@ -286,12 +287,12 @@ class _Goal:
             found, "", why, found.pins or text, found.target, found.values, found.aux
         )
 
-    def _point(self, operand: said.KrlAggregate | said.DataObject) -> FoundGoal:
+    def _point(self, operand: said.KrlAggregate | ir.DataObject) -> FoundGoal:
         """Read a point that is written or named."""
         held = self.task.find_held(operand, self.row, self.here)
         if held is not None:
             return self._read_held(held)
-        name = operand.name if isinstance(operand, said.DataObject) else ""
+        name = operand.name if isinstance(operand, ir.DataObject) else ""
         found = self.task.value(operand, self.row, self.here)
         if not isinstance(found, KrlRecord) or not found.whole:
             return _unknown_goal(
@@ -311,11 +312,11 @@ class _Goal:
         there = replace(self, row=held.row, here=held.scope)
         goal = _unknown_goal(AT_RUN_TIME)
         match held.operand:
-            case said.KrlAggregate() | said.DataObject():
+            case said.KrlAggregate() | ir.DataObject():
                 goal = there._point(held.operand)
-            case said.Operation(operator=":", operands=(first, second)):
+            case ir.Operation(operator=":", operands=(first, second)):
                 goal = there._product(first, second)
-            case said.FunctionCall():
+            case ir.FunctionCall():
                 goal = there._read_returned(held.operand)
         why = [self._explain_pinned(place[-1], goal) for place in held.chain]
         why += [
@@ -369,9 +370,9 @@ class _Goal:
         code, text = self.task.explain_unknown(name, self.here)
         return Reason(code, f"{name} {text}")
 
-    def _describe_point(self, goal: FoundGoal, operand: said.Operand) -> FoundGoal:
+    def _describe_point(self, goal: FoundGoal, operand: ir.Operand) -> FoundGoal:
         """Say what is known of a point beside its numbers."""
-        name = operand.name if isinstance(operand, said.DataObject) else ""
+        name = operand.name if isinstance(operand, ir.DataObject) else ""
         declared = self.task.datum(name, self.here)
         shared = declared is not None and declared[1].shared
         return FoundGoal(
@@ -389,9 +390,9 @@ class _Goal:
             return f"{name} is used otherwise than as a destination too"
         return ""
 
-    def _element(self, operand: said.Operand) -> str:
+    def _element(self, operand: ir.Operand) -> str:
         """Spell which element of an array is meant, "" where it is none."""
-        steps = operand.steps if isinstance(operand, said.DataObject) else ()
+        steps = operand.steps if isinstance(operand, ir.DataObject) else ()
         for step in steps:
             index = self.task.index(step, self.row, self.here)
             return "" if index is None else f"[{','.join(map(str, index))}]"
@@ -479,7 +480,7 @@ class _Goal:
         why = no_target("it stays where it is")
         return FoundGoal(meaning, (0.0,) * WIDTH, name=name, why=why)
 
-    def _home(self, operand: said.DataObject) -> FoundGoal:
+    def _home(self, operand: ir.DataObject) -> FoundGoal:
         """Read a home position: it holds no target of a process."""
         name = operand.name
         stated = name in self.task.written or self.task.place(name, self.here)
@@ -492,14 +493,14 @@ class _Goal:
 
     # Products of frames: the point is moved along.
 
-    def _product(self, first: said.Operand, second: said.Operand) -> FoundGoal:
+    def _product(self, first: ir.Operand, second: ir.Operand) -> FoundGoal:
         """Read ``point : {..}`` (a shift in the point's own frame) or ``{..} : point``.
 
         What is on the right tells what comes out: a frame has no S and T.
         """
-        behind = isinstance(first, said.DataObject) and self._is_point(first)
+        behind = isinstance(first, ir.DataObject) and self._is_point(first)
         point, other = (first, second) if behind else (second, first)
-        if not isinstance(point, said.DataObject):
+        if not isinstance(point, ir.DataObject):
             return _unknown_goal(AT_RUN_TIME)
         base = self._point(point)
         holds = base.holds | self._find_own_shift(other)
@@ -537,14 +538,14 @@ class _Goal:
             holds=holds if found.slots[0] < 0 else base.holds,
         )  # fmt: skip
 
-    def _find_own_shift(self, other: said.Operand) -> set[tuple[int, int]]:
+    def _find_own_shift(self, other: ir.Operand) -> set[tuple[int, int]]:
         """Return where the numbers of a shift begin that stand in the move itself."""
         value = self.task.value(other, self.row, self.here)
         numbers = _numbers(value, PLACE) if isinstance(value, KrlRecord) else None
         file, slots = _places(numbers or ())
         return {(file, slots[0])} if file == self.here.file and slots else set()
 
-    def _outside_of(self, base: FoundGoal, other: said.Operand) -> tuple[float, ...]:
+    def _outside_of(self, base: FoundGoal, other: ir.Operand) -> tuple[float, ...]:
         """Return the external axes of ``point : other``: those that stand on the right.
 
         A frame says nothing of them: they stay where they are, wherever the point has
@@ -556,7 +557,7 @@ class _Goal:
         return tuple(b if math.isnan(a) and b != 0.0 else a for a, b in pairs)
 
     def _shift(
-        self, base: FoundGoal, other: said.Operand, frame: KrlFrame, behind: bool
+        self, base: FoundGoal, other: ir.Operand, frame: KrlFrame, behind: bool
     ) -> FoundShift:
         """Say how a point is shifted, and where the numbers of that stand.
 
@@ -580,14 +581,14 @@ class _Goal:
             return ""
         return "it stands in a system file, which is read and not rewritten"
 
-    def _is_point(self, operand: said.DataObject) -> bool:
+    def _is_point(self, operand: ir.DataObject) -> bool:
         """Tell whether data is a position, and no frame."""
         found = self.task.datum(operand.name, self.here)
         return found is not None and found[1].type in POSITIONS
 
     # Steps.
 
-    def _step(self, operand: said.Operand) -> FoundGoal:
+    def _step(self, operand: ir.Operand) -> FoundGoal:
         """Read ``LIN_REL {X 10}``, ``PTP_REL {A1 5}``: a step from where the arm is."""
         found = self.task.value(operand, self.row, self.here)
         if not isinstance(operand, said.KrlAggregate) or not isinstance(

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from postproc.language.control_flow import EXIT
+from postproc.language import ir
+from postproc.language.analysis.control_flow import EXIT
 from postproc.language.krl import syntax as said
 from postproc.language.template_parser import Children, FormParser, Word
 
@@ -63,9 +64,9 @@ def _build_declaration(c: Children) -> said.KrlDeclaration:
     return said.KrlDeclaration(type_, items, "global" in flags, "const" in flags)
 
 
-def _build_builtin(c: Children) -> said.SourceStatement:
+def _build_builtin(c: Children) -> ir.SourceStatement:
     found = _build_declaration(c)
-    return found if found.type in _BUILT_IN else said.NotUnderstood()
+    return found if found.type in _BUILT_IN else ir.NotUnderstood()
 
 
 def _item(c: Children) -> said.DeclaredItem:
@@ -76,31 +77,31 @@ def _item(c: Children) -> said.DeclaredItem:
     return said.DeclaredItem(_low(name), dimensions, value)
 
 
-def _branch(word: str) -> Callable[[Children], said.Branch]:
-    return lambda c: said.Branch(word, tuple(c))
+def _branch(word: str) -> Callable[[Children], ir.Branch]:
+    return lambda c: ir.Branch(word, tuple(c))
 
 
-def _for(c: Children) -> said.ForLoop:
-    return said.ForLoop(_low(c[0]), c[1], c[2], c[3] if len(c) > 3 else None)
+def _for(c: Children) -> ir.ForLoop:
+    return ir.ForLoop(_low(c[0]), c[1], c[2], c[3] if len(c) > 3 else None)
 
 
 _WORDS = {"endswitch": "endtest"}  # as neutral flow calls it
 
 
-def _block_word(c: Children) -> said.BlockWord:
+def _block_word(c: Children) -> ir.BlockWord:
     word = _low(c[0])
-    return said.BlockWord(_WORDS.get(word, word))
+    return ir.BlockWord(_WORDS.get(word, word))
 
 
-def _operation(c: Children) -> said.Operation:
+def _operation(c: Children) -> ir.Operation:
     operator = next(x for x in c if isinstance(x, Word))
     operands = tuple(x for x in c if not isinstance(x, Word))
-    return said.Operation(str(operator).upper(), operands)
+    return ir.Operation(str(operator).upper(), operands)
 
 
 def _move(c: Children) -> said.KrlMove:
     word = next(_low(x) for x in c if isinstance(x, Word))
-    operands = [x for x in c if isinstance(x, said.Operand)]
+    operands = [x for x in c if isinstance(x, ir.Operand)]
     arc = word.split("_")[0] in ("circ", "scirc")
     via, to = operands[:2] if arc else (None, operands[0])
     angle = operands[2] if arc and len(operands) > 2 else None
@@ -108,20 +109,20 @@ def _move(c: Children) -> said.KrlMove:
 
 
 def _build_switch(c: Children) -> said.InterruptSwitched:
-    number = next((x for x in c if isinstance(x, said.Operand)), None)
+    number = next((x for x in c if isinstance(x, ir.Operand)), None)
     return said.InterruptSwitched(_low(c[0]), number)
 
 
 def _trigger(c: Children) -> said.PathTrigger:
-    action = next(x for x in c if isinstance(x, said.SourceStatement))
-    return said.PathTrigger(action, tuple(x for x in c if isinstance(x, said.Operand)))
+    action = next(x for x in c if isinstance(x, ir.SourceStatement))
+    return said.PathTrigger(action, tuple(x for x in c if isinstance(x, ir.Operand)))
 
 
 def _blends(c: Children) -> tuple[str, ...]:
     return tuple(str(x) for x in c if isinstance(x, BlendPart))
 
 
-def _settings(c: Children) -> tuple[said.Assignment, ...]:
+def _settings(c: Children) -> tuple[ir.Assignment, ...]:
     return tuple(one for x in c if type(x) is tuple for one in x)
 
 
@@ -129,7 +130,7 @@ def _spline(c: Children) -> said.SplineBlock:
     return said.SplineBlock(_low(c[0]), _blends(c), _settings(c))
 
 
-def _build_call(make: Callable[[str, tuple[said.Argument, ...]], Any]) -> Any:
+def _build_call(make: Callable[[str, tuple[ir.Argument, ...]], Any]) -> Any:
     def build(c: Children) -> Any:
         given = c[1]
         if len(given) == 1 and given[0].value is None:
@@ -155,7 +156,7 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "procedure": _routine("def"),
     "function": _routine("deffct"),
     "data_list": lambda c: said.DataList(_low(c[0]), bool(_tokens(c, "PUBLIC"))),
-    "end": lambda c: said.BlockWord(_low(c[0])),
+    "end": lambda c: ir.BlockWord(_low(c[0])),
     "type": lambda c: TypePart(_low(c[0])),
     "parameters": lambda c: tuple(c),
     "parameter": lambda c: _tokens(c, "NAME")[0],
@@ -173,11 +174,11 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "switch": _branch("test"),
     "case": _branch("case"),
     "default": _branch("default"),
-    "label": lambda c: said.LabelMark(_low(c[0])),
+    "label": lambda c: ir.LabelMark(_low(c[0])),
     "block_word": _block_word,
-    "exit_loop": lambda c: said.Leave(EXIT),
-    "goto": lambda c: said.JumpTo(_low(c[0])),
-    "return_value": lambda c: said.Leave("return", *c),
+    "exit_loop": lambda c: ir.Leave(EXIT),
+    "goto": lambda c: ir.JumpTo(_low(c[0])),
+    "return_value": lambda c: ir.Leave("return", *c),
     "halt": lambda c: said.Waiting(),
     "continue_": lambda c: said.ContinueWord(),
     "wait": lambda c: said.Waiting(c[0]),
@@ -195,23 +196,23 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "spline_end": _spline,
     "blend": lambda c: BlendPart(_low(c[0])),
     "settings": lambda c: tuple(c),
-    "setting": lambda c: said.Assignment(*c),
-    "assignment": lambda c: said.Assignment(*c),
-    "proceed": lambda c: said.Instruction("on_error_proceed", ()),
-    "instruction": _build_call(said.Instruction),
+    "setting": lambda c: ir.Assignment(*c),
+    "assignment": lambda c: ir.Assignment(*c),
+    "proceed": lambda c: ir.Instruction("on_error_proceed", ()),
+    "instruction": _build_call(ir.Instruction),
     "arguments": lambda c: tuple(c),
-    "argument": lambda c: said.Argument(c[0] if c else None),
+    "argument": lambda c: ir.Argument(c[0] if c else None),
     "infix": _operation,
     "prefix": _operation,
     "number": lambda c: c[0],
-    "string": lambda c: said.StringLiteral(str(c[0])),
+    "string": lambda c: ir.StringLiteral(str(c[0])),
     "enumerated": lambda c: said.EnumValue(_low(c[0])),
-    "function_call": _build_call(said.FunctionCall),
+    "function_call": _build_call(ir.FunctionCall),
     "aggregate": _aggregate,
     "field": _field,
-    "reference": lambda c: said.DataObject(_low(c[0]), tuple(c[1:])),
+    "reference": lambda c: ir.DataObject(_low(c[0]), tuple(c[1:])),
     "component": lambda c: _low(c[0]),
-    "element": lambda c: said.ElementStep(tuple(c[0])),
+    "element": lambda c: ir.ElementStep(tuple(c[0])),
     "subscripts": SubscriptPart,
 }
 
@@ -239,7 +240,7 @@ _PARSER = FormParser("krl", RULES, RESERVED, LONGEST, DEEPEST)
 
 
 @lru_cache(maxsize=8192)
-def parse_statement(form: str) -> said.SourceStatement:
+def parse_statement(form: str) -> ir.SourceStatement:
     """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
     words = form.lower().split(" ", 2)
     if words[0] == "global" and len(words) > 1:
@@ -247,4 +248,4 @@ def parse_statement(form: str) -> said.SourceStatement:
     if words[0] in _NAMES_ONLY and len(words) > 1:
         return said.OutsideName()
     found = _PARSER.parse(form)
-    return found if isinstance(found, said.SourceStatement) else said.NotUnderstood()
+    return found if isinstance(found, ir.SourceStatement) else ir.NotUnderstood()

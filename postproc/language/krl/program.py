@@ -8,8 +8,9 @@ from functools import cached_property
 
 from postproc.diagnostics import Code
 from postproc.files import base_name
+from postproc.language import ir
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.blocks import BlockWords, Outline
-from postproc.language.control_flow import HeadedRows
 from postproc.language.krl import syntax as said
 from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.statements import KrlText, read_krl_statements
@@ -48,11 +49,11 @@ class KrlDatum:
     name: str
     index: tuple[int, ...]
     type: str
-    value: said.Operand | None
+    value: ir.Operand | None
     row: int
     routine: str
     shared: bool
-    dimensions: tuple[said.Operand, ...] = ()
+    dimensions: tuple[ir.Operand, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -139,15 +140,15 @@ class _KrlReader:
     diagnostics: list[Diagnostic] = field(default_factory=list)
     _spline: int = -1
 
-    def take(self, row: int, one: said.SourceStatement) -> None:
+    def take(self, row: int, one: ir.SourceStatement) -> None:
         """Take the next statement."""
         match one:
             case said.KrlDeclaration():
                 self._declare(row, one)
-            case said.Assignment(target=target, value=value):
+            case ir.Assignment(target=target, value=value):
                 if self.outline.name("defdat"):
                     self._initial(row, target, value)
-            case said.NotUnderstood():
+            case ir.NotUnderstood():
                 message = f"{self.text.quote(row)} is not understood"
                 self.diagnostics.append(
                     self.text.diagnostic(row, Code.UNKNOWN_STATEMENT, message)
@@ -155,18 +156,18 @@ class _KrlReader:
             case _:
                 self._block(row, one)
 
-    def _block(self, row: int, one: said.SourceStatement) -> None:
+    def _block(self, row: int, one: ir.SourceStatement) -> None:
         """Open, divide or end a block."""
         match one:
             case said.KrlRoutine(kind=kind):
                 self.outline.begin(kind, row, one)
             case said.DataList():
                 self.outline.begin("defdat", row, one)
-            case said.ForLoop():
+            case ir.ForLoop():
                 self.outline.open("for", row, one)
-            case said.Branch(word=word) if word in OPENING:
+            case ir.Branch(word=word) if word in OPENING:
                 self.outline.open(word, row, one)
-            case said.Branch(word=word) | said.BlockWord(word=word):
+            case ir.Branch(word=word) | ir.BlockWord(word=word):
                 self.outline.word(word, row)
             case said.SplineBlock(word="endspline"):
                 self.outline.word("endspline", row)
@@ -192,21 +193,21 @@ class _KrlReader:
             )
             self.data.append(datum)
 
-    def _initial(self, row: int, target: said.DataObject, value: said.Operand) -> None:
+    def _initial(self, row: int, target: ir.DataObject, value: ir.Operand) -> None:
         """Take the value that a data list gives to data, or to an element."""
         index = self._index(row, target.steps)
         if index is not None:
             self.data.append(KrlDatum(target.name, index, "", value, row, "", False))
 
     def _index(
-        self, row: int, steps: Sequence[str | said.ElementStep]
+        self, row: int, steps: Sequence[str | ir.ElementStep]
     ) -> tuple[int, ...] | None:
         """Return the index of an element, None where it is none that can be told."""
         if not steps:
             return ()
-        if len(steps) > 1 or not isinstance(steps[0], said.ElementStep):
+        if len(steps) > 1 or not isinstance(steps[0], ir.ElementStep):
             return None
-        slots = [s.slot for s in steps[0].subscripts if isinstance(s, said.Num)]
+        slots = [s.slot for s in steps[0].subscripts if isinstance(s, ir.Num)]
         if len(slots) < len(steps[0].subscripts):
             return None
         first = int(self.text.first[row])

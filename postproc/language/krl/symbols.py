@@ -11,6 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from postproc.diagnostics import Code
+from postproc.language import ir
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.assigned_points import (
     AssignedPoint,
     FunctionBody,
@@ -20,7 +22,6 @@ from postproc.language.assigned_points import (
     TaskSymbols,
     is_point,
 )
-from postproc.language.control_flow import HeadedRows
 from postproc.language.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.krl import syntax as said
@@ -231,7 +232,7 @@ class KrlTask(TaskSymbols):
         """Names of data that something may change."""
         return frozenset(self.uses.written | self.uses.changed)
 
-    def locate(self, data: said.DataObject, row: int, here: Scope) -> PointPart | None:
+    def locate(self, data: ir.DataObject, row: int, here: Scope) -> PointPart | None:
         """Find the point that only assignments change, see `TaskSymbols.locate`."""
         name, steps = data.name, data.steps
         place = self.place(name, here)
@@ -250,7 +251,7 @@ class KrlTask(TaskSymbols):
         return PointPart((file, *place, name), index if known else None, component)
 
     def _find_element(
-        self, file: int, datum: KrlDatum, steps: Sequence[str | said.ElementStep],
+        self, file: int, datum: KrlDatum, steps: Sequence[str | ir.ElementStep],
         row: int, here: Scope,
     ) -> tuple[int, ...] | None:  # fmt: skip
         """Return the index of an element, None where it is not known, or no element."""
@@ -263,7 +264,7 @@ class KrlTask(TaskSymbols):
         return found if inside else None
 
     def evaluate_components(
-        self, part: PointPart, value: said.Operand, row: int, here: Scope
+        self, part: PointPart, value: ir.Operand, row: int, here: Scope
     ) -> list[tuple[str, float | None]]:
         """Return what an assignment gives to components, see `TaskSymbols`."""
         found = self.value(value, row, here)
@@ -278,12 +279,8 @@ class KrlTask(TaskSymbols):
         known = {key: one.value for key, one in fields if isinstance(one, KrlNumber)}
         return [(key, known.get(key)) for key in known or COMPONENTS[:6]]
 
-    def parts_of(self, operand: said.Operand) -> Iterator[said.Operand]:
-        """Yield what is in an operand, see `TaskSymbols.parts_of`."""
-        return parts_of([operand])
-
     def open_function(
-        self, call: said.FunctionCall, row: int, here: Scope
+        self, call: ir.FunctionCall, row: int, here: Scope
     ) -> FunctionBody | None:
         """Return the statements of a function, see `TaskSymbols.open_function`."""
         found = self.routine(call.name, here)
@@ -337,7 +334,7 @@ class KrlTask(TaskSymbols):
         for file in self.files:
             rows = np.bincount(file.text.shape, minlength=len(file.text.said.shapes))
             for one, count in zip(file.text.said, rows.tolist(), strict=False):
-                if isinstance(one, said.ForLoop):
+                if isinstance(one, ir.ForLoop):
                     found[one.name] += count
         return found
 
@@ -370,7 +367,7 @@ class KrlTask(TaskSymbols):
                         found[target.name].add(self._entry(target, row, here))
         return {table: frozenset(numbers) for table, numbers in found.items()}
 
-    def _entry(self, target: said.DataObject, row: int, here: Scope) -> int:
+    def _entry(self, target: ir.DataObject, row: int, here: Scope) -> int:
         """Return the number of an entry, ANY where it is not known."""
         index = self.index(target.steps[0], row, here) if target.steps else None
         return index[0] if index is not None and len(index) == 1 else ANY
@@ -435,7 +432,7 @@ class KrlTask(TaskSymbols):
         for file in (f for f in self.files if not f.is_submit):
             lists = file.routines == ()
             for one in file.text.said:
-                if not (lists and isinstance(one, said.Assignment)):
+                if not (lists and isinstance(one, ir.Assignment)):
                     uses.note(one)
                     continue
                 uses.take(one.value)
@@ -479,35 +476,35 @@ class KrlTask(TaskSymbols):
 
     # Values.
 
-    def number(self, operand: said.Operand | None, row: int, here: Scope) -> float:
+    def number(self, operand: ir.Operand | None, row: int, here: Scope) -> float:
         """Evaluate a number, NaN where it is not known before the program runs."""
         found = self.value(operand, row, here)
         return found.value if isinstance(found, KrlNumber) else math.nan
 
     def value(
-        self, operand: said.Operand | None, row: int, here: Scope, depth: int = 0
+        self, operand: ir.Operand | None, row: int, here: Scope, depth: int = 0
     ) -> KrlValue | None:
         """Evaluate an operand, None where it is not known."""
         if depth > DEEPEST:
             return None
         match operand:
-            case said.Num(slot=slot):
+            case ir.Num(slot=slot):
                 text = self.files[here.file].text
                 at = int(text.first[row]) + slot
                 value = float(text.value[at])
                 return KrlNumber(value, here.file, at) if math.isfinite(value) else None
             case said.EnumValue(name=name):
                 return name
-            case said.StringLiteral(text=written):
+            case ir.StringLiteral(text=written):
                 return written
             case said.KrlAggregate(fields=fields):
                 return self._aggregate(fields, row, here, depth)
-            case said.Operation(operator=operator, operands=operands):
+            case ir.Operation(operator=operator, operands=operands):
                 parts = [self.value(one, row, here, depth + 1) for one in operands]
                 return _link(parts) if operator == ":" else _compute(operator, parts)
-            case said.DataObject():
+            case ir.DataObject():
                 return self._data(operand, row, here, depth)
-            case said.FunctionCall(name=name, arguments=arguments):
+            case ir.FunctionCall(name=name, arguments=arguments):
                 returned = self.find_returned(operand, row, here)
                 if returned is not None:
                     return self.value(*returned, depth + 1)
@@ -516,7 +513,7 @@ class KrlTask(TaskSymbols):
                 return None
 
     def _apply(
-        self, name: str, arguments: Sequence[said.Argument], row: int, here: Scope
+        self, name: str, arguments: Sequence[ir.Argument], row: int, here: Scope
     ) -> KrlNumber | None:
         """Return what a function of the controller gives for a number."""
         if name in self.routines or name not in ALIKE or len(arguments) != 1:
@@ -535,7 +532,7 @@ class KrlTask(TaskSymbols):
         return KrlRecord(known, len(known) == len(fields))
 
     def _data(
-        self, data: said.DataObject, row: int, here: Scope, depth: int
+        self, data: ir.DataObject, row: int, here: Scope, depth: int
     ) -> KrlValue | None:
         """Evaluate data by name, and what the steps behind it lead to."""
         name, loops, rest = data.name, dict(here.loops), list(data.steps)
@@ -549,7 +546,7 @@ class KrlTask(TaskSymbols):
             record = self.evaluate_held(held, depth + 1)
             return record if point is data else _part_of(record, rest[-1])
         index: tuple[int, ...] | None = ()
-        if rest and isinstance(rest[0], said.ElementStep):
+        if rest and isinstance(rest[0], ir.ElementStep):
             index = self.index(rest.pop(0), row, here)
         if index is None or name in self.written or name.startswith("$"):
             return None
@@ -564,7 +561,7 @@ class KrlTask(TaskSymbols):
         return value
 
     def _read_parameter(
-        self, data: said.DataObject, here: Scope, depth: int
+        self, data: ir.DataObject, here: Scope, depth: int
     ) -> KrlValue | None:
         """Evaluate a parameter, None where what is given for it is not known."""
         given = next((one for one in here.given if one[0] == data.name), None)
@@ -606,7 +603,7 @@ class KrlTask(TaskSymbols):
         return KrlNumber(found.value) if known else None
 
     def index(
-        self, step: said.ElementStep | str, row: int, here: Scope
+        self, step: ir.ElementStep | str, row: int, here: Scope
     ) -> tuple[int, ...] | None:
         """Return the index of an element, None where it is not known."""
         if isinstance(step, str):
@@ -616,7 +613,7 @@ class KrlTask(TaskSymbols):
         return known if len(known) == len(values) and known else None
 
 
-def _part_of(value: KrlValue | None, step: str | said.ElementStep) -> KrlValue | None:
+def _part_of(value: KrlValue | None, step: str | ir.ElementStep) -> KrlValue | None:
     """Return a component of a value, None where it has none of that name."""
     if isinstance(step, str) and isinstance(value, KrlRecord):
         return value.get(step)
@@ -672,7 +669,7 @@ class _Beside:
         words: Names in what is not understood: each may be set there, or called.
     """
 
-    said: Sequence[said.SourceStatement]
+    said: Sequence[ir.SourceStatement]
     own: frozenset[str]
     words: frozenset[str]
 
@@ -701,15 +698,15 @@ class _Beside:
         return self.words | found
 
 
-def list_calls(one: said.SourceStatement) -> Iterator[str]:
+def list_calls(one: ir.SourceStatement) -> Iterator[str]:
     """Yield the names of the routines that a statement calls, also later."""
     match one:
         case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
             yield from list_calls(action)
-        case said.Instruction(name=name):
+        case ir.Instruction(name=name):
             yield name
-    for part in parts_of(operands_of(one)):
-        if isinstance(part, said.FunctionCall):
+    for part in ir.walk(*operands_of(one)):
+        if isinstance(part, ir.FunctionCall):
             yield part.name
 
 
@@ -728,16 +725,16 @@ class _Uses(NamesUsed):
     own: Collection[str] = field(kw_only=True)
     points: Collection[str] = field(kw_only=True)
 
-    def note(self, one: said.SourceStatement) -> None:
+    def note(self, one: ir.SourceStatement) -> None:
         """Note what a statement takes and changes."""
         match one:
-            case said.Assignment(target=target, value=value):
+            case ir.Assignment(target=target, value=value):
                 self.written.add(target.name)
                 self._subscripts(target)
                 self._note_assignment(target, value)
-            case said.ForLoop(name=name):
+            case ir.ForLoop(name=name):
                 self.changed.add(name)
-            case said.Instruction(name=name, arguments=arguments):
+            case ir.Instruction(name=name, arguments=arguments):
                 self._call(name, arguments)
             case said.KrlMove(word=word, to=to, via=via, settings=settings):
                 note = self.take if word.endswith("_rel") else self._destination
@@ -749,55 +746,53 @@ class _Uses(NamesUsed):
                 said.InterruptDeclared(action=action) | said.PathTrigger(action=action)
             ):
                 self.note(action)
-        if not isinstance(one, said.Assignment | said.KrlMove | said.Instruction):
+        if not isinstance(one, ir.Assignment | said.KrlMove | ir.Instruction):
             for operand in operands_of(one):
                 self.take(operand)
 
-    def _note_assignment(self, target: said.DataObject, value: said.Operand) -> None:
+    def _note_assignment(self, target: ir.DataObject, value: ir.Operand) -> None:
         """Note what an assignment takes: a point that moves go to by another name."""
-        if isinstance(value, said.DataObject) and is_point(value) and is_point(target):
+        if isinstance(value, ir.DataObject) and is_point(value) and is_point(target):
             self.copies.add((target.name, value.name))
             self._subscripts(value)
         else:
             self.take(value)
 
-    def take(self, operand: said.Operand | None) -> None:
+    def take(self, operand: ir.Operand | None) -> None:
         """Note what an operand takes, and what its functions may change."""
         match operand:
-            case said.DataObject(name=name):
+            case ir.DataObject(name=name):
                 self.read.add(name)
                 self._subscripts(operand)
-            case said.FunctionCall(name=name, arguments=arguments):
+            case ir.FunctionCall(name=name, arguments=arguments):
                 self._call(name, arguments)
-            case said.Operation(operands=operands):
+            case ir.Operation(operands=operands):
                 for one in operands:
                     self.take(one)
             case said.KrlAggregate(fields=fields):
                 for part in fields:
                     self.take(part.value)
 
-    def _subscripts(self, target: said.DataObject) -> None:
+    def _subscripts(self, target: ir.DataObject) -> None:
         for step in target.steps:
-            if isinstance(step, said.ElementStep):
+            if isinstance(step, ir.ElementStep):
                 for one in step.subscripts:
                     self.take(one)
 
-    def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
+    def _call(self, name: str, arguments: Sequence[ir.Argument]) -> None:
         """Note arguments: a routine may change them, unless it is known not to."""
         changed = _list_changed_arguments(name, arguments, self.own)
         self.changed |= {one.name for one in changed}
         for argument in arguments:
             self.take(argument.value)
 
-    def _destination(self, operand: said.Operand | None) -> None:
+    def _destination(self, operand: ir.Operand | None) -> None:
         """Note what a destination takes besides the point itself."""
         match operand:
-            case said.DataObject():
+            case ir.DataObject():
                 self._subscripts(operand)
-            case said.Operation(operator=":", operands=(first, second)):
-                behind = (
-                    isinstance(first, said.DataObject) and first.name in self.points
-                )
+            case ir.Operation(operator=":", operands=(first, second)):
+                behind = isinstance(first, ir.DataObject) and first.name in self.points
                 point, shift = (first, second) if behind else (second, first)
                 self._destination(point)
                 self.take(shift)
@@ -806,8 +801,8 @@ class _Uses(NamesUsed):
 
 
 def list_changes(
-    one: said.SourceStatement, own: Collection[str] = ()
-) -> Iterator[said.DataObject]:
+    one: ir.SourceStatement, own: Collection[str] = ()
+) -> Iterator[ir.DataObject]:
     """Yield data that a statement may change, also what it does later.
 
     Args:
@@ -817,50 +812,50 @@ def list_changes(
     match one:
         case said.InterruptDeclared(action=action) | said.PathTrigger(action=action):
             yield from list_changes(action, own)
-        case said.Assignment(target=target):
+        case ir.Assignment(target=target):
             yield target
-        case said.Instruction(name=name, arguments=arguments):
+        case ir.Instruction(name=name, arguments=arguments):
             yield from _list_changed_arguments(name, arguments, own)
-    for part in parts_of(operands_of(one)):
-        if isinstance(part, said.FunctionCall):
+    for part in ir.walk(*operands_of(one)):
+        if isinstance(part, ir.FunctionCall):
             yield from _list_changed_arguments(part.name, part.arguments, own)
 
 
 def _list_changed_arguments(
-    name: str, arguments: Sequence[said.Argument], own: Collection[str]
-) -> Iterator[said.DataObject]:
+    name: str, arguments: Sequence[ir.Argument], own: Collection[str]
+) -> Iterator[ir.DataObject]:
     """Yield the arguments that a routine may change: all, unless it is known."""
     if name in KEEPING and name not in own:
         return
     for argument in arguments:
-        if isinstance(argument.value, said.DataObject):
+        if isinstance(argument.value, ir.DataObject):
             yield argument.value
 
 
-def _is_of_part(target: said.DataObject) -> bool:
+def _is_of_part(target: ir.DataObject) -> bool:
     """Return True if a component is meant: a list that sets one is not followed."""
     return any(isinstance(step, str) for step in target.steps)
 
 
-def is_word(operand: said.Operand | None, word: str) -> bool:
+def is_word(operand: ir.Operand | None, word: str) -> bool:
     """Return True if an operand is a word such as TRUE."""
-    return operand == said.DataObject(word)
+    return operand == ir.DataObject(word)
 
 
-def operands_of(one: said.SourceStatement) -> Sequence[said.Operand | None]:
+def operands_of(one: ir.SourceStatement) -> Sequence[ir.Operand | None]:
     """Return the values that a statement takes."""
     match one:
         case said.KrlDeclaration(items=items):
             return [item.value for item in items]
-        case said.Assignment(target=target, value=value):
+        case ir.Assignment(target=target, value=value):
             return [target, value]
-        case said.Branch(values=values):
+        case ir.Branch(values=values):
             return values
-        case said.ForLoop(first=first, last=last, step=step):
+        case ir.ForLoop(first=first, last=last, step=step):
             return [first, last, step]
-        case said.Leave(value=value) | said.Waiting(value=value):
+        case ir.Leave(value=value) | said.Waiting(value=value):
             return [value]
-        case said.Instruction(arguments=arguments):
+        case ir.Instruction(arguments=arguments):
             return [argument.value for argument in arguments]
         case said.KrlMove(to=to, via=via, angle=angle, settings=settings):
             return [to, via, angle, *(one.value for one in settings)]
@@ -870,22 +865,3 @@ def operands_of(one: said.SourceStatement) -> Sequence[said.Operand | None]:
             return values
         case _:
             return []
-
-
-def parts_of(operands: Sequence[said.Operand | None]) -> Iterator[said.Operand]:
-    """Yield operands with all that is in them."""
-    waiting = list(operands)
-    while waiting:
-        match one := waiting.pop():
-            case said.FunctionCall(arguments=arguments):
-                waiting += [argument.value for argument in arguments]
-            case said.Operation(operands=inside):
-                waiting += inside
-            case said.KrlAggregate(fields=fields):
-                waiting += [f.value for f in fields]
-            case said.DataObject(steps=steps):
-                for step in steps:
-                    if isinstance(step, said.ElementStep):
-                        waiting += step.subscripts
-        if one is not None:
-            yield one

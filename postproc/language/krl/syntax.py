@@ -4,47 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from postproc.language.ir import (
-    Argument,
-    Assignment,
-    BlockWord,
-    Branch,
-    DataObject,
-    ElementStep,
-    ForLoop,
-    FunctionCall,
-    Instruction,
-    JumpTo,
-    LabelMark,
-    Leave,
-    NotUnderstood,
-    Num,
-    Operand,
-    Operation,
-    SourceStatement,
-    StringLiteral,
-)
-
-__all__ = [
-    "Argument",
-    "Assignment",
-    "BlockWord",
-    "Branch",
-    "DataObject",
-    "ElementStep",
-    "ForLoop",
-    "FunctionCall",
-    "Instruction",
-    "JumpTo",
-    "LabelMark",
-    "Leave",
-    "NotUnderstood",
-    "Num",
-    "Operand",
-    "Operation",
-    "SourceStatement",
-    "StringLiteral",
-]
+from postproc.language.ir import Assignment, Node, Operand, SourceStatement
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +15,7 @@ class EnumValue(Operand):
 
 
 @dataclass(frozen=True, slots=True)
-class NamedField:
+class NamedField(Node):
     """A component in an aggregate: ``X 100.0``."""
 
     name: str

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Generic, TypeVar
 
 from postproc.diagnostics import Code
+from postproc.language.analysis.shared_map import SharedMap
 from postproc.language.pdl2.values import (
     Nothing,
     Value,
@@ -16,69 +16,6 @@ from postproc.language.pdl2.values import (
     may_be,
 )
 from postproc.language.visits import ELSEWHERE
-
-# A mapping that is cheap to copy and to compare: what copies share stays shared.
-
-T = TypeVar("T")
-_COUNT = 256
-
-
-class CowMap(Generic[T]):
-    """Values by key on 256 shelves; a copy shares a shelf until one side writes to it.
-
-    An analysis keeps one copy for every place of a program, and merges copies that
-    differ in a few keys of thousands: both cost what differs, not what is held.
-    """
-
-    __slots__ = ("_mine", "_shelves")
-
-    def __init__(self) -> None:
-        self._shelves: list[dict[str, T]] = [{}] * _COUNT
-        self._mine: set[int] | None = set()  # None: not even the row of shelves is
-
-    def copy(self) -> CowMap[T]:
-        """Return a mapping that can change on its own."""
-        other: CowMap[T] = CowMap.__new__(CowMap)
-        other._shelves = self._shelves
-        other._mine = self._mine = None
-        return other
-
-    def get(self, key: str) -> T | None:
-        """Return what a key holds, None where it holds nothing."""
-        return self._shelves[hash(key) % _COUNT].get(key)
-
-    def __setitem__(self, key: str, value: T) -> None:
-        """Let a key hold a value."""
-        self._own(hash(key) % _COUNT)[key] = value
-
-    def __delitem__(self, key: str) -> None:
-        """Let a key hold nothing."""
-        self._own(hash(key) % _COUNT).pop(key, None)
-
-    def _own(self, at: int) -> dict[str, T]:
-        if self._mine is None:
-            self._shelves, self._mine = self._shelves.copy(), set()
-        if at not in self._mine:
-            self._shelves[at] = self._shelves[at].copy()
-            self._mine.add(at)
-        return self._shelves[at]
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the keys."""
-        for shelf in self._shelves:
-            yield from shelf
-
-    def differing(self, other: CowMap[T]) -> list[str]:
-        """Return the keys that may hold other values in another mapping."""
-        found: list[str] = []
-        for mine, theirs in zip(self._shelves, other._shelves, strict=True):
-            if mine is not theirs:
-                found += [k for k, v in mine.items() if theirs.get(k) is not v]
-                found += [k for k in theirs if k not in mine]
-        return found
-
-
-# The abstract store: what variables hold, and where the arm came from.
 
 Settings = Mapping[str, Value]
 
@@ -150,8 +87,8 @@ class Store:
     """
 
     initial: Callable[[str], Value | None]
-    values: CowMap[Value] = field(default_factory=CowMap)
-    logs: CowMap[Log] = field(default_factory=CowMap)
+    values: SharedMap[str, Value] = field(default_factory=SharedMap)
+    logs: SharedMap[str, Log] = field(default_factory=SharedMap)
     settings: Settings = field(default_factory=dict)
     last: frozenset[int] = frozenset()
     compound: set[str] = field(default_factory=set)
@@ -239,6 +176,11 @@ class Store:
     def set(self, **settings: Value) -> None:
         """Change frames or motion variables (names without ``$``)."""
         self.settings = {**self.settings, **settings}
+
+    def join(self, other: Store) -> Store:
+        """Return what may hold on either way; itself where the other adds nothing."""
+        both = self.copy()
+        return both if both.merge(other) else self
 
     def merge(self, other: Store) -> bool:
         """Take in what may hold too; tell whether anything changed."""

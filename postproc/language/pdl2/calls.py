@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.diagnostics import Code, Reason
+from postproc.language import ir
 from postproc.language.language import Record
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Store
@@ -68,7 +69,7 @@ def summarise_call(
     here: Execution,
     name: str,
     reach: CallGraph,
-    arguments: tuple[ast.Expression | None, ...] = (),
+    arguments: tuple[ir.Operand | None, ...] = (),
 ) -> None:
     """Take in what a call may do without following it; list the moves it may make."""
     for argument in list_changed_arguments(arguments):
@@ -89,10 +90,10 @@ def summarise_call(
 def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
     """List the moves of a body once, from nowhere and with nothing known."""
     program, body = place.program, place.body
-    context = machine.root.within(machine.position(program, body.first), _UNFOLLOWED)
-    if context in machine.places or id(body) in machine.recursive:
+    first = place.offset + body.first
+    if machine.root.find(first, _UNFOLLOWED) or id(body) in machine.recursive:
         return
-    machine.enter(context, place)
+    context = machine.root.within(first, _UNFOLLOWED, place)
     why = f"{name}, which is not followed, runs this move"
     nothing = Nothing(why)
     reason = Reason(Code.NEVER_REACHED, why)
@@ -110,40 +111,41 @@ def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> No
 # Calls: routines of the job are run, others are taken at their word.
 
 
-def call_statement(machine: Machine, here: Execution, call: ast.Call) -> bool:
+def call_statement(machine: Machine, here: Execution, call: ir.Instruction) -> bool:
     """Run a call; tell whether control went into a routine of the job."""
-    find = here.world.find_program if call.program else here.world.find_routine
+    whole = isinstance(call, ast.ProgramCall)
+    find = here.world.find_program if whole else here.world.find_routine
     inside = find(here.place.program, call.name)
     if inside is None:
-        opaque_call(here, call.name, call.arguments)
+        opaque_call(here, call.name, call.values)
         return False
     running = machine.calls_to(inside.body, here.context)
     if running:
         machine.recursive |= {id(body) for body in running}
         _refuse_recursion(machine, here, inside)
         return False
-    _bind(here, inside, call.arguments)
-    machine.call(here, inside)
+    _bind(here, inside, call.values)
+    machine.call(here.context, here.row, inside, here.store)
     return True
 
 
 def calls_in_expressions(
-    machine: Machine, here: Execution, statement: ast.Statement
+    machine: Machine, here: Execution, statement: ir.SourceStatement
 ) -> None:
     """Let the function calls inside of a statement have their effects."""
     for call in machine.find_calls(here.place, statement):
         inside = here.world.find_routine(here.place.program, call.name)
         if inside is None:
-            opaque_call(here, call.name, call.arguments)
+            opaque_call(here, call.name, call.values)
         else:
-            _apply_summary(machine, here, inside, call.arguments)
+            _apply_summary(machine, here, inside, call.values)
 
 
 def _apply_summary(
     machine: Machine,
     here: Execution,
     inside: Place,
-    arguments: tuple[ast.Expression | None, ...],
+    arguments: tuple[ir.Operand | None, ...],
 ) -> None:
     """Take a function's effects from its text instead of running it."""
     name, reach = inside.body.name, call_graph_of(here.world, inside)
@@ -174,7 +176,7 @@ def _refuse_recursion(machine: Machine, here: Execution, inside: Place) -> None:
 
 
 def _bind(
-    here: Execution, inside: Place, arguments: tuple[ast.Expression | None, ...]
+    here: Execution, inside: Place, arguments: tuple[ir.Operand | None, ...]
 ) -> None:
     """Give the parameters their values; variables go by reference."""
     prefix = f"{inside.program.name}:{inside.body.name}/"
@@ -186,7 +188,7 @@ def _bind(
             here.world.pin(here.value(argument), f"arm {other} goes to it too")
             here.store.write(key, Nothing(points_of(other)))
             continue
-        if isinstance(argument, ast.Reference) and not argument.name.startswith("$"):
+        if isinstance(argument, ir.DataObject) and not argument.name.startswith("$"):
             target = here.locate(argument)
             if target.component == ():
                 here.store.write(key, Alias(target.keys, target.exact))
@@ -207,7 +209,7 @@ def _bind(
 
 
 def opaque_call(
-    here: Execution, name: str, arguments: tuple[ast.Expression | None, ...]
+    here: Execution, name: str, arguments: tuple[ir.Operand | None, ...]
 ) -> None:
     """Take in what a routine that the job does not hold is said, or assumed, to do."""
     built_in = name in CHANGING or name in PURE
@@ -265,7 +267,7 @@ def forget_surroundings(here: Execution, why: str) -> None:
 
 
 def _frames_from_table(
-    here: Execution, name: str, arguments: tuple[ast.Expression | None, ...]
+    here: Execution, name: str, arguments: tuple[ir.Operand | None, ...]
 ) -> None:
     table = here.world.start.frame_tables[name]
     values = [here.value(a) for a in arguments]
@@ -297,7 +299,7 @@ def frame_value(record: Record, why: str) -> Position | Nothing:
 # Assignments: what a variable, a component or a setting holds afterwards.
 
 
-def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
+def assign(here: Execution, statement: ir.Assignment, taught: bool) -> None:
     """Let an assignment have its effect; `taught` marks the literal in it."""
     other = here.world.other_arm(here.place, statement.target.name)
     if other:
@@ -306,8 +308,6 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
             invalidate_key(here, key, points_of(other))
         return
     new = statement.value
-    if statement.operator != ":=":
-        new = ast.Binary(statement.operator[0], statement.target, statement.value)
     if _assign_component(here, statement.target, new):
         return
     if not statement.target.name.startswith("$") and copy_parts(
@@ -339,7 +339,7 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
 
 
 def _assign_component(
-    here: Execution, reference: ast.Reference, value: ast.Expression
+    here: Execution, reference: ir.DataObject, value: ir.Operand
 ) -> bool:
     """Replace a number of a position; return False where a reference is none."""
     if reference.name.startswith("$"):
@@ -356,7 +356,7 @@ def _assign_component(
     return True
 
 
-def _setting(here: Execution, reference: ast.Reference, value: Value) -> None:
+def _setting(here: Execution, reference: ir.DataObject, value: Value) -> None:
     """Change a frame or motion variable of our arm."""
     name = here.setting_name(reference)
     if name is None:
@@ -403,16 +403,16 @@ def _frame_part(
     here.store.set(**{name: new})
 
 
-def _whose(here: Execution, reference: ast.Reference) -> int | None:
+def _whose(here: Execution, reference: ir.DataObject) -> int | None:
     """Return the arm that ``$ARM_DATA[n]`` names, None where it is not known."""
     first = reference.steps[0] if reference.steps else None
-    if isinstance(first, ast.Index) and not isinstance(first.subscripts[0], tuple):
+    if isinstance(first, ir.ElementStep):
         return here.integer(first.subscripts[0])
     return 0
 
 
 def _new_value(
-    here: Execution, statement: ast.Assign, target: Location, value: Value
+    here: Execution, statement: ir.Assignment, target: Location, value: Value
 ) -> Value:
     if target.component == ():
         return value

@@ -9,6 +9,7 @@ from typing import cast
 
 import numpy as np
 
+from postproc.language import ir
 from postproc.language.language import Cloner, NamedPoint
 from postproc.language.lexer import scan_lines
 from postproc.language.logical_lines import read_lines
@@ -78,11 +79,11 @@ def find_clone_target(
     """
     program = programs[file]
     row = int(np.searchsorted(program.lines.line, line))
-    move = _unwrap(program.statement(row))
+    move = ast.action(program.statement(row))
     where = None
     if isinstance(move, ast.Move) and move.how == "TO":
         where = move.via if via else move.where[0]
-    if not isinstance(where, ast.Reference):
+    if not isinstance(where, ir.DataObject):
         raise CloneError("the numbers stand in the move itself, or are computed")
     if where.steps:
         raise CloneError("elements of arrays, records and paths are not cloned")
@@ -101,11 +102,6 @@ def find_clone_target(
         raise CloneError(f"{variable.name} holds a copy of {name}")
     span = _destination(program, row, "VIA" if via else "TO", variable.name)
     return CloneTarget(file, body.name if own else "", variable, span)
-
-
-def _unwrap(statement: ast.Statement) -> ast.Statement | None:
-    inner = (ast.Label, ast.Case, ast.Else, ast.When)
-    return statement.then if isinstance(statement, inner) else statement
 
 
 def body_at(program: Program, row: int) -> Body:
@@ -289,10 +285,9 @@ def _assign_clone(
     statement = program.statement(row)
     old = named.variable.name
     own = (
-        isinstance(statement, ast.Assign)
-        and statement.operator == ":="
-        and statement.target == ast.Reference(old.lower())
-        and isinstance(statement.value, ast.Aggregate | ast.Invoke)
+        isinstance(statement, ir.Assignment)
+        and statement.target == ir.DataObject(old.lower())
+        and isinstance(statement.value, ir.Composite | ir.FunctionCall)
     )
     if not own or not _means(program, row, named):
         raise CloneError(f"line {line} is no plain assignment of its value")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from postproc.language.pdl2 import syntax as ast
+from postproc.language import ir
 from postproc.language.pdl2.abstract_state import Store
 from postproc.language.pdl2.job import Place, World, base_variable
 from postproc.language.pdl2.values import (
@@ -53,7 +53,7 @@ class ProgramPoint:
     volatile: frozenset[str] = frozenset()
 
     # ---- arms -----------------------------------------------------------------------
-    def is_ours(self, arm: ast.Expression | None) -> bool | None:
+    def is_ours(self, arm: ir.Operand | None) -> bool | None:
         """Tell whether an arm is ours, None where that is not sure.
 
         Args:
@@ -89,14 +89,14 @@ class ProgramPoint:
         base = self.world.slot_base[lines.source.name]
         return int(base + lines.first[self.row] + slot)
 
-    def integer(self, expression: ast.Expression) -> int | None:
+    def integer(self, expression: ir.Operand) -> int | None:
         """Return a whole number, None where it is not known."""
         value = self.value(expression)
         if isinstance(value, float) and value.is_integer():
             return int(value)
         return None
 
-    def locate(self, reference: ast.Reference) -> Location:
+    def locate(self, reference: ir.DataObject) -> Location:
         """Find what a reference means, as far as its indices are known."""
         root = self.world.root(self.place, reference.name)
         held = self.store.values.get(root)
@@ -119,17 +119,16 @@ class ProgramPoint:
             held = None if plain else self.store.read(next(iter(keys)))
             if isinstance(held, Position) and held.joints:
                 return Location(keys, exact, self._component(rest))
-            index = [
-                None if isinstance(s, tuple) else self.integer(s)
-                for s in step.subscripts
-            ]
+            index = [self.integer(one) for one in step.subscripts]
             if None in index:
                 return Location(keys, False)
             text = ",".join(map(str, index))
             keys = frozenset(f"{key}[{text}]" for key in keys)
         return Location(keys, exact and len(keys) == 1)
 
-    def _component(self, steps: tuple[str | ast.Index, ...]) -> tuple[str, int] | None:
+    def _component(
+        self, steps: tuple[str | ir.ElementStep, ...]
+    ) -> tuple[str, int] | None:
         match steps:
             case (str(name),) if name in COMPONENTS:
                 return (name, 0)
@@ -137,43 +136,43 @@ class ProgramPoint:
                 return ("pos", 0)
             case ("pos", str(name)) if name in COMPONENTS:
                 return (name, 0)
-            case ("aux", ast.Index((index,))) if not isinstance(index, tuple):
+            case ("aux", ir.ElementStep((index,))):
                 axis = self.integer(index)
                 return None if axis is None else ("aux", axis)
-            case (ast.Index((index,)),) if not isinstance(index, tuple):
+            case (ir.ElementStep((index,)),):
                 axis = self.integer(index)
                 return None if axis is None else ("joint", axis)
         return None
 
     # ---- reading --------------------------------------------------------------------
-    def value(self, expression: ast.Expression | None) -> Value:
+    def value(self, expression: ir.Operand | None) -> Value:
         """Return what an expression is worth."""
         match expression:
-            case ast.Number(slot):
+            case ir.Num(slot):
                 number = self.number(slot)
                 return (
                     Nothing("the number cannot be read") if number != number else number
                 )
-            case ast.Text(text):
+            case ir.StringLiteral(text):
                 return text
-            case ast.Reference():
+            case ir.DataObject():
                 return self.read(expression)
-            case ast.Unary("()", operand):
+            case ir.Operation("()", (operand,)):
                 return self.value(operand)
-            case ast.Unary(sign, operand):
+            case ir.Operation(sign, (operand,)):
                 return unary(sign, self.value(operand))
-            case ast.Binary(sign, left, right):
+            case ir.Operation(sign, (left, right)):
                 values = self.value(left), self.value(right)
                 for frame in values if sign == ":" else ():
                     self.world.pin(frame, "the program composes it with a frame (`:`)")
                 return binary(sign, *values)
-            case ast.Aggregate(items):
+            case ir.Composite(items):
                 return self._joints(items)
-            case ast.Invoke(name, arguments):
-                return self._invoke(name, arguments)
+            case ir.FunctionCall(name):
+                return self._invoke(name, expression.values)
         return RUN_TIME
 
-    def read(self, reference: ast.Reference) -> Value:
+    def read(self, reference: ir.DataObject) -> Value:
         """Return what a variable holds."""
         name = reference.name
         if name.startswith("$"):
@@ -206,7 +205,7 @@ class ProgramPoint:
         names = {base_variable(key.rpartition("/")[2]) for key in target.keys}
         return not names.isdisjoint(self.volatile)
 
-    def _system(self, reference: ast.Reference) -> Value:
+    def _system(self, reference: ir.DataObject) -> Value:
         part = self.frame_part(reference)
         name = self.setting_name(reference) if part is None else part[0]
         if name is None or f"${name}" in self.volatile:
@@ -217,39 +216,39 @@ class ProgramPoint:
         number = held.numbers[part[1]] if isinstance(held, Position) else None
         return RUN_TIME if number is None else number
 
-    def frame_part(self, reference: ast.Reference) -> tuple[str, int] | None:
+    def frame_part(self, reference: ir.DataObject) -> tuple[str, int] | None:
         """Return our arm's frame and which of its six numbers is meant, else None."""
         match reference:
-            case ast.Reference("$arm_data", (of, str(name), str(part))):
-                whole = ast.Reference("$arm_data", (of, name))
-            case ast.Reference(name, (str(part),)):
-                whole = ast.Reference(name, ())
+            case ir.DataObject("$arm_data", (of, str(name), str(part))):
+                whole = ir.DataObject("$arm_data", (of, name))
+            case ir.DataObject(name, (str(part),)):
+                whole = ir.DataObject(name, ())
             case _:
                 return None
         frame = self.setting_name(whole)
         known = frame in FRAME_NAMES and part in COMPONENTS
         return (frame, COMPONENTS[part]) if frame and known else None
 
-    def setting_name(self, reference: ast.Reference) -> str | None:
+    def setting_name(self, reference: ir.DataObject) -> str | None:
         """Return the name of our arm's setting, None for another arm's or none."""
         match reference:
-            case ast.Reference("$arm_data", (ast.Index((index,)), str(name))):
-                if not isinstance(index, tuple) and self.is_ours(index):
+            case ir.DataObject("$arm_data", (ir.ElementStep((index,)), str(name))):
+                if self.is_ours(index):
                     return name.lstrip("$")
                 return None
-            case ast.Reference(name, ()):
+            case ir.DataObject(name, ()):
                 setting = name.lstrip("$")
                 ours = setting in _DEFAULT_ARM or not self.other_default()
                 return setting if ours else None
         return None
 
-    def _joints(self, items: tuple[ast.Expression, ...]) -> Value:
+    def _joints(self, items: tuple[ir.Operand, ...]) -> Value:
         if len(items) < 6:
             return Nothing("it has fewer than six joint values")
         aux = tuple((i, self.real(item)) for i, item in enumerate(items[6:], start=1))
         return replace(self._components(items[:6]), joints=True, aux=aux)
 
-    def _components(self, items: tuple[ast.Expression | None, ...]) -> Position:
+    def _components(self, items: tuple[ir.Operand | None, ...]) -> Position:
         parts = [self.read_number(item) for item in items]
         return Position(
             numbers=tuple(part.number for part in parts),
@@ -257,16 +256,16 @@ class ProgramPoint:
             along=frozenset(at for at, part in enumerate(parts) if part.along),
         )
 
-    def read_number(self, expression: ast.Expression | None) -> SourceNumber:
+    def read_number(self, expression: ir.Operand | None) -> SourceNumber:
         """Return a number, and where in the text it is written or comes from."""
         match expression:
-            case ast.Number(slot):
+            case ir.Num(slot):
                 return SourceNumber(self.real(expression), self.global_slot(slot))
-            case ast.Unary("()", operand):
+            case ir.Operation("()", (operand,)):
                 return self.read_number(operand)
-            case ast.Reference():
+            case ir.DataObject():
                 return self._part(expression) or SourceNumber(self.real(expression))
-            case ast.Binary("+" | "-" as sign, ast.Reference() as left, right):
+            case ir.Operation("+" | "-" as sign, (ir.DataObject() as left, right)):
                 part = self._part(left)
                 if part is not None:
                     by = self.real(right)
@@ -277,7 +276,7 @@ class ProgramPoint:
                     )
         return SourceNumber(self.real(expression))
 
-    def _part(self, reference: ast.Reference) -> SourceNumber | None:
+    def _part(self, reference: ir.DataObject) -> SourceNumber | None:
         """Return a component that stands in the text, None for anything else."""
         if reference.name.startswith("$"):
             return None
@@ -290,12 +289,12 @@ class ProgramPoint:
             return None
         return SourceNumber(held.numbers[at], held.slots[at], along=True)
 
-    def real(self, expression: ast.Expression | None) -> float | None:
+    def real(self, expression: ir.Operand | None) -> float | None:
         """Return a real number, None where it is not known."""
         value = self.value(expression)
         return value if isinstance(value, float) and math.isfinite(value) else None
 
-    def _invoke(self, name: str, arguments: tuple[ast.Expression | None, ...]) -> Value:
+    def _invoke(self, name: str, arguments: tuple[ir.Operand | None, ...]) -> Value:
         if name == "pos":
             return self._position(arguments)
         values = [self.value(a) for a in arguments]
@@ -318,7 +317,7 @@ class ProgramPoint:
         why = f"it comes from {name.upper()}, known only at run time"
         return add_unknown(Nothing(why), *values)
 
-    def _position(self, arguments: tuple[ast.Expression | None, ...]) -> Value:
+    def _position(self, arguments: tuple[ir.Operand | None, ...]) -> Value:
         config = None
         if len(arguments) == 7:
             text = self.value(arguments[6])
@@ -352,9 +351,7 @@ SINGLE = frozenset(
 )
 
 
-def copy_parts(
-    here: ProgramPoint, value: ast.Expression, target: ast.Reference
-) -> bool:
+def copy_parts(here: ProgramPoint, value: ir.Operand, target: ir.DataObject) -> bool:
     """Let a variable hold the parts of another one; tell whether it has parts."""
     origin = bare(value)
     if origin is None:
@@ -376,15 +373,15 @@ def copy_parts(
     return True
 
 
-def bare(value: ast.Expression | None) -> ast.Reference | None:
+def bare(value: ir.Operand | None) -> ir.DataObject | None:
     """Return the variable that an expression is, with or without parentheses."""
-    if isinstance(value, ast.Unary) and value.operator == "()":
-        value = value.operand
-    named = isinstance(value, ast.Reference) and not value.name.startswith("$")
-    return value if named and isinstance(value, ast.Reference) else None
+    if isinstance(value, ir.Operation) and value.operator == "()":
+        (value,) = value.operands
+    named = isinstance(value, ir.DataObject) and not value.name.startswith("$")
+    return value if named and isinstance(value, ir.DataObject) else None
 
 
-def parts_of(here: ProgramPoint, origin: ast.Reference) -> dict[str, Value]:
+def parts_of(here: ProgramPoint, origin: ir.DataObject) -> dict[str, Value]:
     """Return what is known of the elements and fields of a variable.
 
     Where what they hold is not known, those count too that may be positions of the

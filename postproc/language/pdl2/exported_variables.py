@@ -8,7 +8,7 @@ from postproc.files import base_name
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import root_of
 from postproc.language.pdl2.external_routines import matches
-from postproc.language.pdl2.job import Place, World
+from postproc.language.pdl2.job import World
 from postproc.language.pdl2.program import Program, Variable
 from postproc.language.pdl2.side_effects import rows_effects
 
@@ -67,7 +67,8 @@ def _list_exported_by_file(world: World) -> Iterator[str]:
     """Yield the variables that the variable file alone calls exported (Xport)."""
     if world.variables is None or world.main.main is None:
         return
-    place, entries = Place(world.main, world.main.main), world.variables.entries
+    place = world.place(world.main, world.main.main)
+    entries = world.variables.entries
     shared = [layout.shared and layout.kind in _KINDS for layout in entries.layouts]
     if any(shared):
         for name, row in entries.row.items():

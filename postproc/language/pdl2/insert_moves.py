@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.language import ir
 from postproc.language.insert_moves import LayoutSplitter, MoveLayout, spell
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.clones import code_of
@@ -76,7 +77,7 @@ class Pdl2Splitter(LayoutSplitter):
         program = self.programs[file]
         row = int(np.searchsorted(program.lines.line, line)) - 1
         for one in map(program.statement, range(row, -1, -1)):
-            if not isinstance(one, ast.Assign) or one.target.name not in _MOTION:
+            if not isinstance(one, ir.Assignment) or one.target.name not in _MOTION:
                 return isinstance(one, ast.Move)
         return False
 
@@ -157,7 +158,7 @@ def _has_events(program: Program) -> bool:
         _EVENT.search(_code(program, range(opener, end)))
         for body in bodies
         if body is not None
-        for opener, end in body.blocks.handlers
+        for opener, end in body.flow.conditions
     )
 
 
@@ -167,5 +168,5 @@ def _enables_others(program: Program) -> bool:
     if not len(program.lines):
         return False
     code = _code(program, range(len(program.lines)))
-    own = any(body.blocks.handlers for body in bodies)
+    own = any(body.flow.conditions for body in bodies)
     return bool(_ENABLE.search(code)) or bool(_ENABLED.search(code) and not own)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from postproc.diagnostics import Code, Reason
+from postproc.language import ir
+from postproc.language.analysis.call_context import CALLED, HANDLED, Context
+from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED, Counting
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Store, root_of
-from postproc.language.pdl2.call_context import HANDLED, Context
 from postproc.language.pdl2.calls import (
     assign,
     call_statement,
@@ -32,8 +33,6 @@ from postproc.language.pdl2.exported_variables import (
 from postproc.language.pdl2.job import FilePoints, Place, World, base_variable
 from postproc.language.pdl2.kept_values import keep_values
 from postproc.language.pdl2.machine import (
-    MAX_ROWS,
-    MAX_STEPS,
     OTHERS_WRITE,
     Execution,
     Goal,
@@ -47,7 +46,7 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.move_blocks import MoveBlocks
 from postproc.language.pdl2.moves import move
-from postproc.language.pdl2.program import Program, Variable, Variables, recover_block
+from postproc.language.pdl2.program import Program, Variable, Variables
 from postproc.language.pdl2.side_effects import (
     CallGraph,
     is_harmless,
@@ -76,164 +75,203 @@ from postproc.language.visits import (
 )
 from postproc.robot.trajectory import Motion
 
-# FOR loops: round by round where the bounds are constant, else over and over.
-
-
-def start_loop(machine: Machine, here: Execution, statement: ast.For) -> None:
-    """Go into the first round, past the loop, or both where that is not known."""
-    row, end = here.row, here.place.body.blocks.end[here.row]
-    start, stop = here.value(statement.start), here.value(statement.stop)
-    by = here.value(statement.step) if statement.step is not None else 1.0
-    rounds = None
-    if isinstance(start, float) and isinstance(stop, float) and isinstance(by, float):
-        by = -by if statement.down and by > 0 else by
-        if by and math.isfinite((stop - start) / by):
-            rounds = max(int((stop - start) / by + 1e-9) + 1, 0)
-            rounds = 0 if (stop - start) / by < 0 else rounds
-    if rounds == 0:
-        machine.go_on(here.context, end + 1, here.store)
-        return
-    loop = (here.context, row)
-    if rounds is not None and _unroll(machine, here, statement, rounds, end):
-        plan = (float(start), float(by), rounds)  # type: ignore[arg-type]
-        if machine.ranges.setdefault(loop, plan) == plan:
-            _round(machine, here, here.context, row, 0)
-            return
-    machine.widened.add(loop)
-    invalidate(here, ast.Reference(statement.name), "it counts a loop")
-    if rounds is None:
-        machine.go_on(here.context, end + 1, here.store)
-    machine.push(here.context, row + 1, here.store)
-
-
-def _unroll(
-    machine: Machine, here: Execution, statement: ast.For, rounds: int, end: int
-) -> bool:
-    """Tell whether a loop is followed round by round."""
-    loop = (here.context, here.row)
-    if loop in machine.widened:
-        return False
-    if loop in machine.ranges:
-        return True
-    program = here.place.program
-    changed = rows_effects(program, here.row + 1, end).assigned | here.volatile
-    if statement.name in changed:
-        return False
-    machine.rows += rounds * (end - here.row)
-    if machine.rows <= MAX_ROWS:
-        return True
-    machine.rows -= rounds * (end - here.row)
-    here.world.report_once(
-        program,
-        here.row,
-        Code.LOOP_NOT_UNROLLED,
-        str(here.row),
-        f"the loop runs {rounds} times: too often to be followed round by round; "
-        "targets that depend on its counter are not compensated",
-    )
-    return False
-
-
-def _round(
-    machine: Machine,
-    here: Execution,
-    context: Context,
-    row: int,
-    number: int,
-) -> None:
-    """Start a round of a constant loop."""
-    first, by, _ = machine.ranges[(context, row)]
-    program = here.place.program
-    statement = recover_block(program.statement(row))
-    if isinstance(statement, ast.Label) and statement.then is not None:
-        statement = statement.then
-    inner = context.within(machine.position(program, row), number)
-    machine.enter(inner, here.place)
-    if isinstance(statement, ast.For):
-        key = here.locate(ast.Reference(statement.name)).key
-        here.store.write(key, first + number * by)
-    machine.go_on(inner, row + 1, here.store)
-
-
-def end_round(machine: Machine, here: Execution) -> None:
-    """Go into the next round, out of the loop, or both where that is not known."""
-    row = here.place.body.blocks.opener[here.row]
-    at = machine.position(here.place.program, row)
-    statement = recover_block(here.place.program.statement(row))
-    if isinstance(statement, ast.Label) and statement.then is not None:
-        statement = statement.then
-    name = statement.name if isinstance(statement, ast.For) else ""
-    last = here.context
-    if last.is_round and last.at == at:
-        if last.kind + 1 < machine.ranges[(last.outer, row)][2]:
-            _round(machine, here, last.outer, row, last.kind + 1)
-            return
-    else:
-        invalidate(here, ast.Reference(name), "it counts a loop")
-        machine.push(here.context, row + 1, here.store)
-    invalidate(here, ast.Reference(name), "it counted a loop that has ended")
-    machine.go_on(here.context, here.row + 1, here.store)
-
-
-# What each statement does to the store, and which way the program goes on.
-
 _MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
 
 
-_OTHERS_RUN = (
-    ast.Still, ast.Transfer, ast.Condition, ast.Cycle, ast.While, ast.Until, ast.Goto
-)  # fmt: skip
-"""Statements that take time, or that a program may wait with."""
+@dataclass(kw_only=True)
+class Pdl2Machine(Machine):
+    """The ways through a PDL2 program: what each statement does to the store.
+
+    Attributes:
+        blocks: Moves that are run at once.
+    """
+
+    blocks: MoveBlocks = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Find blocks with what is known of the job."""
+        self.blocks = MoveBlocks(self)
+
+    def at(self, context: Context, row: int, store: Store) -> Execution:
+        """Return the point of the execution at a row."""
+        return Execution(self.world, context.place, row, store, self.volatile, context)
+
+    def run_block(
+        self, context: Context, row: int, state: Store
+    ) -> tuple[int, Store] | None:
+        """Run a block of moves, or all moves of a body whose blocks do not close."""
+        here = self.at(context, row, state)
+        if here.place.body.broken:
+            run_broken(self, here)
+            return here.place.body.last, state
+        return (here.row, state) if self.blocks.run(here) else None
+
+    def act(
+        self, context: Context, row: int, one: ir.SourceStatement, state: Store
+    ) -> Store | None:
+        """Run one statement that leads to the next row, or into a routine."""
+        if isinstance(one, ast.When):
+            then = one.then
+            return state if then is None else self.run_one(context, row, then, state)
+        here = self.at(context, row, state)
+        text = one.text if isinstance(one, ir.NotUnderstood) else ""
+        prepare(self, here, one, text)
+        return state if step(self, here, one) else None
+
+    def before(
+        self, context: Context, row: int, one: ir.SourceStatement, state: Store
+    ) -> Store:
+        """Allow for what a line does besides leading elsewhere."""
+        here = self.at(context, row, state)
+        written = here.place.program.statement(row)
+        odd = isinstance(written, ir.NotUnderstood)
+        text = written.text if isinstance(written, ir.NotUnderstood) else ""
+        prepare(self, here, one, text)
+        if odd:
+            invalidate_names(here, words_in(text), _why_unknown(here))
+            if not _is_harmless(here, text):
+                _forget_by_text(here, _why_unknown(here))
+        return state
+
+    def truth(
+        self, context: Context, row: int, condition: ir.Operand, state: Store
+    ) -> bool | None:
+        """Tell whether a condition holds, None where only the run tells."""
+        found = self.at(context, row, state).value(condition)
+        return found if isinstance(found, bool) else None
+
+    def fits(
+        self, context: Context, row: int, case: ir.Branch, head: int, state: Store
+    ) -> bool | None:
+        """Tell whether a CASE means the value that SELECT names."""
+        select = ast.action(context.place.statement(head))
+        tested = select.values if isinstance(select, ir.Branch) else ()
+        value = self.at(context, head, state).value(tested[0] if tested else None)
+        return _fits(self.at(context, row, state), case, value)
+
+    def count(
+        self, context: Context, row: int, loop: ir.ForLoop, state: Store
+    ) -> Counting | None:
+        """Return the rounds of a loop, None where they are not known."""
+        here = self.at(context, row, state)
+        first, last = here.value(loop.first), here.value(loop.last)
+        by = here.value(loop.step) if loop.step is not None else 1.0
+        if not (
+            isinstance(first, float) and isinstance(last, float)
+            and isinstance(by, float)
+        ):  # fmt: skip
+            return None
+        return Counting.of(first, last, -by if loop.down and by > 0 else by)
+
+    def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
+        """Tell whether nothing but a loop itself changes its variable."""
+        program, end = context.place.program, context.place.flow.end[row]
+        changed = rows_effects(program, row + 1, end).assigned | self.volatile
+        return loop.name not in changed
+
+    def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
+        """Say that a loop runs too often to be followed round by round."""
+        text = NOT_UNROLLED.format(rounds)
+        program = context.place.program
+        self.world.report_once(program, row, Code.LOOP_NOT_UNROLLED, str(row), text)
+
+    def begin_round(
+        self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: Store
+    ) -> tuple[Place, Store]:
+        """Give the variable of a loop its value."""
+        key = self.at(outer, row, state).locate(ir.DataObject(loop.name)).key
+        state.write(key, value)
+        return outer.place, state
+
+    def forget_counter(
+        self, context: Context, row: int, loop: ir.ForLoop, ended: bool, state: Store
+    ) -> Store:
+        """Forget the variable of a loop."""
+        why = "it counted a loop that has ended" if ended else "it counts a loop"
+        invalidate(self.at(context, row, state), ir.DataObject(loop.name), why)
+        return state
+
+    def leave(self, context: Context, state: Store, by_return: bool = False) -> None:
+        """Go back to the caller, or into the next cycle."""
+        call = context.call
+        body = call.place.body
+        if not by_return and body.flow.cycle >= 0 and not body.name:
+            self.enter(call, body.flow.cycle, state)
+        elif call.kind == CALLED:
+            for name in body.own_names:
+                state.drop(self.world.root(call.place, name))
+            self.return_to_caller(call, state)
+
+    def leave_otherwise(
+        self, context: Context, row: int, one: ir.Leave, state: Store
+    ) -> Store | None:
+        """Begin the next cycle (EXIT CYCLE); without one the program goes on."""
+        _cancel(self.at(context, row, state))
+        return None if self.begin_cycle(context, state) else state
 
 
-def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
-    """Run one statement; tell whether the next row follows."""
-    text = statement.text if isinstance(statement, ast.Unknown) else ""
-    statement = recover_block(statement)
+# What each statement does to the store.
+
+
+def prepare(
+    machine: Machine, here: Execution, statement: ir.SourceStatement, text: str
+) -> None:
+    """Allow for what may happen at a statement, and for the functions that it calls.
+
+    Args:
+        machine: It follows the program.
+        here: The statement.
+        statement: What it says, without what follows it on its line.
+        text: How it is written, where it is not understood.
+    """
     if machine.cycle_left:
         left = here.store.copy()
         left.last = frozenset({ELSEWHERE})
-        machine.begin_cycle(here, left)
+        machine.begin_cycle(here.context, left)
     if _waits(statement):
         machine.paused |= here.store.last
-    if isinstance(statement, _OTHERS_RUN) or text:
+    if _lets_others_run(statement) or text:
         let_others_run(here)
-    if text and not isinstance(statement, ast.Unknown):
-        invalidate_names(here, words_in(text), _why_unknown(here))
-        if not _is_harmless(here, text):
-            _forget_by_text(here, _why_unknown(here))
-    if not isinstance(statement, ast.Label | ast.Else | ast.When):
-        calls_in_expressions(machine, here, statement)
+    if ir.divides(statement):
+        values = statement.values if isinstance(statement, ir.Branch) else ()
+        statement = ir.Branch("case", values)
+    calls_in_expressions(machine, here, statement)
+
+
+def _lets_others_run(one: ir.SourceStatement) -> bool:
+    """Tell whether a statement takes time, or a program may wait with it."""
+    words = ("condition", "while", "until", "cycle")
+    if isinstance(one, ir.Branch | ir.BlockWord):
+        return one.word in words
+    return isinstance(one, ast.Still | ast.Transfer | ir.JumpTo)
+
+
+def step(machine: Machine, here: Execution, statement: ir.SourceStatement) -> bool:
+    """Run one statement; tell whether the next row follows."""
     match statement:
         case ast.Move():
             move(machine, here, statement)
-        case ast.Assign():
-            line = int(here.place.program.lines.line[here.row])
-            taught = (
-                line in here.world.taught_lines[here.place.program.lines.source.name]
-            )
-            assign(here, statement, taught)
-        case ast.Call():
+        case ir.Assignment():
+            lines = here.place.program.lines
+            taught = here.world.taught_lines[lines.source.name]
+            assign(here, statement, int(lines.line[here.row]) in taught)
+        case ir.Instruction():
             return not call_statement(machine, here, statement)
-        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
-            return then is None or step(machine, here, then)
         case ast.Transfer("WRITE", operands):
             for operand in operands:
                 here.world.pin(here.value(operand), "the program writes it out")
         case ast.Transfer(word, operands):
             for operand in list_changed_arguments(operands):
                 invalidate(here, operand, f"{word} changes it")
-        case ast.Unknown():
+        case ir.NotUnderstood():
             _unknown(machine, here, statement)
         case ast.CancelMove(arms):
             if not arms or any(here.is_ours(arm) is not False for arm in arms):
                 _cancel(here)
-        case _:
-            return _control(machine, here, statement)
     return True
 
 
-def _waits(statement: ast.Statement) -> bool:
+def _waits(statement: ir.SourceStatement) -> bool:
     """Tell whether a statement takes time that only the run tells."""
     if isinstance(statement, ast.Transfer):
         return statement.word == "READ"
@@ -253,82 +291,13 @@ def _cancel(here: Execution) -> None:
         here.store.last |= {ELSEWHERE}
 
 
-def _control(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
-    blocks, row = here.place.body.blocks, here.row
-    match statement:
-        case ast.If(condition):
-            inner = blocks.inner[row]
-            otherwise = inner[0] if inner else blocks.end[row]
-            return _branch(machine, here, condition, row + 1, otherwise, True)
-        case ast.While(condition):
-            return _branch(machine, here, condition, row + 1, blocks.end[row] + 1)
-        case ast.Until(condition):
-            return _branch(machine, here, condition, row + 1, blocks.opener[row])
-        case ast.EndWhile():
-            machine.push(here.context, blocks.opener[row], here.store)
-        case ast.Select(value):
-            _select(machine, here, here.value(value))
-        case ast.For():
-            start_loop(machine, here, statement)
-        case ast.EndFor():
-            end_round(machine, here)
-        case ast.Goto(label):
-            machine.push(here.context, blocks.labels[label], here.store)
-        case ast.ExitCycle():
-            _cancel(here)
-            return not machine.begin_cycle(here, here.store)
-        case ast.Return():
-            machine.leave(here, by_return=True)
-        case ast.Condition():
-            machine.go_on(here.context, blocks.end[row] + 1, here.store)
-        case ast.EndCondition():
-            pass
-        case _:
-            return True
-    return False
-
-
-def _branch(
-    machine: Machine,
-    here: Execution,
-    condition: ast.Expression | None,
-    then: int,
-    otherwise: int,
-    enters: bool = False,
-) -> bool:
-    """Go both ways, or the one that is known; `otherwise` may enter an ELSE."""
-    truth = here.value(condition) if condition is not None else None
-    if truth is not True:
-        go = machine.push if enters else machine.go_on
-        go(here.context, otherwise, here.store)
-    if truth is not False:
-        machine.go_on(here.context, then, here.store)
-    return False
-
-
-def _select(machine: Machine, here: Execution, value: Value) -> None:
-    """Go to every CASE that may be meant."""
-    blocks = here.place.body.blocks
-    for row in blocks.inner[here.row]:
-        statement = here.place.program.statement(row)
-        if isinstance(statement, ast.Case):
-            fits = _fits(here, row, statement, value)
-            if fits is not False:
-                machine.push(here.context, row, here.store)
-            if fits is True:
-                return
-        else:
-            machine.push(here.context, row, here.store)
-            return
-    machine.push(here.context, blocks.end[here.row], here.store)
-
-
-def _fits(here: Execution, row: int, case: ast.Case, value: Value) -> bool | None:
+def _fits(at: Execution, case: ir.Branch, value: Value) -> bool | None:
     """Tell whether a CASE means a value, None where it is not known."""
-    at = Execution(here.world, here.place, row, here.store, here.volatile, here.context)
-    found: bool | None = not case.choices and None
-    for choice in case.choices:
-        low, high = choice if isinstance(choice, tuple) else (choice, choice)
+    found: bool | None = not case.values and None
+    for choice in case.values:
+        low, high = choice, choice
+        if isinstance(choice, ir.Interval):
+            low, high = choice.low, choice.high
         a, b = at.value(low), at.value(high)
         known = type(a) is type(value) and type(b) is type(value)
         if not known or not isinstance(value, float | str):
@@ -338,7 +307,7 @@ def _fits(here: Execution, row: int, case: ast.Case, value: Value) -> bool | Non
     return found
 
 
-def _unknown(machine: Machine, here: Execution, statement: ast.Unknown) -> None:
+def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> None:
     """Forget all that unknown text could influence."""
     why = _why_unknown(here)
     invalidate_names(here, words_in(statement.text), why)
@@ -382,7 +351,7 @@ def run_broken(machine: Machine, here: Execution) -> None:
     """List the moves of a body whose blocks do not close; follow none of them."""
     body = here.place.body
     program = here.place.program
-    why = f"the block structure is broken (line {body.blocks.broken})"
+    why = f"the block structure is broken (line {body.broken})"
     here.reason = Reason(Code.BLOCK_STRUCTURE, why)
     for row in range(body.first + 1, body.last):
         said = ast.action(program.statement(row))
@@ -395,7 +364,6 @@ def run_broken(machine: Machine, here: Execution) -> None:
     invalidate_names(here, effects.assigned, why)
     here.store.set(tool=Nothing(why), base=Nothing(why), uframe=Nothing(why))
     here.store.last = frozenset({ELSEWHERE})
-    machine.leave(here)
 
 
 # What variables hold before a program assigns them.
@@ -408,7 +376,7 @@ def fill_initial(world: World) -> None:
     for place, seen in world.declarations():
         _enter_declarations(world, place, seen)
     if world.variables is not None and world.main.main is not None:
-        place = Place(world.main, world.main.main)
+        place = world.place(world.main, world.main.main)
         _enter_all(world, place, world.variables)
         _report_drift(world, place, world.variables)
 
@@ -599,7 +567,7 @@ def resolve(
     if machine.exhausted:
         world.report_once(
             program, 0, Code.TOO_COMPLEX, "", "the program has too many ways, or "
-            f"calls, to be followed to the end (more than {MAX_STEPS} steps): nothing "
+            f"calls, to be followed to the end (more than {MOST_STEPS} steps): nothing "
             "in it is compensated",
         )  # fmt: skip
         machine = _list_moves(world)
@@ -610,17 +578,15 @@ def resolve(
 
 def _follow(world: World) -> Machine:
     """Follow every way from the start."""
-    machine = Machine(world)
-    stretches = MoveBlocks(machine)
+    machine = Pdl2Machine(world=world)
     _start(machine)
-    while (here := machine.next()) is not None:
-        _run(machine, here, stretches)
+    machine.follow()
     return machine
 
 
 def _list_moves(world: World) -> Machine:
     """List every move of a job that is too complex to be followed, once."""
-    machine = Machine(world, exhausted=True)
+    machine = Pdl2Machine(world=world, exhausted=True)
     for place, _ in world.declarations():
         here = Execution(world, place, place.body.first, Store(lambda key: None))
         name = place.body.name or place.program.name
@@ -645,8 +611,8 @@ def _start(machine: Machine) -> None:
     machine.given, machine.lost = store.given, store.lost
     _handlers(machine, store)
     if program.main is not None:
-        machine.enter(machine.root, Place(program, program.main))
-        machine.push(machine.root, program.main.first + 1, store)
+        machine.root.place = world.place(program, program.main)
+        machine.enter(machine.root, program.main.first + 1, store)
 
 
 def _handlers(machine: Machine, store: Store) -> None:
@@ -659,9 +625,9 @@ def _handlers(machine: Machine, store: Store) -> None:
     unknown.set(tool=nothing, base=nothing, uframe=nothing)
     for program in world.programs():
         for body in (program.main, *program.routines.values()):
-            for first, last in body.blocks.handlers if body else ():
+            for first, last in body.flow.conditions if body else ():
                 assert body is not None
-                place = Place(program, body)
+                place = world.place(program, body)
                 reach = live_rows(world, place, first, last)
                 machine.volatile |= reach.may_change
                 for part in reach.parts:
@@ -681,7 +647,7 @@ def _ends_ours(world: World, place: Place, first: int, reach: CallGraph) -> bool
     """Return True if a handler may end moves of our arm."""
     if any(part.effects.cancels for part in reach.parts[1:]):
         return True
-    for row in range(first, place.body.blocks.end[first]):
+    for row in range(first, place.flow.end[first]):
         action = ast.action(place.program.statement(row))
         if isinstance(action, ast.CancelMove):
             at = Execution(world, place, row, Store(lambda key: None))
@@ -695,7 +661,7 @@ def _cancelling_handler(
     machine: Machine, place: Place, row: int, reach: CallGraph
 ) -> None:
     """Allow for a handler that ends moves on their way."""
-    cycles = any(isinstance(one, ast.ExitCycle) for one in reach.cancels)
+    cycles = any(isinstance(one, ir.Leave) for one in reach.cancels)
     if not cycles and not _ends_ours(machine.world, place, row, reach):
         return
     machine.interrupted = True
@@ -723,30 +689,5 @@ def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> N
         "this condition handler may move the arm at any time: the start of every move "
         "is uncertain",
     )
-    context = machine.root.within(machine.position(place.program, row), HANDLED)
-    machine.enter(context, place)
-    machine.push(context, row + 1, store)
-
-
-def _run(machine: Machine, here: Execution, stretches: MoveBlocks) -> None:
-    """Run statements one after the other until ways part or meet."""
-    program, body = here.place.program, here.place.body
-    joins = body.blocks.joins
-    if body.blocks.broken:
-        run_broken(machine, here)
-        return
-    first = True
-    while here.row < body.last:
-        if not first and here.row in joins:
-            machine.push(here.context, here.row, here.store)
-            return
-        if not stretches.run(here):
-            statement = program.statement(here.row)
-            if not first and isinstance(statement, ast.Case | ast.Else):
-                machine.push(here.context, body.blocks.end[here.row], here.store)
-                return
-            if not step(machine, here, statement):
-                return
-            here.row += 1
-        first = False
-    machine.leave(here)
+    context = machine.root.within(place.offset + row, HANDLED, place)
+    machine.enter(context, row + 1, store)

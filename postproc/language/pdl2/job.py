@@ -12,12 +12,20 @@ import numpy as np
 from postproc.arrays import Bools, Ints, release_memory
 from postproc.diagnostics import Code
 from postproc.files import base_name
+from postproc.language import ir
+from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import root_of, wholes
 from postproc.language.pdl2.entries import Entries
 from postproc.language.pdl2.pose_encoding import COMMENTS
-from postproc.language.pdl2.program import Body, Program, Variable, Variables
+from postproc.language.pdl2.program import (
+    Body,
+    Program,
+    Variable,
+    Variables,
+    recover_block,
+)
 from postproc.language.pdl2.values import Nothing, Position, Value
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
 from postproc.language.symbol_column import NameColumn
@@ -180,10 +188,25 @@ class InitialValues:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a statement stands: its program and its body."""
+    """Where a statement stands.
+
+    Attributes:
+        program, body: Its program and its body.
+        offset: Job-wide index of the first row of the program.
+    """
 
     program: Program
     body: Body
+    offset: int
+
+    @property
+    def flow(self) -> ControlFlow:
+        """The blocks of the body."""
+        return self.body.flow
+
+    def statement(self, row: int) -> ir.SourceStatement:
+        """Return what a row says; of what is not understood, which block it opens."""
+        return recover_block(self.program.statement(row))
 
 
 @dataclass
@@ -195,6 +218,7 @@ class World:
         others: Other programs, by lower-case program and file name.
         start: What the cell says.
         slot_base: First global number index of each file, by file name.
+        row_base: Likewise of rows.
         initial: What variables hold before the program assigns them, by key.
         changing: Exported variables, by key, that another program may write at any
             time: numbers, texts and switches, no positions.
@@ -213,6 +237,7 @@ class World:
     start: Start
     variables: ValueFile | None
     slot_base: dict[str, int] = field(default_factory=dict)
+    row_base: dict[str, int] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
     initial: InitialValues = field(default_factory=InitialValues)
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
@@ -229,9 +254,11 @@ class World:
     _later: tuple[int, dict[str, list[str]]] | None = None
 
     def __post_init__(self) -> None:
-        base = 0
+        base, row = 0, 0
         for program in self.programs():
             self.slot_base[program.lines.source.name] = base
+            self.row_base[program.lines.source.name] = row
+            row += len(program.lines) + 1
             self.files.append(program.lines.source.name)
             base += len(program.lines.numbers)
             source = program.lines.source
@@ -260,6 +287,10 @@ class World:
         for program in self.others.values():
             found.setdefault(id(program), program)
         return list(found.values())
+
+    def place(self, program: Program, body: Body) -> Place:
+        """Return where the statements of a body stand."""
+        return Place(program, body, self.row_base[program.lines.source.name])
 
     def report(self, program: Program, row: int, code: Code, message: str) -> None:
         """Collect a finding at a logical line."""
@@ -344,7 +375,7 @@ class World:
                 seen = program.variables
                 if body is not bodies[0]:
                     seen = seen.some(bodies[0].own_names | body.own_names)
-                yield Place(program, body), seen
+                yield self.place(program, body), seen
 
     @cached_property
     def spelling(self) -> Mapping[str, str]:
@@ -355,7 +386,8 @@ class World:
             for name in (*seen.list_names(), *own):
                 found.setdefault(self.root(place, name.lower()), name)
         if self.variables is not None and self.main.main is not None:
-            place, entries = Place(self.main, self.main.main), self.variables.entries
+            place = self.place(self.main, self.main.main)
+            entries = self.variables.entries
             for name, row in entries.row.items():
                 root = root_of(name)
                 key = self.root(place, root) + name[len(root) :]
@@ -396,13 +428,13 @@ class World:
     def find_routine(self, program: Program, name: str) -> Place | None:
         """Return the routine with a body that a name means, if the job holds it."""
         if name in program.routines:
-            return Place(program, program.routines[name])
+            return self.place(program, program.routines[name])
         exporter = program.outside.get(name)
         files = [exporter] if exporter else map(base_name, program.imports)
         for file in files:
             other = self._file(file)
             if other is not None and name in other.routines:
-                return Place(other, other.routines[name])
+                return self.place(other, other.routines[name])
         return None
 
     def find_program(self, program: Program, name: str) -> Place | None:
@@ -410,7 +442,7 @@ class World:
         found = self._file(name)
         if found is None or found.main is None:
             return None
-        return Place(found, found.main)
+        return self.place(found, found.main)
 
     def _file(self, name: str) -> Program | None:
         """Return the program that a name or a file's name means."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -11,7 +10,9 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.pdl2 import syntax as ast
+from postproc.language import ir
+from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.interpreter import Interpreter, calls_around
 from postproc.language.pdl2.abstract_state import (
     MANY,
     MOST_ORIGINS,
@@ -19,10 +20,9 @@ from postproc.language.pdl2.abstract_state import (
     Settings,
     Store,
 )
-from postproc.language.pdl2.call_context import CALLED, Context, Point
 from postproc.language.pdl2.evaluate import ProgramPoint, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
-from postproc.language.pdl2.program import Body, Program
+from postproc.language.pdl2.program import Body
 from postproc.language.pdl2.side_effects import PURE, circles, invocations, references
 from postproc.language.pdl2.values import Nothing, Position
 from postproc.language.visits import ELSEWHERE, Meaning
@@ -137,14 +137,7 @@ def single(
     )
 
 
-# A *configuration* is a place in the program with the calls and the rounds of constant
-# FOR loops that led there. Each has one store, in which all ways that lead there are
-# merged; a configuration is run again when its store has changed, until nothing
-# changes. Work is done in program order, so that most configurations are run once.
-
-MAX_ROWS = 20_000  # rows of unrolled loops and of calls, each time they are run
 DEEP = 64  # calls within calls, from where on it pays to know which call themselves
-MAX_STEPS = 8_000_000  # configurations run, calls and unrolled rows, all in all
 
 Key = tuple[Context, int, int]
 
@@ -157,69 +150,36 @@ class Execution(ProgramPoint):
     reason: Reason = NO_REASON  # why nothing here may be compensated
 
 
-@dataclass
-class Machine:
+@dataclass(kw_only=True)
+class Machine(Interpreter[Store]):
     """The work in hand and what came out of it.
 
     Attributes:
         world: The files of the job.
-        root: The context of the main part.
         arrivals: Runs of visits, by place; the last analysis of a place holds.
         ids: First visit id of each.
-        places: Program and body of each context.
-        entries: The store of each configuration.
-        ranges: (first, step, rounds) of constant loops, by context and row.
-        widened: Loops that are not unrolled.
         recursive: Bodies (by id) that call themselves, directly or not.
         interrupted: A condition handler may move the arm at any time.
         handler: Why no move can be compensated that a handler may interrupt.
         cycle_left: A condition handler may begin the cycle again at any time.
-        exhausted: The program is too complex to be followed to the end.
         paused: Visits behind which the arm may stop before the program goes on.
         lost: Visits behind which it may go anywhere.
         given: What variables are given at any time.
     """
 
     world: World
-    root: Context = field(default_factory=Context)
     arrivals: dict[Key, MoveRun] = field(default_factory=dict)
     ids: dict[Key, int] = field(default_factory=dict)
-    places: dict[Context, Place] = field(default_factory=dict)
-    entries: dict[tuple[Context, int], Store] = field(default_factory=dict)
-    ranges: dict[tuple[Context, int], tuple[float, float, int]] = field(
-        default_factory=dict
-    )
-    widened: set[tuple[Context, int]] = field(default_factory=set)
     volatile: frozenset[str] = frozenset()
     recursive: set[int] = field(default_factory=set)
     interrupted: bool = False
     handler: Reason = NO_REASON
     cycle_left: bool = False
-    exhausted: bool = False
     paused: set[int] = field(default_factory=set)
     lost: set[int] = field(default_factory=set)
     given: GivenValues = field(default_factory=GivenValues)
-    rows: int = 0
-    _heap: list[tuple[Point, int]] = field(default_factory=list)
-    _queued: set[tuple[Context, int]] = field(default_factory=set)
-    _called: dict[int, tuple[ast.Invoke, ...]] = field(default_factory=dict)
-    _offsets: dict[int, int] = field(default_factory=dict)
+    _called: dict[int, tuple[ir.FunctionCall, ...]] = field(default_factory=dict)
     next_id: int = 0
-
-    def __post_init__(self) -> None:
-        offset = 0
-        for program in self.world.programs():
-            self._offsets[id(program)] = offset
-            offset += len(program.lines) + 1
-
-    # ---- places ---------------------------------------------------------------------
-    def position(self, program: Program, row: int) -> int:
-        """Return the job-wide index of a row."""
-        return self._offsets[id(program)] + row
-
-    def enter(self, context: Context, place: Place) -> None:
-        """Say where a context is."""
-        self.places[context] = place
 
     def visit_id(self, key: Key, count: int = 1) -> int:
         """Return the first id of the visits of a place."""
@@ -230,7 +190,7 @@ class Machine:
 
     def record(self, here: Execution, sub: int, arrival: MoveRun) -> int:
         """Keep visits; return the id of the first."""
-        key = (here.context, self.position(here.place.program, here.row), sub)
+        key = (here.context, here.place.offset + here.row, sub)
         self.arrivals[key] = arrival
         if MANY in arrival.predecessors:
             here.world.report_once(
@@ -245,60 +205,9 @@ class Machine:
         last = here.store.last
         return last | {ELSEWHERE} if self.interrupted else last
 
-    # ---- work -----------------------------------------------------------------------
-    def push(self, context: Context, row: int, store: Store) -> None:
-        """A way leads to a row with what is known there."""
-        context = self._inside(context, row)
-        config = (context, row)
-        known = self.entries.get(config)
-        if known is None:
-            self.entries[config] = store.copy()
-        elif not known.merge(store):
-            return
-        if config not in self._queued:
-            self._queued.add(config)
-            at = self.position(self.places[context].program, row)
-            heapq.heappush(self._heap, (Point(context, at), row))
-
-    def go_on(self, context: Context, row: int, store: Store) -> None:
-        """Go on with a row as the one after the last: ELSE and CASE end a branch."""
-        place = self.places[context]
-        if row < place.body.last:
-            statement = place.program.statement(row)
-            if isinstance(statement, ast.Case | ast.Else):
-                row = place.body.blocks.end.get(row, row)
-        self.push(context, row, store)
-
-    def _inside(self, context: Context, row: int) -> Context:
-        """Drop the rounds of loops that a jump to a row leaves."""
-        place = self.places[context]
-        while context.is_round:
-            start = context.at - self._offsets[id(place.program)]
-            if start < row <= place.body.blocks.end[start]:
-                break
-            context = context.outer
-        return context
-
-    def next(self) -> Execution | None:
-        """Take the first piece of work, None when all is done."""
-        if not self._heap:
-            return None
-        point, row = heapq.heappop(self._heap)
-        context = point.context
-        config = (context, row)
-        self._queued.discard(config)
-        self.rows += 1
-        if self.rows > MAX_STEPS:
-            self.exhausted = True
-            return None
-        store = self.entries[config].copy()
-        return Execution(
-            self.world, self.places[context], row, store, self.volatile, context
-        )
-
     def find_calls(
-        self, place: Place, statement: ast.Statement
-    ) -> tuple[ast.Invoke, ...]:
+        self, place: Place, statement: ir.SourceStatement
+    ) -> tuple[ir.FunctionCall, ...]:
         """Return the calls in a statement's expressions that may have effects.
 
         A function without arguments is called by its name alone.
@@ -308,23 +217,18 @@ class Machine:
             found = [c for c in invocations(statement) if c.name not in PURE]
             names = {r.name for r in references(statement) if not r.steps}
             alone = [n for n in names if self.world.is_function(place, n)]
-            found += [ast.Invoke(name, ()) for name in sorted(alone)]
+            found += [ir.FunctionCall(name, ()) for name in sorted(alone)]
             known = self._called[id(statement)] = tuple(found)
         return known
 
-    def begin_cycle(self, here: Execution, store: Store) -> bool:
+    def begin_cycle(self, context: Context, store: Store) -> bool:
         """Go on with the next cycle of the program that runs; False without one."""
-        context = here.context
-        while True:
-            cycle = self.places[context].body.blocks.cycle
-            if cycle >= 0:
-                self.push(context, cycle, store)
+        for one in context.around():
+            if one.place is not None and one.place.flow.cycle >= 0:
+                self.enter(one, one.place.flow.cycle, store)
                 return True
-            if context is self.root:
-                return False
-            context = context.outer
+        return False
 
-    # ---- calls ----------------------------------------------------------------------
     def calls_to(self, body: Body, context: Context) -> list[Body]:
         """Return the bodies that run since one of them was called, none if it was not.
 
@@ -333,43 +237,17 @@ class Machine:
         if context.depth > DEEP and id(body) not in self._circles:
             return []
         found: list[Body] = []
-        while True:
-            place = None if context.is_round else self.places.get(context)
-            if place is not None:
-                found.append(place.body)
-                if place.body is body:
+        for one in calls_around(context):
+            if one.place is not None:
+                found.append(one.place.body)
+                if one.place.body is body:
                     return found
-            if context is self.root:
-                return []
-            context = context.outer
+        return []
 
     @cached_property
     def _circles(self) -> frozenset[int]:
         """Bodies (by id) that may call themselves, directly or not."""
         return circles(self.world)
-
-    def leave(self, here: Execution, by_return: bool = False) -> None:
-        """The body ends: go back to the caller, or into the next cycle."""
-        context = here.context
-        while context.is_round:
-            context = context.outer
-        blocks = here.place.body.blocks
-        if not by_return and blocks.cycle >= 0 and not here.place.body.name:
-            self.push(context, blocks.cycle, here.store)
-        elif context.kind == CALLED:
-            for name in here.place.body.own_names:
-                here.store.drop(here.world.root(here.place, name))
-            caller = self.places[context.outer]
-            row = context.at - self._offsets[id(caller.program)]
-            self.go_on(context.outer, row + 1, here.store)
-
-    def call(self, here: Execution, place: Place) -> None:
-        """Go into a routine; it comes back to the row after this one."""
-        at = self.position(here.place.program, here.row)
-        context = here.context.within(at, CALLED)
-        self.enter(context, place)
-        self.rows += 1
-        self.push(context, place.body.first + 1, here.store)
 
 
 OTHERS_WRITE = (
@@ -386,14 +264,14 @@ def invalidate_names(here: Execution, names: frozenset[str], why: str) -> None:
         if name.startswith("$"):
             here.store.set(**{name[1:]: Nothing(why)})
         elif name:
-            invalidate(here, ast.Reference(name), why)
+            invalidate(here, ir.DataObject(name), why)
 
 
 def escape_names(here: Execution, names: frozenset[str], why: str) -> None:
     """Keep the numbers of variables that something not followed may depend on."""
     for name in sorted(names):
         if not name.startswith("$"):
-            for key in here.locate(ast.Reference(name)).keys:
+            for key in here.locate(ir.DataObject(name)).keys:
                 for part in (key, *parts_under(here, key)):
                     here.world.pin(here.store.read(part), why)
 
@@ -405,7 +283,7 @@ def let_others_run(here: Execution) -> None:
     here.store.exposed = frozenset()
 
 
-def invalidate(here: Execution, reference: ast.Reference, why: str) -> None:
+def invalidate(here: Execution, reference: ir.DataObject, why: str) -> None:
     """Forget what a variable holds, unless it is a constant."""
     declared = here.world.find_declaration(here.place, reference.name)
     if declared is not None and declared.constant:

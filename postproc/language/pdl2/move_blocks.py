@@ -9,6 +9,7 @@ from itertools import islice
 import numpy as np
 
 from postproc.arrays import Bools, Ints
+from postproc.language import ir
 from postproc.language.logical_lines import Lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import call_statement, calls_in_expressions
@@ -81,7 +82,7 @@ class PlainMoves:
 
     first: int
     variant: Ints
-    statements: tuple[ast.Statement, ...]
+    statements: tuple[ir.SourceStatement, ...]
     forms: tuple[MoveForm | None, ...]
     calls: tuple[bool, ...]
     named: tuple[bool, ...]
@@ -123,7 +124,7 @@ def find_plain_moves(
     for form, mine in zip(kinds.tolist(), groups, strict=False):
         of_shape[np.searchsorted(used, mine)] = variants.add(form, mine)
     variant = of_shape[own]
-    joins = np.array(sorted(body.blocks.joins), dtype=np.int64)
+    joins = np.array(sorted(body.flow.joins), dtype=np.int64)
     ends = np.concatenate([first + np.flatnonzero(variant < 0), joins, [body.last]])
     said = variants.statements
     return PlainMoves(
@@ -133,7 +134,7 @@ def find_plain_moves(
         tuple(_form(one) if isinstance(one, ast.Move) else None for one in said),
         tuple(any(_calls(world, place, one)) for one in said),
         tuple(
-            isinstance(one, ast.Move) and isinstance(one.where[0], ast.Reference)
+            isinstance(one, ast.Move) and isinstance(one.where[0], ir.DataObject)
             for one in said
         ),
         variants.points,
@@ -145,9 +146,9 @@ def find_plain_moves(
     )
 
 
-def _may_be_plain(said: ast.Statement) -> bool:
-    if isinstance(said, ast.Call):
-        return not said.program
+def _may_be_plain(said: ir.SourceStatement) -> bool:
+    if isinstance(said, ir.Instruction):
+        return not isinstance(said, ast.ProgramCall)
     return isinstance(said, ast.Move) and _is_plain(said)
 
 
@@ -157,16 +158,20 @@ def _is_plain(move: ast.Move) -> bool:
         return False
     if move.arm or move.via or move.til is not None or move.sync:
         return False
-    for reference, value in move.settings:
+    for one in move.settings:
+        reference, value = one.target, one.value
         plain = reference.name.startswith("$") and not reference.steps
-        if not (plain and isinstance(value, ast.Number)) or reference.name in _NOT_WITH:
+        if not (plain and isinstance(value, ir.Num)) or reference.name in _NOT_WITH:
             return False
     match move.where[0]:
-        case ast.Invoke("pos", (*items, ast.Text(_))) | ast.Aggregate(items):
+        case ir.FunctionCall("pos") as call:
+            *items, last = call.values
+            return _six_numbers(
+                items if isinstance(last, ir.StringLiteral) else call.values
+            )
+        case ir.Composite(items):
             return _six_numbers(items)
-        case ast.Invoke("pos", items):
-            return _six_numbers(items)
-        case ast.Reference(name, () | (ast.Index(_),)):
+        case ir.DataObject(name, () | (ir.ElementStep(_),)):
             return not name.startswith("$")
     return False
 
@@ -174,32 +179,32 @@ def _is_plain(move: ast.Move) -> bool:
 def _form(move: ast.Move) -> MoveForm:
     """Return what moves of a variant have in common, but for their trajectory."""
     slots: tuple[int, ...] = ()
-    items: tuple[ast.Expression | None, ...] = ()
+    items: tuple[ir.Operand | None, ...] = ()
     where = move.where[0]
-    if isinstance(where, ast.Aggregate):
+    if isinstance(where, ir.Composite):
         items = where.items
-    elif isinstance(where, ast.Invoke):
-        items = where.arguments
-    if not isinstance(where, ast.Reference):
-        slots = tuple(i.slot for i in items[:6] if isinstance(i, ast.Number))
+    elif isinstance(where, ir.FunctionCall):
+        items = where.values
+    if not isinstance(where, ir.DataObject):
+        slots = tuple(i.slot for i in items[:6] if isinstance(i, ir.Num))
     config = items[6] if len(items) > 6 else None
     return MoveForm(
         Motion.JOINT,
         fly=move.fly,
         slots=slots,
-        joints=isinstance(where, ast.Aggregate),
-        config=config.value if isinstance(config, ast.Text) else None,
+        joints=isinstance(where, ir.Composite),
+        config=config.text if isinstance(config, ir.StringLiteral) else None,
         overrides=tuple(
-            (reference.name.lstrip("$"), value.slot)
-            for reference, value in move.settings
-            if isinstance(value, ast.Number)
+            (one.target.name.lstrip("$"), one.value.slot)
+            for one in move.settings
+            if isinstance(one.value, ir.Num)
         ),
     )
 
 
 def _six_numbers(items: object) -> bool:
     assert isinstance(items, tuple | list)
-    return len(items) == 6 and all(isinstance(i, ast.Number) for i in items)
+    return len(items) == 6 and all(isinstance(i, ir.Num) for i in items)
 
 
 @dataclass
@@ -212,7 +217,7 @@ class _Variants:
     shapes: Ints  # of the body, ascending
 
     def __post_init__(self) -> None:
-        self.statements: list[ast.Statement] = []
+        self.statements: list[ir.SourceStatement] = []
         self.points: dict[int, PointVariable] = {}
         self._known: dict[tuple[int, tuple[str, ...]], int] = {}
         self._parameters = {p.name for p in self.place.body.parameters}
@@ -228,7 +233,7 @@ class _Variants:
         if len(shapes) == 1:
             return np.array([self._add_one(int(shapes[0]), where)])
         names = said.shapes.names_at(shapes)
-        if not isinstance(where, ast.Reference):
+        if not isinstance(where, ir.DataObject):
             return self._variants(shapes, names)
         index, at = _number_slots(where.steps), name_index(where.name)
         variants = np.full(len(shapes), -1)
@@ -243,10 +248,10 @@ class _Variants:
         variants[quiet] = self._variants(shapes[quiet], names[quiet])
         return variants
 
-    def _add_one(self, shape: int, where: ast.Expression | None) -> int:
+    def _add_one(self, shape: int, where: ir.Operand | None) -> int:
         """Return the variant of the one shape of a form: not worth an array pass."""
         names = self.place.program.lines.shapes.names_of(shape)
-        if isinstance(where, ast.Reference):
+        if isinstance(where, ir.DataObject):
             index, at = _number_slots(where.steps), name_index(where.name)
             name = names[at].lower() if at >= 0 else where.name
             if index is None or not self._is_point(name, array=bool(where.steps)):
@@ -321,7 +326,7 @@ class _Variants:
             return False
         return _is_point(self.world.type_of(self.place, name), array)
 
-    def _does_nothing(self, call: ast.Invoke) -> bool:
+    def _does_nothing(self, call: ir.FunctionCall) -> bool:
         """Tell whether a call neither moves the arm nor sets what moves depend on."""
         name = call.name
         if self.world.find_routine(self.place.program, name) is not None:
@@ -329,14 +334,14 @@ class _Variants:
         bare = name not in CHANGING and name not in PURE
         if bare and not stays_still(self.world, self.place.program, name):
             return False
-        return all(self._keeps(a, bare) for a in call.arguments)
+        return all(self._keeps(a, bare) for a in call.values)
 
-    def _keeps(self, argument: ast.Expression | None, bare: bool) -> bool:
+    def _keeps(self, argument: ir.Operand | None, bare: bool) -> bool:
         """Tell whether nothing that moves depend on is known by an argument's name."""
         match argument:
-            case None | ast.Number() | ast.Text() | ast.Unary(_, ast.Number()):
+            case None | ir.Num() | ir.StringLiteral() | ir.Operation(_, (ir.Num(),)):
                 return True
-            case ast.Reference(name, ()):
+            case ir.DataObject(name, ()):
                 type_ = self.world.type_of(self.place, name)
                 safe = type_ is None or (
                     type_.name not in _POINTS and not type_.array and not type_.path
@@ -353,22 +358,24 @@ def _is_point(type_: ast.Type | None, array: bool) -> bool:
     return type_.array == array
 
 
-def _number_slots(steps: tuple[str | ast.Index, ...]) -> tuple[int, ...] | None:
+def _number_slots(steps: tuple[str | ir.ElementStep, ...]) -> tuple[int, ...] | None:
     """Return the slots of an index that is written in numbers, None for any other."""
     index = [
-        i for step in steps if isinstance(step, ast.Index) for i in step.subscripts
+        i for step in steps if isinstance(step, ir.ElementStep) for i in step.subscripts
     ]
-    slots = tuple(i.slot for i in index if isinstance(i, ast.Number))
+    slots = tuple(i.slot for i in index if isinstance(i, ir.Num))
     return slots if len(slots) == len(index) else None
 
 
-def _calls(world: World, place: Place, said: ast.Statement) -> list[ast.Invoke]:
+def _calls(
+    world: World, place: Place, said: ir.SourceStatement
+) -> list[ir.FunctionCall]:
     """List the calls in a line, those by a function's name alone too."""
     found = [c for c in invocations(said) if c.name not in PURE]
     names = {r.name for r in references(said) if not r.steps}
-    found += [ast.Invoke(n, ()) for n in names if world.is_function(place, n)]
-    if isinstance(said, ast.Call):
-        found.append(ast.Invoke(said.name, said.arguments))
+    found += [ir.FunctionCall(n, ()) for n in names if world.is_function(place, n)]
+    if isinstance(said, ir.Instruction):
+        found.append(ir.FunctionCall(said.name, said.arguments))
     return found
 
 
@@ -452,7 +459,7 @@ class MoveBlocks:
             statement, form = quiet.statements[number], quiet.forms[number]
             if quiet.calls[number]:
                 calls_in_expressions(self.machine, here, statement)
-            if isinstance(statement, ast.Call):
+            if isinstance(statement, ir.Instruction):
                 call_statement(self.machine, here, statement)
             elif isinstance(statement, ast.Move) and form is not None:
                 motion, reason = motion_of(here, statement, here.store.settings)

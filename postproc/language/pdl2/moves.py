@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language import ir
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Settings
 from postproc.language.pdl2.evaluate import SINGLE, parts_under
@@ -26,7 +27,7 @@ from postproc.robot.trajectory import Motion
 MAIN = ("$main_pos", "$main_jntp", "$main_xtnd")
 
 
-def may_be_node(here: Execution, reference: ast.Reference) -> bool:
+def may_be_node(here: Execution, reference: ir.DataObject) -> bool:
     """Tell whether a reference may mean a node of a path, or what is in one."""
     type_ = here.world.type_of(here.place, reference.name)
     if type_ is None:
@@ -34,7 +35,7 @@ def may_be_node(here: Execution, reference: ast.Reference) -> bool:
     return type_.path or type_.name not in SINGLE
 
 
-def destination(here: Execution, reference: ast.Reference) -> Value:
+def destination(here: Execution, reference: ir.DataObject) -> Value:
     """Return where a move to what may be a node goes: to the one position in it.
 
     What other standard fields (``$LIN_SPD``, ``$SEG_TOOL_IDX``) of a node do in a move
@@ -50,7 +51,7 @@ def destination(here: Execution, reference: ast.Reference) -> Value:
     found = {name for name in names if name[:1] == "$" and "." not in name}
     standard = sorted(found | _list_declared(here, reference))
     fields = [
-        here.value(ast.Reference(reference.name, (*reference.steps, name)))
+        here.value(ir.DataObject(reference.name, (*reference.steps, name)))
         for name in standard
         if name in MAIN
     ]
@@ -69,7 +70,7 @@ def destination(here: Execution, reference: ast.Reference) -> Value:
     return add_unknown(Nothing(f"{why} ({', '.join(standard).upper()})"), *fields)
 
 
-def _list_declared(here: Execution, reference: ast.Reference) -> frozenset[str]:
+def _list_declared(here: Execution, reference: ir.DataObject) -> frozenset[str]:
     """Return the standard fields that the type of a node declares."""
     type_ = here.world.type_of(here.place, reference.name)
     steps = [step for step in reference.steps if isinstance(step, str)]
@@ -136,7 +137,7 @@ def _no_target(target: Meaning, numbers: tuple[float | None, ...], word: str) ->
     return Goal(target, numbers, reason=_why(word))
 
 
-def _about(here: Execution, where: tuple[ast.Expression, ...], frame: str) -> Goal:
+def _about(here: Execution, where: tuple[ir.Operand, ...], frame: str) -> Goal:
     axis, angle = here.value(where[0]), here.real(where[1])
     if not isinstance(axis, Vector) or frame not in _FRAME:
         return Goal(Meaning.UNKNOWN, reason=_why("ABOUT"))
@@ -144,9 +145,7 @@ def _about(here: Execution, where: tuple[ast.Expression, ...], frame: str) -> Go
     return _no_target(Meaning.ABOUT, numbers, "ABOUT")
 
 
-def _towards(
-    here: Execution, where: tuple[ast.Expression, ...], motion: Motion
-) -> Goal:
+def _towards(here: Execution, where: tuple[ir.Operand, ...], motion: Motion) -> Goal:
     """Go a distance towards a pose: a place of its own on a straight line only."""
     goal, distance = absolute(here, where[1]), here.real(where[0])
     known = goal.target is Meaning.POSE and distance is not None and distance >= 0.0
@@ -156,9 +155,9 @@ def _towards(
     return Goal(Meaning.FOR, goal.numbers, towards, distance, _why("FOR"))
 
 
-def _along(here: Execution, path: ast.Expression) -> Goal:
+def _along(here: Execution, path: ir.Operand) -> Goal:
     """Go along a path: its nodes must stay, for the arm goes to them from elsewhere."""
-    name = path.name if isinstance(path, ast.Reference) else ""
+    name = path.name if isinstance(path, ir.DataObject) else ""
     why = f"MOVE ALONG {name} goes to it too"
     escape_names(here, frozenset({name}), why)
     reason = (
@@ -168,13 +167,13 @@ def _along(here: Execution, path: ast.Expression) -> Goal:
     return Goal(Meaning.UNKNOWN, reason=Reason(Code.POSITION_UNKNOWN, reason))
 
 
-def absolute(here: Execution, expression: ast.Expression) -> Goal:
+def absolute(here: Execution, expression: ir.Operand) -> Goal:
     """Tell what a place means that does not depend on where the arm is."""
-    if isinstance(expression, ast.Reference) and expression.name.startswith("$"):
+    if isinstance(expression, ir.DataObject) and expression.name.startswith("$"):
         return _system(here, expression)
-    if isinstance(expression, ast.Reference):
+    if isinstance(expression, ir.DataObject):
         _check_declared(here, expression.name)
-    if isinstance(expression, ast.Reference) and may_be_node(here, expression):
+    if isinstance(expression, ir.DataObject) and may_be_node(here, expression):
         value = destination(here, expression)
     else:
         value = here.value(expression)
@@ -183,7 +182,7 @@ def absolute(here: Execution, expression: ast.Expression) -> Goal:
     return from_value(value)
 
 
-def _system(here: Execution, reference: ast.Reference) -> Goal:
+def _system(here: Execution, reference: ir.DataObject) -> Goal:
     """Tell where a place of the controller is; it belongs to no target."""
     name = here.setting_name(reference)
     if name is None:
@@ -325,14 +324,15 @@ def _keep(here: Execution, statement: ast.Move) -> None:
             f"corrected. Compensate it with a cell of its arm{number}, and its model"
         )
         here.world.report(here.place.program, here.row, Code.OTHER_ARM, text)
-    names = frozenset(r.name for r in references((statement.where, statement.via)))
+    names = frozenset(r.name for r in references(*statement.where, statement.via))
     escape_names(here, names, "another arm goes to it too")
 
 
 def _with(here: Execution, statement: ast.Move) -> Settings:
     """Return the settings that hold during this move."""
     changes: dict[str, Value] = {}
-    for reference, expression in statement.settings:
+    for one in statement.settings:
+        reference, expression = one.target, one.value
         part = here.frame_part(reference)
         if part is not None:
             changes[part[0]] = Nothing("a part of it is set for this move alone")
@@ -348,7 +348,7 @@ def motion_of(
 ) -> tuple[Motion, Reason]:
     """Return the trajectory of a move, and why it is not known or not followed."""
     said: Value | None = statement.trajectory.lower() or settings.get("move_type")
-    with_ = any(r.name == "$move_type" for r, _ in statement.settings)
+    with_ = any(one.target.name == "$move_type" for one in statement.settings)
     if with_:
         said = settings.get("move_type")
     if said is None:

@@ -11,10 +11,11 @@ from typing import Any
 
 import lark
 
+from postproc.language import ir
 from postproc.language.grammars import line_parser
+from postproc.language.ir import Num
 from postproc.language.lexer import NAME_MARK, UNREADABLE
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.syntax import Number
 from postproc.language.templates import open_name
 
 # Parts of a line on their way from tree to statement, told apart by type.
@@ -89,8 +90,8 @@ def _of(children: Children, kind: type) -> tuple[Any, ...]:
     return tuple(c for c in children if isinstance(c, kind) and type(c) is not Mark)
 
 
-def _statement(children: Children) -> ast.Statement | None:
-    found = _of(children, ast.Statement)
+def _statement(children: Children) -> ir.SourceStatement | None:
+    found = _of(children, ir.SourceStatement)
     return found[0] if found else None
 
 
@@ -109,13 +110,13 @@ def _read_attributes(children: Children, first: int) -> tuple[str, tuple[str, ..
 
 def _program_attribute(c: Children) -> int:
     """Return the slot of ``PROG_ARM=n``, -1 for any other attribute."""
-    arm = len(c) == 2 and _name(c[0]) == "prog_arm" and isinstance(c[1], ast.Number)
+    arm = len(c) == 2 and _name(c[0]) == "prog_arm" and isinstance(c[1], ir.Num)
     return c[1].slot if arm else -1
 
 
 def _arm_slot(c: Children) -> int:
     """Return the slot of the number in ``FOR ARM[n]``, -1 where there is none."""
-    found = [part[0].slot for part in _of(c, ArmPart) if isinstance(part[0], Number)]
+    found = [part[0].slot for part in _of(c, ArmPart) if isinstance(part[0], Num)]
     return found[0] if found else -1
 
 
@@ -128,7 +129,7 @@ def _routine(c: Children) -> ast.Routine:
 
 
 def _variables(c: Children) -> ast.Declare:
-    initial = c[2] if len(c) > 2 and isinstance(c[2], ast.Expression) else None
+    initial = c[2] if len(c) > 2 and isinstance(c[2], ir.Operand) else None
     exported, words = _read_attributes(c, 2)
     return ast.Declare(tuple(c[0]), c[1], initial, exported, words)
 
@@ -158,7 +159,7 @@ def _move(fly: bool, c: Children) -> ast.Move:
         where=where,
         via=via,
         frame=frame,
-        settings=tuple((s[0], s[1]) for s in _of(c, SettingPart)),
+        settings=tuple(ir.Assignment(s[0], s[1]) for s in _of(c, SettingPart)),
         conditions=tuple(b[0] for b in _of(c, BesidePart)),
         til=(_of(c, TilPart) or (None,))[0],
         sync=tuple(replace(s[0], fly=fly) for s in _of(c, SyncPart)),
@@ -189,54 +190,70 @@ _CONDITION_WORDS = frozenset(
 """Words of the language that brackets may follow without being called."""
 
 
-def _terms(c: Children) -> tuple[ast.Reference | ast.Invoke, ...]:
+def _terms(c: Children) -> tuple[ir.DataObject | ir.FunctionCall, ...]:
     """Return the names in text that is not understood; those with arguments call."""
-    found: list[ast.Reference | ast.Invoke] = []
+    found: list[ir.DataObject | ir.FunctionCall] = []
     for part, after in zip_longest(c, c[1:]):
-        if isinstance(part, ast.Reference):
+        if isinstance(part, ir.DataObject):
             calls = type(after) is RoundPart and part.name not in _CONDITION_WORDS
-            found.append(ast.Invoke(part.name, ()) if calls else part)
+            found.append(ir.FunctionCall(part.name, ()) if calls else part)
         elif isinstance(part, GroupPart):
             found += _terms(part)
     return tuple(found)
 
 
-def _soup_word(c: Children) -> ast.Reference | None:
+def _soup_word(c: Children) -> ir.DataObject | None:
     name = type(c[0]) is Mark and c[0].kind == "NAME" if c else False
-    return ast.Reference(_name(c[0])) if name else None
+    return ir.DataObject(_name(c[0])) if name else None
 
 
-def _reference(c: Children) -> ast.Reference:
+def _reference(c: Children) -> ir.DataObject:
     steps = tuple(_name(s) if isinstance(s, str) else s for s in c[1:])
-    return ast.Reference(_name(c[0]), steps)
+    return ir.DataObject(_name(c[0]), steps)
 
 
-def _one_or_pair(c: Children) -> Any:
-    return c[0] if len(c) == 1 else tuple(c)
+def _one_or_pair(c: Children) -> ir.Operand:
+    return c[0] if len(c) == 1 else ir.Interval(c[0], c[1])
 
 
-def _for(c: Children) -> ast.For:
+def _for(c: Children) -> ir.ForLoop:
     step = c[4] if len(c) > 4 else None
-    return ast.For(_name(c[0]), c[1], c[3], step, c[2].kind == "DOWNTO")
+    return ir.ForLoop(_name(c[0]), c[1], c[3], step, c[2].kind == "DOWNTO")
 
 
 def _beside(c: Children) -> BesidePart:
-    inside = c[0] if len(c) == 1 else ast.Invoke(_name(c[0]), c[1])
+    inside = c[0] if len(c) == 1 else ir.FunctionCall(_name(c[0]), c[1])
     return BesidePart((inside,))
 
 
-def _case(c: Children) -> ast.Case:
-    choices = tuple(x for x in c if not isinstance(x, ast.Statement))
-    return ast.Case(choices, _statement(c))
+def _case(c: Children) -> ir.Branch:
+    choices = tuple(x for x in c if not isinstance(x, ir.SourceStatement))
+    return ir.Branch("case", choices, _statement(c))
 
 
-def _call(c: Children) -> ast.Call:
-    return ast.Call(_name(c[0]), c[1] if len(c) > 1 else ())
+def _call(make: type[ir.Instruction]) -> Rule:
+    return lambda c: make(_name(c[0]), c[1] if len(c) > 1 else ())
+
+
+def _branch(word: str) -> Rule:
+    return lambda c: ir.Branch(word, tuple(c))
+
+
+def _word(word: str) -> Rule:
+    return lambda c: ir.BlockWord(word, _statement(c))
+
+
+def _assign(c: Children) -> ir.Assignment:
+    """Return what ``:=`` does, and ``+=`` and ``-=``, which compute with the target."""
+    target, operator, value = c[0], str(c[1]), c[2]
+    if operator != ":=":
+        value = ir.Operation(operator[0], (target, value))
+    return ir.Assignment(target, value)
 
 
 RULES: dict[str, Rule] = {
     "line": _statement,
-    "labelled": lambda c: ast.Label(_name(c[0]).rstrip(": "), _statement(c)),
+    "labelled": lambda c: ir.LabelMark(_name(c[0]).rstrip(": "), _statement(c)),
     "program": lambda c: ast.ProgramHead(_name(c[0]), max([-1, *_of(c, int)])),
     "program_attribute": _program_attribute,
     "import": lambda c: ast.Import(_unquote(c[0])),
@@ -259,26 +276,26 @@ RULES: dict[str, Rule] = {
     "path_type": lambda c: ast.Type(_name(c[0]), path=True),
     "dimensions": lambda c: None,
     "dimension": lambda c: None,
-    "if": lambda c: ast.If(c[0]),
-    "else": lambda c: ast.Else(_statement(c)),
-    "endif": lambda c: ast.EndIf(),
-    "select": lambda c: ast.Select(c[0]),
+    "if": _branch("if"),
+    "else": _word("else"),
+    "endif": _word("endif"),
+    "select": _branch("test"),
     "case": _case,
     "choice": _one_or_pair,
-    "endselect": lambda c: ast.EndSelect(),
+    "endselect": _word("endtest"),
     "for": _for,
-    "endfor": lambda c: ast.EndFor(),
-    "while": lambda c: ast.While(c[0]),
-    "endwhile": lambda c: ast.EndWhile(),
-    "repeat": lambda c: ast.Repeat(),
-    "until": lambda c: ast.Until(c[0]),
-    "cycle": lambda c: ast.Cycle(),
-    "exit_cycle": lambda c: ast.ExitCycle(),
-    "goto": lambda c: ast.Goto(_name(c[0])),
-    "return": lambda c: ast.Return(c[0] if c else None),
-    "condition": lambda c: ast.Condition(),
+    "endfor": _word("endfor"),
+    "while": _branch("while"),
+    "endwhile": _word("endwhile"),
+    "repeat": _branch("repeat"),
+    "until": _branch("until"),
+    "cycle": _word("cycle"),
+    "exit_cycle": lambda c: ir.Leave("exitcycle"),
+    "goto": lambda c: ir.JumpTo(_name(c[0])),
+    "return": lambda c: ir.Leave("return", *c),
+    "condition": lambda c: ir.Branch("condition"),
     "when": lambda c: ast.When(_statement(c[1:]), c[0].terms),
-    "endcondition": lambda c: ast.EndCondition(),
+    "endcondition": _word("endcondition"),
     "motion": _motion,
     "arm": lambda c: ArmPart((c[0].subscripts[0],)),
     "absolute": _absolute,
@@ -290,9 +307,9 @@ RULES: dict[str, Rule] = {
     "sync": lambda c: SyncPart((_move(False, c),)),
     "item": SettingPart,
     "item_condition": _beside,
-    "assign": lambda c: ast.Assign(c[0], str(c[1]), c[2]),
-    "call": _call,
-    "call_program": lambda c: ast.Call(_name(c[0]), c[1] if len(c) > 1 else (), True),
+    "assign": _assign,
+    "call": _call(ir.Instruction),
+    "call_program": _call(ast.ProgramCall),
     "io": lambda c: ast.Transfer(str(c[0]).upper(), tuple(c[1:])),
     "format": lambda c: c[0],
     "open": lambda c: ast.Still(False),
@@ -305,21 +322,21 @@ RULES: dict[str, Rule] = {
     "soup_word": _soup_word,
     "group": GroupPart,
     "round_group": RoundPart,
-    "binary": lambda c: ast.Binary(str(c[1]).upper(), c[0], c[2]),
-    "unary": lambda c: ast.Unary(str(c[0]).upper(), c[1]),
+    "binary": lambda c: ir.Operation(str(c[1]).upper(), (c[0], c[2])),
+    "unary": lambda c: ir.Operation(str(c[0]).upper(), (c[1],)),
     "parenthesised": lambda c: (
-        ast.Unary("()", c[0]) if isinstance(c[0], ast.Reference) else c[0]
+        ir.Operation("()", (c[0],)) if isinstance(c[0], ir.DataObject) else c[0]
     ),
     "number": lambda c: c[0],
-    "string": lambda c: ast.Text(_unquote(c[0])),
-    "aggregate": lambda c: ast.Aggregate(tuple(c)),
-    "invoke": lambda c: ast.Invoke(_name(c[0]), c[1]),
+    "string": lambda c: ir.StringLiteral(_unquote(c[0])),
+    "aggregate": lambda c: ir.Composite(tuple(c)),
+    "invoke": lambda c: ir.FunctionCall(_name(c[0]), c[1]),
     "arguments": tuple,
-    "argument": lambda c: c[0] if c else None,
+    "argument": lambda c: ir.Argument(c[0] if c else None),
     "reference": _reference,
     "step": lambda c: c[0],
     "field": lambda c: _name(c[0]),
-    "index": lambda c: ast.Index(tuple(c)),
+    "index": lambda c: ir.ElementStep(tuple(c)),
     "subscript": _one_or_pair,
 }
 
@@ -431,7 +448,7 @@ VALUE_RULES: Mapping[str, Rule] = {
     "arm": lambda c: _Arm(c[1].slot),
     "counted": lambda c: None,
     "word": lambda c: _Word(c[0]),
-    "element": lambda c: _Element(n.slot for n in c if isinstance(n, Number)),
+    "element": lambda c: _Element(n.slot for n in c if isinstance(n, Num)),
     "node": lambda c: _Node(c[1].slot),
     "component": lambda c: ("component", str(c[0]), int(c[1])),
     "axis": lambda c: ("axis", c[0].slot, int(c[1])),
@@ -454,14 +471,14 @@ class _TooDeepError(Exception):
 
 
 @lru_cache(maxsize=8192)
-def parse_form(form: str) -> ast.Statement:
+def parse_form(form: str) -> ir.SourceStatement:
     """Parse the form of a logical line of PDL2, `Unknown` where the grammar cannot."""
     found = _parse("pdl2", form, RULES)
     if found is _FAILED:
         numbered = count()
         text = re.sub(NAME_MARK, lambda _: open_name(next(numbered)), form)
-        return ast.Unknown(text if form[:2] != UNREADABLE else form[2:])
-    return found if isinstance(found, ast.Statement) else ast.Statement()
+        return ir.NotUnderstood(text if form[:2] != UNREADABLE else form[2:])
+    return found if isinstance(found, ir.SourceStatement) else ir.SourceStatement()
 
 
 @lru_cache(maxsize=8192)
@@ -490,7 +507,7 @@ def _build(tree: lark.Tree[lark.Token], rules: Mapping[str, Rule]) -> object:
             raise _TooDeepError
         if isinstance(node, lark.Token):
             if node.type == "NUMBER":
-                return ast.Number(next(slots))
+                return ir.Num(next(slots))
             text = open_name(next(names)) if node == NAME_MARK else str(node)
             return Mark(text, node.type)
         return rules[str(node.data)](

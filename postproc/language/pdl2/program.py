@@ -13,6 +13,8 @@ import numpy as np
 
 from postproc.arrays import Bools, Indices, Ints
 from postproc.diagnostics import Code
+from postproc.language import ir
+from postproc.language.analysis.control_flow import ControlFlow, FlowReader
 from postproc.language.logical_lines import Lines, read_lines, reread_lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_form
@@ -24,23 +26,14 @@ from postproc.language.visits import Diagnostic
 
 # Block structure of one body: which line closes which, and where jumps lead.
 
-_CLOSED_BY: dict[type, type] = {
-    ast.If: ast.EndIf,
-    ast.Select: ast.EndSelect,
-    ast.For: ast.EndFor,
-    ast.While: ast.EndWhile,
-    ast.Repeat: ast.Until,
-    ast.Condition: ast.EndCondition,
-}
-_INNER = (ast.Else, ast.Case)
-_UNKNOWN_OPENERS: tuple[tuple[str, ast.Statement], ...] = (
-    (r"IF\b(?!.*\bENDIF\b)", ast.If(None)),
-    (r"SELECT\b(?!.*\bENDSELECT\b)", ast.Select(None)),
-    (r"FOR\b(?!.*\bENDFOR\b)", ast.For("", None, None)),
-    (r"WHILE\b(?!.*\bENDWHILE\b)", ast.While(None)),
-    (r"UNTIL\b", ast.Until(None)),
-    (r"CASE\b", ast.Case(())),
-    (r"CONDITION\b(?!.*\bENDCONDITION\b)", ast.Condition()),
+_UNKNOWN_OPENERS: tuple[tuple[str, ir.SourceStatement], ...] = (
+    (r"IF\b(?!.*\bENDIF\b)", ir.Branch("if")),
+    (r"SELECT\b(?!.*\bENDSELECT\b)", ir.Branch("test")),
+    (r"FOR\b(?!.*\bENDFOR\b)", ir.ForLoop("", None, None)),
+    (r"WHILE\b(?!.*\bENDWHILE\b)", ir.Branch("while")),
+    (r"UNTIL\b", ir.Branch("until")),
+    (r"CASE\b", ir.Branch("case")),
+    (r"CONDITION\b(?!.*\bENDCONDITION\b)", ir.Branch("condition")),
 )
 _STRING = re.compile(r"'[^']*'")
 _JUMP = re.compile(r"\b(?:GOTO|RETURN|EXIT)\b", re.I)
@@ -50,183 +43,45 @@ _LEADS = (
 )
 
 
-@dataclass(frozen=True)
-class Blocks:
-    """Where the jumps of a body lead, by row.
-
-    Attributes:
-        end: Row that closes the block which a row opens or divides.
-        opener: Row that opens the block which a row closes.
-        inner: Rows of ELSE and CASE in a block, by the row that opens it.
-        labels: Row of each label.
-        cycle: Row of CYCLE, -1 where there is none.
-        joins: Rows at which several ways meet.
-        loops: (opener, end) rows of the FOR loops.
-        handlers: (opener, end) rows of the condition handlers.
-        broken: First line whose block structure is wrong, 0 where all is well.
-    """
-
-    end: Mapping[int, int]
-    opener: Mapping[int, int]
-    inner: Mapping[int, tuple[int, ...]]
-    labels: Mapping[str, int]
-    cycle: int
-    joins: frozenset[int]
-    loops: tuple[tuple[int, int], ...]
-    handlers: tuple[tuple[int, int], ...]
-    broken: int
-
-
-def recover_block(statement: ast.Statement) -> ast.Statement:
+def recover_block(statement: ir.SourceStatement) -> ir.SourceStatement:
     """Return the block that an unknown line opens, or the statement itself."""
-    if isinstance(statement, ast.Unknown):
+    if isinstance(statement, ir.NotUnderstood):
         for pattern, opener in _UNKNOWN_OPENERS:
             if re.match(pattern, statement.text, re.I):
                 return opener
     return statement
 
 
-def build_blocks(
-    lines: Lines, statements: ParsedShapes[ast.Statement], rows: Ints
-) -> tuple[Blocks, list[tuple[int, str]]]:
-    """Match the blocks of rows that are no plain ones; also return (row, problem)."""
-    reader = _BlockReader(lines, statements)
+def read_flow(
+    lines: Lines,
+    statements: ParsedShapes[ir.SourceStatement],
+    rows: Ints,
+    first: int,
+    last: int,
+) -> ControlFlow:
+    """Match the blocks of a body.
+
+    Args:
+        lines: Those of the program.
+        statements: What their shapes say.
+        rows: Those of the body that are no plain ones.
+        first: The first row of the body.
+        last: The row of its end.
+    """
+    reader = FlowReader(lambda row: int(lines.line[row]), _spell)
     for row in rows.tolist():
-        reader.take(row)
-    return reader.blocks(), reader.problems
-
-
-class _BlockReader:
-    """The blocks of a body, as far as its rows have been read."""
-
-    def __init__(self, lines: Lines, statements: ParsedShapes[ast.Statement]) -> None:
-        self._lines, self._statements = lines, statements
-        self._end: dict[int, int] = {}
-        self._opener: dict[int, int] = {}
-        self._inner: dict[int, list[int]] = {}
-        self._labels: dict[str, int] = {}
-        self._gotos: list[tuple[int, str]] = []
-        self._open: list[tuple[int, ast.Statement]] = []
-        self._cycle = -1
-        self._problems: list[tuple[int, str]] = []
-
-    def take(self, row: int) -> None:
-        """Read the next row."""
-        written = self._statements[int(self._lines.shape[row])]
+        written = statements[int(lines.shape[row])]
         odd = ast.action(written)
-        text = odd.text if isinstance(odd, ast.Unknown) else ""
+        text = odd.text if isinstance(odd, ir.NotUnderstood) else ""
         if _JUMP.search(_STRING.sub("", text)):  # it may lead to another place
-            self._problems.append((row, _LEADS))
-        statement = recover_block(written)
-        if isinstance(statement, ast.Label):
-            self._labels[statement.name] = row
-            statement = statement.then or ast.Statement()
-        self._take_behind(row, statement)
-        kind = type(statement)
-        if kind in _CLOSED_BY:
-            self._open.append((row, statement))
-            self._inner[row] = []
-        elif kind in _CLOSED_BY.values():
-            self._close(row, statement)
-        elif kind in _INNER:
-            self._divide(row, statement)
-        elif kind is ast.Cycle:
-            self._cycle = row
-        elif isinstance(statement, ast.Goto):
-            self._gotos.append((row, statement.label))
-
-    def _take_behind(self, row: int, statement: ast.Statement) -> None:
-        """Read what a division of a block, or an event, has on its line."""
-        behind = _behind(statement)
-        if type(behind) in (*_CLOSED_BY, *_CLOSED_BY.values()):
-            text = f"this {_word(behind)} stands behind {_word(statement)}"
-            self._problems.append((row, f"{text}: put it on a line of its own"))
-        elif isinstance(behind, ast.Goto):
-            self._gotos.append((row, behind.label))
-
-    def _close(self, row: int, statement: ast.Statement) -> None:
-        """Close the innermost block."""
-        if self._open and _CLOSED_BY[type(self._open[-1][1])] is type(statement):
-            start, _ = self._open.pop()
-            for part in (start, *self._inner[start]):
-                self._end[part] = row
-            self._opener[row] = start
-        else:
-            self._refuse(row, statement)
-
-    def _divide(self, row: int, statement: ast.Statement) -> None:
-        """Divide the innermost block: ELSE, CASE."""
-        is_else = isinstance(statement, ast.Else)
-        wanted = (ast.If, ast.Select) if is_else else (ast.Select,)
-        if self._open and isinstance(self._open[-1][1], wanted):
-            self._inner[self._open[-1][0]].append(row)
-        else:
-            self._refuse(row, statement)
-
-    def _refuse(self, row: int, statement: ast.Statement) -> None:
-        text = f"this {_word(statement)} closes or divides no block"
-        if self._open:
-            begin, open_one = self._open[-1]
-            text += f" (line {self._lines.line[begin]} opens {_word(open_one)})"
-        self._problems.append((row, text))
-
-    @property
-    def problems(self) -> list[tuple[int, str]]:
-        """Return what does not match, (row, text)."""
-        never = [
-            (row, f"this {_word(statement)} is never closed")
-            for row, statement in self._open
-        ]
-        lost = [
-            (row, f"label {label} does not exist")
-            for row, label in self._gotos
-            if label not in self._labels
-        ]
-        return [*self._problems, *never, *lost]
-
-    def blocks(self) -> Blocks:
-        """Return where jumps lead, and where ways of the program join."""
-        joins = {*self._labels.values(), *self._opener}
-        loops, handlers = [], []
-        for row, start in self._opener.items():
-            kind = recover_block(self._statements[int(self._lines.shape[start])])
-            if isinstance(kind, ast.Label) and kind.then is not None:
-                kind = kind.then
-            if isinstance(kind, ast.For):
-                loops.append((start, row))
-                joins.add(row + 1)
-            elif isinstance(kind, ast.While):
-                joins |= {start, row + 1}
-            elif isinstance(kind, ast.Repeat):
-                joins.add(start)
-            elif isinstance(kind, ast.Condition):
-                handlers.append((start, row))
-                joins.add(row + 1)
-        if self._cycle >= 0:
-            joins.add(self._cycle)
-        return Blocks(
-            self._end,
-            self._opener,
-            {row: tuple(parts) for row, parts in self._inner.items()},
-            self._labels,
-            self._cycle,
-            frozenset(joins),
-            tuple(sorted(loops)),
-            tuple(sorted(handlers)),
-            min((int(self._lines.line[row]) for row, _ in self.problems), default=0),
-        )
+            reader.problems.append((row, _LEADS))
+        reader.take(row, recover_block(written))
+    return reader.flow(first, last)
 
 
-def _behind(statement: ast.Statement) -> ast.Statement:
-    """Return what a division of a block, or an event, has on its line."""
-    match statement:
-        case ast.Else(then) | ast.Case(_, then) | ast.When(then) if then is not None:
-            return then
-    return ast.Statement()
-
-
-def _word(statement: ast.Statement) -> str:
-    return type(statement).__name__.upper()
+def _spell(word: str) -> str:
+    """Write the words of blocks as the language does."""
+    return {"test": "SELECT", "endtest": "ENDSELECT"}.get(word, word.upper())
 
 
 # Declared variables: a list of names is one declaration, whatever its length.
@@ -250,7 +105,7 @@ class Variable:
     name: str
     row: int
     type: ast.Type | None = None
-    initial: ast.Expression | None = None
+    initial: ir.Operand | None = None
     exported: str = ""
     constant: bool = False
     taught: bool = False
@@ -388,7 +243,8 @@ class Body:
         first, last: Rows of its BEGIN and of its END.
         parameters: Formal parameters.
         variables: Its own variables, by lower-case name; the main part has none.
-        blocks: Where its jumps lead.
+        flow: Where its jumps lead.
+        broken: First line whose block structure is wrong, 0 where all is well.
         arms: ``FOR ARM[n]`` of its parameters, by name, where it is said.
     """
 
@@ -397,7 +253,8 @@ class Body:
     last: int
     parameters: tuple[ast.FormalParameter, ...]
     variables: Variables
-    blocks: Blocks
+    flow: ControlFlow
+    broken: int = 0
     arms: Mapping[str, int] = field(default_factory=dict)
 
     @cached_property
@@ -426,7 +283,7 @@ class Program:
 
     name: str
     lines: Lines
-    statements: ParsedShapes[ast.Statement]
+    statements: ParsedShapes[ir.SourceStatement]
     main: Body | None
     routines: Mapping[str, Body]
     outside: Mapping[str, str]
@@ -436,7 +293,7 @@ class Program:
     diagnostics: tuple[Diagnostic, ...]
     nodes: Mapping[str, frozenset[str]]
 
-    def statement(self, row: int) -> ast.Statement:
+    def statement(self, row: int) -> ir.SourceStatement:
         """Return what a logical line says."""
         return self.statements[int(self.lines.shape[row])]
 
@@ -451,7 +308,7 @@ class Program:
 # Programs from lines: declarations, routines, blocks, and where each jump leads.
 
 _PLAIN = (
-    ast.Move, ast.Assign, ast.Call, ast.Transfer, ast.Still, ast.CancelMove
+    ast.Move, ir.Assignment, ir.Instruction, ast.Transfer, ast.Still, ast.CancelMove
 )  # fmt: skip
 
 
@@ -470,7 +327,7 @@ class _Reader:
     """Collects the parts of a program, one structural line after the other."""
 
     lines: Lines
-    statements: ParsedShapes[ast.Statement]
+    statements: ParsedShapes[ir.SourceStatement]
     taught: frozenset[int]
     structural: Ints  # rows of other statements than plain ones, ascending
     name: str = ""
@@ -489,7 +346,7 @@ class _Reader:
         line = int(self.lines.line[row])
         self.diagnostics.append(Diagnostic(name, line, code, message))
 
-    def take(self, row: int, statement: ast.Statement) -> None:
+    def take(self, row: int, statement: ir.SourceStatement) -> None:
         scope = self.scopes[-1]
         match statement:
             case ast.DeclarationSection(then) if then is not None:
@@ -580,15 +437,17 @@ class _Reader:
         routine = scope.routine
         within = np.searchsorted(self.structural, (scope.begin + 1, last))
         rows = self.structural[slice(*within)]
-        blocks, problems = build_blocks(self.lines, self.statements, rows)
-        for row, message in problems:
+        flow = read_flow(self.lines, self.statements, rows, scope.begin + 1, last)
+        for row, message in flow.problems:
             self.report(row, Code.BLOCK_STRUCTURE, message)
+        wrong = (int(self.lines.line[row]) for row, _ in flow.problems)
+        broken = min(wrong, default=0)
         name = routine.name if routine else ""
         parameters = routine.parameters if routine else ()
         own = scope.variables if routine else Variables()
         given = {p.name: self._arm(scope.row, p.type.arm) for p in parameters}
         arms = {name: arm for name, arm in given.items() if arm}
-        body = Body(name, scope.begin, last, parameters, own, blocks, arms)
+        body = Body(name, scope.begin, last, parameters, own, flow, broken, arms)
         if routine:
             self.routines[name] = body
             self.scopes.pop()
@@ -615,7 +474,7 @@ def parse(source: Source) -> Program:
     reader = _Reader(lines, statements, taught, rows)
     for row in rows.tolist():
         statement = statements.once(int(lines.shape[row]))
-        if isinstance(statement, ast.Unknown):
+        if isinstance(statement, ir.NotUnderstood):
             line = int(reader.lines.line[row])
             text = reader.lines.source.line_text(line).strip()
             reader.report(
@@ -660,7 +519,7 @@ def parse_again(source: Source, before: Program) -> Program:
     return replace(before, lines=found.lines, diagnostics=told)
 
 
-def _structural(statements: ParsedShapes[ast.Statement], lines: Lines) -> Ints:
+def _structural(statements: ParsedShapes[ir.SourceStatement], lines: Lines) -> Ints:
     """List the rows of other statements than plain ones, ascending."""
     structural = statements.which(lambda said: not isinstance(said, _PLAIN))
     return np.flatnonzero(structural[lines.shape])

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import get_args
 
 import numpy as np
 
 from postproc.arrays import Ints
+from postproc.language import ir
+from postproc.language.analysis.call_graph import find_recursive, reach
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.external_routines import (
     TRACKING,
@@ -45,7 +46,6 @@ NODES = frozenset({"node_app", "node_del", "node_ins"})
 
 
 FRAMES = ("tool", "base", "uframe")
-CANCELLING = (ast.CancelMove, ast.ExitCycle)
 
 # What text may do that is not understood.
 
@@ -112,47 +112,24 @@ class Effects:
     assigned: frozenset[str]
     read: frozenset[str]
     calls: frozenset[str]
-    cancels: frozenset[ast.CancelMove | ast.ExitCycle] = frozenset()
+    cancels: frozenset[ir.SourceStatement] = frozenset()
 
 
-def invocations(node: object) -> Iterator[ast.Invoke]:
-    """Yield the function calls in a statement or expression, inner ones first."""
-    return (part for part in _parts(node) if isinstance(part, ast.Invoke))
+def invocations(*nodes: ir.Node | None) -> Iterator[ir.FunctionCall]:
+    """Yield the function calls in statements or values, inner ones first."""
+    return (part for part in ir.walk(*nodes) if isinstance(part, ir.FunctionCall))
 
 
-def references(node: object) -> Iterator[ast.Reference]:
-    """Yield the variables in a statement or expression."""
-    return (part for part in _parts(node) if isinstance(part, ast.Reference))
-
-
-_LEAVES = (str, int, float, type(None))
-_NODES = (ast.Statement, *get_args(ast.Expression), ast.Index)
-
-
-def _parts(node: object) -> list[object]:
-    """List a statement or expression with all that is in it, inner ones first."""
-    found: list[object] = []
-    _add_parts(node, found)
-    return found
-
-
-def _add_parts(node: object, found: list[object]) -> None:
-    if isinstance(node, tuple):
-        for part in node:
-            _add_parts(part, found)
-    elif isinstance(node, _NODES):
-        for name in node.__slots__:
-            part = getattr(node, name)
-            if not isinstance(part, _LEAVES):
-                _add_parts(part, found)
-        found.append(node)
+def references(*nodes: ir.Node | None) -> Iterator[ir.DataObject]:
+    """Yield the variables in statements or values."""
+    return (part for part in ir.walk(*nodes) if isinstance(part, ir.DataObject))
 
 
 def list_changed_arguments(
-    arguments: tuple[ast.Expression | None, ...],
-) -> list[ast.Reference]:
+    arguments: tuple[ir.Operand | None, ...],
+) -> list[ir.DataObject]:
     """Return the arguments that go by reference: variables by themselves."""
-    return [a for a in arguments if isinstance(a, ast.Reference)]
+    return [a for a in arguments if isinstance(a, ir.DataObject)]
 
 
 def rows_effects(program: Program, first: int, last: int) -> Effects:
@@ -185,54 +162,55 @@ def _reach(
     program: Program, shapes: tuple[int, ...]
 ) -> tuple[list[Effects], frozenset[str]]:
     found = [_direct(program.statements[s]) for s in shapes]
-    waiting = [n for e in found for n in e.calls | e.read]
-    done: set[str] = set()
-    while waiting:
-        name = waiting.pop()
-        if name in done:
-            continue
-        done.add(name)
+
+    def enter(name: str) -> list[str]:
         body = program.routines.get(name)
-        if body is not None:
-            for shape in _shapes(program, body.first, body.last):
-                effects = _direct(program.statements[shape])
-                found.append(effects)
-                waiting += effects.calls | effects.read
+        rows = (0, 0) if body is None else (body.first, body.last)
+        inside = [_direct(program.statements[s]) for s in _shapes(program, *rows)]
+        found.extend(inside)
+        return _names_in(inside)
+
+    done = {*reach(_names_in(found), enter, str)}
     named = frozenset().union(*(e.calls for e in found))
-    return found, frozenset(done) & named
+    return found, named & done
+
+
+def _names_in(found: Sequence[Effects]) -> list[str]:
+    """List the names that statements call, or may call."""
+    return [name for effects in found for name in effects.calls | effects.read]
 
 
 @lru_cache(maxsize=8192)
-def _direct(statement: ast.Statement) -> Effects:
+def _direct(statement: ir.SourceStatement) -> Effects:
     assigned: set[str] = set()
     calls = {i.name for i in invocations(statement)}
     moves = False
     action = ast.action(statement)
-    cancels = frozenset([action] if isinstance(action, CANCELLING) else [])
+    cancels = frozenset([action] if action and _cancels(action) else [])
+    if then := ast.behind(statement):
+        inner = _direct(then)
+        moves, assigned = inner.moves, set(inner.assigned)
+        calls |= inner.calls
     match statement:
-        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
-            if then is not None:
-                inner = _direct(then)
-                moves, assigned = inner.moves, set(inner.assigned)
-                calls |= inner.calls
         case ast.Move():
             moves = True
-        case ast.Unknown(text):
+        case ir.NotUnderstood(text):
             moves, assigned = True, set(words_in(text))
             if not is_harmless(text):
                 assigned |= {f"${frame}" for frame in FRAMES}
-        case ast.Assign(target):
+        case ir.Assignment(target):
             assigned.add(_name_assigned(target))
-        case ast.For(name):
+        case ir.ForLoop(name):
             assigned.add(name)
         case ast.Transfer(word, operands) if word != "WRITE":
             assigned |= {_name_assigned(o) for o in list_changed_arguments(operands)}
-        case ast.Call(name, arguments):
+        case ir.Instruction(name):
             calls.add(name)
-            assigned |= {_name_assigned(a) for a in list_changed_arguments(arguments)}
+            changed = list_changed_arguments(statement.values)
+            assigned |= {_name_assigned(a) for a in changed}
     for call in invocations(statement):
         if call.name not in PURE:
-            changed = list_changed_arguments(call.arguments)
+            changed = list_changed_arguments(call.values)
             assigned |= {_name_assigned(a) for a in changed}
     if TRACKING in calls:
         assigned.add(f"${TRACKING}")
@@ -241,7 +219,12 @@ def _direct(statement: ast.Statement) -> Effects:
     return Effects(moves, frozenset(assigned), read, called, cancels)
 
 
-def _name_assigned(reference: ast.Reference) -> str:
+def _cancels(one: ir.SourceStatement) -> bool:
+    """Tell whether a statement ends moves on their way."""
+    return isinstance(one, ast.CancelMove) or one == ir.Leave("exitcycle")
+
+
+def _name_assigned(reference: ir.DataObject) -> str:
     if reference.name == "$arm_data" and len(reference.steps) >= 2:
         return f"${str(reference.steps[1]).lstrip('$')}"
     return reference.name
@@ -278,7 +261,7 @@ class CallGraph:
     frames: bool
 
     @property
-    def cancels(self) -> frozenset[ast.CancelMove | ast.ExitCycle]:
+    def cancels(self) -> frozenset[ir.SourceStatement]:
         """Statements that end moves on their way."""
         return frozenset().union(*(part.effects.cancels for part in self.parts))
 
@@ -302,16 +285,15 @@ def call_graph_of(world: World, place: Place) -> CallGraph:
 def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
     """Follow rows first to last - 1 of a body into all that they call."""
     parts = [LiveRows(place, _own_effects(place.program, first, last))]
-    done, waiting = {id(place.body)}, list(_list_called(world, place, first, last))
-    if (first, last) != (place.body.first, place.body.last):
-        done.clear()  # the rest of the body may be called from these rows
-    while waiting:
-        one = waiting.pop()
-        if id(one.body) not in done:
-            done.add(id(one.body))
+    whole = (first, last) == (place.body.first, place.body.last)
+    for one in reach(
+        _list_called(world, place, first, last),
+        lambda one: _list_called(world, one, one.body.first, one.body.last),
+        lambda one: id(one.body),
+    ):
+        if not (whole and one.body is place.body):  # else its rest may be called, too
             rows = (one.body.first, one.body.last)
             parts.append(LiveRows(one, _own_effects(one.program, *rows)))
-            waiting += _list_called(world, one, *rows)
     outside = {effect for part in parts for effect in _outside(world, part)}
     moves = {RoutineEffect.MOVES, RoutineEffect.TRACKS, RoutineEffect.UNKNOWN}
     return CallGraph(
@@ -347,51 +329,23 @@ def _list_called(world: World, place: Place, first: int, last: int) -> Iterator[
 
 
 def circles(world: World) -> frozenset[int]:
-    """Return the bodies (by id) that may call themselves, and those between such.
-
-    Bodies that call none that is left are taken out, then those that none calls.
-    """
+    """Return the bodies (by id) that may call themselves, and those between such."""
     calls: dict[int, set[int]] = {}
     for program in world.programs():
         for body in filter(None, (program.main, *program.routines.values())):
-            called = _list_called(world, Place(program, body), body.first, body.last)
+            called = _list_called(
+                world, world.place(program, body), body.first, body.last
+            )
             calls[id(body)] = {id(one.body) for one in called}
-    callers = _reverse_edges(_without_sinks(calls))
-    return frozenset(_without_sinks(callers))
+    return find_recursive(calls)
 
 
-def _without_sinks(edges: Mapping[int, set[int]]) -> dict[int, set[int]]:
-    """Take out, again and again, what leads to nothing that is left."""
-    back, count = _reverse_edges(edges), {one: len(to) for one, to in edges.items()}
-    waiting = [one for one, left in count.items() if not left]
-    gone: set[int] = set()
-    while waiting:
-        sink = waiting.pop()
-        gone.add(sink)
-        for one in back[sink]:
-            count[one] -= 1
-            if not count[one]:
-                waiting.append(one)
-    return {one: to - gone for one, to in edges.items() if one not in gone}
-
-
-def _reverse_edges(edges: Mapping[int, set[int]]) -> dict[int, set[int]]:
-    """Turn the edges of a graph round."""
-    back: dict[int, set[int]] = {one: set() for one in edges}
-    for one, to in edges.items():
-        for other in to:
-            back[other].add(one)
-    return back
-
-
-def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
+def _names(statement: ir.SourceStatement) -> Iterator[tuple[str, bool]]:
     """Yield names that may be called, and whether each is that of a program."""
-    match statement:
-        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
-            if then is not None:
-                yield from _names(then)
-        case ast.Call(name, _, program):
-            yield name, program
+    if then := ast.behind(statement):
+        yield from _names(then)
+    if isinstance(statement, ir.Instruction):
+        yield statement.name, isinstance(statement, ast.ProgramCall)
     for call in invocations(statement):
         yield call.name, False
     for reference in references(statement):
@@ -421,7 +375,7 @@ def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
     return found
 
 
-def _has_target(statement: ast.Statement) -> bool:
+def _has_target(statement: ir.SourceStatement) -> bool:
     """Tell whether a line moves to a target, and not to a system variable.
 
     A move that names its arm may be one of another arm, and does not count.
@@ -435,4 +389,4 @@ def goes_to_target(move: ast.Move) -> bool:
     if move.how != "TO":
         return False
     where = move.where[0] if move.where else None
-    return not (isinstance(where, ast.Reference) and where.name.startswith("$"))
+    return not (isinstance(where, ir.DataObject) and where.name.startswith("$"))

@@ -22,8 +22,8 @@ from postproc.arrays import (
     spans,
 )
 from postproc.diagnostics import Code, Reason
+from postproc.language.analysis.call_context import Point
 from postproc.language.pdl2.abstract_state import MANY
-from postproc.language.pdl2.call_context import Point
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.machine import Key, Machine, MoveRun

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
+from postproc.language import ir
 from postproc.language.assigned_points import Scope
 from postproc.language.language import Cloner, NamedPoint
 from postproc.language.rapid import syntax as said
@@ -78,7 +79,7 @@ class RapidCloner(Cloner):
         """Find the data that a move goes to, as far as they can be cloned."""
         move = self._move(file, line)
         operand = move.via if via else move.to
-        if not isinstance(operand, said.DataObject):
+        if not isinstance(operand, ir.DataObject):
             raise CloneError("the numbers stand in the move itself, or are computed")
         if operand.steps:
             raise CloneError("elements of arrays and records are not cloned")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
-from postproc.language.interpreter import CallContext
+from postproc.language.analysis.call_context import Context
 from postproc.language.rapid.errors import (
     ANY,
     EXIT_CYCLE,
@@ -45,14 +45,14 @@ class ErrorExit:
 
     numbers: Numbers
     lost: bool
-    context: CallContext | None = None
+    context: Context | None = None
     row: int = -1
     restarts: bool = False
     own: bool = False
 
 
 def exits_of(
-    context: CallContext, handlers: Callable[[CallContext], ErrorHandlers]
+    context: Context, handlers: Callable[[Context], ErrorHandlers]
 ) -> Iterator[ErrorExit]:
     """Find where a program goes on when a statement raises an error.
 
@@ -66,7 +66,7 @@ def exits_of(
         handlers: What handles the errors of a routine.
     """
     numbers, lost, row = ANY, False, 0
-    at: CallContext | None = context
+    at: Context | None = context
     while at is not None:
         here, raised = handlers(at), NO_NUMBERS
         lost = lost or here.moves
@@ -78,8 +78,7 @@ def exits_of(
                 yield replace(_exit(at, row, end), numbers=number, lost=lost, own=own)
         if not all(clause.listed for clause in here.clauses):
             numbers = raised
-        base = base_of(at)
-        at, row = base.caller, base.back - 1
+        at, row = caller_of(at)
 
 
 def _ends(here: ErrorHandlers, numbers: Numbers) -> Iterator[tuple[Numbers, str]]:
@@ -92,18 +91,19 @@ def _ends(here: ErrorHandlers, numbers: Numbers) -> Iterator[tuple[Numbers, str]
                 yield reached, end.word
 
 
-def _exit(at: CallContext, row: int, word: str) -> ErrorExit:
+def _exit(at: Context, row: int, word: str) -> ErrorExit:
     """Return where a word leads to that ends the handling of an error at a row."""
-    base = base_of(at)
     if word in ("retry", "trynext"):
         return ErrorExit(ANY, False, at, row + (word == "trynext"))
     if word == EXIT_CYCLE:
         return ErrorExit(ANY, False, restarts=True)
-    return ErrorExit(ANY, False, base.caller, base.back)
+    caller, called_at = caller_of(at)
+    return ErrorExit(ANY, False, caller, called_at + 1)
 
 
-def base_of(context: CallContext) -> CallContext:
-    """Return the call of a routine in whose loops a context is."""
-    while context.outer is not None:
-        context = context.outer
-    return context
+def caller_of(context: Context) -> tuple[Context | None, int]:
+    """Return where a routine was called, and the row; None for the first one."""
+    call = context.call
+    if call.outer.place is None:
+        return None, -1
+    return call.outer, call.at - call.outer.place.offset

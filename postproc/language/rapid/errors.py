@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
 
-from postproc.language.control_flow import CLOSING, RoutineFlow
+from postproc.language import ir
+from postproc.language.analysis.control_flow import CLOSING, ControlFlow
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.symbols import SHIFTS, functions_in, inside
 from postproc.language.rapid.targets import operands_of
@@ -93,11 +94,11 @@ def together(one: Numbers, other: Numbers) -> Numbers:
     return None if one is None or other is None else one | other
 
 
-ReadNumber = Callable[[said.Operand | None, int], str]
+ReadNumber = Callable[[ir.Operand | None, int], str]
 """Names an error number that stands in a row, "" where it is not known."""
 
 
-def key_of(operand: said.Operand | None, value: float) -> str:
+def key_of(operand: ir.Operand | None, value: float) -> str:
     """Name an error number, "" where it is not known.
 
     Args:
@@ -106,13 +107,13 @@ def key_of(operand: said.Operand | None, value: float) -> str:
     """
     if value > 0.0:
         return f"{value:g}" if value <= LARGEST_OWN else ""
-    if isinstance(operand, said.DataObject) and not operand.steps:
+    if isinstance(operand, ir.DataObject) and not operand.steps:
         return operand.name
     return ""
 
 
 def numbers_of(
-    operands: Iterable[said.Operand | None], read: Callable[[said.Operand | None], str]
+    operands: Iterable[ir.Operand | None], read: Callable[[ir.Operand | None], str]
 ) -> Numbers:
     """Name error numbers, any where one of them is not known."""
     names = frozenset(read(one) for one in operands)
@@ -120,7 +121,7 @@ def numbers_of(
 
 
 def clauses_of(
-    text: StatementText[said.RapidStatement], flow: RoutineFlow, read: ReadNumber
+    text: StatementText[ir.SourceStatement], flow: ControlFlow, read: ReadNumber
 ) -> tuple[ErrorClause, ...]:
     """Read the error handlers of a routine.
 
@@ -143,41 +144,39 @@ def clauses_of(
     return tuple(found)
 
 
-def _read(
-    operands: Iterable[said.Operand | None], row: int, read: ReadNumber
-) -> Numbers:
+def _read(operands: Iterable[ir.Operand | None], row: int, read: ReadNumber) -> Numbers:
     """Name the error numbers of a statement."""
     return numbers_of(operands, lambda operand: read(operand, row))
 
 
-def _begins(one: said.RapidStatement) -> bool:
+def _begins(one: ir.SourceStatement) -> bool:
     """Return True if a clause behind the statements of a routine begins."""
     return isinstance(one, said.ErrorHandler) or (
-        isinstance(one, said.BlockWord) and one.word in ("undo", "backward")
+        isinstance(one, ir.BlockWord) and one.word in ("undo", "backward")
     )
 
 
 def _ends(
-    statements: Iterable[tuple[int, said.RapidStatement]], read: ReadNumber
+    statements: Iterable[tuple[int, ir.SourceStatement]], read: ReadNumber
 ) -> Iterator[HandlerEnd]:
     """Find how a handler goes on, and with which errors each word is reached."""
     blocks: list[tuple[Numbers, bool]] = []  # each with whether it tests ERRNO
     for row, one in statements:
         match one:
-            case said.Branch(word="if", values=(condition, *_)):
+            case ir.Branch(word="if", values=(condition, *_)):
                 blocks.append((_find_errors(condition, row, read), False))
-            case said.Branch(word="elseif", values=(condition, *_)) if blocks:
+            case ir.Branch(word="elseif", values=(condition, *_)) if blocks:
                 blocks[-1] = _find_errors(condition, row, read), False
-            case said.Branch(word="test", values=(value, *_)):
+            case ir.Branch(word="test", values=(value, *_)):
                 blocks.append((NO_NUMBERS, _is_errno(value)))
-            case said.Branch(word="case", values=values) if blocks:
+            case ir.Branch(word="case", values=values) if blocks:
                 tested = blocks[-1][1]
                 blocks[-1] = _read(values, row, read) if tested else ANY, tested
-            case said.Branch(word="default") | said.BlockWord(word="else") if blocks:
+            case ir.Branch(word="default") | ir.BlockWord(word="else") if blocks:
                 blocks[-1] = ANY, blocks[-1][1]
-            case said.Branch() | said.ForLoop():
+            case ir.Branch() | ir.ForLoop():
                 blocks.append((ANY, False))
-            case said.BlockWord(word=word) if word in CLOSING and blocks:
+            case ir.BlockWord(word=word) if word in CLOSING and blocks:
                 blocks.pop()
             case _:
                 numbers = reduce(common, (numbers for numbers, _ in blocks), ANY)
@@ -185,41 +184,41 @@ def _ends(
 
 
 def _end(
-    one: said.RapidStatement, row: int, numbers: Numbers, read: ReadNumber
+    one: ir.SourceStatement, row: int, numbers: Numbers, read: ReadNumber
 ) -> Iterator[HandlerEnd]:
     """Yield the word with which a statement of a handler goes on."""
     while isinstance(one, said.CompactIf):
         numbers = common(numbers, _find_errors(one.condition, row, read))
         one = one.statement
-    if isinstance(one, said.Leave) and one.word in LEAVES:
+    if isinstance(one, ir.Leave) and one.word in LEAVES:
         yield HandlerEnd(one.word, numbers)
-    elif isinstance(one, said.Instruction) and one.name == EXIT_CYCLE:
+    elif isinstance(one, ir.Instruction) and one.name == EXIT_CYCLE:
         yield HandlerEnd(EXIT_CYCLE, numbers)
-    elif isinstance(one, said.JumpTo | said.NotUnderstood):  # that is not followed
+    elif isinstance(one, ir.JumpTo | ir.NotUnderstood):  # that is not followed
         yield from (HandlerEnd(word, ANY) for word in LEAVES)
 
 
-def _find_errors(condition: said.Operand, row: int, read: ReadNumber) -> Numbers:
+def _find_errors(condition: ir.Operand, row: int, read: ReadNumber) -> Numbers:
     """Return the errors for which a condition can hold."""
     match condition:
-        case said.Operation(operator="=", operands=(left, right)):
+        case ir.Operation(operator="=", operands=(left, right)):
             if _is_errno(left) or _is_errno(right):
                 return _read([right if _is_errno(left) else left], row, read)
-        case said.Operation(operator="OR", operands=(left, right)):
+        case ir.Operation(operator="OR", operands=(left, right)):
             return together(
                 _find_errors(left, row, read), _find_errors(right, row, read)
             )
-        case said.Operation(operator="AND", operands=(left, right)):
+        case ir.Operation(operator="AND", operands=(left, right)):
             return common(_find_errors(left, row, read), _find_errors(right, row, read))
     return ANY
 
 
-def _is_errno(operand: said.Operand | None) -> bool:
-    return isinstance(operand, said.DataObject) and operand.name == "errno"
+def _is_errno(operand: ir.Operand | None) -> bool:
+    return isinstance(operand, ir.DataObject) and operand.name == "errno"
 
 
 def may_raise(
-    one: said.RapidStatement,
+    one: ir.SourceStatement,
     numbers: Numbers,
     routines: Collection[str],
     declared: Collection[str],
@@ -232,7 +231,7 @@ def may_raise(
         routines: Names of the routines of the task.
         declared: Names of the data of the task.
     """
-    if isinstance(one, said.LabelMark | said.BlockWord | said.JumpTo):
+    if isinstance(one, ir.LabelMark | ir.BlockWord | ir.JumpTo):
         return False
     if numbers is None:
         return True
@@ -240,7 +239,7 @@ def may_raise(
     if any(name in routines for name in functions):
         return bool(numbers)
     one = inside(one)
-    name = one.name if isinstance(one, said.Instruction) else ""
+    name = one.name if isinstance(one, ir.Instruction) else ""
     return any(_raises([name, *functions], k, k in declared) for k in numbers)
 
 
@@ -254,14 +253,14 @@ def _raises(called: Sequence[str], number: str, declared: bool) -> bool:
     return starts is None or any(name.startswith(starts) for name in called)
 
 
-def may_be_skipped(one: said.RapidStatement) -> bool:
+def may_be_skipped(one: ir.SourceStatement) -> bool:
     """Return True if an error may keep an instruction from being carried out.
 
     Plain moves, and instructions that set modes, raise none: but for an index or a
     function among their operands, and for what waits or couples.
     """
     one = inside(one)
-    if not isinstance(one, said.Instruction):
+    if not isinstance(one, ir.Instruction):
         return False
     concurrent = any(argument.name == "conc" for argument in one.arguments)
     asks = any(name not in SHIFTS for name in functions_in(one))
@@ -269,16 +268,16 @@ def may_be_skipped(one: said.RapidStatement) -> bool:
     return concurrent or asks or indexed or one.name in COUPLING
 
 
-def _is_indexed(operand: said.Operand | None) -> bool:
+def _is_indexed(operand: ir.Operand | None) -> bool:
     """Return True if an operand is an element whose index is no number."""
     match operand:
-        case said.DataObject(steps=steps):
-            found = [at for at in steps if isinstance(at, said.ElementStep)]
+        case ir.DataObject(steps=steps):
+            found = [at for at in steps if isinstance(at, ir.ElementStep)]
             indices = [index for at in found for index in at.subscripts]
-            return not all(isinstance(index, said.Num) for index in indices)
-        case said.FunctionCall(arguments=arguments):
+            return not all(isinstance(index, ir.Num) for index in indices)
+        case ir.FunctionCall(arguments=arguments):
             return any(_is_indexed(argument.value) for argument in arguments)
-        case said.Composite(items=items) | said.Operation(operands=items):
+        case ir.Composite(items=items) | ir.Operation(operands=items):
             return any(map(_is_indexed, items))
     return False
 

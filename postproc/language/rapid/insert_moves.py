@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from postproc.arrays import Floats
+from postproc.language import ir
 from postproc.language.insert_moves import (
     LayoutSplitter,
     MoveLayout,
     spell,
     split_arguments,
 )
-from postproc.language.rapid import syntax as said
 from postproc.language.rapid.clones import ends_line
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile
@@ -54,7 +54,7 @@ class RapidSplitter(LayoutSplitter):
         own = self.task.files[file]
         row = _row_of(own, line)
         move = own.text.statement(row)
-        if not isinstance(move, said.Instruction):
+        if not isinstance(move, ir.Instruction):
             return "it does not stand alone on its line"
         options = {one.name for one in move.arguments if one.name}
         others = sorted(options - _KEPT)
@@ -92,8 +92,8 @@ class RapidSplitter(LayoutSplitter):
         own = self.task.files[file]
         row = _row_of(own, line)
         for one in map(own.text.statement, range(row - 1, -1, -1)):
-            if not isinstance(one, said.Instruction) or one.name not in _MOTION:
-                return isinstance(one, said.Instruction) and one.name in _PLAIN
+            if not isinstance(one, ir.Instruction) or one.name not in _MOTION:
+                return isinstance(one, ir.Instruction) and one.name in _PLAIN
         return False
 
     def layout(self, file: int, line: int) -> RapidLayout:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from postproc.language.rapid.syntax import Argument, Operand
+from postproc.language.ir import Argument, Operand
 
 INSTRUCTIONS = Path(__file__).parent / "instructions.txt"
 

@@ -10,12 +10,14 @@ from functools import cached_property, partial
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
+from postproc.language import ir
+from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.call_graph import reach
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.assigned_points import Scope
-from postproc.language.control_flow import HeadedRows
 from postproc.language.interpreter import (
     NOWHERE,
     Arrived,
-    CallContext,
     TaskMachine,
 )
 from postproc.language.language import Start
@@ -64,11 +66,11 @@ BY_NAME = "callbyvar"
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (
-    said.FileHeader, said.DataDeclaration, said.ConnectTrap, said.Assignment,
+    said.FileHeader, said.DataDeclaration, said.ConnectTrap, ir.Assignment,
     said.TypeAlias,
 )  # fmt: skip
 _Place = tuple[int, str, HeadedRows]  # file, module and rows of a routine
-_PASSED = (*_PLAIN, said.RapidStatement, said.LabelMark)
+_PASSED = (*_PLAIN, ir.SourceStatement, ir.LabelMark)
 
 
 @dataclass
@@ -88,7 +90,7 @@ class RapidMachine(TaskMachine):
     ends: list[Arrived] = field(default_factory=list)
     restarts: list[Arrived] = field(default_factory=list)
     _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
-    _exits: dict[CallContext, tuple[ErrorExit, ...]] = field(default_factory=dict)
+    _exits: dict[Context, tuple[ErrorExit, ...]] = field(default_factory=dict)
     _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
     _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
     _direct: dict[tuple[int, int], tuple[bool, list[_Place]]] = field(
@@ -126,12 +128,12 @@ class RapidMachine(TaskMachine):
         if any(self._moves(*trap) for trap in traps):
             here = replace(here, modes=replace(here.modes, blocked=frozenset([_TRAP])))
         for file, module, routine in found:
-            self.call(file, module, routine, None, -1, here)
-        self.follow_all()
+            self.call_routine((file, module, routine), self.root, -1, here)
+        self.follow()
         again = self._next_cycle(here)
         if len(mains) == 1 and again != here:
-            self.call(*mains[0], None, -1, again)
-            self.follow_all()
+            self.call_routine(mains[0], self.root, -1, again)
+            self.follow()
 
     def _next_cycle(self, here: Arrived) -> Arrived:
         """Return how main begins again: from where, and with what, a cycle ends.
@@ -162,7 +164,7 @@ class RapidMachine(TaskMachine):
                 routine.first + 1, routine.last,
             ):  # fmt: skip
                 one = inside(text.statement(row))
-                if isinstance(one, said.Instruction):
+                if isinstance(one, ir.Instruction):
                     given = list_set_modes(partial(self._change_modes, one, row, scope))
                     found |= set() if given >= ANYTHING else given
         return {name for name, value in found if value != getattr(AT_START, name)}
@@ -171,27 +173,27 @@ class RapidMachine(TaskMachine):
         routines = (one for found in self.task.routines.values() for one in found)
         return [one for one in routines if _kind(one[2]) == "proc"]
 
-    def acts(self, one: said.RapidStatement) -> bool:
+    def acts(self, one: ir.SourceStatement) -> bool:
         """Tell instructions, see `TaskMachine.acts`."""
-        return isinstance(one, said.Instruction)
+        return isinstance(one, ir.Instruction)
 
-    def goes_on(self, one: said.RapidStatement) -> bool:
+    def goes_on(self, one: ir.SourceStatement) -> bool:
         """Tell what does nothing, see `TaskMachine.goes_on`."""
         return type(one) in _PLAIN
 
-    def places_of(self, one: said.RapidStatement) -> Sequence[int] | None:
+    def places_of(self, one: ir.SourceStatement) -> Sequence[int] | None:
         """Return place and turn of MoveL to numbers, see `TaskMachine.places_of`."""
-        if not isinstance(one, said.Instruction) or "movel" in self.task.routines:
+        if not isinstance(one, ir.Instruction) or "movel" in self.task.routines:
             return None
         return own_numbers(one)
 
     is_plain = staticmethod(are_targets)
 
-    def apart(self, context: CallContext) -> set[int] | None:
+    def apart(self, context: Context) -> set[int] | None:
         """Return all (None) where an error may lead to any statement."""
         return None if self._exits_of(context) else set()
 
-    def number(self, operand: said.Operand | None, row: int, scope: Scope) -> float:
+    def number(self, operand: ir.Operand | None, row: int, scope: Scope) -> float:
         """Evaluate a number, see `TaskMachine.number`."""
         return self.task.number(operand, row, scope)
 
@@ -200,18 +202,18 @@ class RapidMachine(TaskMachine):
         return self.task.scope_of(file, module, routine)
 
     def bind_arguments(
-        self, scope: Scope, routine: HeadedRows, caller: CallContext, row: int
+        self, scope: Scope, routine: HeadedRows, caller: Context, row: int
     ) -> Scope:
         """Add what a routine is called with, see `TaskMachine.bind_arguments`.
 
         One that calls itself has other values the next time.
         """
-        call = inside(self.texts[caller.scope.file].statement(row))
-        known = isinstance(call, said.Instruction) and call.name == routine.head.name
+        call = inside(self.texts[caller.place.scope.file].statement(row))
+        known = isinstance(call, ir.Instruction) and call.name == routine.head.name
         if not known or self._is_recursive(scope.file, routine):
             return scope
-        assert isinstance(call, said.Instruction)
-        return self.task.bind(scope, routine, call, row, caller.scope)
+        assert isinstance(call, ir.Instruction)
+        return self.task.bind(scope, routine, call, row, caller.place.scope)
 
     def _is_recursive(self, file: int, routine: HeadedRows) -> bool:
         """Return True if a routine has parameters and may come to call itself."""
@@ -226,23 +228,22 @@ class RapidMachine(TaskMachine):
         last = {
             (at, r.first): r.last for at, rs in self._by_file.items() for _, _, r in rs
         }
-        waiting, seen = [routine], set[tuple[int, int]]()
-        while waiting:
-            file, first = waiting.pop()
-            for row in range(first + 1, last[file, first]):
-                for at, one in self.calls_of(file, self.texts[file].statement(row)):
-                    if (at, one.first) not in seen:
-                        seen.add((at, one.first))
-                        waiting.append((at, one.first))
-        return seen
 
-    def handles(self, one: said.RapidStatement) -> bool:
+        def calls(one: tuple[int, int]) -> Iterator[tuple[int, int]]:
+            file, first = one
+            for row in range(first + 1, last[one]):
+                for at, called in self.calls_of(file, self.texts[file].statement(row)):
+                    yield at, called.first
+
+        return {*reach(calls(routine), calls, tuple)}
+
+    def handles(self, one: ir.SourceStatement) -> bool:
         """Tell whether a handler begins, see `TaskMachine.handles`."""
         return isinstance(one, said.ErrorHandler) or (
-            isinstance(one, said.BlockWord) and one.word in HANDLERS
+            isinstance(one, ir.BlockWord) and one.word in HANDLERS
         )
 
-    def at_call(self, context: CallContext, here: Arrived) -> Arrived:
+    def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
         if self._handlers_of(context).moves:
             here = replace(
@@ -251,40 +252,40 @@ class RapidMachine(TaskMachine):
             )
         return here
 
-    def at_return(self, context: CallContext, here: Arrived) -> Arrived:
+    def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Note the end of a cycle; forget what a handler may have changed."""
-        if context.caller is None:
+        if context.outer is self.root:
             self.ends.append(here)
         return here.forget() if self._handlers_of(context).moves else here
 
     # Errors.
 
-    def _handlers_of(self, context: CallContext) -> ErrorHandlers:
+    def _handlers_of(self, context: Context) -> ErrorHandlers:
         """Read the error handlers of a routine once."""
-        key = context.scope.file, context.routine.first
+        key = context.place.scope.file, context.place.routine.first
         if key not in self._handlers:
-            scope = replace(context.scope, given=(), loops=())
+            scope = replace(context.place.scope, given=(), loops=())
             text = self.texts[scope.file]
 
-            def read(operand: said.Operand | None, row: int) -> str:
+            def read(operand: ir.Operand | None, row: int) -> str:
                 return key_of(operand, self.task.number(operand, row, scope))
 
-            clauses = clauses_of(text, context.flow, read)
-            rows = context.flow.handlers
+            clauses = clauses_of(text, context.place.flow, read)
+            rows = context.place.flow.handlers
             moves, called = self._read_rows(scope, rows, (EXIT_CYCLE,))
             if moves := moves or self._reach_moves(called):
                 self.beside.add((scope.file, rows.start, rows.stop))
             self._handlers[key] = ErrorHandlers(clauses, moves)
         return self._handlers[key]
 
-    def _exits_of(self, context: CallContext) -> tuple[ErrorExit, ...]:
+    def _exits_of(self, context: Context) -> tuple[ErrorExit, ...]:
         """Find where the program goes on behind errors raised in a routine."""
         if context not in self._exits:
             self._exits[context] = tuple(exits_of(context, self._handlers_of))
         return self._exits[context]
 
     def _fail(
-        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> None:
         """Allow for an error that a statement raises and another routine handles.
 
@@ -300,11 +301,11 @@ class RapidMachine(TaskMachine):
             elif way.row and may_be_skipped(one):
                 self._handle(context, row, way, here)
 
-    def _may_raise(self, one: said.RapidStatement, numbers: Numbers) -> bool:
+    def _may_raise(self, one: ir.SourceStatement, numbers: Numbers) -> bool:
         return may_raise(one, numbers, self.task.routines, self.task.declared)
 
     def _interrupt(
-        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+        self, context: Context, row: int, one: ir.Instruction, here: Arrived
     ) -> None:
         """Allow for an error that ends a move on its way."""
         always = (
@@ -316,24 +317,26 @@ class RapidMachine(TaskMachine):
                 self._handle(context, row, way, replace(here, origins=NOWHERE))
 
     def _handle(
-        self, context: CallContext, row: int, way: ErrorExit, here: Arrived
+        self, context: Context, row: int, way: ErrorExit, here: Arrived
     ) -> None:
         """Go on behind an error."""
         here = here.forget() if way.lost else here
         if way.context is context and way.own:
-            self.enter(context, row + way.row, here)
+            self.go_on(context, row + way.row, here)
         elif way.context is not None:
-            self.enter(way.context, way.row, here)
+            self.go_on(way.context, way.row, here)
         elif way.restarts:
             self.restarts.append(here)
         else:
             self.ends.append(here)
 
-    def raise_error(
-        self, context: CallContext, row: int, one: said.Leave, here: Arrived
+    def leave_otherwise(
+        self, context: Context, row: int, one: ir.Leave, here: Arrived
     ) -> None:
-        """Go on behind ``RAISE``, see `TaskMachine.raise_error`."""
-        number = self.task.number(one.value, row, context.scope)
+        """Go on behind ``RAISE``; behind ``EXIT`` the program stops."""
+        if one.word != "raise":
+            return
+        number = self.task.number(one.value, row, context.place.scope)
         raised = numbers_of([one.value], lambda value: key_of(value, number))
         for way in self._exits_of(context):
             shared = common(way.numbers, raised)
@@ -341,23 +344,22 @@ class RapidMachine(TaskMachine):
                 self._handle(context, row, way, here)
 
     def part_otherwise(
-        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
-    ) -> None:
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
+    ) -> Arrived | None:
         """Go on behind ``IF condition statement;``."""
         if isinstance(one, said.CompactIf):
-            self.enter(context, row + 1, here)
-            self._compact(context, row, one.statement, here)
-        else:
-            self._bind_late(one)
-            super().part_otherwise(context, row, one, here)
+            after = self._compact(context, row, one.statement, here)
+            return here if after is None else here.join(after)
+        self._bind_late(one)
+        return super().part_otherwise(context, row, one, here)
 
-    def may_jump(self, context: CallContext, row: int, here: Arrived) -> None:
+    def may_jump(self, context: Context, row: int, here: Arrived) -> None:
         """Begin a cycle as well, see `TaskMachine.may_jump`."""
         super().may_jump(context, row, here)
-        if EXIT_CYCLE in self.texts[context.scope.file].words([row]):
+        if EXIT_CYCLE in self.texts[context.place.scope.file].words([row]):
             self.restarts.append(here)
 
-    def _bind_late(self, one: said.RapidStatement) -> None:
+    def _bind_late(self, one: ir.SourceStatement) -> None:
         """Note the procedures that ``%name%`` may call."""
         if not isinstance(one, said.LateCall):
             return
@@ -377,21 +379,21 @@ class RapidMachine(TaskMachine):
             self.run_beside(file, routine)
 
     def calls_of(
-        self, file: int, one: said.RapidStatement
+        self, file: int, one: ir.SourceStatement
     ) -> list[tuple[int, HeadedRows]]:
         """Return the routines that a statement calls, see `TaskMachine`."""
         inner = inside(one)
         names = {*functions_in(one)}
         if isinstance(inner, said.LateCall) or getattr(inner, "name", "") == BY_NAME:
             return [(at, routine) for at, _, routine in self._procedures()]
-        if isinstance(inner, said.Instruction):
+        if isinstance(inner, ir.Instruction):
             texts = [a.value for a in inner.arguments if _is_text(a.value)]
             late = inner.name in SYNCHRONOUS
             names |= {inner.name, *(_name_procedure(text) for text in texts if late)}
         found = [one for name in names for one in self.task.routines.get(name, [])]
         return [(at, routine) for at, _, routine in found]
 
-    def changes_of(self, one: said.RapidStatement) -> Iterator[str]:
+    def changes_of(self, one: ir.SourceStatement) -> Iterator[str]:
         """Yield the names of data that a statement changes, see `TaskMachine`."""
         yield from super().changes_of(inside(one))
 
@@ -414,7 +416,7 @@ class RapidMachine(TaskMachine):
         around = (r for r in self._by_file[file] if r[2].first < row < r[2].last)
         place = next(around, None)
         signature = MOTIONS.get(getattr(one, "name", ""))
-        if place and signature and isinstance(one, said.Instruction):
+        if place and signature and isinstance(one, ir.Instruction):
             for scope in self._scopes_of(place):
                 for visit in self.goals.visits(one, signature, row, scope, AT_START):
                     yield visit.goal
@@ -436,15 +438,15 @@ class RapidMachine(TaskMachine):
     @cached_property
     def _calls_by_name(
         self,
-    ) -> Mapping[str, list[tuple[_Place, int, said.Instruction]]]:
+    ) -> Mapping[str, list[tuple[_Place, int, ir.Instruction]]]:
         """Return all calls of routines of the task, and where they stand."""
-        found = defaultdict[str, list[tuple[_Place, int, said.Instruction]]](list)
+        found = defaultdict[str, list[tuple[_Place, int, ir.Instruction]]](list)
         for places in self._by_file.values():
             for place in places:
                 file, _, routine = place
                 for row in range(routine.first + 1, routine.last):
                     one = inside(self.texts[file].statement(row))
-                    if isinstance(one, said.Instruction):
+                    if isinstance(one, ir.Instruction):
                         found[one.name].append((place, row, one))
         return found
 
@@ -458,29 +460,23 @@ class RapidMachine(TaskMachine):
         return found
 
     def _compact(
-        self, context: CallContext, row: int, inside: said.RapidStatement, here: Arrived
-    ) -> None:
+        self, context: Context, row: int, inside: ir.SourceStatement, here: Arrived
+    ) -> Arrived | None:
         """Run the statement behind a condition."""
-        if isinstance(inside, said.Instruction):
-            after = self.act(context, row, inside, here)
-            if after is not None:
-                self.enter(context, row + 1, after)
-        elif isinstance(inside, said.JumpTo | said.Leave | said.CompactIf):
-            self.part(context, row, inside, here)
-        elif isinstance(inside, said.Assignment):
-            self.enter(context, row + 1, self.assign_point(context, row, inside, here))
-        elif type(inside) not in _PASSED:
-            self._bind_late(inside)
-            super().part_otherwise(context, row, inside, here)
+        if isinstance(inside, ir.Assignment):
+            return self.assign_point(context, row, inside, here)
+        if type(inside) in _PASSED:
+            return here
+        return self.run_one(context, row, inside, here)
 
     # What instructions do.
 
-    def act(
-        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+    def carry_out(
+        self, context: Context, row: int, one: ir.Instruction, here: Arrived
     ) -> Arrived | None:
         """Run an instruction; None where it goes on in a routine."""
         here = self.after_functions(context, row, one, here)
-        name, scope = one.name, context.scope
+        name, scope = one.name, context.place.scope
         found = self.task.routine(name, scope)
         if name in MOTIONS and name not in self.task.routines:
             return self._move(context, row, one, here)
@@ -513,7 +509,7 @@ class RapidMachine(TaskMachine):
         return self.outside(context, row, name, here)
 
     def _change_modes(
-        self, one: said.Instruction, row: int, scope: Scope, modes: Modes
+        self, one: ir.Instruction, row: int, scope: Scope, modes: Modes
     ) -> Modes:
         """Carry out an instruction that changes how the moves after it are."""
         return change_modes(
@@ -524,10 +520,10 @@ class RapidMachine(TaskMachine):
         )  # fmt: skip
 
     def _move(
-        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+        self, context: Context, row: int, one: ir.Instruction, here: Arrived
     ) -> Arrived:
         """Record the visits of a move."""
-        signature, scope = MOTIONS[one.name], context.scope
+        signature, scope = MOTIONS[one.name], context.place.scope
         self._interrupt(context, row, one, here)
         after = self.arrive(
             context, row, here,
@@ -545,7 +541,7 @@ class RapidMachine(TaskMachine):
         return after
 
     def _synchronous(
-        self, context: CallContext, row: int, one: said.Instruction, here: Arrived
+        self, context: Context, row: int, one: ir.Instruction, here: Arrived
     ) -> Arrived:
         """Allow for the procedure that a move calls while the program runs ahead."""
         placed = [argument.value for argument in one.arguments if not argument.name]
@@ -553,7 +549,7 @@ class RapidMachine(TaskMachine):
         name = _name_procedure(called) if _is_text(called) else ""
         if self.declares_motionless(name) and name not in self.task.routines:
             return here
-        found = self.task.routine(name, context.scope)
+        found = self.task.routine(name, context.place.scope)
         given = None if found is None else self._list_set_modes(*found)
         if given is None:
             self._run_named_beside(name)
@@ -574,8 +570,8 @@ class RapidMachine(TaskMachine):
             one = inside(self.texts[file].statement(row))
             if self._asks_moving(scope, self.texts[file].statement(row)):
                 return None
-            own = isinstance(one, said.Instruction) and one.name in self.task.routines
-            if isinstance(one, said.Instruction) and not own:
+            own = isinstance(one, ir.Instruction) and one.name in self.task.routines
+            if isinstance(one, ir.Instruction) and not own:
                 kind = read_known_instructions().get(one.name)
                 if kind == "modal" and one.name not in STOPPED:
                     found |= list_set_modes(
@@ -584,14 +580,14 @@ class RapidMachine(TaskMachine):
                     continue
                 if kind == "still" or self.declares_motionless(one.name):
                     continue
-            if own or isinstance(one, said.Instruction | said.LateCall):
+            if own or isinstance(one, ir.Instruction | said.LateCall):
                 return None
-            if isinstance(one, said.NotUnderstood):
+            if isinstance(one, ir.NotUnderstood):
                 return None
         return frozenset(found)
 
     def after_functions(
-        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what the functions of a statement do, and for its errors."""
         here = self._after_functions(context, row, one, here)
@@ -599,10 +595,10 @@ class RapidMachine(TaskMachine):
         return here
 
     def _after_functions(
-        self, context: CallContext, row: int, one: said.RapidStatement, here: Arrived
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         for name in functions_in(one):
-            found = self.task.routine(name, context.scope)
+            found = self.task.routine(name, context.place.scope)
             own = name in self.task.routines
             if not own and name in WAITING:
                 self.pause(here)
@@ -628,22 +624,23 @@ class RapidMachine(TaskMachine):
 
     def _reach_moves(self, waiting: list[_Place]) -> bool:
         """Return True if routines, or those that they call, may move the arm."""
-        waiting, seen = [*waiting], set[tuple[int, int]]()
-        while waiting:
-            file, module, routine = waiting.pop()
-            key = file, routine.first
-            if key in seen:
-                continue
-            seen.add(key)
-            if key not in self._direct:
-                scope = self.task.scope_of(file, module, routine)
-                rows = range(routine.first + 1, routine.last)
-                self._direct[key] = self._read_rows(scope, rows)
-            moves, called = self._direct[key]
-            if moves:
-                return True
-            waiting += called
-        return False
+        return any(
+            self._read_routine(one)[0]
+            for one in reach(
+                waiting,
+                lambda one: self._read_routine(one)[1],
+                lambda one: (one[0], one[2].first),
+            )
+        )
+
+    def _read_routine(self, routine: _Place) -> tuple[bool, list[_Place]]:
+        """Read once what the statements of a routine do, see `_read_rows`."""
+        file, module, rows = routine
+        key = file, rows.first
+        if key not in self._direct:
+            scope = self.task.scope_of(file, module, rows)
+            self._direct[key] = self._read_rows(scope, range(rows.first + 1, rows.last))
+        return self._direct[key]
 
     def _read_rows(
         self, scope: Scope, rows: range, passed: tuple[str, ...] = ()
@@ -652,11 +649,11 @@ class RapidMachine(TaskMachine):
         text, called = self.texts[scope.file], list[_Place]()
         for row in rows:
             one = inside(text.statement(row))
-            if isinstance(one, said.LateCall | said.NotUnderstood):
+            if isinstance(one, said.LateCall | ir.NotUnderstood):
                 return True, []
             names = [*functions_in(text.statement(row))]
             still = [self._is_still_function(name) for name in names]
-            if isinstance(one, said.Instruction) and one.name not in passed:
+            if isinstance(one, ir.Instruction) and one.name not in passed:
                 names.append(one.name)
                 still.append(self._is_still(one.name))
             for name, harmless in zip(names, still, strict=True):
@@ -666,7 +663,7 @@ class RapidMachine(TaskMachine):
                     return True, []
         return False, called
 
-    def _asks_moving(self, scope: Scope, one: said.RapidStatement) -> bool:
+    def _asks_moving(self, scope: Scope, one: ir.SourceStatement) -> bool:
         """Return True if a function of a statement may move the arm or set modes."""
         for name in functions_in(one):
             found = self.task.routine(name, scope)
@@ -696,16 +693,16 @@ _HANDLER = Reason(
 )
 
 
-def _is_synchronous(one: said.RapidStatement) -> bool:
+def _is_synchronous(one: ir.SourceStatement) -> bool:
     """Return True if a move calls a procedure on its way."""
     return getattr(inside(one), "name", "") in SYNCHRONOUS
 
 
-def _is_text(operand: said.Operand | None) -> TypeGuard[said.StringLiteral]:
-    return isinstance(operand, said.StringLiteral)
+def _is_text(operand: ir.Operand | None) -> TypeGuard[ir.StringLiteral]:
+    return isinstance(operand, ir.StringLiteral)
 
 
-def _name_procedure(text: said.StringLiteral) -> str:
+def _name_procedure(text: ir.StringLiteral) -> str:
     """Return the procedure that a text names, without its module."""
     return text.text.strip('"').lower().rpartition(":")[2]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from postproc.diagnostics import Code, Reason
-from postproc.language.rapid import syntax as said
+from postproc.language import ir
 from postproc.language.visits import OrientationLaw, Switch
 
 NO_SHIFT = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # position [mm] and quaternion
@@ -154,11 +154,11 @@ HARMLESS = frozenset(
 
 def change_modes(
     name: str,
-    arguments: Sequence[said.Argument],
+    arguments: Sequence[ir.Argument],
     modes: Modes,
-    number: Callable[[said.Operand | None], float],
-    pose: Callable[[said.Operand | None], tuple[float, ...]],
-    load: Callable[[said.Operand | None], tuple[float, ...]],
+    number: Callable[[ir.Operand | None], float],
+    pose: Callable[[ir.Operand | None], tuple[float, ...]],
+    load: Callable[[ir.Operand | None], tuple[float, ...]],
 ) -> Modes:
     """Carry out an instruction that changes how the moves after it are.
 
@@ -206,7 +206,7 @@ def change_modes(
     return modes if name in HARMLESS else replace(LOST, blocked=modes.blocked)
 
 
-def _which(name: str, placed: Sequence[said.Operand | None]) -> str:
+def _which(name: str, placed: Sequence[ir.Operand | None]) -> str:
     """Say which of several couplings an instruction begins or ends, "" for all.
 
     That is ``?`` where it is not known.
@@ -214,8 +214,8 @@ def _which(name: str, placed: Sequence[said.Operand | None]) -> str:
     if name not in ONE_OF_MANY:
         return ""
     one = placed[0] if placed else None
-    plain = isinstance(one, said.DataObject) and not one.steps
-    return one.name if plain and isinstance(one, said.DataObject) else _ANY
+    plain = isinstance(one, ir.DataObject) and not one.steps
+    return one.name if plain and isinstance(one, ir.DataObject) else _ANY
 
 
 _ANY = "?"

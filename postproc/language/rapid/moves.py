@@ -11,13 +11,13 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language import ir
 from postproc.language.assigned_points import (
     NO_POINTS,
     AssignedPoint,
     Points,
     Scope,
 )
-from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import POINT, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
 from postproc.language.rapid.pose_encoding import (
@@ -144,13 +144,13 @@ class Goals:
     _frames: dict[tuple[object, ...], FrameOfMove] = field(default_factory=dict)
     _known: dict[
         tuple[int, Scope],
-        tuple[said.Instruction, tuple[FrameOfMove, FrameOfMove, float, float]],
+        tuple[ir.Instruction, tuple[FrameOfMove, FrameOfMove, float, float]],
     ] = field(default_factory=dict)
-    _slots: dict[int, tuple[said.Composite, list[int]]] = field(default_factory=dict)
+    _slots: dict[int, tuple[ir.Composite, list[int]]] = field(default_factory=dict)
 
     def visits(
         self,
-        one: said.Instruction,
+        one: ir.Instruction,
         signature: Signature,
         row: int,
         scope: Scope,
@@ -181,21 +181,21 @@ class Goals:
         )  # fmt: skip
 
     def load(
-        self, operand: said.Operand | None, row: int, scope: Scope
+        self, operand: ir.Operand | None, row: int, scope: Scope
     ) -> tuple[float, ...]:
         """Read mass [kg] and centre [mm] of loaddata, empty where they are not known.
 
         ``load0`` and other loads up to a hundredth of a kilogram are no load.
         """
         operand, row, scope = self.task.behind(operand, row, scope)
-        if isinstance(operand, said.DataObject) and operand.name == "load0":
+        if isinstance(operand, ir.DataObject) and operand.name == "load0":
             if not operand.steps and "load0" not in self.task.declared:
                 return EMPTY_HAND
         found = load_of(self.task.record(operand, row, scope))
         return EMPTY_HAND if found and found[0] <= PLACEHOLDER else found
 
     def _total(
-        self, one: said.Instruction, row: int, scope: Scope
+        self, one: ir.Instruction, row: int, scope: Scope
     ) -> tuple[tuple[float, ...], Reason]:
         r"""Read ``\TLoad``: all that the arm carries, and why that is not known."""
         given = [argument for argument in one.arguments if argument.name == "tload"]
@@ -208,8 +208,8 @@ class Goals:
 
     def _conditions(
         self,
-        one: said.Instruction,
-        ends: Sequence[said.Operand | None],
+        one: ir.Instruction,
+        ends: Sequence[ir.Operand | None],
         row: int,
         scope: Scope,
     ) -> tuple[FrameOfMove, FrameOfMove, float, float]:
@@ -219,7 +219,7 @@ class Goals:
         """
         others = [a.value for a in one.arguments if all(a.value is not e for e in ends)]
         named = all(
-            value is None or (isinstance(value, said.DataObject) and not value.steps)
+            value is None or (isinstance(value, ir.DataObject) and not value.steps)
             for value in others
         )
         key = id(one), scope
@@ -235,7 +235,7 @@ class Goals:
         return found
 
     def _read_end(
-        self, operand: said.Operand | None, signature: Signature, row: int,
+        self, operand: ir.Operand | None, signature: Signature, row: int,
         scope: Scope, points: Points,
     ) -> FoundGoal:  # fmt: skip
         """Read a destination, and note what it takes of assigned points."""
@@ -277,7 +277,7 @@ class Goals:
 
     def goal(
         self,
-        operand: said.Operand | None,
+        operand: ir.Operand | None,
         signature: Signature,
         row: int,
         scope: Scope,
@@ -296,7 +296,7 @@ class Goals:
 
     def _goal(
         self,
-        operand: said.Operand | None,
+        operand: ir.Operand | None,
         signature: Signature,
         row: int,
         scope: Scope,
@@ -305,12 +305,12 @@ class Goals:
         if passed:  # given to a routine, which may read it
             _, operand, row, scope = passed[-1]
         match operand:
-            case said.Composite() | said.DataObject():
+            case ir.Composite() | ir.DataObject():
                 found = self._point(operand, signature.joints, row, scope)
                 names = sorted({name for name, *_ in passed})
                 why = [self._explain_pinned(one, scope) for one in names]
                 return replace(found, pins=next(filter(None, why), found.pins))
-            case said.FunctionCall(name=name, arguments=arguments) if (
+            case ir.FunctionCall(name=name, arguments=arguments) if (
                 name in SHIFTS
                 and name not in self.task.routines
                 and not signature.joints
@@ -322,13 +322,13 @@ class Goals:
                 held, turned = shifted.shift.shift, "it is shifted and turned"
                 pins = shifted.pins or (turned if any(held.numbers[3:]) else "")
                 return replace(shifted, shift=FoundShift(held), pins=pins)
-            case said.FunctionCall():
+            case ir.FunctionCall():
                 return self._read_returned(operand, signature, row, scope)
             case _:
                 return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
 
     def _read_returned(
-        self, call: said.FunctionCall, signature: Signature, row: int, scope: Scope
+        self, call: ir.FunctionCall, signature: Signature, row: int, scope: Scope
     ) -> FoundGoal:
         """Read what a function of the task returns: its numbers stay."""
         returned = self.task.find_returned(call, row, scope)
@@ -344,14 +344,14 @@ class Goals:
 
     def _point(
         self,
-        operand: said.Composite | said.DataObject,
+        operand: ir.Composite | ir.DataObject,
         joints: bool,
         row: int,
         scope: Scope,
     ) -> FoundGoal:
         """Read a point that is written or named."""
-        name = operand.name if isinstance(operand, said.DataObject) else ""
-        if isinstance(operand, said.Composite):
+        name = operand.name if isinstance(operand, ir.DataObject) else ""
+        if isinstance(operand, ir.Composite):
             plain = self._read_written(operand, joints, row, scope)
             if plain is not None:
                 return plain
@@ -380,7 +380,7 @@ class Goals:
     def _own_places(
         self,
         numbers: Sequence[WrittenNumber],
-        operand: said.Composite | said.DataObject,
+        operand: ir.Composite | ir.DataObject,
         row: int,
         scope: Scope,
     ) -> tuple[int, tuple[int, ...]]:
@@ -390,7 +390,7 @@ class Goals:
         """
         file, slots = _places(numbers)
         holder = scope.file
-        if isinstance(operand, said.DataObject):
+        if isinstance(operand, ir.DataObject):
             found = self.task.constant(operand.name, scope)
             holder, row = (found[0], found[1].row) if found else (-1, -1)
         if file < 0 or file != holder:
@@ -400,7 +400,7 @@ class Goals:
         return (file, slots) if own else (-1, NO_SLOTS)
 
     def _read_written(
-        self, operand: said.Composite, joints: bool, row: int, scope: Scope
+        self, operand: ir.Composite, joints: bool, row: int, scope: Scope
     ) -> FoundGoal | None:
         """Read a point whose numbers all stand in the move, None for others."""
         if id(operand) not in self._slots:
@@ -421,9 +421,9 @@ class Goals:
         target = Meaning.JOINTS if joints else Meaning.POSE
         return FoundGoal(target, tuple(main), scope.file, at, aux=aux)
 
-    def _element(self, operand: said.Operand, row: int, scope: Scope) -> str:
+    def _element(self, operand: ir.Operand, row: int, scope: Scope) -> str:
         """Spell which element of an array is meant, "" where it is none."""
-        steps = operand.steps if isinstance(operand, said.DataObject) else ()
+        steps = operand.steps if isinstance(operand, ir.DataObject) else ()
         spelt = []
         for step in steps:
             if isinstance(step, str):
@@ -472,7 +472,7 @@ class Goals:
         return ""
 
     def _read_shifted(
-        self, name: str, arguments: Sequence[said.Argument], row: int, scope: Scope
+        self, name: str, arguments: Sequence[ir.Argument], row: int, scope: Scope
     ) -> FoundGoal:
         """Read Offs and RelTool: the point is moved along, the shift stays."""
         by = self.task.read_shift(arguments, row, scope)
@@ -483,7 +483,7 @@ class Goals:
         base = self.goal(placed[0], POINT, row, scope)
         at = int(self.task.files[scope.file].text.first[row])
         x = placed[1]
-        own = {(scope.file, at + x.slot)} if isinstance(x, said.Num) else set()
+        own = {(scope.file, at + x.slot)} if isinstance(x, ir.Num) else set()
         holds = base.holds | own
         if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
             pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
@@ -513,7 +513,7 @@ class Goals:
         self,
         shift: Shift,
         base: FoundGoal,
-        numbers: Sequence[said.Operand | None],
+        numbers: Sequence[ir.Operand | None],
         row: int,
         scope: Scope,
     ) -> FoundShift:
@@ -521,10 +521,10 @@ class Goals:
         if base.shift is not None:
             shift = shift.around(base.shift.shift, RAPID_DIALECT)
         first = int(self.task.files[scope.file].text.first[row])
-        slots = [first + n.slot if isinstance(n, said.Num) else -1 for n in numbers]
+        slots = [first + n.slot if isinstance(n, ir.Num) else -1 for n in numbers]
         # x, y, z, and all angles that are there, must be written as numbers.
-        written = all(isinstance(one, said.Num) for one in numbers[:3])
-        written &= all(one is None or isinstance(one, said.Num) for one in numbers)
+        written = all(isinstance(one, ir.Num) for one in numbers[:3])
+        written &= all(one is None or isinstance(one, ir.Num) for one in numbers)
         if base.why or base.origin[0] < 0 or not written:
             return FoundShift(shift)
         rest = (-1,) * (WIDTH - len(slots))
@@ -540,13 +540,13 @@ class Goals:
         return self._frame("tool", operand, arguments)
 
     def _frame(
-        self, kind: str, operand: said.Operand, arguments: _Arguments
+        self, kind: str, operand: ir.Operand, arguments: _Arguments
     ) -> FrameOfMove:
         """Read a tool or a work object, by name once for each place it may mean."""
         found, row, scope = self.task.behind(operand, arguments.row, arguments.scope)
         operand = operand if found is None else found
         arguments = replace(arguments, row=row, scope=scope)
-        if isinstance(operand, said.DataObject) and not operand.steps:
+        if isinstance(operand, ir.DataObject) and not operand.steps:
             if operand.name == f"{kind}0" and arguments.is_built_in(operand.name):
                 return FLANGE if kind == "tool" else WORLD
             key = kind, operand.name, scope.file, scope.module, scope.routine
@@ -556,9 +556,9 @@ class Goals:
         return self._read_frame(kind, operand, arguments)
 
     def _read_frame(
-        self, kind: str, operand: said.Operand, arguments: _Arguments
+        self, kind: str, operand: ir.Operand, arguments: _Arguments
     ) -> FrameOfMove:
-        name = operand.name if isinstance(operand, said.DataObject) else f"the {kind}"
+        name = operand.name if isinstance(operand, ir.DataObject) else f"the {kind}"
         found = self.task.record(operand, arguments.row, arguments.scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
@@ -582,16 +582,16 @@ class _Arguments:
     """
 
     task: RapidTask
-    arguments: Sequence[said.Argument]
+    arguments: Sequence[ir.Argument]
     row: int
     scope: Scope
 
-    def option(self, name: str) -> said.Operand | None:
+    def option(self, name: str) -> ir.Operand | None:
         r"""Return the value of ``\name:=value``, None where it is not there."""
         found = (one for one in self.arguments if one.name == name)
         return next((one.value for one in found), None)
 
-    def of_type(self, type_: str) -> said.Operand | None:
+    def of_type(self, type_: str) -> ir.Operand | None:
         """Return the only argument by place that is data of a type."""
         found = [
             one.value
@@ -600,9 +600,9 @@ class _Arguments:
         ]
         return found[0] if len(found) == 1 else None
 
-    def _type(self, operand: said.Operand | None) -> str:
+    def _type(self, operand: ir.Operand | None) -> str:
         operand, _, scope = self.task.behind(operand, self.row, self.scope)
-        if not isinstance(operand, said.DataObject):
+        if not isinstance(operand, ir.DataObject):
             return ""
         found = self.task.datum(operand.name, scope)
         if found is not None:
@@ -613,10 +613,10 @@ class _Arguments:
             return "zonedata"
         return "speeddata" if _SPEED.match(operand.name) else ""
 
-    def _find_argument(self, type_: str) -> tuple[said.DataObject | None, _Arguments]:
+    def _find_argument(self, type_: str) -> tuple[ir.DataObject | None, _Arguments]:
         """Return the only argument of a type, and the arguments where it stands."""
         found = self.task.behind(self.of_type(type_), self.row, self.scope)
-        named = found[0] if isinstance(found[0], said.DataObject) else None
+        named = found[0] if isinstance(found[0], ir.DataObject) else None
         return named, replace(self, row=found[1], scope=found[2])
 
     def is_built_in(self, name: str) -> bool:
@@ -692,7 +692,7 @@ def are_targets(numbers: Floats) -> Bools:
     return turned & all_in_rows(np.isfinite(numbers))
 
 
-def own_numbers(one: said.Instruction) -> list[int] | None:
+def own_numbers(one: ir.Instruction) -> list[int] | None:
     """Return which numbers of ``MoveL [[..], ..], ..`` are its place and rotation.
 
     None for other instructions, and where anything else is more than a name or number.
@@ -702,23 +702,23 @@ def own_numbers(one: said.Instruction) -> list[int] | None:
     to, *others = (argument.value for argument in one.arguments)
     simple = (
         value is None
-        or isinstance(value, said.Num)
-        or (isinstance(value, said.DataObject) and not value.steps)
+        or isinstance(value, ir.Num)
+        or (isinstance(value, ir.DataObject) and not value.steps)
         for value in others
     )
-    if not isinstance(to, said.Composite) or not all(simple):
+    if not isinstance(to, ir.Composite) or not all(simple):
         return None
     slots = _plain_slots(to)
     return slots[:7] if len(slots) == 17 else None
 
 
-def _plain_slots(operand: said.Composite) -> list[int]:
+def _plain_slots(operand: ir.Composite) -> list[int]:
     """Return the slots of ``[[1, 2, ..], ..]`` of a target, nothing for all else."""
-    parts = [part.items for part in operand.items if isinstance(part, said.Composite)]
+    parts = [part.items for part in operand.items if isinstance(part, ir.Composite)]
     if tuple(map(len, parts)) not in COUNTS or len(parts) != len(operand.items):
         return []
     leaves = [leaf for part in parts for leaf in part]
-    slots = [leaf.slot for leaf in leaves if isinstance(leaf, said.Num)]
+    slots = [leaf.slot for leaf in leaves if isinstance(leaf, ir.Num)]
     return slots if len(slots) == len(leaves) else []
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
+from postproc.language import ir
 from postproc.language.rapid import syntax as said
 from postproc.language.template_parser import Children, FormParser, Word
 
@@ -17,7 +18,7 @@ class ScopePart(str):
     """LOCAL or TASK."""
 
 
-class OptionPart(tuple[said.Argument, ...]):
+class OptionPart(tuple[ir.Argument, ...]):
     """Optional arguments and what stands before them."""
 
 
@@ -64,43 +65,41 @@ def _data(c: Children) -> said.DataDeclaration:
     return said.DataDeclaration(*names, _scope(c), dimensions, value)
 
 
-def _branch(word: str) -> Callable[[Children], said.Branch]:
-    return lambda c: said.Branch(word, tuple(c))
+def _branch(word: str) -> Callable[[Children], ir.Branch]:
+    return lambda c: ir.Branch(word, tuple(c))
 
 
-def _for(c: Children) -> said.ForLoop:
-    return said.ForLoop(_low(c[0]), c[1], c[2], c[3] if len(c) > 3 else None)
+def _for(c: Children) -> ir.ForLoop:
+    return ir.ForLoop(_low(c[0]), c[1], c[2], c[3] if len(c) > 3 else None)
 
 
 def _part(c: Children) -> OptionPart:
-    return OptionPart(
-        x if isinstance(x, said.Argument) else said.Argument(x) for x in c
-    )
+    return OptionPart(x if isinstance(x, ir.Argument) else ir.Argument(x) for x in c)
 
 
-def _option(name: str, value: Any = None, passed_on: bool = False) -> said.Argument:
-    return said.Argument(value, _low(name).lstrip("\\"), passed_on)
+def _option(name: str, value: Any = None, passed_on: bool = False) -> ir.Argument:
+    return ir.Argument(value, _low(name).lstrip("\\"), passed_on)
 
 
 def _with_arguments(
-    make: Callable[[Any, tuple[said.Argument, ...]], Any], c: Children
+    make: Callable[[Any, tuple[ir.Argument, ...]], Any], c: Children
 ) -> Any:
     first = _low(c[0]) if isinstance(c[0], str) else c[0]
     return make(first, c[1] if len(c) > 1 else ())
 
 
-def _operation(c: Children) -> said.Operation:
+def _operation(c: Children) -> ir.Operation:
     operator = next(x for x in c if isinstance(x, Word))
-    return said.Operation(
+    return ir.Operation(
         str(operator).upper(), tuple(x for x in c if not isinstance(x, Word))
     )
 
 
-def _reference(c: Children) -> said.DataObject:
-    return said.DataObject(_low(c[0]), tuple(c[1:]))
+def _reference(c: Children) -> ir.DataObject:
+    return ir.DataObject(_low(c[0]), tuple(c[1:]))
 
 
-def _join_arguments(c: Children) -> tuple[said.Argument, ...]:
+def _join_arguments(c: Children) -> tuple[ir.Argument, ...]:
     return tuple(argument for part in c for argument in part)
 
 
@@ -112,7 +111,7 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "function": _routine("func"),
     "trap": _routine("trap"),
     "record": lambda c: said.RecordHead(_low(_after_scope(c)[0])),
-    "end": lambda c: said.BlockWord(_low(c[0])),
+    "end": lambda c: ir.BlockWord(_low(c[0])),
     "scope": lambda c: ScopePart(c[0]),
     "parameters": lambda c: tuple(c),
     "parameter": lambda c: said.RoutineParameter(
@@ -133,34 +132,34 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "default": _branch("default"),
     "compact_if": lambda c: said.CompactIf(*c),
     "for_do": _for,
-    "label": lambda c: said.LabelMark(_low(c[0])),
-    "branch_word": lambda c: said.BlockWord(_low(c[0])),
+    "label": lambda c: ir.LabelMark(_low(c[0])),
+    "branch_word": lambda c: ir.BlockWord(_low(c[0])),
     "on_error": lambda c: said.ErrorHandler(tuple(c)),
-    "on_undo": lambda c: said.BlockWord("undo"),
-    "on_backward": lambda c: said.BlockWord("backward"),
-    "assignment": lambda c: said.Assignment(*c),
-    "instruction": lambda c: _with_arguments(said.Instruction, c),
+    "on_undo": lambda c: ir.BlockWord("undo"),
+    "on_backward": lambda c: ir.BlockWord("backward"),
+    "assignment": lambda c: ir.Assignment(*c),
+    "instruction": lambda c: _with_arguments(ir.Instruction, c),
     "late_binding": lambda c: _with_arguments(said.LateCall, c),
-    "goto": lambda c: said.JumpTo(_low(c[0])),
-    "return_value": lambda c: said.Leave("return", *c),
-    "raise_error": lambda c: said.Leave("raise", *c),
+    "goto": lambda c: ir.JumpTo(_low(c[0])),
+    "return_value": lambda c: ir.Leave("return", *c),
+    "raise_error": lambda c: ir.Leave("raise", *c),
     "connect": lambda c: said.ConnectTrap(c[0], _low(c[1])),
-    "leave": lambda c: said.Leave(_low(c[0])),
-    "nothing": lambda c: said.RapidStatement(),
+    "leave": lambda c: ir.Leave(_low(c[0])),
+    "nothing": lambda c: ir.SourceStatement(),
     "arguments": _join_arguments,
     "part": _part,
     "switch": lambda c: _option(c[0]),
     "named": lambda c: _option(c[0], c[1]),
-    "conditional": lambda c: _option(c[0], said.DataObject(_low(c[1])), True),
+    "conditional": lambda c: _option(c[0], ir.DataObject(_low(c[1])), True),
     "infix": _operation,
     "prefix": _operation,
     "number": lambda c: c[0],
-    "string": lambda c: said.StringLiteral(str(c[0])),
-    "function_call": lambda c: _with_arguments(said.FunctionCall, c),
-    "composite": lambda c: said.Composite(tuple(c)),
+    "string": lambda c: ir.StringLiteral(str(c[0])),
+    "function_call": lambda c: _with_arguments(ir.FunctionCall, c),
+    "composite": lambda c: ir.Composite(tuple(c)),
     "reference": _reference,
     "component": lambda c: _low(c[0]),
-    "element": lambda c: said.ElementStep(tuple(c)),
+    "element": lambda c: ir.ElementStep(tuple(c)),
 }
 
 LONGEST = 1 << 18  # characters of a form; arrays of a thousand targets have 60,000
@@ -179,9 +178,9 @@ _PARSER = FormParser("rapid", RULES, RESERVED, LONGEST, DEEPEST)
 
 
 @lru_cache(maxsize=8192)
-def parse_statement(form: str) -> said.RapidStatement:
+def parse_statement(form: str) -> ir.SourceStatement:
     """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
     found = _PARSER.parse(form)
     if found is None:
-        return said.NotUnderstood()
-    return found if isinstance(found, said.RapidStatement) else said.RapidStatement()
+        return ir.NotUnderstood()
+    return found if isinstance(found, ir.SourceStatement) else ir.SourceStatement()

@@ -6,8 +6,18 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from postproc.diagnostics import Code
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.blocks import BlockWords, Outline
-from postproc.language.control_flow import HeadedRows
+from postproc.language.ir import (
+    Argument,
+    BlockWord,
+    Branch,
+    ForLoop,
+    Instruction,
+    NotUnderstood,
+    Operand,
+    SourceStatement,
+)
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import (
     MOTIONS,
@@ -16,18 +26,10 @@ from postproc.language.rapid.instructions import (
 )
 from postproc.language.rapid.statements import RapidText, read_statements
 from postproc.language.rapid.syntax import (
-    Argument,
-    BlockWord,
-    Branch,
     CompactIf,
     DataDeclaration,
-    ForLoop,
-    Instruction,
     LateCall,
     ModuleHead,
-    NotUnderstood,
-    Operand,
-    RapidStatement,
     RecordHead,
     RoutineHead,
 )
@@ -133,11 +135,11 @@ def read_rapid(source: Source) -> RapidFile:
     )
 
 
-def _is_call(said: RapidStatement) -> bool:
+def _is_call(said: SourceStatement) -> bool:
     return isinstance(said, Instruction | LateCall | CompactIf | NotUnderstood)
 
 
-def _is_outline(said: RapidStatement) -> bool:
+def _is_outline(said: SourceStatement) -> bool:
     heads = ModuleHead | RoutineHead | RecordHead | Branch | ForLoop
     return isinstance(said, heads | BlockWord | DataDeclaration)
 
@@ -200,7 +202,7 @@ class _Calls:
         default_factory=dict
     )  # by the id of arguments, which are kept so that nothing else gets it
 
-    def take(self, row: int, said: RapidStatement, condition: bool = False) -> None:
+    def take(self, row: int, said: SourceStatement, condition: bool = False) -> None:
         """Take the next statement that may move."""
         match said:
             case CompactIf(statement=inside):

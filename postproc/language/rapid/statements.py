@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from postproc import _native
+from postproc.language.ir import SourceStatement
 from postproc.language.rapid.parser import parse_statement
-from postproc.language.rapid.syntax import RapidStatement
 from postproc.language.source import Source
 from postproc.language.statement_table import StatementText, read_text
 
-RapidText = StatementText[RapidStatement]
+RapidText = StatementText[SourceStatement]
 
 
 def read_statements(source: Source) -> RapidText:

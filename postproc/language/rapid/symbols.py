@@ -10,6 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
+from postproc.language import ir
+from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.assigned_points import (
     AssignedPoint,
     FunctionBody,
@@ -21,7 +23,6 @@ from postproc.language.assigned_points import (
     is_point,
     source_of,
 )
-from postproc.language.control_flow import HeadedRows
 from postproc.language.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said
@@ -222,13 +223,13 @@ class RapidTask(TaskSymbols):
     def find_calls(self) -> frozenset[str]:
         """Names of all instructions."""
         found = (inside(one) for file in self.files for one in file.text.said.said)
-        return frozenset(o.name for o in found if isinstance(o, said.Instruction))
+        return frozenset(o.name for o in found if isinstance(o, ir.Instruction))
 
     @cached_property
     def loop_variables(self) -> frozenset[str]:
         """Names of all variables of loops."""
         found = (one for file in self.files for one in file.text.said.said)
-        return frozenset(o.name for o in found if isinstance(o, said.ForLoop))
+        return frozenset(o.name for o in found if isinstance(o, ir.ForLoop))
 
     @cached_property
     def written(self) -> frozenset[str]:
@@ -240,7 +241,7 @@ class RapidTask(TaskSymbols):
         """Names of data that something but the destination of a move takes."""
         return frozenset(self.uses.read)
 
-    def locate(self, data: said.DataObject, row: int, here: Scope) -> PointPart | None:
+    def locate(self, data: ir.DataObject, row: int, here: Scope) -> PointPart | None:
         """Find the point that only assignments change, see `TaskSymbols.locate`."""
         name, steps = data.name, data.steps
         found = self.datum(name, here)
@@ -262,7 +263,7 @@ class RapidTask(TaskSymbols):
         return PointPart(place, index, component)
 
     def _find_element(
-        self, file: int, datum: Datum, steps: Sequence[str | said.ElementStep],
+        self, file: int, datum: Datum, steps: Sequence[str | ir.ElementStep],
         row: int, here: Scope,
     ) -> tuple[int, ...] | None:  # fmt: skip
         """Return the index of an element, None where it is not known, or no element."""
@@ -277,7 +278,7 @@ class RapidTask(TaskSymbols):
         return tuple(at + 1 for at in found) if inside else None
 
     def evaluate_components(
-        self, part: PointPart, value: said.Operand, row: int, here: Scope
+        self, part: PointPart, value: ir.Operand, row: int, here: Scope
     ) -> list[tuple[str, float | None]]:
         """Return what an assignment gives to components, see `TaskSymbols`."""
         file, module, routine, name = part.place
@@ -288,12 +289,8 @@ class RapidTask(TaskSymbols):
             return [(one, None) for one in names]
         return [(one, at.value) for one, at in zip(names, found, strict=True)]
 
-    def parts_of(self, operand: said.Operand) -> Iterator[said.Operand]:
-        """Yield what is in an operand, see `TaskSymbols.parts_of`."""
-        return _parts_of([operand])
-
     def open_function(
-        self, call: said.FunctionCall, row: int, here: Scope
+        self, call: ir.FunctionCall, row: int, here: Scope
     ) -> FunctionBody | None:
         """Return the statements of a function, see `TaskSymbols.open_function`."""
         found = self.routine(call.name, here)
@@ -355,7 +352,7 @@ class RapidTask(TaskSymbols):
 
     def bind(
         self, scope: Scope, routine: HeadedRows,
-        call: said.Instruction | said.FunctionCall, row: int, there: Scope,
+        call: ir.Instruction | ir.FunctionCall, row: int, there: Scope,
     ) -> Scope:  # fmt: skip
         """Add what a routine is called with to where its statements stand.
 
@@ -379,8 +376,8 @@ class RapidTask(TaskSymbols):
         return replace(scope, given=given)
 
     def behind(
-        self, operand: said.Operand | None, row: int, here: Scope
-    ) -> tuple[said.Operand | None, int, Scope]:
+        self, operand: ir.Operand | None, row: int, here: Scope
+    ) -> tuple[ir.Operand | None, int, Scope]:
         """Return what stands behind a parameter or a call of a function, and its place.
 
         That is the operand itself where it is neither, or not known.
@@ -388,7 +385,7 @@ class RapidTask(TaskSymbols):
         for _ in range(DEEPEST):
             for _, given, at, there in self.find_given(operand, here):
                 operand, row, here = given, at, there
-            if not isinstance(operand, said.FunctionCall):
+            if not isinstance(operand, ir.FunctionCall):
                 break
             returned = self.find_returned(operand, row, here)
             if returned is None:
@@ -397,10 +394,10 @@ class RapidTask(TaskSymbols):
         return operand, row, here
 
     def find_given(
-        self, operand: said.Operand | None, here: Scope
-    ) -> Iterator[tuple[str, said.Operand, int, Scope]]:
+        self, operand: ir.Operand | None, here: Scope
+    ) -> Iterator[tuple[str, ir.Operand, int, Scope]]:
         """Yield the parameters that an operand stands for, as in `Scope.given`."""
-        while isinstance(operand, said.DataObject) and not operand.steps:
+        while isinstance(operand, ir.DataObject) and not operand.steps:
             if operand.name in dict(here.loops):
                 return
             found = (one for one in here.given if one[0] == operand.name)
@@ -412,16 +409,16 @@ class RapidTask(TaskSymbols):
 
     # Values.
 
-    def number(self, operand: said.Operand | None, row: int, here: Scope) -> float:
+    def number(self, operand: ir.Operand | None, row: int, here: Scope) -> float:
         """Evaluate a number, NaN where it is not known before the program runs."""
         match operand:
-            case said.Num(slot=slot):
+            case ir.Num(slot=slot):
                 text = self.files[here.file].text
                 return _finite(float(text.value[int(text.first[row]) + slot]))
-            case said.Operation(operator=operator, operands=operands):
+            case ir.Operation(operator=operator, operands=operands):
                 parts = [self.number(one, row, here) for one in operands]
                 return _finite(_compute(operator, parts))
-            case said.DataObject(name=name, steps=()):
+            case ir.DataObject(name=name, steps=()):
                 loops = dict(here.loops)
                 if name in loops:
                     return loops[name]
@@ -435,9 +432,9 @@ class RapidTask(TaskSymbols):
                 if found is None:
                     return CONSTANTS.get(name, float("nan"))
                 return self._number_of_declaration(*found)
-            case said.DataObject():
+            case ir.DataObject():
                 return _number_in(self._data_object(operand, row, here, 0))
-            case said.FunctionCall(name=name, arguments=arguments):
+            case ir.FunctionCall(name=name, arguments=arguments):
                 other, at, there = self.behind(operand, row, here)
                 if other is not operand:
                     return self.number(other, at, there)
@@ -446,7 +443,7 @@ class RapidTask(TaskSymbols):
                 return float("nan")
 
     def _compute(
-        self, name: str, arguments: Sequence[said.Argument], row: int, here: Scope
+        self, name: str, arguments: Sequence[ir.Argument], row: int, here: Scope
     ) -> float:
         """Return what a built-in function of one number gives, else NaN."""
         if name in self.routines or name not in ALIKE or len(arguments) != 1:
@@ -458,31 +455,31 @@ class RapidTask(TaskSymbols):
             return float("nan")
         there = Scope(file, datum.module, datum.routine)
         value = datum.declared.value
-        if isinstance(value, said.DataObject) and value.name == datum.declared.name:
+        if isinstance(value, ir.DataObject) and value.name == datum.declared.name:
             return float("nan")
         return self.number(value, datum.row, there)
 
     def record(
-        self, operand: said.Operand | None, row: int, here: Scope, depth: int = 0
+        self, operand: ir.Operand | None, row: int, here: Scope, depth: int = 0
     ) -> Nested | None:
         """Evaluate a record or array, None where it is not known."""
-        if isinstance(operand, said.DataObject | said.FunctionCall):
+        if isinstance(operand, ir.DataObject | ir.FunctionCall):
             operand, row, here = self.behind(operand, row, here)
         match operand:
-            case said.Composite(items=items):
+            case ir.Composite(items=items):
                 parts = [self.record(one, row, here, depth) for one in items]
                 known = tuple(part for part in parts if part is not None)
                 return known if len(known) == len(parts) else None
-            case said.StringLiteral(text=text):
+            case ir.StringLiteral(text=text):
                 return text
-            case said.Num(slot=slot):
+            case ir.Num(slot=slot):
                 file = self.files[here.file].text
                 at = int(file.first[row]) + slot
                 value = _finite(float(file.value[at]))
                 return WrittenNumber(value, here.file, at) if value == value else None
-            case said.DataObject(name=name) if name not in CONSTANTS:
+            case ir.DataObject(name=name) if name not in CONSTANTS:
                 return self._data_object(operand, row, here, depth)
-            case said.FunctionCall(name=name, arguments=arguments) if (
+            case ir.FunctionCall(name=name, arguments=arguments) if (
                 name in SHIFTS and name not in self.routines
             ):
                 return self._evaluate_shift(name, arguments, row, here, depth)
@@ -491,7 +488,7 @@ class RapidTask(TaskSymbols):
                 return None if value != value else WrittenNumber(value)
 
     def _data_object(
-        self, data: said.DataObject, row: int, here: Scope, depth: int
+        self, data: ir.DataObject, row: int, here: Scope, depth: int
     ) -> Nested | None:
         """Evaluate data, or a part of them."""
         loops, name = dict(here.loops), data.name
@@ -509,8 +506,8 @@ class RapidTask(TaskSymbols):
         return value
 
     def _whole(
-        self, data: said.DataObject, row: int, here: Scope, depth: int
-    ) -> tuple[Nested | None, Sequence[str | said.ElementStep], str]:
+        self, data: ir.DataObject, row: int, here: Scope, depth: int
+    ) -> tuple[Nested | None, Sequence[str | ir.ElementStep], str]:
         """Return what data, or an element, hold; then further steps, and their type."""
         count = next((k for k, s in enumerate(data.steps) if isinstance(s, str)), None)
         whole = data if count is None else replace(data, steps=data.steps[:count])
@@ -554,7 +551,7 @@ class RapidTask(TaskSymbols):
         )
 
     def read_shift(
-        self, arguments: Sequence[said.Argument], row: int, here: Scope
+        self, arguments: Sequence[ir.Argument], row: int, here: Scope
     ) -> tuple[list[float], list[float]] | None:
         """Return how far Offs or RelTool shift [mm], and turn about x, y, z [deg].
 
@@ -571,7 +568,7 @@ class RapidTask(TaskSymbols):
         return [self.number(one, row, here) for one in placed[1:]], angles
 
     def _evaluate_shift(
-        self, name: str, arguments: Sequence[said.Argument], row: int, here: Scope,
+        self, name: str, arguments: Sequence[ir.Argument], row: int, here: Scope,
         depth: int,
     ) -> Nested | None:  # fmt: skip
         """Evaluate Offs or RelTool."""
@@ -587,7 +584,7 @@ class RapidTask(TaskSymbols):
         return (place, turn, *base[2:])
 
     def _indices(
-        self, step: str | said.ElementStep, row: int, here: Scope, type_: str = ""
+        self, step: str | ir.ElementStep, row: int, here: Scope, type_: str = ""
     ) -> list[int]:
         """Return the indices from 0 of a step, nothing where they are not known."""
         if isinstance(step, str):
@@ -623,7 +620,7 @@ def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
 _READING_MOVES = frozenset(name for name, one in MOTIONS.items() if one.given < 0)
 
 
-def _is_odd(one: said.RapidStatement) -> bool:
+def _is_odd(one: ir.SourceStatement) -> bool:
     """Return True if a statement, or what a condition leads to, is odd."""
     return is_odd(inside(one))
 
@@ -649,8 +646,8 @@ def parameters_of(routine: HeadedRows) -> tuple[said.RoutineParameter, ...]:
 
 
 def match_arguments(
-    parameters: Sequence[said.RoutineParameter], arguments: Sequence[said.Argument]
-) -> list[tuple[said.RoutineParameter, said.Argument]] | None:
+    parameters: Sequence[said.RoutineParameter], arguments: Sequence[ir.Argument]
+) -> list[tuple[said.RoutineParameter, ir.Argument]] | None:
     """Pair parameters with arguments; None where the call does not fit."""
     placed = [one for one in arguments if not one.name]
     required = [one for one in parameters if not one.optional]
@@ -720,35 +717,35 @@ class _NamesUsed(NamesUsed):
                     self.changed.add(name)
             super().pass_on()
 
-    def note(self, one: said.RapidStatement) -> None:
+    def note(self, one: ir.SourceStatement) -> None:
         """Note the names that a statement may change, and those that it takes."""
         match one:
             case said.DataDeclaration(value=value, dimensions=dimensions):
                 for operand in (value, *dimensions):
                     self._operand(operand)
-            case said.Assignment(target=target, value=value):
+            case ir.Assignment(target=target, value=value):
                 self.written.add(target.name)
                 self._note_assignment(target, value)
-            case said.Branch(values=values):
+            case ir.Branch(values=values):
                 for operand in values:
                     self._operand(operand)
             case said.CompactIf(condition=condition, statement=inside):
                 self._operand(condition)
                 self.note(inside)
-            case said.ForLoop(name=name, first=first, last=last, step=step):
+            case ir.ForLoop(name=name, first=first, last=last, step=step):
                 self.changed.add(name)
                 for operand in (first, last, step):
                     self._operand(operand)
-            case said.Leave(value=value):
+            case ir.Leave(value=value):
                 self._operand(value)
             case said.ConnectTrap(interrupt=interrupt):
                 self.changed.add(interrupt.name)
-            case said.Instruction(name=name, arguments=arguments):
+            case ir.Instruction(name=name, arguments=arguments):
                 self._call(name, arguments)
             case said.LateCall(arguments=arguments):
                 self._arguments(arguments)
 
-    def _note_assignment(self, target: said.DataObject, value: said.Operand) -> None:
+    def _note_assignment(self, target: ir.DataObject, value: ir.Operand) -> None:
         """Note what an assignment takes: a point that moves go to by another name."""
         source = source_of(value)
         self._steps(target.steps)
@@ -758,21 +755,21 @@ class _NamesUsed(NamesUsed):
         self._steps(source.steps)
         if value is source:
             self.copies.add((target.name, source.name))
-        elif isinstance(value, said.FunctionCall) and self._shifts(value):
+        elif isinstance(value, ir.FunctionCall) and self._shifts(value):
             self.copies.add((target.name, source.name))
             self._destination(value)
         else:
             self._operand(value)
 
-    def _shifts(self, value: said.Operand | None) -> bool:
+    def _shifts(self, value: ir.Operand | None) -> bool:
         """Return True if a value is a point, or one that functions only shift."""
-        while isinstance(value, said.FunctionCall):
+        while isinstance(value, ir.FunctionCall):
             if value.name not in SHIFTS or value.name in self.own:
                 return False
             value = value.arguments[0].value if value.arguments else None
-        return isinstance(value, said.DataObject)
+        return isinstance(value, ir.DataObject)
 
-    def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
+    def _call(self, name: str, arguments: Sequence[ir.Argument]) -> None:
         pairs = self._fitting(name, arguments)
         if pairs is not None:
             for parameter, argument in pairs:
@@ -797,7 +794,7 @@ class _NamesUsed(NamesUsed):
         else:
             self._arguments(arguments)
 
-    def _read(self, argument: said.Argument) -> None:
+    def _read(self, argument: ir.Argument) -> None:
         """Note an argument that is only read, unless it is an option that answers."""
         if argument.name in ANSWERS:
             self._arguments([argument])
@@ -805,8 +802,8 @@ class _NamesUsed(NamesUsed):
             self._operand(argument.value)
 
     def _fitting(
-        self, name: str, arguments: Sequence[said.Argument]
-    ) -> list[tuple[said.RoutineParameter, said.Argument]] | None:
+        self, name: str, arguments: Sequence[ir.Argument]
+    ) -> list[tuple[said.RoutineParameter, ir.Argument]] | None:
         """Pair the arguments of a call of the only routine of a name, else None.
 
         A local one need not be what is called.
@@ -819,23 +816,23 @@ class _NamesUsed(NamesUsed):
         return match_arguments(parameters_of(found[0][2]), arguments)
 
     def _give(
-        self, parameter: said.RoutineParameter, operand: said.Operand | None
+        self, parameter: said.RoutineParameter, operand: ir.Operand | None
     ) -> None:
         """Note what a routine of the task is called with."""
-        if isinstance(operand, said.DataObject):
+        if isinstance(operand, ir.DataObject):
             by_reference = parameter.by_reference
             self.passed.add((operand.name, parameter.name, by_reference))
             self._steps(operand.steps)
         else:
             self._operand(operand)
 
-    def _destination(self, operand: said.Operand | None) -> None:
+    def _destination(self, operand: ir.Operand | None) -> None:
         """Note what the destination of a move takes besides the point itself."""
         match operand:
-            case said.DataObject(name=name, steps=steps):
+            case ir.DataObject(name=name, steps=steps):
                 self.parts |= {name} if steps else set()
                 self._steps(steps)
-            case said.FunctionCall(name=name, arguments=arguments) if (
+            case ir.FunctionCall(name=name, arguments=arguments) if (
                 name in SHIFTS and name not in self.own
             ):
                 if arguments:  # the point that is shifted
@@ -845,28 +842,28 @@ class _NamesUsed(NamesUsed):
             case _:
                 self._operand(operand)
 
-    def _steps(self, steps: Sequence[str | said.ElementStep]) -> None:
+    def _steps(self, steps: Sequence[str | ir.ElementStep]) -> None:
         for step in steps:
-            if isinstance(step, said.ElementStep):
+            if isinstance(step, ir.ElementStep):
                 for subscript in step.subscripts:
                     self._operand(subscript)
 
-    def _arguments(self, arguments: Sequence[said.Argument]) -> None:
+    def _arguments(self, arguments: Sequence[ir.Argument]) -> None:
         """Note arguments that a routine may change."""
         for argument in arguments:
-            if isinstance(argument.value, said.DataObject):
+            if isinstance(argument.value, ir.DataObject):
                 self.changed.add(argument.value.name)
             self._operand(argument.value)
 
-    def _operand(self, operand: said.Operand | None) -> None:
+    def _operand(self, operand: ir.Operand | None) -> None:
         match operand:
-            case said.DataObject(name=name, steps=steps):
+            case ir.DataObject(name=name, steps=steps):
                 self.read.add(name)
                 self._steps(steps)
-            case said.Composite(items=items) | said.Operation(operands=items):
+            case ir.Composite(items=items) | ir.Operation(operands=items):
                 for item in items:
                     self._operand(item)
-            case said.FunctionCall(name=name, arguments=arguments):
+            case ir.FunctionCall(name=name, arguments=arguments):
                 if name in BUILT_IN_FUNCTIONS and name not in self.own:
                     for argument in arguments:
                         self._read(argument)
@@ -874,47 +871,31 @@ class _NamesUsed(NamesUsed):
                     self._arguments(arguments)
 
 
-def inside(one: said.RapidStatement) -> said.RapidStatement:
+def inside(one: ir.SourceStatement) -> ir.SourceStatement:
     """Return the statement behind a condition, the statement itself without one."""
     while isinstance(one, said.CompactIf):
         one = one.statement
     return one
 
 
-def functions_in(one: said.RapidStatement) -> Iterator[str]:
+def functions_in(one: ir.SourceStatement) -> Iterator[str]:
     """Yield the names of the functions that a statement calls."""
     match one:
-        case said.Branch(values=values):
-            operands: Sequence[said.Operand | None] = values
+        case ir.Branch(values=values):
+            operands: Sequence[ir.Operand | None] = values
         case said.CompactIf(condition=condition, statement=inside):
             operands = (condition, *operands_of(inside))
-        case said.ForLoop(first=first, last=last, step=step):
+        case ir.ForLoop(first=first, last=last, step=step):
             operands = (first, last, step)
-        case said.Leave(value=value):
+        case ir.Leave(value=value):
             operands = (value,)
-        case said.Assignment(target=target, value=value):
+        case ir.Assignment(target=target, value=value):
             operands = (target, value)
         case _:
             operands = operands_of(one)
-    for part in _parts_of(operands):
-        if isinstance(part, said.FunctionCall):
+    for part in ir.walk(*operands):
+        if isinstance(part, ir.FunctionCall):
             yield part.name
-
-
-def _parts_of(operands: Sequence[said.Operand | None]) -> Iterator[said.Operand]:
-    """Yield functions and data with all that is in them."""
-    waiting = list(operands)
-    while waiting:
-        match one := waiting.pop():
-            case said.FunctionCall(arguments=arguments):
-                yield one
-                waiting += [argument.value for argument in arguments]
-            case said.DataObject(steps=steps):
-                yield one
-                for at in steps:
-                    waiting += at.subscripts if isinstance(at, said.ElementStep) else ()
-            case said.Composite(items=items) | said.Operation(operands=items):
-                waiting += items
 
 
 def _number_in(found: Nested | None) -> float:

@@ -4,60 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from postproc.language.ir import (
-    Argument,
-    Assignment,
-    BlockWord,
-    Branch,
-    Composite,
-    DataObject,
-    ElementStep,
-    ForLoop,
-    FunctionCall,
-    Instruction,
-    JumpTo,
-    LabelMark,
-    Leave,
-    NotUnderstood,
-    Num,
-    Operand,
-    Operation,
-    StringLiteral,
-)
-from postproc.language.ir import (
-    SourceStatement as RapidStatement,
-)
-
-__all__ = [
-    "Argument",
-    "Assignment",
-    "BlockWord",
-    "Branch",
-    "Composite",
-    "DataObject",
-    "ElementStep",
-    "ForLoop",
-    "FunctionCall",
-    "Instruction",
-    "JumpTo",
-    "LabelMark",
-    "Leave",
-    "NotUnderstood",
-    "Num",
-    "Operand",
-    "Operation",
-    "RapidStatement",
-    "StringLiteral",
-]
+from postproc.language.ir import Argument, DataObject, Operand, SourceStatement
 
 
 @dataclass(frozen=True, slots=True)
-class FileHeader(RapidStatement):
+class FileHeader(SourceStatement):
     """``%%% VERSION:1 LANGUAGE:ENGLISH %%%``."""
 
 
 @dataclass(frozen=True, slots=True)
-class ModuleHead(RapidStatement):
+class ModuleHead(SourceStatement):
     """``MODULE name(SYSMODULE, ..)``."""
 
     name: str
@@ -81,7 +37,7 @@ class RoutineParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class RoutineHead(RapidStatement):
+class RoutineHead(SourceStatement):
     """``PROC name(..)``, ``FUNC type name(..)``, ``TRAP name``.
 
     Attributes:
@@ -100,14 +56,14 @@ class RoutineHead(RapidStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class RecordHead(RapidStatement):
+class RecordHead(SourceStatement):
     """``RECORD name``."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
-class DataDeclaration(RapidStatement):
+class DataDeclaration(SourceStatement):
     """``LOCAL PERS tooldata t{2} := [..]``.
 
     Attributes:
@@ -127,7 +83,7 @@ class DataDeclaration(RapidStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class TypeAlias(RapidStatement):
+class TypeAlias(SourceStatement):
     """``ALIAS type name``."""
 
     type: str
@@ -135,15 +91,15 @@ class TypeAlias(RapidStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class CompactIf(RapidStatement):
+class CompactIf(SourceStatement):
     """``IF condition statement;``."""
 
     condition: Operand
-    statement: RapidStatement
+    statement: SourceStatement
 
 
 @dataclass(frozen=True, slots=True)
-class ConnectTrap(RapidStatement):
+class ConnectTrap(SourceStatement):
     """``CONNECT interrupt WITH trap;``."""
 
     interrupt: DataObject
@@ -151,14 +107,14 @@ class ConnectTrap(RapidStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class ErrorHandler(RapidStatement):
+class ErrorHandler(SourceStatement):
     """``ERROR`` and what follows, up to the end of the routine."""
 
     numbers: tuple[Operand, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class LateCall(RapidStatement):
+class LateCall(SourceStatement):
     """``%name% ..;``: which procedure is called shows when it runs."""
 
     procedure: Operand

@@ -10,21 +10,18 @@ from typing import TypeVar
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.language.rapid.statements import RapidText
-from postproc.language.rapid.syntax import (
+from postproc.language.ir import (
     Argument,
     Assignment,
-    CompactIf,
     Composite,
-    DataDeclaration,
-    FunctionCall,
     Instruction,
-    LateCall,
+    Node,
     Num,
     Operand,
-    Operation,
-    RapidStatement,
+    SourceStatement,
 )
+from postproc.language.rapid.statements import RapidText
+from postproc.language.rapid.syntax import CompactIf, DataDeclaration, LateCall
 
 
 class RecordKind(IntEnum):
@@ -116,13 +113,13 @@ def find_literals(text: RapidText, kind: RecordKind) -> RecordLiterals:
     return RecordLiterals(kind, row, text.start[at], text.stop[at], text.value[at])
 
 
-def literals_in(said: RapidStatement) -> Iterator[tuple[list[int], RecordKind]]:
+def literals_in(said: SourceStatement) -> Iterator[tuple[list[int], RecordKind]]:
     """Find the records in what a statement says, as slots of its numbers."""
     for operand in operands_of(said):
         yield from _literals(operand)
 
 
-def _literals(operand: Operand) -> Iterator[tuple[list[int], RecordKind]]:
+def _literals(operand: Node) -> Iterator[tuple[list[int], RecordKind]]:
     if isinstance(operand, Composite):
         parts = [_slots(part) for part in operand.items]
         if all(part is not None for part in parts):
@@ -131,8 +128,8 @@ def _literals(operand: Operand) -> Iterator[tuple[list[int], RecordKind]]:
             if kind is not None:
                 yield [slot for part in whole for slot in part], kind
                 return
-    for inside in _inside(operand):
-        yield from _literals(inside)
+    for part in operand.children():
+        yield from _literals(part)
 
 
 def _slots(operand: Operand) -> list[int] | None:
@@ -143,7 +140,7 @@ def _slots(operand: Operand) -> list[int] | None:
     return slots if len(slots) == len(operand.items) else None
 
 
-def operands_of(said: RapidStatement) -> Sequence[Operand]:
+def operands_of(said: SourceStatement) -> Sequence[Operand]:
     """Return the values that a statement gives: declared, assigned, as arguments."""
     match said:
         case DataDeclaration(value=value):
@@ -164,15 +161,3 @@ def _drop_none(values: Sequence[T | None]) -> list[T]:
 
 def _values(arguments: Sequence[Argument]) -> Sequence[Operand]:
     return _drop_none([argument.value for argument in arguments])
-
-
-def _inside(operand: Operand) -> Sequence[Operand]:
-    match operand:
-        case Composite(items=items):
-            return items
-        case FunctionCall(arguments=arguments):
-            return _values(arguments)
-        case Operation(operands=operands):
-            return operands
-        case _:
-            return []

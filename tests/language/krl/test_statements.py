@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from postproc import _native
 from postproc.exceptions import ProgramError
+from postproc.language import ir
 from postproc.language.krl import syntax as said
 from postproc.language.krl.language import skeleton_of
 from postproc.language.krl.program import read_krl
@@ -84,7 +85,7 @@ def one(text):
     return found.statement(0)
 
 
-X = said.DataObject("x")
+X = ir.DataObject("x")
 
 
 @pytest.mark.parametrize(
@@ -96,44 +97,44 @@ X = said.DataObject("x")
         ("deffct real f ( )", said.KrlRoutine("deffct", "f")),
         ("DEFDAT $CONFIG", said.DataList("$config")),
         ("DEFDAT m PUBLIC", said.DataList("m", True)),
-        ("END", said.BlockWord("end")),
-        ("ENDSWITCH", said.BlockWord("endtest")),
+        ("END", ir.BlockWord("end")),
+        ("ENDSWITCH", ir.BlockWord("endtest")),
         ("DECL GLOBAL CONST INT N=3", said.KrlDeclaration(
-            "int", (said.DeclaredItem("n", (), said.Num(0)),), True, True)),
+            "int", (said.DeclaredItem("n", (), ir.Num(0)),), True, True)),
         ("INT i, j[4]", said.KrlDeclaration("int", (
-            said.DeclaredItem("i"), said.DeclaredItem("j", (said.Num(0),))))),
-        ("ASYPTP XP1", said.NotUnderstood()),
+            said.DeclaredItem("i"), said.DeclaredItem("j", (ir.Num(0),))))),
+        ("ASYPTP XP1", ir.NotUnderstood()),
         ("EXT weld(REAL :IN)", said.OutsideName()),
         ("GLOBAL ENUM kind a, b", said.OutsideName()),
         ("CONTINUE", said.ContinueWord()),
-        ("WAIT SEC 0.5", said.Waiting(said.Num(0))),
+        ("WAIT SEC 0.5", said.Waiting(ir.Num(0))),
         ("HALT", said.Waiting()),
-        ("RETURN x", said.Leave("return", X)),
-        ("again:", said.LabelMark("again")),
-        ("x[2].y = x", said.Assignment(
-            said.DataObject("x", (said.ElementStep((said.Num(0),)), "y")), X)),
-        ("f(1, , #a)", said.Instruction("f", (
-            said.Argument(said.Num(0)), said.Argument(None),
-            said.Argument(said.EnumValue("#a"))))),
-        ("f( )", said.Instruction("f")),
+        ("RETURN x", ir.Leave("return", X)),
+        ("again:", ir.LabelMark("again")),
+        ("x[2].y = x", ir.Assignment(
+            ir.DataObject("x", (ir.ElementStep((ir.Num(0),)), "y")), X)),
+        ("f(1, , #a)", ir.Instruction("f", (
+            ir.Argument(ir.Num(0)), ir.Argument(None),
+            ir.Argument(said.EnumValue("#a"))))),
+        ("f( )", ir.Instruction("f")),
         ("PTP x C_PTP C_DIS", said.KrlMove("ptp", X, words=("c_ptp", "c_dis"))),
-        ("CIRC x,x,CA -90", said.KrlMove("circ", X, X, said.Operation(
-            "-", (said.Num(0),)))),
+        ("CIRC x,x,CA -90", said.KrlMove("circ", X, X, ir.Operation(
+            "-", (ir.Num(0),)))),
         ("LIN_REL {X 5} #TOOL", said.KrlMove("lin_rel", said.KrlAggregate(
-            "", (said.NamedField("x", said.Num(0)),)), words=("#tool",))),
+            "", (said.NamedField("x", ir.Num(0)),)), words=("#tool",))),
         ("SLIN x WITH $VEL.CP=1 C_SPL", said.KrlMove("slin", X, words=("c_spl",),
-            settings=(said.Assignment(
-                said.DataObject("$vel", ("cp",)), said.Num(0)),))),
-        ("x={FRAME: X 1}", said.Assignment(X, said.KrlAggregate(
-            "frame", (said.NamedField("x", said.Num(0)),)))),
-        ("x=x:x", said.Assignment(X, said.Operation(":", (X, X)))),
+            settings=(ir.Assignment(
+                ir.DataObject("$vel", ("cp",)), ir.Num(0)),))),
+        ("x={FRAME: X 1}", ir.Assignment(X, said.KrlAggregate(
+            "frame", (said.NamedField("x", ir.Num(0)),)))),
+        ("x=x:x", ir.Assignment(X, ir.Operation(":", (X, X)))),
         ("INTERRUPT DECL 3 WHEN x DO f()", said.InterruptDeclared(
-            said.Num(0), X, said.Instruction("f"))),
+            ir.Num(0), X, ir.Instruction("f"))),
         ("TRIGGER WHEN PATH=-20 DELAY=0 DO f() PRIO=-1", said.PathTrigger(
-            said.Instruction("f"), (said.Num(0), said.Num(1), said.Num(2)))),
-        ("PTP IF", said.NotUnderstood()),
-        ("LIN", said.NotUnderstood()),
-        ("x = = 1", said.NotUnderstood()),
+            ir.Instruction("f"), (ir.Num(0), ir.Num(1), ir.Num(2)))),
+        ("PTP IF", ir.NotUnderstood()),
+        ("LIN", ir.NotUnderstood()),
+        ("x = = 1", ir.NotUnderstood()),
     ],
 )  # fmt: skip
 def test_what_a_statement_says(text, wanted):

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 import pytest
 
 from postproc.compensation.program import read_program
+from postproc.language import ir
 from postproc.language.pdl2 import parser
-from postproc.language.pdl2 import syntax as ast
 from postproc.language.visits import ELSEWHERE
 from tests.bench.growth import KINDS, Files, chain, routines, terms, tree
 
@@ -76,11 +76,11 @@ def test_a_line_of_more_terms_than_are_followed_is_listed(n, job_cell):
 def test_a_line_that_no_program_has_is_not_even_parsed(monkeypatch):
     monkeypatch.setattr(parser, "line_parser", lambda name, start: pytest.fail())
     text = "n := " + "n + " * (parser.LONGEST // 4) + "n"
-    assert isinstance(parser.parse_form(text), ast.Unknown)
+    assert isinstance(parser.parse_form(text), ir.NotUnderstood)
 
 
 def test_a_program_beyond_the_limit_is_listed_once_and_left(job_cell, monkeypatch):
-    monkeypatch.setattr("postproc.language.pdl2.machine.MAX_STEPS", 5000)
+    monkeypatch.setattr("postproc.language.analysis.interpreter.MOST_STEPS", 5000)
     found = read_program(tree(1 << 14), job_cell)
     assert [d.code for d in found.diagnostics] == ["too-complex"]
     assert "too many ways, or calls" in found.diagnostics[0].message

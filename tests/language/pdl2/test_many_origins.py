@@ -2,9 +2,9 @@
 
 import pytest
 
+from postproc.language.analysis.interpreter import Interpreter
 from postproc.language.pdl2.abstract_state import MOST_ORIGINS
 from postproc.language.pdl2.interpreter import Resolved, resolve
-from postproc.language.pdl2.machine import Machine
 from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
 from postproc.language.visits import ELSEWHERE, START
@@ -54,9 +54,9 @@ def test_a_move_that_is_always_run_tells_the_side_again() -> None:
 @pytest.mark.parametrize("count", [300, 700])
 def test_a_cycle_of_them_settles(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     taken = []
-    following = Machine.next
+    run = Interpreter._run
     monkeypatch.setattr(
-        Machine, "next", lambda self: taken.append(0) or following(self)
+        Interpreter, "_run", lambda *args: taken.append(0) or run(*args)
     )
     visits = body(f"REPEAT\n{written(count)}UNTIL $DIN[2]\n").visits
     assert len(taken) < 10 * count  # a row is run anew a few times, not once an origin

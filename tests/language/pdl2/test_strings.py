@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.language.pdl2 import syntax as ast
+from postproc.language import ir
 from postproc.language.pdl2.program import parse
 from postproc.language.source import Source
 from tests.language.pdl2.test_external_routines import FIRST, codes, followed, reasons
@@ -21,7 +21,9 @@ def test_two_quotes_are_an_apostrophe(text):
         "a.pdl", f"PROGRAM a\nBEGIN\n  s := {text} -- it's\nEND a\n".encode()
     )
     found = parse(source).statement(2)
-    assert isinstance(found, ast.Assign) and found.value == ast.Text(STRINGS[text])
+    assert isinstance(found, ir.Assignment) and found.value == ir.StringLiteral(
+        STRINGS[text]
+    )
 
 
 @pytest.mark.parametrize("text", STRINGS)

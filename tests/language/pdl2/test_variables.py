@@ -1,5 +1,6 @@
 """Declared variables by name, list by list."""
 
+from postproc.language import ir
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.program import Variable, Variables
 
@@ -7,7 +8,7 @@ from postproc.language.pdl2.program import Variable, Variables
 def declared() -> Variables:
     found = Variables()
     found.declare(["P1", "p2"], Variable("", 3, ast.Type("position")))
-    found.declare(["n"], Variable("", 4, ast.Type("integer"), ast.Number(0)))
+    found.declare(["n"], Variable("", 4, ast.Type("integer"), ir.Num(0)))
     found.declare(["p2", "Q"], Variable("", 5, ast.Type("xtndpos"), taught=True))
     return found
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 
 from postproc.exceptions import ProgramError
+from postproc.language import ir
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import MOTIONS, read_known_instructions
 from postproc.language.rapid.program import read_rapid
@@ -98,8 +99,8 @@ def test_no_statement_that_may_move_is_passed_in_silence(path):
             statement = statement.statement
         quiet = row not in seen and file.text.line(row) not in listed
         if quiet and not in_record(file, row):
-            assert not isinstance(statement, said.NotUnderstood | said.LateCall)
-            if isinstance(statement, said.Instruction):
+            assert not isinstance(statement, ir.NotUnderstood | said.LateCall)
+            if isinstance(statement, ir.Instruction):
                 assert statement.name in read_known_instructions().keys() | own
                 assert statement.name not in MOTIONS
 
@@ -111,7 +112,7 @@ def in_record(file, row):
         statement = file.text.statement(k)
         if isinstance(statement, said.RecordHead) and k < row:
             inside = True
-        elif inside and isinstance(statement, said.BlockWord):
+        elif inside and isinstance(statement, ir.BlockWord):
             inside = False
             if row < k:
                 return statement.word == "endrecord"
@@ -131,14 +132,14 @@ def test_moves_with_their_positions():
     named = {name for name, _ in moves}
     assert named == {"moveabsj", "movej", "movel", "arclstart", "arcc", "searchl"}
     (search,) = (m for m in file.moves if m.name == "searchl")
-    assert search.to == said.DataObject("p10") and not search.signature.reaches
+    assert search.to == ir.DataObject("p10") and not search.signature.reaches
     (arc,) = (m for m in file.moves if m.name == "arcc")
-    assert isinstance(arc.via, said.Composite) and isinstance(arc.to, said.Composite)
+    assert isinstance(arc.via, ir.Composite) and isinstance(arc.to, ir.Composite)
     assert [m.condition for m in file.moves].count(True) == 1
     (shifted,) = (m for m in file.moves if m.condition)
-    assert isinstance(shifted.to, said.FunctionCall) and shifted.to.name == "offs"
+    assert isinstance(shifted.to, ir.FunctionCall) and shifted.to.name == "offs"
     wobj = next(a for a in shifted.arguments if a.name == "wobj")
-    assert wobj.value == said.DataObject("wtable")
+    assert wobj.value == ir.DataObject("wtable")
 
 
 def test_data_with_its_place():
@@ -149,7 +150,7 @@ def test_data_with_its_place():
     assert (data["phome"].module, data["phome"].routine) == ("welding", "")
     assert data["phome"].declared.scope == "local"
     assert data["ttorch"].declared.scope == "task"
-    assert data["list"].declared.dimensions == (said.Num(0),)
+    assert data["list"].declared.dimensions == (ir.Num(0),)
     kinds = Counter(one.declared.type for one in file.data)
     assert kinds["robtarget"] == 4 and kinds["tooldata"] == kinds["wobjdata"] == 1
     routines = [(s.head.kind, s.head.name, s.head.local) for s in file.routines]

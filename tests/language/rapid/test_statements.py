@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from postproc import _native
 from postproc.exceptions import ProgramError
+from postproc.language import ir
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.parser import parse_statement
 from postproc.language.rapid.statements import read_statements
@@ -74,7 +75,7 @@ def one(text):
 
 
 given = said.RoutineParameter
-X, P10 = said.DataObject("x"), said.DataObject("p10")
+X, P10 = ir.DataObject("x"), ir.DataObject("p10")
 
 
 @pytest.mark.parametrize(
@@ -94,58 +95,58 @@ X, P10 = said.DataObject("x"), said.DataObject("p10")
          said.RoutineHead("func", "near2", (given("p"),), False, "robtarget")),
         ("TRAP t_stop", said.RoutineHead("trap", "t_stop")),
         ("LOCAL RECORD seam", said.RecordHead("seam")),
-        ("EndProc", said.BlockWord("endproc")),
+        ("EndProc", ir.BlockWord("endproc")),
         ("TASK PERS num n{2, 3};",
-         said.DataDeclaration("pers", "num", "n", "task", (said.Num(0), said.Num(1)))),
+         said.DataDeclaration("pers", "num", "n", "task", (ir.Num(0), ir.Num(1)))),
         ("CONST string s:=\"a;\"\"!b\";",
          said.DataDeclaration("const", "string", "s", "", (),
-                              said.StringLiteral('"a;""!b"'))),
+                              ir.StringLiteral('"a;""!b"'))),
         ("ALIAS num level;", said.TypeAlias("num", "level")),
-        ("IF x = 1 OR NOT y THEN", said.Branch("if", (said.Operation("OR", (
-            said.Operation("=", (X, said.Num(0))),
-            said.Operation("NOT", (said.DataObject("y"),)))),))),
-        ("IF x p10:=x;", said.CompactIf(X, said.Assignment(P10, X))),
-        ("FOR i FROM 1 TO 5 STEP -1 DO", said.ForLoop("i", said.Num(0), said.Num(1),
-            said.Operation("-", (said.Num(2),)))),
+        ("IF x = 1 OR NOT y THEN", ir.Branch("if", (ir.Operation("OR", (
+            ir.Operation("=", (X, ir.Num(0))),
+            ir.Operation("NOT", (ir.DataObject("y"),)))),))),
+        ("IF x p10:=x;", said.CompactIf(X, ir.Assignment(P10, X))),
+        ("FOR i FROM 1 TO 5 STEP -1 DO", ir.ForLoop("i", ir.Num(0), ir.Num(1),
+            ir.Operation("-", (ir.Num(2),)))),
         ("WHILE x<2 DO",
-         said.Branch("while", (said.Operation("<", (X, said.Num(0))),))),
-        ("CASE 1, 2:", said.Branch("case", (said.Num(0), said.Num(1)))),
-        ("DEFAULT:", said.Branch("default")),
-        ("again:", said.LabelMark("again")),
-        ("GOTO again;", said.JumpTo("again")),
-        ("RETURN x;", said.Leave("return", X)),
-        ("RAISE;", said.Leave("raise")),
-        ("TRYNEXT;", said.Leave("trynext")),
+         ir.Branch("while", (ir.Operation("<", (X, ir.Num(0))),))),
+        ("CASE 1, 2:", ir.Branch("case", (ir.Num(0), ir.Num(1)))),
+        ("DEFAULT:", ir.Branch("default")),
+        ("again:", ir.LabelMark("again")),
+        ("GOTO again;", ir.JumpTo("again")),
+        ("RETURN x;", ir.Leave("return", X)),
+        ("RAISE;", ir.Leave("raise")),
+        ("TRYNEXT;", ir.Leave("trynext")),
         ("CONNECT i1 WITH t_stop;",
-         said.ConnectTrap(said.DataObject("i1"), "t_stop")),
+         said.ConnectTrap(ir.DataObject("i1"), "t_stop")),
         ("ERROR (ERR_A, ERR_B)", said.ErrorHandler((
-            said.DataObject("err_a"), said.DataObject("err_b")))),
-        ("p.trans.z:=list{2}.z+1;", said.Assignment(
-            said.DataObject("p", ("trans", "z")),
-            said.Operation("+", (
-                said.DataObject("list", (said.ElementStep((said.Num(0),)), "z")),
-                said.Num(1))))),
-        ("%\"weld\"% 1;", said.LateCall(said.StringLiteral('"weld"'),
-                                        (said.Argument(said.Num(0)),))),
+            ir.DataObject("err_a"), ir.DataObject("err_b")))),
+        ("p.trans.z:=list{2}.z+1;", ir.Assignment(
+            ir.DataObject("p", ("trans", "z")),
+            ir.Operation("+", (
+                ir.DataObject("list", (ir.ElementStep((ir.Num(0),)), "z")),
+                ir.Num(1))))),
+        ("%\"weld\"% 1;", said.LateCall(ir.StringLiteral('"weld"'),
+                                        (ir.Argument(ir.Num(0)),))),
         ("MoveL\\Conc,Offs(p10,0,0,-5),v100\\V:=x,fine,tool0\\WObj?w;",
-         said.Instruction("movel", (
-             said.Argument(None, "conc"),
-             said.Argument(said.FunctionCall("offs", (
-                 said.Argument(P10), said.Argument(said.Num(0)),
-                 said.Argument(said.Num(1)), said.Argument(said.Num(2))))),
-             said.Argument(said.DataObject("v100")), said.Argument(X, "v"),
-             said.Argument(said.DataObject("fine")),
-             said.Argument(said.DataObject("tool0")),
-             said.Argument(said.DataObject("w"), "wobj", True)))),
-        ("MoveL [[1,-2,3]],v1,\\Z:=x;", said.Instruction("movel", (
-            said.Argument(said.Composite((said.Composite(
-                (said.Num(0), said.Num(1), said.Num(2))),))),
-            said.Argument(said.DataObject("v1")), said.Argument(X, "z")))),
-        ("home;", said.Instruction("home")),
+         ir.Instruction("movel", (
+             ir.Argument(None, "conc"),
+             ir.Argument(ir.FunctionCall("offs", (
+                 ir.Argument(P10), ir.Argument(ir.Num(0)),
+                 ir.Argument(ir.Num(1)), ir.Argument(ir.Num(2))))),
+             ir.Argument(ir.DataObject("v100")), ir.Argument(X, "v"),
+             ir.Argument(ir.DataObject("fine")),
+             ir.Argument(ir.DataObject("tool0")),
+             ir.Argument(ir.DataObject("w"), "wobj", True)))),
+        ("MoveL [[1,-2,3]],v1,\\Z:=x;", ir.Instruction("movel", (
+            ir.Argument(ir.Composite((ir.Composite(
+                (ir.Num(0), ir.Num(1), ir.Num(2))),))),
+            ir.Argument(ir.DataObject("v1")), ir.Argument(X, "z")))),
+        ("home;", ir.Instruction("home")),
         ("MoveL;x", None),
         ("MoveL THEN", None),
-        ("p 1 2;", said.NotUnderstood()),
-        ("ok(1);", said.Instruction("ok", (said.Argument(said.Num(0)),))),
+        ("p 1 2;", ir.NotUnderstood()),
+        ("ok(1);", ir.Instruction("ok", (ir.Argument(ir.Num(0)),))),
     ],
 )  # fmt: skip
 def test_what_a_statement_says(text, wanted):
@@ -157,19 +158,18 @@ def test_a_word_of_the_language_names_nothing():
     for text in ("MoveL then, v1;", "to:=1;", "MODULE else"):
         found = read_statements(Source("x.mod", text.encode()))
         assert any(
-            isinstance(found.statement(k), said.NotUnderstood)
-            for k in range(len(found))
+            isinstance(found.statement(k), ir.NotUnderstood) for k in range(len(found))
         ), text
 
 
 def test_what_is_nested_too_deeply_is_not_understood():
     for opening, closing in ("[]", ("f(", ")"), ("-[", "]")):
         deep = f"x:={opening * 5000}1{closing * 5000};"
-        assert isinstance(one(deep), said.NotUnderstood)
+        assert isinstance(one(deep), ir.NotUnderstood)
     brackets = f"x:={'(' * 5000}1{')' * 5000};"  # say nothing, and count as nothing
-    assert one(brackets) == said.Assignment(X, said.Num(0))
+    assert one(brackets) == ir.Assignment(X, ir.Num(0))
     long = parse_statement("x:=[" + ",".join("\0" * 200_000) + "];")
-    assert isinstance(long, said.NotUnderstood)
+    assert isinstance(long, ir.NotUnderstood)
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Iterable, Iterator
 from functools import total_ordering
+from typing import Any, TypeVar
 
 CALLED, HANDLED, HERE = -1, -3, -2
+K = TypeVar("K", bound=Hashable)
 
 
 class Context:
@@ -18,14 +21,21 @@ class Context:
         at: Job-wide index of the row of the call or loop.
         kind: The round of a loop, or CALLED or HANDLED.
         depth: How many are around it.
+        place: Where its statements stand: what the language knows of the routine.
     """
 
-    __slots__ = ("_inner", "_jump", "at", "depth", "kind", "outer")
+    __slots__ = ("_inner", "_jump", "at", "depth", "kind", "outer", "place")
 
-    def __init__(self, outer: Context | None = None, at: int = -1, kind: int = HERE):
+    def __init__(
+        self,
+        outer: Context | None = None,
+        at: int = -1,
+        kind: int = HERE,
+        place: Any = None,
+    ):
         """Make the outermost context; `within` makes all others."""
         self.outer: Context = outer or self
-        self.at, self.kind = at, kind
+        self.at, self.kind, self.place = at, kind, place
         self.depth: int = 0 if outer is None else outer.depth + 1
         self._inner: dict[tuple[int, int], Context] = {}
         self._jump: Context = self if outer is None else outer._far()
@@ -39,17 +49,43 @@ class Context:
         near, far = self._jump, self._jump._jump
         return far if self.depth - near.depth == near.depth - far.depth else self
 
-    def within(self, at: int, kind: int) -> Context:
-        """Return the context of a call or round inside of this one."""
+    def find(self, at: int, kind: int) -> Context | None:
+        """Return the context of a call or round inside of this one, if it is known."""
+        return self._inner.get((at, kind))
+
+    def within(self, at: int, kind: int, place: Any) -> Context:
+        """Return the context of a call or round inside of this one.
+
+        Args:
+            at: Job-wide index of the row of the call or loop.
+            kind: The round, or CALLED or HANDLED.
+            place: Where its statements stand, where it is met first.
+        """
         found = self._inner.get((at, kind))
         if found is None:
-            found = self._inner[at, kind] = Context(self, at, kind)
+            found = self._inner[at, kind] = Context(self, at, kind, place)
         return found
 
     @property
     def is_round(self) -> bool:
         """Tell whether this is a round of a loop."""
         return self.kind >= 0
+
+    @property
+    def call(self) -> Context:
+        """The call of the routine in whose loops this is, or itself."""
+        one = self
+        while one.is_round:
+            one = one.outer
+        return one
+
+    def around(self) -> Iterator[Context]:
+        """Go through this context and those around it, up to the outermost one."""
+        one = self
+        while one.outer is not one:
+            yield one
+            one = one.outer
+        yield one
 
     def up_to(self, depth: int) -> Context:
         """Return the context of a depth around this one, or itself."""
@@ -102,3 +138,34 @@ class Point:
             return (self.at, HERE) < (b.at, b.kind)
         a = mine.up_to(depth + 1)
         return (a.at, a.kind) < (other.at, HERE)
+
+
+def in_program_order(keys: Iterable[tuple[Context, int, int]]) -> list[int]:
+    """Sort places as a program comes to them.
+
+    Args:
+        keys: Context, job-wide row, and number within the row, of each.
+
+    Returns:
+        Their indices, in order.
+    """
+    own: dict[Context, list[tuple[int, int, int, Any]]] = {}
+    outermost: Context | None = None
+    for k, (context, at, number) in enumerate(keys):
+        known = context in own
+        own.setdefault(context, []).append((at, HERE, number, k))
+        while not known and context.outer is not context:
+            inner, context = context, context.outer
+            known = context in own
+            own.setdefault(context, []).append((inner.at, inner.kind, 0, inner))
+        outermost = context if context.outer is context else outermost
+    order: list[int] = []
+    waiting: list[Any] = [] if outermost is None else [outermost]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, Context):
+            inside = sorted(own[one], key=lambda entry: entry[:3], reverse=True)
+            waiting += [entry[3] for entry in inside]
+        else:
+            order.append(one)
+    return order

@@ -1,0 +1,1 @@
+"""Follow a program in any language: control flow, calls, and what is known where."""

@@ -1,0 +1,460 @@
+"""Follow a program every way that it may take, in any language."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Generic, Protocol, Self, TypeVar
+
+from postproc.language import ir
+from postproc.language.analysis.call_context import CALLED, Context, Point
+from postproc.language.analysis.control_flow import EXIT, ControlFlow
+
+MOST_ROUNDS = 10_000  # rounds of loops within each other, followed one by one
+MOST_ROWS = 400_000  # of loops that are followed so, all in all
+MOST_STEPS = 4_000_000  # statements run one by one, all in all
+NOT_UNROLLED = (
+    "the loop runs {:,} times: too often to be followed round by round; targets that "
+    "depend on its counter are not compensated"
+)
+_CONTROL = (ir.Branch, ir.BlockWord, ir.ForLoop, ir.JumpTo, ir.Leave)
+
+
+class RoutinePlace(Protocol):
+    """Where statements stand."""
+
+    @property
+    def flow(self) -> ControlFlow:
+        """The blocks of the routine."""
+
+    @property
+    def offset(self) -> int:
+        """The job-wide index of the first row of its file."""
+
+    def statement(self, row: int) -> ir.SourceStatement:
+        """Return what a row of its file says."""
+
+
+class AbstractState(Protocol):
+    """What is known at a place of a program, on every way there."""
+
+    def copy(self) -> Self:
+        """Return a state that can change on its own."""
+
+    def join(self, other: Self) -> Self:
+        """Return what holds on either way; itself where that is no less."""
+
+
+S = TypeVar("S", bound=AbstractState)
+
+
+@dataclass(frozen=True)
+class Counting:
+    """The rounds of a loop whose bounds are known.
+
+    Attributes:
+        first: What its variable is in the first round.
+        step: By what it counts.
+        rounds: How many there are.
+    """
+
+    first: float
+    step: float
+    rounds: int
+
+    @classmethod
+    def of(cls, first: float, last: float, step: float) -> Counting | None:
+        """Count the rounds of a loop, None where its bounds are not known."""
+        if not all(map(math.isfinite, (first, last, step))) or not step:
+            return None
+        steps = (last - first) / step
+        if not math.isfinite(steps):
+            return None
+        return cls(first, step, 0 if steps < 0 else int(steps + 1e-9) + 1)
+
+    def value(self, number: int) -> float:
+        """Return what the variable is in a round."""
+        return self.first + number * self.step
+
+
+@dataclass(kw_only=True)
+class Interpreter(ABC, Generic[S]):
+    """The ways through a program.
+
+    A *configuration* is a row with the calls, and the rounds of loops that count, that
+    led there. Each has one state, in which all ways there are joined; it is run again
+    when that has changed, until nothing changes. Work is done in program order, so that
+    most configurations are run once.
+
+    Attributes:
+        root: The outermost context.
+        entries: The state of each configuration.
+        counted: Loops that are followed round by round, by context and row.
+        widened: Loops that are not.
+        unrolled: Rows of loops that are followed round by round, all rounds together.
+        steps: Statements that have been run.
+        exhausted: The program has too many ways to be followed to the end.
+    """
+
+    root: Context = field(default_factory=Context)
+    entries: dict[tuple[Context, int], S] = field(default_factory=dict)
+    counted: dict[tuple[Context, int], Counting] = field(default_factory=dict)
+    widened: set[tuple[Context, int]] = field(default_factory=set)
+    unrolled: int = 0
+    steps: int = 0
+    exhausted: bool = False
+    _heap: list[tuple[Point, int]] = field(default_factory=list)
+    _queued: set[tuple[Context, int]] = field(default_factory=set)
+
+    # What a language says.
+
+    @abstractmethod
+    def act(
+        self, context: Context, row: int, one: ir.SourceStatement, state: S
+    ) -> S | None:
+        """Carry out a statement that leads to the next one.
+
+        None where it goes on in a routine, or where the language goes on by itself.
+        """
+
+    def run_block(self, context: Context, row: int, state: S) -> tuple[int, S] | None:
+        """Run moves at once that differ only in where they go.
+
+        Returns:
+            The row behind them and what holds there, None where none begin at a row.
+        """
+        return None
+
+    def before(
+        self, context: Context, row: int, one: ir.SourceStatement, state: S
+    ) -> S:
+        """Allow for what a statement does besides leading elsewhere."""
+        return state
+
+    def truth(
+        self, context: Context, row: int, condition: ir.Operand, state: S
+    ) -> bool | None:
+        """Tell whether a condition holds, None where only the run tells."""
+        return None
+
+    def fits(
+        self, context: Context, row: int, case: ir.Branch, head: int, state: S
+    ) -> bool | None:
+        """Tell whether a case means what its block tests, None where it may."""
+        return None
+
+    @abstractmethod
+    def count(
+        self, context: Context, row: int, loop: ir.ForLoop, state: S
+    ) -> Counting | None:
+        """Return the rounds of a loop, None where they are not known."""
+
+    def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
+        """Tell whether nothing but a loop itself changes its variable."""
+        return True
+
+    def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
+        """Say that a loop runs too often to be followed round by round."""
+
+    @abstractmethod
+    def begin_round(
+        self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: S
+    ) -> tuple[Any, S]:
+        """Return where the statements of a round stand, and what holds as it begins."""
+
+    def forget_counter(
+        self, context: Context, row: int, loop: ir.ForLoop, ended: bool, state: S
+    ) -> S:
+        """Forget what a loop counts, behind it or where it is not known."""
+        return state
+
+    @abstractmethod
+    def leave(self, context: Context, state: S, by_return: bool = False) -> None:
+        """Go on where a routine ends."""
+
+    def leave_otherwise(
+        self, context: Context, row: int, one: ir.Leave, state: S
+    ) -> S | None:
+        """Go on behind another word than RETURN that leads elsewhere; often nowhere."""
+        return None
+
+    def lose_way(
+        self, context: Context, row: int, one: ir.SourceStatement, state: S
+    ) -> S:
+        """Go on behind a statement that leads to no place that is known."""
+        return state
+
+    # Configurations.
+
+    def enter(self, context: Context, row: int, state: S) -> None:
+        """Come to a row, once more or for the first time."""
+        context = _rounds_of(context, row)
+        config = context, row
+        known = self.entries.get(config)
+        joined = state.copy() if known is None else known.join(state)
+        if joined is known:
+            return
+        self.entries[config] = joined
+        if config not in self._queued:
+            self._queued.add(config)
+            at = context.place.offset + row
+            heapq.heappush(self._heap, (Point(context, at), row))
+
+    def go_on(self, context: Context, row: int, state: S) -> None:
+        """Go on with a row as the one after the last: ELSE and CASE end a branch."""
+        place = context.place
+        if row < place.flow.last and ir.divides(place.statement(row)):
+            row = place.flow.end.get(row, row)
+        self.enter(context, row, state)
+
+    def follow(self) -> None:
+        """Follow all ways from the rows that have been entered."""
+        while self._heap and not self.exhausted:
+            point, row = heapq.heappop(self._heap)
+            config = point.context, row
+            self._queued.discard(config)
+            self._run(point.context, row, self.entries[config].copy())
+
+    def _run(self, context: Context, row: int, state: S) -> None:
+        """Run statements one after the other until ways part or meet."""
+        place, start = context.place, row
+        flow = place.flow
+        while row < flow.last:
+            if row != start and row in flow.joins:
+                self.go_on(context, row, state)
+                return
+            self.steps += 1
+            self.exhausted |= self.steps > MOST_STEPS
+            if (block := self.run_block(context, row, state)) is not None:
+                row, state = block
+                continue
+            one = place.statement(row)
+            if ir.divides(one):
+                if row != start:
+                    self.go_on(context, row, state)
+                    return
+                one = _then(one)
+            after = self.run_one(context, row, one, state)
+            if after is None:
+                return
+            row, state = row + 1, after
+        self.leave(context, state)
+
+    def run_one(
+        self, context: Context, row: int, one: ir.SourceStatement, state: S
+    ) -> S | None:
+        """Run a statement; None where the next row does not follow."""
+        while isinstance(one, ir.LabelMark) and one.then is not None:
+            one = one.then
+        if isinstance(one, _CONTROL):
+            state = self.before(context, row, one, state)
+            return self._part(context, row, one, state)
+        return self.act(context, row, one, state)
+
+    # Where ways part.
+
+    def _part(
+        self, context: Context, row: int, one: ir.SourceStatement, state: S
+    ) -> S | None:
+        """Go all ways that a statement may lead; return the state where one goes on."""
+        flow = context.place.flow
+        match one:
+            case ir.Branch(word="if" | "while" | "until"):
+                self._decide(context, row, one, state)
+            case ir.Branch(word="test"):
+                self._otherwise(context, row, state)
+            case ir.BlockWord(word="endwhile" | "endloop") if row in flow.head:
+                self.enter(context, flow.head[row], state)
+            case ir.Branch(word="condition"):
+                self.go_on(context, flow.behind(row), state)
+            case ir.BlockWord(word="endcondition"):
+                pass
+            case ir.ForLoop():
+                self._begin_loop(context, row, one, state)
+            case ir.BlockWord(word="endfor") if row in flow.head:
+                self._end_round(context, row, state)
+            case ir.JumpTo(name=name):
+                return self._jump(context, row, flow.labels.get(name), one, state)
+            case ir.Leave(word=word) if word == EXIT:
+                to = flow.behind(flow.exits[row]) if row in flow.exits else None
+                return self._jump(context, row, to, one, state)
+            case ir.Leave(word="return"):
+                self.leave(context, state, by_return=True)
+            case ir.Leave():
+                return self.leave_otherwise(context, row, one, state)
+            case _:
+                return state
+        return None
+
+    def _decide(self, context: Context, row: int, one: ir.Branch, state: S) -> None:
+        """Go both ways behind a condition, or the one that is known."""
+        flow = context.place.flow
+        truth = None
+        if one.values:
+            truth = self.truth(context, row, one.values[0], state)
+        if truth is not False:
+            self.go_on(context, row + 1, state)
+        if truth is not True and one.word == "if":
+            self._otherwise(context, row, state)
+        elif truth is not True and one.word == "while":
+            self.go_on(context, flow.behind(row), state)
+        elif truth is not True:
+            self.enter(context, flow.head.get(row, row), state)
+
+    def _otherwise(self, context: Context, row: int, state: S) -> None:
+        """Go to the divisions of a block that may be meant, or to its end."""
+        place, flow = context.place, context.place.flow
+        for at in flow.divisions_behind(row):
+            one = place.statement(at)
+            state = self.before(context, at, one, state)
+            fits = self._fits(context, at, one, row, state)
+            if fits is not False:
+                self.enter(context, at, state)
+            if fits is True:
+                return
+        self.enter(context, flow.end.get(row, flow.last), state)
+
+    def _fits(
+        self, context: Context, row: int, one: ir.SourceStatement, head: int, state: S
+    ) -> bool | None:
+        if not isinstance(one, ir.Branch) or one.word == "default":
+            return True
+        if one.word == "elseif":
+            return self.truth(context, row, one.values[0], state)
+        return self.fits(context, row, one, head, state)
+
+    def _jump(
+        self, context: Context, row: int, to: int | None, one: ir.SourceStatement,
+        state: S,
+    ) -> S | None:  # fmt: skip
+        """Go to a label, or out of a loop."""
+        if to is None:
+            return self.lose_way(context, row, one, state)
+        self.enter(context, to, state)
+        return None
+
+    # Loops that count: round by round where the bounds are known, else over and over.
+
+    def _begin_loop(
+        self, context: Context, row: int, loop: ir.ForLoop, state: S
+    ) -> None:
+        """Go into the first round, past the loop, or both where that is not known."""
+        config, behind = (context, row), context.place.flow.behind(row)
+        counting = self.count(context, row, loop, state)
+        if counting is not None and not counting.rounds:
+            self.go_on(context, behind, state)
+            return
+        if counting is not None and self._unroll(context, row, loop, counting):
+            self._round(context, row, loop, 0, state)
+            return
+        self.widened.add(config)
+        state = self.forget_counter(context, row, loop, False, state)
+        if counting is None:
+            self.go_on(context, behind, state)
+        self.go_on(context, row + 1, state)
+
+    def _unroll(
+        self, context: Context, row: int, loop: ir.ForLoop, counting: Counting
+    ) -> bool:
+        """Tell whether a loop is followed round by round."""
+        config = context, row
+        if config in self.widened:
+            return False
+        if config not in self.counted:
+            if not self.counts_alone(context, row, loop):
+                return False
+            if not self._afford(context, row, counting.rounds):
+                self.say_not_unrolled(context, row, counting.rounds)
+                return False
+            self.counted[config] = counting
+        return self.counted[config] == counting
+
+    def _afford(self, context: Context, row: int, rounds: int) -> bool:
+        """Tell whether there are so few rounds that each is followed by itself."""
+        rows = rounds * (context.place.flow.behind(row) - row)
+        if rounds * self.rounds_around(context) > MOST_ROUNDS:
+            return False
+        if self.unrolled + rows > MOST_ROWS:
+            return False
+        self.unrolled += rows
+        return True
+
+    def _round(
+        self, outer: Context, row: int, loop: ir.ForLoop, number: int, state: S
+    ) -> None:
+        """Start a round."""
+        at, value = outer.place.offset + row, self.counted[outer, row].value(number)
+        place, state = self.begin_round(outer, row, loop, value, state)
+        self.go_on(outer.within(at, number, place), row + 1, state)
+
+    def _end_round(self, context: Context, row: int, state: S) -> None:
+        """Go into the next round, out of the loop, or both where that is not known."""
+        place = context.place
+        head = place.flow.head[row]
+        loop = _loop_at(place.statement(head))
+        if context.is_round and context.at == place.offset + head:
+            outer, number = context.outer, context.kind + 1
+            if number < self.counted[outer, head].rounds:
+                self._round(outer, head, loop, number, state)
+                return
+            context = outer
+        else:
+            state = self.forget_counter(context, row, loop, False, state)
+            self.go_on(context, head + 1, state)
+        state = self.forget_counter(context, row, loop, True, state)
+        self.go_on(context, row + 1, state)
+
+    def rounds_around(self, context: Context) -> int:
+        """Return how often a context is run by the loops around it and its callers."""
+        times = 1
+        for one in context.around():
+            if one.is_round:
+                row = one.at - one.place.offset
+                times *= self.counted[one.outer, row].rounds
+        return times
+
+    # Calls.
+
+    def call(self, context: Context, row: int, place: RoutinePlace, state: S) -> None:
+        """Go into a routine; it comes back to the row behind this one."""
+        inner = context.within(context.place.offset + row, CALLED, place)
+        self.steps += 1
+        self.enter(inner, place.flow.first, state)
+
+    def return_to_caller(self, context: Context, state: S) -> None:
+        """Go back to where a routine was called."""
+        call = context.call
+        if call.kind == CALLED and call.outer.place is not None:
+            row = call.at - call.outer.place.offset
+            self.go_on(call.outer, row + 1, state)
+
+
+def calls_around(context: Context) -> Iterator[Context]:
+    """Go through the calls in which a context is, the innermost first."""
+    return (one for one in context.around() if not one.is_round)
+
+
+def _rounds_of(context: Context, row: int) -> Context:
+    """Drop the rounds of loops that a jump to a row leaves."""
+    while context.is_round:
+        head = context.at - context.place.offset
+        if head < row <= context.place.flow.end[head]:
+            break
+        context = context.outer
+    return context
+
+
+def _then(one: ir.SourceStatement) -> ir.SourceStatement:
+    """Return what follows a division of a block on its line."""
+    return getattr(one, "then", None) or ir.SourceStatement()
+
+
+def _loop_at(one: ir.SourceStatement) -> ir.ForLoop:
+    """Return the loop that begins at a row."""
+    if isinstance(one, ir.LabelMark):
+        one = one.then or one
+    assert isinstance(one, ir.ForLoop)
+    return one

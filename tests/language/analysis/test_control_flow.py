@@ -1,0 +1,85 @@
+"""Blocks of routines: what closes what, where ways lead, and what fits nowhere."""
+
+from __future__ import annotations
+
+import pytest
+
+from postproc.language import ir
+from postproc.language.analysis.control_flow import (
+    EXIT,
+    ControlFlow,
+    HeadedRows,
+    flow_of,
+)
+from postproc.language.language import Start
+from postproc.language.rapid.language import Rapid
+from postproc.language.source import Source
+from tests.golden.rapid_cases import go, module
+from tests.language.krl.test_visits import job, origins
+
+WORDS = {
+    "if": ir.Branch("if"), "else": ir.BlockWord("else"), "endif": ir.BlockWord("endif"),
+    "while": ir.Branch("while"), "endwhile": ir.BlockWord("endwhile"),
+    "test": ir.Branch("test"), "case": ir.Branch("case"),
+    "endtest": ir.BlockWord("endtest"), "for": ir.ForLoop("i", None, None),
+    "endfor": ir.BlockWord("endfor"), "exit": ir.Leave(EXIT),
+    "label": ir.LabelMark("here"), "goto": ir.JumpTo("here"), ".": ir.SourceStatement(),
+}  # fmt: skip
+
+
+def flow(words: str) -> ControlFlow:
+    said = [ir.SourceStatement(), *(WORDS[word] for word in words.split())]
+    rows = HeadedRows(None, 0, len(said))
+    return flow_of(said.__getitem__, range(1, len(said)), rows)
+
+
+def test_blocks_within_blocks_close_in_their_order() -> None:
+    found = flow("while if . else . endif endwhile .")
+    assert found.end == {1: 7, 2: 6, 4: 6} and found.head == {6: 2, 7: 1}
+    assert found.divisions == {1: (), 2: (4,)}
+    assert found.divisions_behind(2) == (4,) and found.divisions_behind(4) == ()
+    assert found.behind(1) == 8 and not found.problems
+
+
+def test_ways_meet_at_labels_heads_ends_and_behind_loops() -> None:
+    found = flow("label for . endfor . goto")
+    assert {1, 2, 4, 5} <= found.joins and 3 not in found.joins
+    assert found.loops == {2: 4} and found.labels == {"here": 1}
+
+
+def test_a_word_leaves_the_innermost_loop() -> None:
+    found = flow("for while if exit endif endwhile exit endfor exit")
+    assert found.exits == {4: 2, 7: 1}
+
+
+@pytest.mark.parametrize(
+    ("words", "lost"),
+    [
+        ("while . endif endwhile", {3}),
+        ("else", {1}),
+        ("case if", {1, 2}),
+        ("goto", {1}),
+        ("if while endif", {1, 2, 3}),
+        ("if else endif test case case endtest label goto", set()),
+    ],
+)
+def test_what_fits_nowhere_is_told_and_closes_nothing(words: str, lost: set[int]):
+    found = flow(words)
+    assert lost == {row for row, _ in found.problems}
+    if words.startswith("while"):
+        assert found.end == {1: 4}
+
+
+def rapid(*lines: str) -> list[list[int]]:
+    found = Rapid().read([Source("job.mod", module(*lines))], Start()).visits
+    return [found.predecessors(k).tolist() for k in range(len(found))]
+
+
+def test_what_stands_behind_an_endless_loop_leads_nowhere():
+    """Its first move comes from before, or from its end: nothing else begins it."""
+    endless = ("WHILE TRUE DO", go("p1"), go("p2"), "ENDWHILE", go("p3"))
+    assert rapid(*endless)[1:] == [[0, 2], [1]]
+    assert len(rapid("WHILE di1=1 DO", *endless[1:])) == 4
+    assert len(rapid("IF FALSE THEN", go("p1"), "ENDIF", go("p2"))) == 3
+    found = job("LIN XP1", "WHILE TRUE", "LIN XP2", "ENDWHILE", "LIN XP1")
+    assert origins(found)[1] == [0, 1] and len(found.visits) == 2
