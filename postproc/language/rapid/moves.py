@@ -159,20 +159,24 @@ class Goals:
     ) -> Iterator[RapidVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         ends = signature.operands(one.arguments)
-        tool, wobj, zone, speed = self._conditions(one, ends, row, scope)
+        watched = points.watch()
+        there = replace(scope, points=watched)
+        tool, wobj, zone, speed = self._conditions(one, ends, row, there)
+        given = watched.given
         motion = _motion(one.name, signature)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
-        total, untold = self._total(one, row, scope)
+        total, untold = self._total(one, row, there)
+        given |= watched.given
         why = why or untold
         if signature.via >= 0:
-            goal = self._read_end(ends[1], signature, row, scope, points)
+            goal = self._read_end(ends[1], signature, row, scope, points, given)
             yield RapidVisit(
                 scope, row, motion, True, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
             )  # fmt: skip
-        goal = self._read_end(ends[0], signature, row, scope, points)
+        goal = self._read_end(ends[0], signature, row, scope, points, given)
         if not signature.reaches:
             goal = not_reached(goal, why)
         yield RapidVisit(
@@ -221,8 +225,8 @@ class Goals:
         named = all(
             value is None or (isinstance(value, ir.DataObject) and not value.steps)
             for value in others
-        )
-        key = id(one), scope
+        ) and not any(self._is_assigned(value) for value in others)
+        key = id(one), replace(scope, points=NO_POINTS)
         if named and key in self._known:
             return self._known[key][1]
         arguments = _Arguments(self.task, one.arguments, row, scope)
@@ -236,13 +240,17 @@ class Goals:
 
     def _read_end(
         self, operand: ir.Operand | None, signature: Signature, row: int,
-        scope: Scope, points: Points,
+        scope: Scope, points: Points, given: frozenset[AssignedPoint],
     ) -> FoundGoal:  # fmt: skip
-        """Read a destination, and note what it takes of assigned points."""
+        """Read a destination, and note what it takes of assigned data.
+
+        Tool, work object, zone and speed have taken what is given before.
+        """
         watched = points.watch()
         there = replace(scope, points=watched)
         goal = self.goal(operand, signature, row, there)
-        return replace(goal, given=watched.given) if watched.given else goal
+        given |= watched.given
+        return replace(goal, given=given) if given else goal
 
     def _read_held(self, held: AssignedPoint, signature: Signature) -> FoundGoal:
         """Read the destination that assignments gave to a point."""
@@ -533,6 +541,10 @@ class Goals:
 
     # Tools and work objects.
 
+    def _is_assigned(self, operand: ir.Operand | None) -> bool:
+        """Return True if the program may give data another value on its way."""
+        return isinstance(operand, ir.DataObject) and operand.name in self.task.written
+
     def _tool(self, arguments: _Arguments) -> FrameOfMove:
         operand = arguments.of_type("tooldata")
         if operand is None:
@@ -550,6 +562,8 @@ class Goals:
             if operand.name == f"{kind}0" and arguments.is_built_in(operand.name):
                 return FLANGE if kind == "tool" else WORLD
             key = kind, operand.name, scope.file, scope.module, scope.routine
+            if self._is_assigned(operand):
+                return self._read_frame(kind, operand, arguments)
             if key not in self._frames:
                 self._frames[key] = self._read_frame(kind, operand, arguments)
             return self._frames[key]
