@@ -15,7 +15,9 @@ sys.path.insert(0, str(ROOT / "docs" / "tools"))
 
 import architecture  # noqa: E402
 import causes  # noqa: E402
+import file_keys  # noqa: E402
 import findings  # noqa: E402
+import pages  # noqa: E402
 import site_pages  # noqa: E402
 from sessions import BLOCK, PAGES, normal, run_page, steps_of  # noqa: E402
 
@@ -220,3 +222,17 @@ def test_the_table_of_causes_is_that_of_the_effects():
 def test_the_page_of_findings_is_that_of_the_registry():
     page = findings.PAGE.read_text(encoding="utf-8")
     assert page == findings.written(), "run python docs/tools/findings.py"
+
+
+def test_the_page_of_files_is_that_of_their_classes():
+    text = file_keys.PAGE.read_text(encoding="utf-8")
+    assert text == file_keys.written(), "run python docs/tools/file_keys.py"
+
+
+def test_every_page_is_short_enough():
+    assert pages.too_long() == []
+
+
+def test_every_page_has_a_place_in_the_navigation():
+    known = {page.path.resolve() for page in pages.pages()}
+    assert {path.resolve() for path in site_pages.sources()} <= known

@@ -28,7 +28,7 @@ MOST = 1500  # words of a page
 LONGEST = 25  # words of a sentence
 LIMITED = ("Home", "Tutorials", "How-to", "Explanation")
 DRAWN = (*LIMITED, "Reference")
-NO_PAGE_OF_OURS = ("reference/", "findings.md", "history/", "changelog.md")
+NO_PAGE_OF_OURS = ("reference/", "findings.md", "files.md", "history/", "changelog.md")
 """What a program writes, and what is history: no sentence is drawn there."""
 PART = re.compile(r"^  - ([\w-]+):(?: (\S+\.md))?$")
 ENTRY = re.compile(r"^ {6,}- .*?(\S+\.md)$")
