@@ -34,7 +34,7 @@ PART = re.compile(r"^  - ([\w-]+):(?: (\S+\.md))?$")
 ENTRY = re.compile(r"^ {6,}- .*?(\S+\.md)$")
 CODE = re.compile(r"(?ms)^ *(`{3,}|~{3,}).*?^ *\1 *$|^ {4,}\S[^\n]*$|<!--.*?-->")
 LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
-SENTENCE_END = re.compile(r"(?<=[a-z0-9)`\"*][.?!])\s+(?=[A-Z`*\"(\[])")
+SENTENCE_END = re.compile(r"(?<=[a-z0-9)`\"*%][.?!])\s+(?=[A-Z0-9`*\"(\[])")
 PRONOUN = re.compile(
     r"^(?:It|They|This|These|That|Those|Both|Such|There it)\b(?! page)"
 )
