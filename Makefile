@@ -63,6 +63,7 @@ lint: $(STAMP)
 	@$(VENV)/bin/ruff format --check .
 	@$(VENV)/bin/mypy
 	@$(PYTHON_BIN) docs/tools/words.py
+	@$(PYTHON_BIN) docs/tools/pages.py
 
 lock:
 	@PATH="$(abspath $(VENV))/bin:$$PATH" bash .ci/lock $(if $(UPGRADE),--upgrade)

@@ -233,6 +233,13 @@ def test_every_page_is_short_enough():
     assert pages.too_long() == []
 
 
+def test_few_sentences_of_pages_break_a_rule():
+    found = pages.suspects()
+    assert len(found) <= pages.ALLOWED, "\n".join(map(str, found))
+    assert pages.faults("It is what that does, where which is so.")
+    assert pages.faults("The arm misses its targets by 0.1 mm.") == []
+
+
 def test_every_page_has_a_place_in_the_navigation():
     known = {page.path.resolve() for page in pages.pages()}
     assert {path.resolve() for path in site_pages.sources()} <= known
