@@ -165,4 +165,4 @@ generated: $(STAMP)
 		--count $(or $(COUNT),1000) --language $$language || exit 1; done
 
 clean:
-	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis native/target
+	rm -rf $(VENV) demo build dist .cache .pytest_cache .mypy_cache .ruff_cache .hypothesis native/target
