@@ -207,6 +207,11 @@ def test_only_times_and_the_folder_are_taken_to_be_equal(tmp_path):
     assert run_page(text, tmp_path)[1] == []
 
 
+def test_progress_of_a_slow_machine_is_no_part_of_the_output(tmp_path):
+    text = page("$ echo '12 s: report' >&2; echo '3 s of travel'", "3 s of travel")
+    assert run_page(text, tmp_path) == (text, [])
+
+
 def test_a_block_begins_with_a_command():
     with pytest.raises(ValueError, match="begins with output"):
         steps_of("output\n$ a\n")
