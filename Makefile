@@ -6,22 +6,22 @@
 # make chaos   kill 200 batches of 300 files at random moments and resume them; end 50 long runs by signals
 # make awkward   200 drawn surveys of every awkward kind: fitted, or refused in words
 # make fuzz    20,000 damaged programs, PDL2, RAPID and KRL: refused, or rewritten byte for byte; the parsers by coverage
-# make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
+# make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/studies/plant.md
 # make generated    1,000 random programs a language: followed as they run, landing where they say
 # make golden  what the commands write, here and at BASE=<commit>: a changed byte fails
-# make bench   where the time goes on this machine: docs/benchmarks.md
+# make bench   where the time goes on this machine: docs/studies/benchmarks.md
 # make growth  how the time to read a program grows with its lines, variables and branches
 # make evidence    coverage of the intervals, and what direction is worth
-# make reproduce   the published method and ours, simulated: docs/reproduction.md
-# make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
-# make intervals   coverage of a reading's intervals on two real arms: docs/intervals.md
-# make detection   outliers, wrong directions and nests that a fit finds: docs/detection.md
+# make reproduce   the published method and ours, simulated: docs/studies/reproduction.md
+# make accuracy    held-out errors, coverage, real and blind data: docs/studies/accuracy.md
+# make intervals   coverage of a reading's intervals on two real arms: docs/studies/intervals.md
+# make detection   outliers, wrong directions and nests that a fit finds: docs/studies/detection.md
 # make languages   where arms land that run one job in every language: docs/languages.md
-# make campaigns    repeats, nests, rounds, rounded angles: fits of 200 drawn campaigns, docs/campaigns.md
-# make undeclared  undeclared effects traced on virtual arms, 1,880 of them: docs/undeclared.md
-# make paths       predicted and true path accuracy on virtual arms: docs/paths.md
-# make real DATA=folder [FITS=1]   real arms, rows that nothing has seen; FITS leaves out diagnoses: docs/real-arms.md
-# make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
+# make campaigns    repeats, nests, rounds, rounded angles: fits of 200 drawn campaigns, docs/studies/campaigns.md
+# make undeclared  undeclared effects traced on virtual arms, 1,880 of them: docs/studies/undeclared.md
+# make paths       predicted and true path accuracy on virtual arms: docs/studies/paths.md
+# make real DATA=folder [FITS=1]   real arms, rows that nothing has seen; FITS leaves out diagnoses: docs/studies/real-arms.md
+# make blind       effects traced in the blind campaigns and on a real arm: docs/studies/blind.md
 # make wheel       a wheel for every Python from 3.11 on, tried in a new environment, in dist
 # make wheels  the same, and one for Windows, cross-built: needs rustup and mingw-w64
 # make windows     try that one under Wine: same bytes as here; needs wine and maven, too
@@ -63,6 +63,7 @@ lint: $(STAMP)
 	@$(VENV)/bin/ruff format --check .
 	@$(VENV)/bin/mypy
 	@$(PYTHON_BIN) docs/tools/words.py
+	@$(PYTHON_BIN) docs/tools/pages.py
 
 lock:
 	@PATH="$(abspath $(VENV))/bin:$$PATH" bash .ci/lock $(if $(UPGRADE),--upgrade)
@@ -108,7 +109,7 @@ blind: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/diagnosed.py
 
 real: $(STAMP)
-	@test -n "$(DATA)" || { echo "make real DATA=folder: see docs/real-arms.md" >&2; exit 2; }
+	@test -n "$(DATA)" || { echo "make real DATA=folder: see docs/studies/real-arms.md" >&2; exit 2; }
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/real_arms.py "$(DATA)" --jobs $(or $(JOBS),1) $(if $(QUICK),--quick -o build/real-arms.md) $(if $(FITS),--no-diagnosis)
 
 chaos: $(STAMP)
@@ -164,4 +165,4 @@ generated: $(STAMP)
 		--count $(or $(COUNT),1000) --language $$language || exit 1; done
 
 clean:
-	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis native/target
+	rm -rf $(VENV) demo build dist .cache .pytest_cache .mypy_cache .ruff_cache .hypothesis native/target

@@ -2,7 +2,7 @@
 
 python -m tests.plant_bench --files 10000        (or: make plant-bench)
 
-Writes docs/plant.md. All ratios are of runs that take turns in the same minutes.
+Writes docs/studies/plant.md. Ratios are of runs that take turns in the same minutes.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ MANY = 1000  # targets of the files that a cluster is given
 SOME = 100  # files that are compensated in this process
 ROUNDS = 2  # of runs that are compared with each other
 STEPS = 40_000_000  # of the plain loop: some seconds
-PAGE = ROOT / "docs" / "plant.md"
+PAGE = ROOT / "docs" / "studies" / "plant.md"
 
 
 @dataclass

@@ -15,7 +15,10 @@ sys.path.insert(0, str(ROOT / "docs" / "tools"))
 
 import architecture  # noqa: E402
 import causes  # noqa: E402
+import file_keys  # noqa: E402
 import findings  # noqa: E402
+import pages  # noqa: E402
+import site_pages  # noqa: E402
 from sessions import BLOCK, PAGES, normal, run_page, steps_of  # noqa: E402
 
 from tests.report.html.browser import complaints, open_browser, requests  # noqa: E402
@@ -104,25 +107,31 @@ def test_the_drawing_of_the_chapters_is_that_of_the_code():
     assert list(architecture.problems()) == []
 
 
-def build(config, out):
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", config]
-    return subprocess.run([*command, "-d", out], capture_output=True, text=True)
+def build(folder):
+    """Build the site of the pages in folder/pages, with the settings of ours."""
+    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    text = text.replace("build/pages", "pages").replace("build/docs", "site")
+    text = text.replace("paths: [.]", f"paths: [{ROOT}]")
+    text = text.replace("[docs/tools/", f"[{ROOT}/docs/tools/")
+    if not (folder / "pages" / "tutorial.md").exists():
+        text = text.split("\nnav:\n")[0]
+    (folder / "mkdocs.yml").write_text(text)
+    command = [sys.executable, "-m", "zensical", "build", "--strict"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
 
 
 def test_the_site_is_whole_and_can_be_searched_from_disk(tmp_path):
-    pytest.importorskip("material", reason="no MkDocs: pip install -e '.[docs]'")
+    pytest.importorskip("zensical", reason="no Zensical: pip install -e '.[docs]'")
     site = tmp_path / "site"
-    done = build(ROOT / "mkdocs.yml", site)
+    site_pages.stage(tmp_path / "pages")
+    done = build(tmp_path)
     assert done.returncode == 0, done.stderr
     for name in ("index", "tutorial", "changelog", "files/programs/drilling.pdl"):
         assert (site / f"{name}.html").stat().st_size > 5000, name
     with open_browser(tmp_path / "profile") as browser:
         browser.get((site / "index.html").as_uri())
-        box = browser.find_element("css selector", "input.md-search__input")
-        box.click()
-        box.send_keys("backlash")
-        found = wait_for(browser, "a.md-search-result__link")
-        assert any("effects.html" in link.get_attribute("href") for link in found)
+        found = search(browser, "backlash")
+        assert any("effects.html" in link for link in found)
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", PHONE)
         for name in ("accuracy", "benchmarks", "pdl2", "tutorial"):
             browser.get((site / f"{name}.html").as_uri())
@@ -132,26 +141,43 @@ def test_the_site_is_whole_and_can_be_searched_from_disk(tmp_path):
 
 
 def test_a_link_or_a_heading_that_is_not_there_fails(tmp_path):
-    pytest.importorskip("material", reason="no MkDocs: pip install -e '.[docs]'")
-    folder = tmp_path / "docs"
+    pytest.importorskip("zensical", reason="no Zensical: pip install -e '.[docs]'")
+    folder = tmp_path / "pages"
     folder.mkdir()
-    wrong = "# Home\n\n[a](none.md), [b](#none), [c](../none.txt)\n"
-    (folder / "index.md").write_text(wrong)
-    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").split("\nnav:\n")[0]
-    (tmp_path / "mkdocs.yml").write_text(text.replace("hooks:", "#"))
-    done = build(tmp_path / "mkdocs.yml", tmp_path / "site")
-    assert done.returncode != 0
-    for target in ("none.md", "#none", "../none.txt"):
-        assert target in done.stderr
+    (folder / "other.md").write_text("# Other\n")
+    for target in ("none.md", "#none", "other.md#none", "../none.md"):
+        (folder / "index.md").write_text(f"# Home\n\n[a]({target})\n")
+        assert build(tmp_path).returncode != 0, target
+    (folder / "index.md").write_text("# Home\n\n[a](other.md#other)\n")
+    assert build(tmp_path).returncode == 0
 
 
-def wait_for(browser, selector, seconds=10.0):
+def test_a_link_to_a_file_that_is_not_there_is_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("[a](none.txt), ![b](none.png), [c](page.md), [d](https://e.org)")
+    assert [text.split()[-1] for text in site_pages.dead_links([page])] == [
+        "none.txt",
+        "none.png",
+    ]
+
+
+LINKS_OF_SEARCH = """
+    const places = [...document.querySelectorAll("*")].filter((e) => e.shadowRoot);
+    const links = places.map((e) => [...e.shadowRoot.querySelectorAll("li a")]);
+    return links.flat().map((link) => link.href);
+"""
+
+
+def search(browser, word, seconds=10.0):
+    """Type a word into the search of the site; return where its results lead."""
+    browser.find_element("css selector", ".md-search__button").click()
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        if found := browser.find_elements("css selector", selector):
+        browser.switch_to.active_element.send_keys(word)
+        time.sleep(0.5)
+        if found := browser.execute_script(LINKS_OF_SEARCH):
             return found
-        time.sleep(0.1)
-    raise AssertionError(f"no {selector} on the page")
+    raise AssertionError(f"the search finds no {word}")
 
 
 def page(*lines: str) -> str:
@@ -181,6 +207,11 @@ def test_only_times_and_the_folder_are_taken_to_be_equal(tmp_path):
     assert run_page(text, tmp_path)[1] == []
 
 
+def test_progress_of_a_slow_machine_is_no_part_of_the_output(tmp_path):
+    text = page("$ echo '12 s: report' >&2; echo '3 s of travel'", "3 s of travel")
+    assert run_page(text, tmp_path) == (text, [])
+
+
 def test_a_block_begins_with_a_command():
     with pytest.raises(ValueError, match="begins with output"):
         steps_of("output\n$ a\n")
@@ -196,3 +227,24 @@ def test_the_table_of_causes_is_that_of_the_effects():
 def test_the_page_of_findings_is_that_of_the_registry():
     page = findings.PAGE.read_text(encoding="utf-8")
     assert page == findings.written(), "run python docs/tools/findings.py"
+
+
+def test_the_page_of_files_is_that_of_their_classes():
+    text = file_keys.PAGE.read_text(encoding="utf-8")
+    assert text == file_keys.written(), "run python docs/tools/file_keys.py"
+
+
+def test_every_page_is_short_enough():
+    assert pages.too_long() == []
+
+
+def test_few_sentences_of_pages_break_a_rule():
+    found = pages.suspects()
+    assert len(found) <= pages.ALLOWED, "\n".join(map(str, found))
+    assert pages.faults("It is what that does, where which is so.")
+    assert pages.faults("The arm misses its targets by 0.1 mm.") == []
+
+
+def test_every_page_has_a_place_in_the_navigation():
+    known = {page.path.resolve() for page in pages.pages()}
+    assert {path.resolve() for path in site_pages.sources()} <= known

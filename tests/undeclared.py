@@ -1,6 +1,6 @@
 """Trace undeclared effects on virtual arms, and count how often the answer is right.
 
-    python -m tests.undeclared --seeds 60 --none 200 --jobs 2 -o docs/undeclared.md
+    python -m tests.undeclared --seeds 60 --none 200 --jobs 2
 
 The data come from the virtual arm, which shares no code with the model. An effect is
 drawn by seed, the fitter is not told, and the truth is opened only to score. Results
@@ -75,7 +75,9 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--skip", type=int, default=0, help="leave out the first ones")
     parser.add_argument("--log", type=Path, default=Path("build/undeclared.jsonl"))
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs/undeclared.md"))
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("docs/studies/undeclared.md")
+    )
     chosen = parser.parse_args()
     chosen.log.parent.mkdir(parents=True, exist_ok=True)
     every = jobs_of(chosen.seeds, chosen.none)

@@ -1,4 +1,4 @@
-"""Write docs/undeclared.md and its plot from the scored trials."""
+"""Write docs/studies/undeclared.md and its plot from the scored trials."""
 
 from __future__ import annotations
 

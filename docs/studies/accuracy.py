@@ -1,4 +1,4 @@
-"""Write docs/accuracy.md: how accurate the fits are, and how sure of it.
+"""Write docs/studies/accuracy.md: how accurate the fits are, and how sure of it.
 
 PYTHONPATH=. python docs/studies/accuracy.py [--seeds 20] [--shared ../shared]
 """
@@ -23,7 +23,7 @@ from simulated import (
 from postproc.exceptions import PostprocError
 from tests.awkward import run
 
-OUT = Path(__file__).parents[1] / "accuracy.md"
+OUT = Path(__file__).parent / "accuracy.md"
 
 
 def awkward(count: int) -> list[str]:

@@ -1,4 +1,4 @@
-"""Write docs/detection.md: which mistakes in a survey a fit finds, and how often.
+"""Write detection.md: which mistakes in a survey a fit finds, and how often.
 
 PYTHONPATH=. python docs/studies/detected.py [--seeds 40]
 """
@@ -28,7 +28,7 @@ from tests.calibration.simulator import (
     survey_of,
 )
 
-OUT = Path(__file__).parents[1] / "detection.md"
+OUT = Path(__file__).parent / "detection.md"
 ROWS = 300
 STAND = np.array([3.0, -2.0, 1.5])  # [m] of the tracker, where it is not known
 MM = 1e-3

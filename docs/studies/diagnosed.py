@@ -1,4 +1,4 @@
-"""Write docs/blind.md: what the diagnosis finds in data whose answers are not known.
+"""Write blind.md: what the diagnosis finds in data whose answers are not known.
 
 PYTHONPATH=. python docs/studies/diagnosed.py [--shared ../shared]
 """
@@ -24,7 +24,7 @@ from postproc.model.model import Model
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.pose import MM
 
-OUT = Path(__file__).parents[1] / "blind.md"
+OUT = Path(__file__).parent / "blind.md"
 UR10_BASE = ("geometry", "backlash")
 
 

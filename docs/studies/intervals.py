@@ -1,4 +1,4 @@
-"""Write docs/intervals.md: whether 95 % intervals of a reading hold 95 % of readings.
+"""Write intervals.md: whether 95 % intervals of a reading hold 95 % of readings.
 
 PYTHONPATH=. python docs/studies/intervals.py [--seeds 20] [--shared ../shared]
 """
@@ -26,7 +26,7 @@ from postproc.robot.cell import Cell, load_cell
 
 Splits = tuple[tuple[str, Callable[[int, int], np.ndarray]], ...]
 Frames = tuple[str, ...]
-OUT = Path(__file__).parents[1] / "intervals.md"
+OUT = Path(__file__).parent / "intervals.md"
 WITHIN = 1.96
 UR5 = """name = "ur5"
 repeatability_mm = 0.1

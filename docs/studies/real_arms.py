@@ -1,4 +1,4 @@
-"""Write docs/real-arms.md: what a fit leaves of real arms, on rows it has not seen.
+"""Write real-arms.md: what a fit leaves of real arms, on rows it has not seen.
 
 PYTHONPATH=. python docs/studies/real_arms.py DATA [--jobs 2] [--quick]
 """
@@ -38,7 +38,7 @@ from postproc.model.model_file import Method
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.pose import MM
 
-OUT = Path(__file__).parents[1] / "real-arms.md"
+OUT = Path(__file__).parent / "real-arms.md"
 ACCOUNT = SHIPPED / "account.md"  # what was tried, and what came of it
 WITHIN = 1.96
 QUICK = 150  # rows that are fitted in a quick run

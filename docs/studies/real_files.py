@@ -1,4 +1,4 @@
-"""Write the rows of docs/real-arms.md as files, for the command line.
+"""Write the rows of docs/studies/real-arms.md as files, for the command line.
 
 PYTHONPATH=. python docs/studies/real_files.py DATA FOLDER
 

@@ -1,4 +1,4 @@
-"""Write docs/reproduction.md: the source's protocols over working volumes.
+"""Write docs/studies/reproduction.md: the source's protocols over working volumes.
 
 python docs/studies/reproduction.py [--centres 60] [--arms 40]
 """
@@ -25,7 +25,7 @@ from protocols import (
 )
 
 DOCS = Path(__file__).parents[1]
-OUT = DOCS / "reproduction.md"
+OUT = Path(__file__).with_suffix(".md")
 PICTURE = DOCS / "pictures/working_volume.svg"
 SOURCE = (1.383, 0.106, 0.169, 0.088)  # [mm] before: mean, std; after: mean, std
 WHAT = ("mean before", "std before", "mean after", "std after")
@@ -267,7 +267,7 @@ def page(given: argparse.Namespace) -> list[str]:
         *stops(whole),
         "",
         "![Mean error against the size of the working volume, every method]"
-        "(pictures/working_volume.svg)",
+        "(../pictures/working_volume.svg)",
         "",
         f"Beside the source's table, within {told(BESIDE)}, arms with all these "
         "effects. The volume is the one of the simulation above, not the one that fits "

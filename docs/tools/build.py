@@ -12,10 +12,8 @@ Links that lead nowhere are found while the site is written, and fail.
 from __future__ import annotations
 
 import argparse
-import os
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -24,6 +22,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import architecture
+import site_pages as site
 from sessions import PAGES, ROOT, run_page
 
 NOT_COPIED = shutil.ignore_patterns(
@@ -46,7 +45,7 @@ def main(arguments: Sequence[str]) -> int:
     for problem in problems:
         print(problem, file=sys.stderr)
     print(f"{len(chosen)} pages run, {len(problems)} problems")
-    broken = 0 if options.no_site else write_site()
+    broken = 0 if options.no_site else site.build()
     return 1 if problems or broken else 0
 
 
@@ -80,13 +79,6 @@ def run_all(pages: Sequence[Path], place: Path, update: bool) -> list[str]:
     for page in pages:
         run(page)
     return wrong
-
-
-def write_site() -> int:
-    """Write build/docs; return 0 when no link and no heading is missing."""
-    quiet = {"NO_MKDOCS_2_WARNING": "1"}  # a banner of the theme
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict"]
-    return subprocess.run(command, cwd=ROOT, env=os.environ | quiet).returncode
 
 
 if __name__ == "__main__":

@@ -206,8 +206,36 @@ def slowly() -> None:
          [("a step at row 120, told backwards", order, x)])  # fmt: skip
 
 
+def real_arms() -> None:
+    """Mean errors of tested rows, from the first table of the study of real arms."""
+    text = (PICTURES.parent / "studies" / "real-arms.md").read_text("utf-8")
+    table = text.split("\n## In short")[1].split("\n\n")[1].splitlines()
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in table]
+    values = {row[0]: [float(cell) for cell in row[1:]] for row in rows[2:]}
+    figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+    axes = figure.subplots()
+    shown = (("registered only", GREY, "s"), ("geometry alone", "black", "^"),
+             ("kriging", RED, "D"), ("fit", BLUE, "o"))  # fmt: skip
+    for name, colour, mark in shown:
+        column = rows[0].index(name) - 1
+        x = [row[column] for row in values.values()]
+        axes.plot(x, range(len(x)), mark, color=colour, label=name, markersize=5)
+    axes.set_xscale("log")
+    axes.set_yticks(range(len(values)), list(values), fontsize=8)
+    axes.invert_yaxis()
+    ticks = [0.05, 0.1, 0.2, 0.5, 1.0]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.grid(axis="x", color="#dddddd", linewidth=0.6)
+    axes.set_xlabel("mean error of the tested rows [mm]")
+    axes.legend(frameon=False, fontsize=8, ncols=4, loc="lower center",
+                bbox_to_anchor=(0.4, 1.0))  # fmt: skip
+    with rc_context({"svg.hashsalt": "real_arms", "svg.fonttype": "none"}):
+        figure.savefig(PICTURES / "real_arms.svg", metadata={"Date": None})
+
+
 PARTS: tuple[Callable[[], None], ...] = (
-    geometry, backlash, load_backlash, waves, loads, motion, slowly,
+    geometry, backlash, load_backlash, waves, loads, motion, slowly, real_arms,
 )  # fmt: skip
 
 

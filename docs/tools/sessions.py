@@ -22,9 +22,12 @@ PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 BLOCK = re.compile(r"(?ms)^```console\n(.*?)^```$")
 PROMPT, MORE = "$ ", "> "
 # All that is taken to be equal: seconds, rates, ids of models, which hash the last bits
-# of sums that processors round differently, and where the page was run.
+# of sums that processors round differently, dates, and where the page was run.
 TIMES = re.compile(r"\b\d+(\.\d+)? ?(s|ms|/s|files/s|programs/s)(?![\w/])")
 MODELS = re.compile(r"\b[0-9a-f]{16}\b")
+FITTED = re.compile(r"\bfitted on \d{4}-\d\d-\d\d\b")
+PROGRESS = re.compile(r"(?m)^\d+ s: .*\n")
+"""Progress that a command prints when it takes long: it depends on the machine."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,7 @@ def run_step(command: str, folder: Path) -> str:
     )
     text = done.stdout.decode("utf-8", "replace").replace(f"{folder}/", "")
     text = "".join(f"{line.rstrip()}\n" for line in text.splitlines())
+    text = PROGRESS.sub("", text)
     return text + (f"[exit code {done.returncode}]\n" if done.returncode else "")
 
 
@@ -106,8 +110,11 @@ def normal(output: str) -> str:
 
     >>> normal("model 135d6e7307b40c29 done in 1.25 s at 3 files/s, 5 steps")
     'model ID done in T s at T files/s, 5 steps'
+    >>> normal("fitted on 2026-11-29 by postproc")
+    'fitted on DATE by postproc'
     """
-    return MODELS.sub("ID", TIMES.sub(lambda found: f"T {found.group(2)}", output))
+    timeless = TIMES.sub(lambda found: f"T {found.group(2)}", output)
+    return FITTED.sub("fitted on DATE", MODELS.sub("ID", timeless))
 
 
 def told_apart(step: Step, printed: str) -> str:

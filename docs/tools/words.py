@@ -128,6 +128,7 @@ def pages() -> list[str]:
         *ROOT.glob("*.md"),
         *ROOT.glob("docs/*.md"),
         *ROOT.glob("docs/reference/*.md"),
+        *ROOT.glob("docs/studies/*.md"),
     ]
     files = sorted(str(p.relative_to(ROOT)) for p in found)
     return [file for file in files if file != "CHANGELOG.md"]

@@ -1,4 +1,4 @@
-"""Where the time goes: every kind of program at every length, into docs/benchmarks.md.
+"""Where the time goes: every kind of program at every length, into benchmarks.md.
 
 Run by ``make bench``. Each program runs in a process of its own, the short ones first;
 a length that would not fit into what is left of the budget is left out, and says so.
@@ -28,7 +28,7 @@ from tests.bench.memory import watched
 ROOT = Path(__file__).parents[2]
 CELL = ROOT / "programs" / "cell.toml"
 WORK = ROOT / "demo"
-TABLE = ROOT / "docs" / "benchmarks.md"
+TABLE = ROOT / "docs" / "studies" / "benchmarks.md"
 LENGTHS = (1_000, 10_000, 100_000, 1_000_000)
 ALWAYS = 10_000  # targets that fit into any budget
 STAGES = (

@@ -15,7 +15,7 @@ def lines(path: Path) -> int:
 
 
 def table() -> list[str]:
-    """Write the table of docs/languages.md, Python to the hundred lines."""
+    """Write the table of docs/studies/languages.md, Python to the hundred lines."""
     rows = ["| | grammar | Python |", "|---|---|---|"]
     for name, folder in FOLDERS.items():
         names = [f"{part}.lark" for part in GRAMMARS.get(name, ())]

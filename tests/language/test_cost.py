@@ -1,4 +1,4 @@
-"""docs/languages.md says what a language costs."""
+"""docs/studies/languages.md says what a language costs."""
 
 import re
 
@@ -8,7 +8,7 @@ from tests.language.cost import ROOT, table
 
 
 def test_the_page_says_what_a_language_costs() -> None:
-    text = (ROOT / "docs" / "languages.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "studies" / "languages.md").read_text(encoding="utf-8")
     page = text.split("## What a language costs")[1].splitlines()
     for row in table():
         name, *counted = re.split(r"(?<=[|] )([\d,]+)(?= lines)", row)
