@@ -535,7 +535,7 @@ class RapidMachine(TaskMachine):
             ],
         )  # fmt: skip
         (last,) = after.origins
-        if math.isnan(self.visits[last].zone_mm):
+        if self.visits[last].kept and math.isnan(self.visits[last].zone_mm):
             after = replace(after, modes=after.modes.settle())
         if one.name in SYNCHRONOUS:
             return self._synchronous(context, row, one, after)

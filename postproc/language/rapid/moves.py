@@ -41,6 +41,7 @@ from postproc.language.to_visits import (
     Pose,
     compose_poses,
     explain_components,
+    explain_disagreement,
     flat,
     hold_numbers,
     not_reached,
@@ -135,6 +136,12 @@ class RapidVisit(FoundVisit):
     speed: float = field(kw_only=True)
     total: tuple[float, ...] = field(kw_only=True, default=())
 
+    def forget_conditions(self) -> None:
+        """Forget tool, work object, zone and speed."""
+        why = explain_disagreement(Code.FRAME_UNKNOWN, self.taken)
+        self.tool, self.wobj = FrameOfMove((), True, why), FrameOfMove((), False, why)
+        self.zone_mm, self.speed, self.total = UNKNOWN_ZONE, np.nan, ()
+
 
 @dataclass
 class Goals:
@@ -162,26 +169,26 @@ class Goals:
         watched = points.watch()
         there = replace(scope, points=watched)
         tool, wobj, zone, speed = self._conditions(one, ends, row, there)
-        given = watched.given
         motion = _motion(one.name, signature)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
         total, untold = self._total(one, row, there)
-        given |= watched.given
         why = why or untold
         if signature.via >= 0:
-            goal = self._read_end(ends[1], signature, row, scope, points, given)
+            goal = self._read_end(ends[1], signature, row, scope, points)
             yield RapidVisit(
                 scope, row, motion, True, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
+                taken=watched.given,
             )  # fmt: skip
-        goal = self._read_end(ends[0], signature, row, scope, points, given)
+        goal = self._read_end(ends[0], signature, row, scope, points)
         if not signature.reaches:
             goal = not_reached(goal, why)
         yield RapidVisit(
             scope, row, motion, False, goal, modes, why=why,
             tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
+                taken=watched.given,
         )  # fmt: skip
 
     def load(
@@ -240,17 +247,13 @@ class Goals:
 
     def _read_end(
         self, operand: ir.Operand | None, signature: Signature, row: int,
-        scope: Scope, points: Points, given: frozenset[AssignedPoint],
+        scope: Scope, points: Points,
     ) -> FoundGoal:  # fmt: skip
-        """Read a destination, and note what it takes of assigned data.
-
-        Tool, work object, zone and speed have taken what is given before.
-        """
+        """Read a destination, and note what it takes of assigned points."""
         watched = points.watch()
         there = replace(scope, points=watched)
         goal = self.goal(operand, signature, row, there)
-        given |= watched.given
-        return replace(goal, given=given) if given else goal
+        return replace(goal, given=watched.given) if watched.given else goal
 
     def _read_held(self, held: AssignedPoint, signature: Signature) -> FoundGoal:
         """Read the destination that assignments gave to a point."""

@@ -546,3 +546,13 @@ def test_work_objects_that_only_the_run_tells_are_not(lines):
         SET, *body, in_wobj("p2"), more=WOBJ, others=[f"MODULE o\n{change}ENDMODULE\n"]
     )
     assert all(reasons(found))
+
+
+def test_a_frame_that_differs_in_later_rounds_is_not_that_of_the_first():
+    """Nothing of the move may keep what the first round has shown of it."""
+    tool = "VAR tooldata tv;"
+    move = L.format("p1").replace(",t\\", ",tv\\")
+    other = "tv:=[TRUE,[[0,0,9],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];"
+    found = task("tv:=t;", "WHILE di1=1 DO", move, other, "ENDWHILE", more=tool)
+    assert found.visits.tool.tolist() == [-1]
+    assert "different values" in reasons(found)[0]
