@@ -47,6 +47,11 @@ class VisitLike(Protocol):
     count: int
     goal: Any
     agreed: bool
+    taken: frozenset[Any]
+    kept: bool
+
+    def forget_conditions(self) -> None:
+        """Forget what it is carried out with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -497,6 +502,7 @@ class TaskMachine(Interpreter[Arrived]):
             if visit.modes != here.modes:
                 visit.modes = visit.modes.join(here.modes)
             visit.agreed = visit.agreed and here.points.agree(visit.goal.given)
+            visit.kept = visit.kept and here.points.agree(visit.taken)
         self.visits[known[0]].origins |= here.origins
         return replace(here, origins=frozenset([known[-1]]))
 
@@ -510,8 +516,8 @@ class TaskMachine(Interpreter[Arrived]):
         return here.with_points(points)
 
     def settle_points(self) -> None:
-        """Forget where moves go whose points hold other values on other ways."""
-        given = [visit for visit in self.visits if visit.goal.given]
+        """Forget what moves take of data that hold other values on other ways."""
+        given = [visit for visit in self.visits if visit.goal.given or visit.taken]
         if not given:
             return
         rows = self._rows_of({*self.beside, *self.routines_beside()})
@@ -522,6 +528,8 @@ class TaskMachine(Interpreter[Arrived]):
         for visit in given:
             if not visit.agreed or any(lost & one.names for one in visit.goal.given):
                 visit.goal = visit.goal.lost
+            if not visit.kept or any(lost & one.names for one in visit.taken):
+                visit.forget_conditions()
 
     def pause(self, here: Arrived) -> None:
         """Note that the arm may stop where it stands, although a zone is written."""

@@ -10,6 +10,7 @@ from collections.abc import (
     Callable,
     Collection,
     Hashable,
+    Iterable,
     Iterator,
     Mapping,
     Sequence,
@@ -133,8 +134,7 @@ class FoundGoal:
     def lost(self) -> FoundGoal:
         """The goal where data that it names hold different values on the ways here."""
         names = sorted({point.name for point in self.given})
-        text = f"{', '.join(names[:MOST_NAMED])} is given different values on the ways "
-        why = Reason(Code.RUNTIME_VALUE, f"{text}here, or beside them")
+        why = explain_disagreement(Code.RUNTIME_VALUE, self.given)
         goal = hold_numbers(self, self.name, why, self.pins, aux=self.aux)
         return replace(goal, doubtful=frozenset({*names, _array_of(self.name)} - {""}))
 
@@ -163,6 +163,13 @@ class FoundGoal:
         The place is that of the first number, -1 where it is not written.
         """
         return self.file, max(self.slots[0], self.follows[0])
+
+
+def explain_disagreement(code: Code, given: Iterable[AssignedPoint]) -> Reason:
+    """Say that assigned data hold different values on the ways to a move."""
+    names = sorted({point.name for point in given})
+    text = f"{', '.join(names[:MOST_NAMED])} is given different values on the ways "
+    return Reason(code, f"{text}here, or beside them")
 
 
 def hold_numbers(
@@ -273,6 +280,8 @@ class FoundVisit:
         count: How many moves it stands for that follow each other and differ only in
             where they go: this one is the first.
         agreed: The points that it names hold the same on every way here.
+        taken: What assignments gave to the frames and other data that it names.
+        kept: These hold the same on every way here.
     """
 
     scope: Scope
@@ -288,6 +297,11 @@ class FoundVisit:
     curved: bool = False
     count: int = 1
     agreed: bool = True
+    taken: frozenset[AssignedPoint] = frozenset()
+    kept: bool = True
+
+    def forget_conditions(self) -> None:
+        """Forget what it is carried out with, where that differs on the ways here."""
 
 
 @dataclass(frozen=True)

@@ -498,7 +498,8 @@ class RapidMachine(TaskMachine):
             self.lost |= here.origins
             return here.forget()
         if kind == "modal":
-            changed = self._change_modes(one, row, scope, here.modes)
+            there = replace(scope, points=here.points)
+            changed = self._change_modes(one, row, there, here.modes)
             return replace(here, modes=changed.allowing())
         if kind in ("still", "modal") or self.declares_motionless(name):
             return here
@@ -534,7 +535,7 @@ class RapidMachine(TaskMachine):
             ],
         )  # fmt: skip
         (last,) = after.origins
-        if math.isnan(self.visits[last].zone_mm):
+        if self.visits[last].kept and math.isnan(self.visits[last].zone_mm):
             after = replace(after, modes=after.modes.settle())
         if one.name in SYNCHRONOUS:
             return self._synchronous(context, row, one, after)

@@ -41,6 +41,7 @@ from postproc.language.to_visits import (
     Pose,
     compose_poses,
     explain_components,
+    explain_disagreement,
     flat,
     hold_numbers,
     not_reached,
@@ -135,6 +136,12 @@ class RapidVisit(FoundVisit):
     speed: float = field(kw_only=True)
     total: tuple[float, ...] = field(kw_only=True, default=())
 
+    def forget_conditions(self) -> None:
+        """Forget tool, work object, zone and speed."""
+        why = explain_disagreement(Code.FRAME_UNKNOWN, self.taken)
+        self.tool, self.wobj = FrameOfMove((), True, why), FrameOfMove((), False, why)
+        self.zone_mm, self.speed, self.total = UNKNOWN_ZONE, np.nan, ()
+
 
 @dataclass
 class Goals:
@@ -159,18 +166,21 @@ class Goals:
     ) -> Iterator[RapidVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         ends = signature.operands(one.arguments)
-        tool, wobj, zone, speed = self._conditions(one, ends, row, scope)
+        watched = points.watch()
+        there = replace(scope, points=watched)
+        tool, wobj, zone, speed = self._conditions(one, ends, row, there)
         motion = _motion(one.name, signature)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
-        total, untold = self._total(one, row, scope)
+        total, untold = self._total(one, row, there)
         why = why or untold
         if signature.via >= 0:
             goal = self._read_end(ends[1], signature, row, scope, points)
             yield RapidVisit(
                 scope, row, motion, True, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
+                taken=watched.given,
             )  # fmt: skip
         goal = self._read_end(ends[0], signature, row, scope, points)
         if not signature.reaches:
@@ -178,6 +188,7 @@ class Goals:
         yield RapidVisit(
             scope, row, motion, False, goal, modes, why=why,
             tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
+                taken=watched.given,
         )  # fmt: skip
 
     def load(
@@ -221,8 +232,8 @@ class Goals:
         named = all(
             value is None or (isinstance(value, ir.DataObject) and not value.steps)
             for value in others
-        )
-        key = id(one), scope
+        ) and not any(self._is_assigned(value) for value in others)
+        key = id(one), replace(scope, points=NO_POINTS)
         if named and key in self._known:
             return self._known[key][1]
         arguments = _Arguments(self.task, one.arguments, row, scope)
@@ -533,6 +544,10 @@ class Goals:
 
     # Tools and work objects.
 
+    def _is_assigned(self, operand: ir.Operand | None) -> bool:
+        """Return True if the program may give data another value on its way."""
+        return isinstance(operand, ir.DataObject) and operand.name in self.task.written
+
     def _tool(self, arguments: _Arguments) -> FrameOfMove:
         operand = arguments.of_type("tooldata")
         if operand is None:
@@ -550,6 +565,8 @@ class Goals:
             if operand.name == f"{kind}0" and arguments.is_built_in(operand.name):
                 return FLANGE if kind == "tool" else WORLD
             key = kind, operand.name, scope.file, scope.module, scope.routine
+            if self._is_assigned(operand):
+                return self._read_frame(kind, operand, arguments)
             if key not in self._frames:
                 self._frames[key] = self._read_frame(kind, operand, arguments)
             return self._frames[key]

@@ -36,10 +36,15 @@ from postproc.language.rapid.instructions import (
 )
 from postproc.language.rapid.pose_encoding import COMMENTS, shift_point
 from postproc.language.rapid.program import Datum, RapidFile
-from postproc.language.rapid.targets import RECORDS, operands_of, spell_components
+from postproc.language.rapid.targets import (
+    RECORDS,
+    Layout,
+    operands_of,
+    spell_components,
+)
 
 TARGETS = ("robtarget", "jointtarget")
-FOLLOWED = (*TARGETS, "num")  # types of data whose assignments are followed
+FOLLOWED = (*RECORDS, "num")  # types of data whose assignments are followed
 SHIFTS = ("offs", "reltool")  # functions whose first argument is a target
 CONSTANTS = {"true": 1.0, "false": 0.0, "pi": 3.141592653589793}
 
@@ -287,7 +292,10 @@ class RapidTask(TaskSymbols):
         found = [*_leaves(self.record(value, row, here))]
         if len(found) != len(names):
             return [(one, None) for one in names]
-        return [(one, at.value) for one, at in zip(names, found, strict=True)]
+        return [
+            (one, at.value if isinstance(at, WrittenNumber) else None)
+            for one, at in zip(names, found, strict=True)
+        ]
 
     def open_function(
         self, call: ir.FunctionCall, row: int, here: Scope
@@ -497,8 +505,13 @@ class RapidTask(TaskSymbols):
         if depth > DEEPEST:
             return None
         value, steps, type_ = self._whole(data, row, here, depth + 1)
+        layout = RECORDS.get(type_, {})
         for step in steps:
-            indices = self._indices(step, row, here, type_)
+            if isinstance(step, str):
+                indices = [[*layout].index(step)] if step in layout else []
+                layout = layout.get(step, {})
+            else:
+                indices = self._indices(step, row, here)
             for index in indices or [-1]:
                 if not isinstance(value, tuple) or not 0 <= index < len(value):
                     return None
@@ -543,12 +556,7 @@ class RapidTask(TaskSymbols):
                 found[one.name] = WrittenNumber(one.value)
         if len(found) < len(names):
             return None
-        if type_ not in RECORDS:
-            return found[""]
-        return tuple(
-            tuple(found[f"{part}.{name}"] for name in inside)
-            for part, inside in RECORDS[type_].items()
-        )
+        return _build(found, RECORDS.get(type_, {}))
 
     def read_shift(
         self, arguments: Sequence[ir.Argument], row: int, here: Scope
@@ -576,35 +584,23 @@ class RapidTask(TaskSymbols):
         if by is None or depth > DEEPEST or any(map(math.isnan, [*by[0], *by[1]])):
             return None
         base = self.record(arguments[0].value, row, here, depth + 1)
-        own = [one.value for one in _leaves(base)]
+        own = [one.value for one in _leaves(base) if isinstance(one, WrittenNumber)]
         if not isinstance(base, tuple) or len(base) != 4 or len(own) != 17:
             return None
         new = shift_point(np.array(own[:11]), name, *by)
         place, turn = (tuple(map(WrittenNumber, new[k])) for k in _PLACE_AND_TURN)
         return (place, turn, *base[2:])
 
-    def _indices(
-        self, step: str | ir.ElementStep, row: int, here: Scope, type_: str = ""
-    ) -> list[int]:
-        """Return the indices from 0 of a step, nothing where they are not known."""
+    def _indices(self, step: str | ir.ElementStep, row: int, here: Scope) -> list[int]:
+        """Return the indices from 0 of an element, nothing where they are not known."""
         if isinstance(step, str):
-            at = _FIELDS.get(type_, {}).get(step)
-            return [] if at is None else [at]
+            return []
         values = [self.number(one, row, here) for one in step.subscripts]
         whole = [v for v in values if v == v and v == int(v)]
         return [int(v) - 1 for v in whole] if len(whole) == len(values) else []
 
 
 _PLACE_AND_TURN = slice(3), slice(3, 7)
-_FIELDS = {
-    type_: {
-        name: at
-        for fields in (parts, *parts.values())
-        for at, name in enumerate(fields)
-    }
-    for type_, parts in RECORDS.items()
-}
-"""Where components stand in what they are of, by type."""
 DEEPEST = 20  # names that stand for names
 
 
@@ -903,10 +899,21 @@ def _number_in(found: Nested | None) -> float:
     return found.value if isinstance(found, WrittenNumber) else math.nan
 
 
-def _leaves(found: Nested | None) -> Iterator[WrittenNumber]:
-    """Yield the numbers of a record in their order."""
+def _leaves(found: Nested | None) -> Iterator[WrittenNumber | str]:
+    """Yield the values of a record in their order."""
     if isinstance(found, tuple):
         for one in found:
             yield from _leaves(one)
-    elif isinstance(found, WrittenNumber):
+    elif found is not None:
         yield found
+
+
+def _build(
+    found: Mapping[str, WrittenNumber | str], layout: Layout, prefix: str = ""
+) -> Nested:
+    """Put the values of a record together; those of other data are their only one."""
+    if not layout:
+        return found[prefix.rstrip(".")]
+    return tuple(
+        _build(found, inside, f"{prefix}{name}.") for name, inside in layout.items()
+    )

@@ -32,14 +32,42 @@ class RecordKind(IntEnum):
     POSE = 2  # [[x,y,z],[q1,q2,q3,q4]], also in tools and work objects
 
 
-_AXES = tuple(f"eax_{axis}" for axis in "abcdef")
-_POSE = {"trans": ("x", "y", "z"), "rot": ("q1", "q2", "q3", "q4")}
-RECORDS: Mapping[str, Mapping[str, Sequence[str]]] = {
-    "robtarget": {**_POSE, "robconf": ("cf1", "cf4", "cf6", "cfx"), "extax": _AXES},
-    "jointtarget": {"robax": [f"rax_{k}" for k in range(1, 7)], "extax": _AXES},
+Layout = Mapping[str, "Layout"]
+"""The components of a record in their order, and their own; a value has none."""
+
+
+def _values(names: str) -> Layout:
+    """Lay out components that are values."""
+    return {name: {} for name in names.split()}
+
+
+_AXES = _values("eax_a eax_b eax_c eax_d eax_e eax_f")
+_POSE = {"trans": _values("x y z"), "rot": _values("q1 q2 q3 q4")}
+_INERTIA = _values("ix iy iz")
+_LOAD = {"mass": {}, "cog": _POSE["trans"], "aom": _POSE["rot"], **_INERTIA}
+RECORDS: Mapping[str, Layout] = {
+    "robtarget": {**_POSE, "robconf": _values("cf1 cf4 cf6 cfx"), "extax": _AXES},
+    "jointtarget": {
+        "robax": _values("rax_1 rax_2 rax_3 rax_4 rax_5 rax_6"), "extax": _AXES
+    },
     "pose": _POSE,
-}
-"""Parts of data by type, and the components of these, in their order."""
+    "loaddata": _LOAD,
+    "tooldata": {"robhold": {}, "tframe": _POSE, "tload": _LOAD},
+    "wobjdata": {**_values("robhold ufprog ufmec"), "uframe": _POSE, "oframe": _POSE},
+    "speeddata": _values("v_tcp v_ori v_leax v_reax"),
+    "zonedata": _values(
+        "finep pzone_tcp pzone_ori pzone_eax zone_ori zone_leax zone_reax"
+    ),
+}  # fmt: skip
+"""Components of data by type."""
+
+
+def leaves_of(layout: Layout, prefix: str = "") -> list[str]:
+    """Spell the values of a record in their order, with all that they are in."""
+    found: list[str] = []
+    for name, inside in layout.items():
+        found += leaves_of(inside, f"{prefix}{name}.") if inside else [prefix + name]
+    return found
 
 
 def spell_components(type_: str, component: str) -> list[str]:
@@ -52,8 +80,7 @@ def spell_components(type_: str, component: str) -> list[str]:
     >>> len(spell_components("robtarget", "")), spell_components("pose", "z")
     (17, [])
     """
-    parts = RECORDS.get(type_, {})
-    every = [f"{part}.{name}" for part, names in parts.items() for name in names]
+    every = leaves_of(RECORDS.get(type_, {}))
     if not component:
         return every or [""]
     return [one for one in every if f"{one}.".startswith(f"{component}.")]
@@ -148,7 +175,7 @@ def operands_of(said: SourceStatement) -> Sequence[Operand]:
         case Assignment(value=value):
             return [value]
         case Instruction(arguments=arguments) | LateCall(arguments=arguments):
-            return _values(arguments)
+            return _given(arguments)
         case CompactIf(statement=inside):
             return operands_of(inside)
         case _:
@@ -159,5 +186,5 @@ def _drop_none(values: Sequence[T | None]) -> list[T]:
     return [value for value in values if value is not None]
 
 
-def _values(arguments: Sequence[Argument]) -> Sequence[Operand]:
+def _given(arguments: Sequence[Argument]) -> Sequence[Operand]:
     return _drop_none([argument.value for argument in arguments])

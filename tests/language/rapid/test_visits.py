@@ -499,3 +499,60 @@ def test_a_move_of_external_axes_says_where_they_go():
     more = f"CONST jointtarget far:=[[9E9,{unused}],[500,{unused}]];\n"
     found = once("MoveExtJ far,vrot10,fine;", L.format("p1"), more=more)
     assert found.visits.aux[:, 0].tolist()[0] == 500.0
+
+
+WOBJ = 'VAR wobjdata wv:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
+SET = 'wv:=[FALSE,TRUE,"",[[100,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
+
+
+def in_wobj(name):
+    return L.format(name).replace(":=w;", ":=wv;")
+
+
+def heights(found):
+    v = found.visits
+    return [v.frames[k][2, 3] if k >= 0 else None for k in v.uframe]
+
+
+def test_work_objects_and_tools_that_the_program_assigns_are_known():
+    up = "wv.oframe.trans.z:=5;"
+    found = task(SET, in_wobj("p1"), up, in_wobj("p2"), more=WOBJ)
+    assert reasons(found) == ["", ""] and heights(found) == [0.0, 0.005]
+    found = task(SET, "FOR i FROM 1 TO 2 DO", in_wobj("p1"), up, "ENDFOR", more=WOBJ)
+    assert reasons(found) == ["", ""] and heights(found) == [0.0, 0.005]
+    tool = "VAR tooldata tv:=[TRUE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];"
+    move = L.format("p1").replace(",t\\", ",tv\\")
+    found = task("tv:=t;", "tv.tframe.trans.z:=77;", move, more=tool)
+    assert reasons(found) == [""]
+    assert found.visits.frames[found.visits.tool[0]][2, 3] == pytest.approx(0.077)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["IF di1=1 THEN", "wv.oframe.trans.z:=5;", "ENDIF", "{}"],
+        ["WHILE di1=1 DO", "{}", "wv.oframe.trans.z:=5;", "ENDWHILE"],
+        ["wv.oframe.trans.z:=ReadNum(d);", "{}"],
+        ["wv.oframe:=DefFrame(p1,p2,p3);", "{}"],
+        ["change wv;", "{}"],
+        ["unknown_one;", "{}"],
+    ],
+)
+def test_work_objects_that_only_the_run_tells_are_not(lines):
+    """What is set on one way, read from outside, computed, or changed by a routine."""
+    body = [line.format(in_wobj("p1")) for line in lines]
+    change = "PROC change(INOUT wobjdata o)\no.oframe.trans.z:=9;\nENDPROC\n"
+    found = task(
+        SET, *body, in_wobj("p2"), more=WOBJ, others=[f"MODULE o\n{change}ENDMODULE\n"]
+    )
+    assert all(reasons(found))
+
+
+def test_a_frame_that_differs_in_later_rounds_is_not_that_of_the_first():
+    """Nothing of the move may keep what the first round has shown of it."""
+    tool = "VAR tooldata tv;"
+    move = L.format("p1").replace(",t\\", ",tv\\")
+    other = "tv:=[TRUE,[[0,0,9],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];"
+    found = task("tv:=t;", "WHILE di1=1 DO", move, other, "ENDWHILE", more=tool)
+    assert found.visits.tool.tolist() == [-1]
+    assert "different values" in reasons(found)[0]
