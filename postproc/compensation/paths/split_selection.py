@@ -17,6 +17,7 @@ from postproc.compensation.paths.insertion_prediction import (
 from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.split_constraints import shortest_pieces
 
+MOST = 0.95  # of a way: that much is to be within half of the tolerance
 SPEED = "Set the speed before the move, or [motion] linear_mm_s in the cell"
 
 
@@ -25,7 +26,7 @@ def find_split(now: PathPrediction) -> InsertionPlan:
     task, plan = now.task, now.plan
     shortest = task.setting.cell.limits.segment_ms / 1e3
     pieces = shortest_pieces(task.visits, task.first.before, shortest)
-    far = set(now.paths.visit[now.to_split].tolist())
+    far = _list_far(now)
     open_, stops = dict(plan.open), dict[int, BacklashPreload | None]()
     for v in sorted({half for row in far for half in halves(task.visits, row)}):
         if told := _explain_refusal(now, v):
@@ -46,6 +47,17 @@ def find_split(now: PathPrediction) -> InsertionPlan:
         idle={v: taken for v, taken in stops.items() if taken is not None},
         unconfirmed=frozenset(v for v, taken in stops.items() if taken is None),
     )
+
+
+def _list_far(now: PathPrediction) -> set[int]:
+    """List the moves that are left too far, or most of whose way is not near enough."""
+    paths, tolerance = now.in_time.paths, now.task.tolerance
+    step = np.diff(paths.way, prepend=0.0)
+    step[paths.first[:-1]] = 0.0
+    far = np.where(paths.after.across > tolerance / 2, step, 0.0)
+    off, whole = (np.add.reduceat(each, paths.first[:-1]) for each in (far, step))
+    far_off = (off > (1.0 - MOST) * whole) | (paths.after.sizes > tolerance)
+    return set(paths.visit[far_off].tolist())
 
 
 def _explain_refusal(now: PathPrediction, v: int) -> str:

@@ -13,13 +13,12 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from postproc.arrays import Floats, Ints
-from postproc.compensation.paths import insertion_loop, prune
+from postproc.arrays import Floats
+from postproc.compensation.paths import insertion_loop, prune, split_selection
 from postproc.compensation.paths.arcs import is_arc
 from postproc.compensation.paths.insertion_loop import TAKEN
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import AIM, PathPrediction
-from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.plan_outcomes import BEGINS
 from postproc.model.backlash_width import ahead
 from postproc.model.model import load_model
@@ -360,21 +359,20 @@ def test_both_halves_of_an_arc_are_open_where_one_is(
 ) -> None:
     judged: list[PathPrediction] = []
     monkeypatch.setattr(insertion_loop, "judge", lambda p: judged.append(p) or p)
-    monkeypatch.setattr(PathPrediction, "to_split", property(one_half_of_every_arc))
+    monkeypatch.setattr(split_selection, "_list_far", one_half_of_every_arc)
     compensated(shop, "job.pdl", "halves", "--path-tolerance", TOLERANCE)
     (now,) = judged
     via = np.flatnonzero(now.task.visits.via)
     assert len(via) > 1 and {*via, *(via + 1)} == set(now.plan.open)
     assert now.plan.beside == set(via.tolist())
-    sizes = sizes_of(now.paths)
+    sizes = now.sizes
     for half in now.plan.beside:  # it gets points of its own where it leaves its path
         alone = now.plan.points.get(half, ()) in ((), (1.0,))
         assert not alone or sizes[half] <= TOLERANCE * MM / 2
 
 
-def one_half_of_every_arc(now: PathPrediction) -> Ints:
-    behind = np.flatnonzero(now.task.visits.via) + 1
-    return np.searchsorted(now.paths.visit, behind)
+def one_half_of_every_arc(now: PathPrediction) -> set[int]:
+    return {*(np.flatnonzero(now.task.visits.via) + 1).tolist()}
 
 
 def test_of_two_points_too_close_for_the_error_the_one_with_more_room_goes() -> None:
@@ -695,16 +693,16 @@ def test_an_arc_that_loses_all_points_is_whole_again() -> None:
 
 
 def test_points_behind_which_a_move_would_be_worse_are_taken_back() -> None:
-    def paths(*mm: float) -> Mock:
-        return Mock(visit=np.array([3, 4, 9]), after=Mock(sizes=np.array(mm) * MM))
+    def sizes(*mm: float) -> dict[int, float]:
+        return dict(zip([3, 4, 9], np.array(mm) * MM, strict=True))
 
     now = Mock(plan=InsertionPlan(points={3: (0.5,)}), cut_arcs=[])
     now.task.visits.motion = [Motion.LINEAR] * 10
-    without = sizes_of(paths(0.3, 0.01, 0.01))
-    now.paths = paths(0.02, 0.07, 0.09)
+    without = sizes(0.3, 0.01, 0.01)
+    now.sizes = sizes(0.02, 0.07, 0.09)
     ((v, (why, *_)),) = prune._harmful(now, without)  # 9 is too far behind
     assert v == 3 and "a later move would be worse" in why
-    now.paths = paths(0.02, 0.05, 0.09)
+    now.sizes = sizes(0.02, 0.05, 0.09)
     assert not [*prune._harmful(now, without)]
 
 
