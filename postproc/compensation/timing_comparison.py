@@ -220,12 +220,18 @@ class InTime:
 
 def _cell_speed(told: Insertions) -> str:
     """Say at which speed moves are judged whose program sets none, "" if it does."""
-    if not told.cell_mm_s:
-        return ""
-    return (
-        f"; where the program sets no speed, {told.cell_mm_s:g} mm/s counts, [motion] "
-        "linear_mm_s of the cell"
-    )
+    said = ""
+    if told.cell_mm_s:
+        said += (
+            f"; where the program sets no speed, {told.cell_mm_s:g} mm/s counts, "
+            "[motion] linear_mm_s of the cell"
+        )
+    if told.limit_mm_s:
+        said += (
+            f"; where the speed is not known, pieces are as long as {told.limit_mm_s:g}"
+            " mm/s needs, [motion] linear_limit_mm_s of the cell"
+        )
+    return said
 
 
 def _round_off(corners: RoundOff) -> str:

@@ -287,6 +287,7 @@ def _report_insertions(now: PathPrediction) -> Insertions:
         plan.unconfirmed,
         _cures(now),
         _cell_speed(now),
+        _limit_speed(now),
     )
 
 
@@ -296,6 +297,13 @@ def _cell_speed(now: PathPrediction) -> float:
     speed = task.setting.cell.file.motion.linear_mm_s or 0.0
     own = task.first.before.targets.linear_speed[sorted(now.plan.points)] / MM
     return speed if np.isclose(own, speed).any() else 0.0
+
+
+def _limit_speed(now: PathPrediction) -> float:
+    """Return the limit of the cell if moves with points are judged at it [mm/s]."""
+    unknown = np.isnan(now.task.first.before.targets.linear_speed)
+    judged = unknown[sorted(now.plan.points)].any()
+    return float(now.task.setting.cell.file.motion.linear_limit_mm_s or 0.0) * judged
 
 
 def _cures(now: PathPrediction) -> dict[int, str]:

@@ -33,7 +33,11 @@ from postproc.compensation.paths.changed_windows import (
 )
 from postproc.compensation.paths.insertion_plan import InsertionPlan, Written
 from postproc.compensation.paths.path_error import PathAccuracy
-from postproc.compensation.paths.split_constraints import hindrances, unwritable
+from postproc.compensation.paths.split_constraints import (
+    hindrances,
+    speeds_of_pieces,
+    unwritable,
+)
 from postproc.compensation.paths.write_points import insert, lines_in_files
 from postproc.compensation.pipeline import (
     BY_VISIT,
@@ -115,11 +119,18 @@ class InsertionTask:
         return Windows.of(self.visits, self.first.before, self.setting, self.flanks)
 
     @cached_property
+    def speeds(self) -> Floats:
+        """Return the largest speed that each move may have, (n,) [m/s]."""
+        setting = self.setting
+        return speeds_of_pieces(self.first.before, setting.cell, setting.model)
+
+    @cached_property
     def _hindrances(self) -> dict[int, str]:
         decided, keeps_aux = self.source.kept.decisions, self.splitter.keeps_aux
         return hindrances(
-            self.visits, decided, self.first.before, self.setting.cell, keeps_aux
-        )
+            self.visits, decided, self.first.before, self.setting.cell, self.speeds,
+            keeps_aux,
+        )  # fmt: skip
 
     def find_hindrance(self, v: int) -> str:
         """Say why nothing can be put on the way to a visit, "" for nothing."""

@@ -18,20 +18,23 @@ from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.split_constraints import shortest_pieces
 
 MOST = 0.95  # of a way: that much is to be within half of the tolerance
-SPEED = "Set the speed before the move, or [motion] linear_mm_s in the cell"
+SPEED = (
+    "Set the speed before the move, or in the cell [motion] linear_mm_s, or "
+    "linear_limit_mm_s where the speed is a value at run time"
+)
 
 
 def find_split(now: PathPrediction) -> InsertionPlan:
     """Say which of the moves that leave their paths may be split."""
     task, plan = now.task, now.plan
     shortest = task.setting.cell.limits.segment_ms / 1e3
-    pieces = shortest_pieces(task.visits, task.first.before, shortest)
+    pieces = shortest_pieces(task.visits, task.first.before, shortest, task.speeds)
     far = _list_far(now)
     open_, stops = dict(plan.open), dict[int, BacklashPreload | None]()
     for v in sorted({half for row in far for half in halves(task.visits, row)}):
         if told := _explain_refusal(now, v):
             if v in far:
-                unknown = np.isnan(task.first.before.targets.linear_speed[v])
+                unknown = np.isnan(task.speeds[v])
                 plan = plan.leave(v, told, SPEED if unknown else None)
             continue
         open_[v] = pieces[v]

@@ -375,6 +375,35 @@ def one_half_of_every_arc(now: PathPrediction) -> set[int]:
     return {*(np.flatnonzero(now.task.visits.via) + 1).tolist()}
 
 
+def test_pieces_of_unknown_speed_are_as_long_as_the_fastest_needs(shop: Path) -> None:
+    (shop / "unknown.pdl").write_text(job())
+    cell = shop / "limit.toml"
+    left = compensated(shop, "unknown.pdl", "left", "--path-tolerance", TOLERANCE)
+    assert not any(path["inserted"] for path in left["path"])
+    assert "linear_limit_mm_s" in (messages(left, "path-tolerance-exceeded"))[0]
+    points = {}
+    for limit in (SPEED, 20.0 * SPEED):
+        cell.write_text(f"[motion]\nlinear_limit_mm_s = {limit}\n" + CELL.read_text())
+        done("compensate", shop / "unknown.pdl", "--cell", cell, "--model",
+             shop / "confirmed.json", "-o", shop / "limit.pdl", "--report",
+             shop / "limit.json", "--path-tolerance", TOLERANCE)  # fmt: skip
+        found = told(shop, "limit")
+        assert f"as {limit:g} mm/s needs" in messages(found, "path-points")[0]
+        points[limit] = [path["points"] for path in found["path"]]
+    for limit, moves in points.items():
+        least = limit * SHORTEST_MS / 1e3
+        for own in moves:
+            at = [0.0, *(point["at_mm"] for point in own)]
+            assert (np.diff(at) >= least - 1e-3).all()
+    slow, fast = (sum(map(len, points[limit])) for limit in points)
+    assert slow > fast > 0
+
+
+def messages(report: dict[str, Any], code: str) -> list[str]:
+    """Return the messages of the findings with a code."""
+    return [one["message"] for one in report["diagnostics"] if one["code"] == code]
+
+
 def test_of_two_points_too_close_for_the_error_the_one_with_more_room_goes() -> None:
     plan = InsertionPlan(points={7: (0.2, 0.5, 0.6)})
     now = Mock(plan=plan)
