@@ -83,8 +83,10 @@ class InTime:
             return said
         before, after = self.paths.before.sizes / MM, self.paths.after.sizes / MM
         worst = int(after.argmax())
-        line = int(visits.line[self.paths.visit[worst]])
-        most = f"{self._largest(worst)}, line {line} (before: {before.max():.3f} mm)"
+        v = int(self.paths.visit[worst])
+        file = f"{visits.files[visits.file[v]]} " if len(visits.files) > 1 else ""
+        place = f"{file}line {visits.line[v]}"
+        most = f"{self._largest(worst)}, {place} (before: {before.max():.3f} mm)"
         return (
             f"predicted path accuracy AT_p (systematic part): at most {most}; mean "
             f"{before.mean():.3f} -> {after.mean():.3f} mm over {len(before)} moves"
@@ -183,7 +185,8 @@ class InTime:
             for j in np.argsort(-shares, kind="stable").tolist()
             if shares[j] > max(SHARE * size, NO_SHARE)
         )
-        return f"{size:.3f} mm, {at:.0f} mm from its start" + (told and f" ({told})")
+        told = told or "no joint that changes its flank makes a tenth of it"
+        return f"{size:.3f} mm, {at:.0f} mm from its start ({told})"
 
     def _other_sides(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where joints arrive otherwise in time than along the path."""

@@ -64,7 +64,7 @@ MEASURE_STARTS = (
     "Measure how the joints change their flanks: survey.reversals, or diagnose --path"
 )
 BY_HAND = "Change what the reason names, or put targets on its way in the program"
-MORE_ROOM = "Allow more points: --max-inserted"
+MORE_ROOM = "Allow more points: compensation.max_inserted"
 SHORTER = "A lower speed, or a smaller [limits] segment_ms, allows shorter pieces"
 TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
 LATEST = 0.9  # of a way: the last place of it for a stop

@@ -399,6 +399,26 @@ def test_pieces_of_unknown_speed_are_as_long_as_the_fastest_needs(shop: Path) ->
     assert slow > fast > 0
 
 
+LARGEST = (
+    r"the predicted path error of the move is 0\.\d{3} mm, \d+ mm from its start "
+    r"\((joint \d 0\.\d{3} mm.*|no joint that changes .*)\): .+\. [A-Z].+"
+)
+
+
+def test_every_move_left_too_far_names_joints_and_a_remedy(shop: Path) -> None:
+    (shop / "untimed.pdl").write_text(job())
+    asked = ("--path-tolerance", TOLERANCE)
+    few = compensated(
+        shop, "job.pdl", "few", *asked, "--set", "compensation.max_inserted=1"
+    )
+    unknown = compensated(shop, "untimed.pdl", "slow", *asked)
+    for report in (unknown, few):
+        found = messages(report, "path-tolerance-exceeded")
+        sizes = [path["max_mm"]["after"] for path in report["path"]]
+        assert len(found) == sum(size > TOLERANCE for size in sizes) > 0
+        assert all(re.fullmatch(LARGEST, text) for text in found), found
+
+
 def messages(report: dict[str, Any], code: str) -> list[str]:
     """Return the messages of the findings with a code."""
     return [one["message"] for one in report["diagnostics"] if one["code"] == code]
