@@ -52,7 +52,7 @@ from postproc.compensation.paths.reapproach import (
     find_reapproaches,
     insert_reapproaches,
 )
-from postproc.compensation.paths.split_selection import find_split
+from postproc.compensation.paths.split_selection import can_stop, find_split
 from postproc.compensation.pipeline import CompensatedProgram
 from postproc.language.languages import language_of
 from postproc.robot.pose import MM
@@ -62,6 +62,10 @@ BETTER = 1e-6  # [m] less is no matter
 PRELOAD = "Preload the backlash: compensation.preload_backlash"
 MEASURE_STARTS = (
     "Measure how the joints change their flanks: survey.reversals, or diagnose --path"
+)
+IN_CORNER = (
+    "Joints change their flanks where it begins, and the arm does not stop there, or "
+    "may not stop once more: let it stop there, or lead the corner elsewhere"
 )
 BY_HAND = "Change what the reason names, or put targets on its way in the program"
 MORE_ROOM = "Allow more points: compensation.max_inserted"
@@ -318,7 +322,8 @@ def _cures(now: PathPrediction) -> dict[int, str]:
         elif v not in plan.open:
             found[v] = BY_HAND
         elif paths.way[paths.after.largest[k]] < BEGINS and v not in plan.stops:
-            found[v] = MEASURE_STARTS if v in plan.unconfirmed else PRELOAD
+            told = MEASURE_STARTS if v in plan.unconfirmed else PRELOAD
+            found[v] = told if can_stop(now.task, both[0]) else IN_CORNER
         else:
             found[v] = MORE_ROOM if plan.crowded else SHORTER
     return found

@@ -32,6 +32,7 @@ from postproc.compensation.paths.changed_windows import (
     take_windows,
 )
 from postproc.compensation.paths.insertion_plan import InsertionPlan, Written
+from postproc.compensation.paths.moved_corners import SourceCorners
 from postproc.compensation.paths.path_error import PathAccuracy
 from postproc.compensation.paths.split_constraints import (
     hindrances,
@@ -125,6 +126,13 @@ class InsertionTask:
         return speeds_of_pieces(self.first.before, setting.cell, setting.model)
 
     @cached_property
+    def corners(self) -> SourceCorners:
+        """Return how the source passes its visits."""
+        return SourceCorners.of(
+            self.setting.cell.arm, self.first.before, self.visits.via
+        )
+
+    @cached_property
     def _hindrances(self) -> dict[int, str]:
         decided, keeps_aux = self.source.kept.decisions, self.splitter.keeps_aux
         return hindrances(
@@ -199,7 +207,7 @@ class InsertionTask:
         with clock("time"):
             told = run_in_time(
                 reading, again, kept.position, self.setting, owner,
-                self.list_wanted_arcs(plan),
+                self.list_wanted_arcs(plan), self.corners.at(own, len(owner)),
             )  # fmt: skip
         program = CompensatedProgram(reading, kept, output, told)
         return Whole(Part(reading.visits, kept, told, own), program)
@@ -229,7 +237,7 @@ class InsertionTask:
         with self.setting.clock("time"):
             told = run_in_time(
                 reading, again, kept.position, self.setting, owner,
-                self.list_wanted_arcs(plan),
+                self.list_wanted_arcs(plan), self.corners.at(mine, len(owner)),
             )  # fmt: skip
         part = Part(reading.visits, kept, told, mine)
         if not self._is_where_it_was(part, inside):
@@ -375,15 +383,6 @@ class PathPrediction:
             sizes = paths.after.sizes[mine].tolist()
             found.update(zip(paths.visit[mine].tolist(), sizes, strict=True))
         return dict(sorted(found.items()))
-
-    @cached_property
-    def aside(self) -> Floats:
-        """Return how far the path passes the source's visits, (n, 3) [m]."""
-        out = np.empty((len(self.part), 3))
-        for k, part in enumerate(self.parts):
-            rows = np.flatnonzero(self.part == k)
-            out[rows] = part.in_time.before.path.aside[part.own[rows]]
-        return out
 
     @property
     def room(self) -> int:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, any_in_rows
+from postproc.arrays import Floats
 from postproc.compensation.paths.arcs import (
     halves,
     is_arc,
@@ -27,7 +27,6 @@ from postproc.robot.pose import lengths
 
 JUDGED = 8  # rounds in which points are taken back
 NEAR = 4  # visits behind a move that may be worse for its points
-MOVED = 5e-6  # [m] that a rounded corner may move
 
 
 def judge(now: PathPrediction) -> PathPrediction:
@@ -144,18 +143,11 @@ def _bad(
     now: PathPrediction, without: dict[int, float]
 ) -> Iterator[tuple[int, Removal]]:
     """Yield the moves with points that must go, and why."""
-    task, plan = now.task, now.plan
+    plan = now.plan
     if not plan.points:
         return
     bent = {cut[0] for cut in now.flat if not now.may_be_chord(cut)}
-    moved = now.aside - task.first.before.path.aside
-    there = any_in_rows(np.abs(np.nan_to_num(moved)) > MOVED)
-    there[now.cut_arcs] = False  # judged as the points that they are
-    before = task.visits.before
-    judged = _Judged(
-        now, without, _worst(now), _objections(now),
-        there | (there[before] & (before >= 0)), bent,
-    )  # fmt: skip
+    judged = _Judged(now, without, _worst(now), _objections(now), bent)
     for v in sorted(_with_points(now)):
         if reason := judged.why_not(v):
             yield v, reason
@@ -170,7 +162,6 @@ class _Judged:
         without: How far each move leaves its path without points [m].
         worst: .. and with them at the most, however they are rounded, and where.
         objections: Which hypotheses make moves worse, and where.
-        corner: Moves with a rounded corner at an end that is passed otherwise, (n,).
         bent: Arcs with pieces that bend too little.
     """
 
@@ -178,7 +169,6 @@ class _Judged:
     without: dict[int, float]
     worst: dict[int, tuple[float, float]]
     objections: dict[int, Objection]
-    corner: Bools
     bent: set[int]
 
     def why_not(self, v: int) -> Removal | None:
@@ -195,8 +185,6 @@ class _Judged:
         if v in self.objections:
             objection = self.objections[v]
             return Removal(str(objection), objection.place % 1.0, objection.cure)
-        if self.corner[v]:
-            return Removal("a rounded corner at one of its ends would move")
         return None
 
 
@@ -210,15 +198,20 @@ def _harmful(
 ) -> Iterator[tuple[int, Removal]]:
     """Yield moves with points behind which moves without any are worse for them.
 
-    From which flank a joint leaves is a matter of the moves before.
+    From which flank a joint leaves is a matter of the moves before, and how a corner is
+    rounded one of both moves beside it.
     """
     far = _of_moves(now, now.sizes)
     cut = np.array(sorted(now.plan.points), dtype=np.int64)
     for v in far.keys() - _with_points(now) - now.plan.approaches.keys():
         last = int(np.searchsorted(cut, v)) - 1
         near = last >= 0 and v - cut[last] <= NEAR
-        if near and far[v] > without.get(v, np.inf) + WORSE:
+        if far[v] <= without.get(v, np.inf) + WORSE:
+            continue
+        if near:
             yield int(cut[last]), Removal("a later move would be worse")
+        if v + 1 in now.plan.points and now.task.visits.fly[v]:
+            yield v + 1, Removal("the corner where it begins would move")
 
 
 def _objections(now: PathPrediction) -> dict[int, Objection]:

@@ -38,7 +38,7 @@ def find_split(now: PathPrediction) -> InsertionPlan:
                 plan = plan.leave(v, told, SPEED if unknown else None)
             continue
         open_[v] = pieces[v]
-        if task.setting.options.preload_backlash and _can_stop(task, v):
+        if task.setting.options.preload_backlash and can_stop(task, v):
             taken = take_up(task.first.after, task.setting, task.visits, v)
             if taken.crossing:
                 fits = _is_within_lag(task, v, taken.crossing)
@@ -71,7 +71,7 @@ def _explain_refusal(now: PathPrediction, v: int) -> str:
     return task.find_hindrance(v)
 
 
-def _can_stop(task: InsertionTask, v: int) -> bool:
+def can_stop(task: InsertionTask, v: int) -> bool:
     """Tell whether the arm stands where a move begins, and may stop once more."""
     visits = task.visits
     before = int(visits.before[v])
