@@ -86,7 +86,7 @@ class InTime:
         before, after = self.paths.before.sizes / MM, self.paths.after.sizes / MM
         worst = int(after.argmax())
         v = int(self.paths.visit[worst])
-        file = f"{visits.files[visits.file[v]]} " if len(visits.files) > 1 else ""
+        file = f"{visits.files[visits.file[v]]} " if visits.file[v] else ""
         place = f"{file}line {visits.line[v]}"
         most = f"{self._largest(worst)}, {place} (before: {before.max():.3f} mm)"
         return (
