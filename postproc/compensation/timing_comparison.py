@@ -14,6 +14,7 @@ from postproc.compensation.options import Job
 from postproc.compensation.paths.arcs import NO_ARCS, WantedArcs
 from postproc.compensation.paths.corner_error import RoundOff, predict_corners
 from postproc.compensation.paths.insertion_report import Insertions
+from postproc.compensation.paths.moved_corners import SourceCorners
 from postproc.compensation.paths.path_error import PathAccuracy, predict_paths
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.targets import targets_from_visits
@@ -28,6 +29,7 @@ from postproc.robot.pose import MM
 
 MOST_SLOWER = 0.03  # of the cycle time
 SHARE, NO_SHARE = 0.1, 0.002  # of a deviation, and [mm]: joints that are named
+NO_JOINT = "no joint that changes its flank makes a tenth of it"
 FEW = 5  # lines that a finding names
 _LIMITS = [CODE[one] for one in (*LIMITS, *PATH_LIMITS)]
 
@@ -83,8 +85,10 @@ class InTime:
             return said
         before, after = self.paths.before.sizes / MM, self.paths.after.sizes / MM
         worst = int(after.argmax())
-        line = int(visits.line[self.paths.visit[worst]])
-        most = f"{self._largest(worst)}, line {line} (before: {before.max():.3f} mm)"
+        v = int(self.paths.visit[worst])
+        file = f"{visits.files[visits.file[v]]} " if visits.file[v] else ""
+        place = f"{file}line {visits.line[v]}"
+        most = f"{self._largest(worst)}, {place} (before: {before.max():.3f} mm)"
         return (
             f"predicted path accuracy AT_p (systematic part): at most {most}; mean "
             f"{before.mean():.3f} -> {after.mean():.3f} mm over {len(before)} moves"
@@ -168,13 +172,19 @@ class InTime:
         for k in self._too_far.tolist():
             v = int(self.paths.visit[k])
             why = told.left.get(v, "more points do not help")
-            text = f"the predicted path error of the move is {self._largest(k)}: {why}"
+            most = self._largest(k, NO_JOINT)
+            text = f"the predicted path error of the move is {most}: {why}"
             text += f". {told.cures[v]}" if v in told.cures else ""
             place = visits.files[visits.file[v]], int(visits.line[v])
             yield Diagnostic(*place, Code.PATH_TOLERANCE_EXCEEDED, text)
 
-    def _largest(self, k: int) -> str:
-        """Say how far a path is left the most, where, and what each joint makes."""
+    def _largest(self, k: int, none: str = "") -> str:
+        """Say how far a path is left the most, where, and what each joint makes.
+
+        Args:
+            k: The path.
+            none: What is said where no joint makes a tenth of it.
+        """
         after = self.paths.after
         size, at = after.sizes[k] / MM, self.paths.way[after.largest[k]] / MM
         shares = after.shares[k] / MM
@@ -183,6 +193,7 @@ class InTime:
             for j in np.argsort(-shares, kind="stable").tolist()
             if shares[j] > max(SHARE * size, NO_SHARE)
         )
+        told = told or none
         return f"{size:.3f} mm, {at:.0f} mm from its start" + (told and f" ({told})")
 
     def _other_sides(self, visits: Visits) -> Iterator[Diagnostic]:
@@ -220,12 +231,18 @@ class InTime:
 
 def _cell_speed(told: Insertions) -> str:
     """Say at which speed moves are judged whose program sets none, "" if it does."""
-    if not told.cell_mm_s:
-        return ""
-    return (
-        f"; where the program sets no speed, {told.cell_mm_s:g} mm/s counts, [motion] "
-        "linear_mm_s of the cell"
-    )
+    said = ""
+    if told.cell_mm_s:
+        said += (
+            f"; where the program sets no speed, {told.cell_mm_s:g} mm/s counts, "
+            "[motion] linear_mm_s of the cell"
+        )
+    if told.limit_mm_s:
+        said += (
+            f"; where the speed is not known, pieces are as long as {told.limit_mm_s:g}"
+            " mm/s needs, [motion] linear_limit_mm_s of the cell"
+        )
+    return said
 
 
 def _round_off(corners: RoundOff) -> str:
@@ -246,6 +263,7 @@ def run_in_time(
     setting: Job,
     owner: Ints | None = None,
     arcs: WantedArcs = NO_ARCS,
+    corners: SourceCorners | None = None,
 ) -> InTime:
     """Run a program in time, as it was written and as it is compensated.
 
@@ -257,14 +275,16 @@ def run_in_time(
         owner: The move of the source that every visit belongs to, (n,), where points
             were put on ways.
         arcs: The arcs of the source that were cut.
+        corners: How the source passes the visits; None: as the program does.
     """
     cell = setting.cell
     before, after = (_run(part.visits, cell) for part in (reading, again))
     passed = cell.arm.tcp(before.path.q, before.targets.tool[:, :3, 3])
     shift = np.nan_to_num(position + before.path.aside - passed)
     paths = predict_paths(
-        before, after, shift, cell, setting.model, setting.temperature, owner, arcs
-    )
+        before, after, shift, cell, setting.model, setting.temperature, owner, arcs,
+        corners,
+    )  # fmt: skip
     guessed, told = list_guessed_limits(cell.arm), setting.model.in_motion
     return InTime(before, after, paths, guessed, cell.arm, in_motion=told)
 

@@ -159,9 +159,11 @@ class MotionSection(Strict):
     Attributes:
         linear_mm_s: Of the TCP along lines and arcs.
         override: Of all speeds, in percent.
+        linear_limit_mm_s: The largest of the TCP that the controller allows.
     """
 
     linear_mm_s: PositiveFloat | None = None
+    linear_limit_mm_s: PositiveFloat | None = None
     override: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
 
 

@@ -66,7 +66,8 @@ def halve_flat_pieces(
             continue
         known = plan.points.get(v, ())
         begin = max((s for s in known if s < end), default=0.0)
-        size = (end - begin) * float(now.paths.way[now.paths.samples_to(v)][-1])
+        paths, k = now.path_to(v)
+        size = (end - begin) * float(paths.way[paths.samples(k)][-1])
         shut = any(begin < share < end for share in plan.shut.get(v, ()))
         if v in plan.open and not shut and size >= 2 * plan.open[v][0]:
             plan = plan.put(v, (*known, (begin + end) / 2))

@@ -7,9 +7,10 @@ sides times what the TCP moves as that joint goes from the middle to its upper f
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 
@@ -21,6 +22,10 @@ from postproc.robot.pose import lengths
 LATE = 0.01  # [m] of the way by which a flank changes later
 AT_ONCE = 0.02  # gaps over which a flank goes that changes as its drive turns back
 UNSURE = 1e-3  # of half the play: a side that is known
+
+
+Key = tuple[int, FlankKind, int]
+"""A joint (from 1), what it does, and which of its cases of that kind it is."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,26 @@ class FlankCases:
                     FlankCase(joint + 1, kind, weight, at, across, lengths(by))
                 )
         return tuple(found)
+
+    def on_moves(self, moves: Sequence[int]) -> dict[Key, FlankCase]:
+        """Return the cases that make a difference on some moves."""
+        first = self._first_rows
+        there = [first[:, k + 1] > first[:, k] for k in moves]
+        found: list[int] = np.flatnonzero(np.any(there, axis=0)).tolist()
+        return {self._keys[k]: self.cases[k] for k in found}
+
+    @cached_property
+    def _first_rows(self) -> Ints:
+        """Return how many rows of each case lie in front of each move, (c, m + 1)."""
+        found = [np.searchsorted(case.rows, self.first) for case in self.cases]
+        return np.array(found, dtype=np.int64).reshape(len(found), len(self.first))
+
+    @cached_property
+    def _keys(self) -> tuple[Key, ...]:
+        kinds = groupby(self.cases, key=lambda case: (case.joint, case.kind))
+        return tuple(
+            (*kind, number) for kind, own in kinds for number, _ in enumerate(own)
+        )
 
     @property
     def usually(self) -> Floats:

@@ -52,7 +52,7 @@ from postproc.compensation.paths.reapproach import (
     find_reapproaches,
     insert_reapproaches,
 )
-from postproc.compensation.paths.split_selection import find_split
+from postproc.compensation.paths.split_selection import can_stop, find_split
 from postproc.compensation.pipeline import CompensatedProgram
 from postproc.language.languages import language_of
 from postproc.robot.pose import MM
@@ -63,8 +63,12 @@ PRELOAD = "Preload the backlash: compensation.preload_backlash"
 MEASURE_STARTS = (
     "Measure how the joints change their flanks: survey.reversals, or diagnose --path"
 )
+IN_CORNER = (
+    "Joints change their flanks where it begins, and the arm does not stop there, or "
+    "may not stop once more: let it stop there, or lead the corner elsewhere"
+)
 BY_HAND = "Change what the reason names, or put targets on its way in the program"
-MORE_ROOM = "Allow more points: --max-inserted"
+MORE_ROOM = "Allow more points: compensation.max_inserted"
 SHORTER = "A lower speed, or a smaller [limits] segment_ms, allows shorter pieces"
 TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
 LATEST = 0.9  # of a way: the last place of it for a stop
@@ -161,13 +165,12 @@ def put_points(now: PathPrediction) -> InsertionPlan:
 def _put_on_paths(now: PathPrediction) -> InsertionPlan:
     """Put points on the paths that are left too far, the worst first."""
     plan, room = now.plan, now.room
-    sizes, whole = now.paths.after.sizes, whole_arcs(now)
-    for k in np.argsort(-sizes, kind="stable").tolist():
-        v = int(now.paths.visit[k])
-        if not _needs_points(now, v, sizes[k]):
+    whole = whole_arcs(now)
+    for v in now.worst_first:
+        if not _needs_points(now, v, now.sizes[v]):
             continue
         via = v in whole  # the point on the way of an arc becomes one, too
-        more = _put_on_path(now, plan, k, room - via)
+        more = _put_on_path(now, plan, v, room - via)
         count = more.count - plan.count
         if count or more.points.get(v) != plan.points.get(v):
             room -= count + via
@@ -186,37 +189,37 @@ def _needs_points(now: PathPrediction, v: int, size: float) -> bool:
 
 
 def _put_on_path(
-    now: PathPrediction, plan: InsertionPlan, k: int, room: int
+    now: PathPrediction, plan: InsertionPlan, v: int, room: int
 ) -> InsertionPlan:
     """Put the stop in front of a path, or points where it is left too far.
 
     Args:
         now: The program.
         plan: Its points, and those of other paths.
-        k: The path.
+        v: The visit that the path leads to.
         room: How many points may be put on it.
     """
-    v = int(now.paths.visit[k])
     known = plan.points.get(v, ())
     if v in plan.idle and room > 0:
-        plan, stop = _find_stop(now, plan, k)
+        plan, stop = _find_stop(now, plan, v)
         if stop is not None:
             rest = known[v in plan.stops :]
             return replace(plan, stops=plan.stops | {v}).put(v, (stop, *rest))
-    wanted = _on_path(now, k, v)
+    wanted = _on_path(now, v)
     new = wanted[: max(room, 0)]
     plan = replace(plan, crowded=plan.crowded or len(new) < len(wanted))
     return plan.put(v, (*known, *new)) if new else plan
 
 
 def _find_stop(
-    now: PathPrediction, plan: InsertionPlan, k: int
+    now: PathPrediction, plan: InsertionPlan, v: int
 ) -> tuple[InsertionPlan, float | None]:
     """Find where the arm stops to take up play before a path, as a share of it.
 
     How near does best is tried out. None where nothing is left to try.
     """
-    v, paths, samples = int(now.paths.visit[k]), now.paths, now.paths.samples(k)
+    paths, k = now.path_to(v)
+    samples = paths.samples(k)
     begin, length = paths.way[samples] < plan.open[v][0], float(paths.way[samples][-1])
     places = [there / length for there in TAKEN if there < LATEST * length]
     off = float(paths.after.across[samples][begin].max(initial=0.0))
@@ -232,9 +235,10 @@ def _find_stop(
     return replace(plan, tried={**plan.tried, v: tried}), stop
 
 
-def _on_path(now: PathPrediction, k: int, v: int) -> list[float]:
+def _on_path(now: PathPrediction, v: int) -> list[float]:
     """Find a point in every part of a path that is left too far, the worst first."""
-    plan, paths, samples = now.plan, now.paths, now.paths.samples(k)
+    plan, (paths, k) = now.plan, now.path_to(v)
+    samples = paths.samples(k)
     way, far = paths.way[samples], paths.after.across[samples]
     known, shut = plan.points.get(v, ()), plan.shut.get(v, ())
     least, clear, behind = plan.open[v]
@@ -270,7 +274,7 @@ def _report_insertions(now: PathPrediction) -> Insertions:
     why = "its pieces would be too short, or the path no better"
     if plan.crowded:
         why = "no more points may be inserted (max_inserted)"
-    too_far = set(now.paths.visit[now.too_far].tolist()) - plan.points.keys()
+    too_far = set(now.too_far) - plan.points.keys()
     left = {}
     for v in sorted(too_far):  # what is known of one half of an arc is so of both
         halved = (plan.left[h] for h in halves(visits, v) if h in plan.left)
@@ -287,6 +291,7 @@ def _report_insertions(now: PathPrediction) -> Insertions:
         plan.unconfirmed,
         _cures(now),
         _cell_speed(now),
+        _limit_speed(now),
     )
 
 
@@ -298,19 +303,27 @@ def _cell_speed(now: PathPrediction) -> float:
     return speed if np.isclose(own, speed).any() else 0.0
 
 
+def _limit_speed(now: PathPrediction) -> float:
+    """Return the limit of the cell if moves with points are judged at it [mm/s]."""
+    unknown = np.isnan(now.task.first.before.targets.linear_speed)
+    judged = unknown[sorted(now.plan.points)].any()
+    return float(now.task.setting.cell.file.motion.linear_limit_mm_s or 0.0) * judged
+
+
 def _cures(now: PathPrediction) -> dict[int, str]:
     """Say what helps the moves that are left too far, by visit."""
-    plan, paths, found = now.plan, now.paths, dict[int, str]()
-    for k in now.too_far.tolist():
-        v, largest = int(paths.visit[k]), paths.after.largest[k]
+    plan, found = now.plan, dict[int, str]()
+    for v in now.too_far:
+        paths, k = now.path_to(v)
         both = halves(now.task.visits, v)
         known = [plan.cures[h] for h in both if plan.cures.get(h)]
         if known:
             found[v] = known[0]
         elif v not in plan.open:
             found[v] = BY_HAND
-        elif paths.way[largest] < BEGINS and v not in plan.stops:
-            found[v] = MEASURE_STARTS if v in plan.unconfirmed else PRELOAD
+        elif paths.way[paths.after.largest[k]] < BEGINS and v not in plan.stops:
+            told = MEASURE_STARTS if v in plan.unconfirmed else PRELOAD
+            found[v] = told if can_stop(now.task, both[0]) else IN_CORNER
         else:
             found[v] = MORE_ROOM if plan.crowded else SHORTER
     return found
@@ -319,9 +332,9 @@ def _cures(now: PathPrediction) -> dict[int, str]:
 def _promises(now: PathPrediction) -> dict[int, float]:
     """Return what 95 % of every move stays within by all open hypotheses [m]."""
     task = now.task
-    moves = {halves(task.visits, v) for v in now.paths.visit.tolist()}
+    moves = {halves(task.visits, v) for v in now.sizes}
     return {
-        v: compare((now.paths,), rows, task.tolerance).choose()[1]
+        v: compare((now.part_of(v).paths,), rows, task.tolerance).choose()[1]
         for rows in moves
         for v in rows
     }
@@ -394,7 +407,7 @@ def _unfit(now: PathPrediction) -> set[int]:
 
 def _list_tried(now: PathPrediction) -> dict[int, _Tried]:
     """Say what the moves have now, by their first visits, and how they do."""
-    plan, sizes, found = now.plan, sizes_of(now.paths), dict[int, _Tried]()
+    plan, sizes, found = now.plan, now.sizes, dict[int, _Tried]()
     for own in {halves(now.task.visits, v) for v in plan.open}:
         found[own[0]] = _Tried(
             hypot(*(sizes.get(row, np.inf) for row in own)),

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.options import Job
 from postproc.compensation.outcome import Status
+from postproc.compensation.paths import changed_windows
 from postproc.compensation.paths.arcs import (
     STRAIGHT,
     Cut,
@@ -24,9 +25,20 @@ from postproc.compensation.paths.backlash_preload import (
     cross_at_once,
     find_drive_turns,
 )
+from postproc.compensation.paths.changed_windows import (
+    Key,
+    Part,
+    Windows,
+    take_windows,
+)
 from postproc.compensation.paths.insertion_plan import InsertionPlan, Written
+from postproc.compensation.paths.moved_corners import SourceCorners
 from postproc.compensation.paths.path_error import PathAccuracy
-from postproc.compensation.paths.split_constraints import hindrances, unwritable
+from postproc.compensation.paths.split_constraints import (
+    hindrances,
+    speeds_of_pieces,
+    unwritable,
+)
 from postproc.compensation.paths.write_points import insert, lines_in_files
 from postproc.compensation.pipeline import (
     BY_VISIT,
@@ -38,18 +50,31 @@ from postproc.compensation.pipeline import (
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.rewrite import Output
 from postproc.compensation.timing_comparison import InTime, run_in_time
-from postproc.diagnostics import Code
 from postproc.language.language import Splitter
 from postproc.language.visits import Visits
 from postproc.model.flank_hypotheses import FlankOfJoint, flanks_of
 from postproc.robot.pose import MM
 
 AIM = 0.4  # of the tolerance: what points are to reach
-MOST = 0.95  # of a way: that much is to be within half of the tolerance
 KEPT = 4  # predictions that are kept: plans return to what was tried
 
 
+MeantKey = tuple[int, tuple[float, ...], bool]
+"""A visit, the points on its way, and whether they correct half of what flanks do."""
 Write = Callable[[ParsedProgram, WindowResult, Job], tuple[Output, ParsedProgram]]
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """A program with the points of a plan, written.
+
+    Attributes:
+        part: All of its visits.
+        program: It, corrected; the source where there are no points.
+    """
+
+    part: Part
+    program: CompensatedProgram
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +94,10 @@ class InsertionTask:
     setting: Job
     write: Write
     splitter: Splitter
-    _known: dict[Written, PathPrediction] = field(default_factory=dict, repr=False)
+    _whole: dict[Written, Whole] = field(default_factory=dict, repr=False)
+    _parts: dict[tuple[int, Key], Part] = field(default_factory=dict, repr=False)
+
+    _meant: dict[MeantKey, MeantSides] = field(default_factory=dict, repr=False)
 
     @property
     def visits(self) -> Visits:
@@ -87,11 +115,30 @@ class InsertionTask:
         return flanks_of(self.setting.model, self.setting.cell.arm)
 
     @cached_property
+    def windows(self) -> Windows:
+        """Return the windows of the program between its stops."""
+        return Windows.of(self.visits, self.first.before, self.setting, self.flanks)
+
+    @cached_property
+    def speeds(self) -> Floats:
+        """Return the largest speed that each move may have, (n,) [m/s]."""
+        setting = self.setting
+        return speeds_of_pieces(self.first.before, setting.cell, setting.model)
+
+    @cached_property
+    def corners(self) -> SourceCorners:
+        """Return how the source passes its visits."""
+        return SourceCorners.of(
+            self.setting.cell.arm, self.first.before, self.visits.via
+        )
+
+    @cached_property
     def _hindrances(self) -> dict[int, str]:
         decided, keeps_aux = self.source.kept.decisions, self.splitter.keeps_aux
         return hindrances(
-            self.visits, decided, self.first.before, self.setting.cell, keeps_aux
-        )
+            self.visits, decided, self.first.before, self.setting.cell, self.speeds,
+            keeps_aux,
+        )  # fmt: skip
 
     def find_hindrance(self, v: int) -> str:
         """Say why nothing can be put on the way to a visit, "" for nothing."""
@@ -113,38 +160,110 @@ class InsertionTask:
     def predict(self, plan: InsertionPlan) -> PathPrediction:
         """Correct the program with the points of a plan, and predict it.
 
+        Only windows whose points, or whose run-up's, have not been predicted lately;
+        of short programs, and where that is most of it, all.
+        """
+        if plan.approaches or len(self.visits) < changed_windows.LEAST:
+            return self.predict_whole(plan)
+        keys = self.windows.list_keys(plan)
+        new = [k for k, key in keys.items() if (k, key) not in self._parts]
+        if new and not self._predict_windows(plan, keys, new):
+            return self.predict_whole(plan)
+        part = np.zeros(len(self.visits), dtype=np.int64)
+        parts = [self._source]
+        for k, key in keys.items():
+            found = self._parts[k, key]
+            if found is not parts[-1]:
+                parts.append(found)
+            part[self.windows.own(k)] = len(parts) - 1
+        return PathPrediction(self, plan, tuple(parts), part)
+
+    def predict_whole(self, plan: InsertionPlan) -> PathPrediction:
+        """Correct the program with the points of a plan, write it, and predict it.
+
         What was predicted lately is not predicted again.
         """
         key = plan.written
-        found = self._known.pop(key, None)
-        found = self._make(plan) if found is None else replace(found, plan=plan)
-        self._known[key] = found
-        if len(self._known) > KEPT:
-            del self._known[next(iter(self._known))]
-        return found
+        found = self._whole.pop(key, None) or self._make(plan)
+        self._whole[key] = found
+        if len(self._whole) > KEPT:
+            del self._whole[next(iter(self._whole))]
+        part = np.zeros(len(self.visits), dtype=np.int64)
+        return PathPrediction(self, plan, (found.part,), part, found.program)
 
-    def _make(self, plan: InsertionPlan) -> PathPrediction:
+    @cached_property
+    def _source(self) -> Part:
         own = np.arange(len(self.visits))
+        return Part(self.visits, self.source.kept, self.first, own)
+
+    def _make(self, plan: InsertionPlan) -> Whole:
         if not (plan.points or plan.approaches):
-            return PathPrediction(self, plan, self.source, own)
-        cell, clock = self.setting.cell, self.setting.clock
-        with clock("insert"):
-            reading, own = insert(
-                self.source.reading, plan.points, plan.preloads, self.splitter, cell,
-                plan.chords, plan.approaches, self._list_meant_sides(plan),
-                self._joints_along,
-            )  # fmt: skip
-        options = self.setting.options.without_clones()
-        reading, kept = correct(reading, replace(self.setting, options=options))
+            return Whole(self._source, self.source)
+        clock = self.setting.clock
+        reading, own = self._insert(plan)
+        reading, kept = self._correct(reading)
         output, again = self.write(reading, kept, self.setting)
         owner = np.searchsorted(own, np.arange(len(reading.visits)))
         with clock("time"):
             told = run_in_time(
                 reading, again, kept.position, self.setting, owner,
-                self.list_wanted_arcs(plan),
+                self.list_wanted_arcs(plan), self.corners.at(own, len(owner)),
             )  # fmt: skip
         program = CompensatedProgram(reading, kept, output, told)
-        return PathPrediction(self, plan, program, own)
+        return Whole(Part(reading.visits, kept, told, own), program)
+
+    def _predict_windows(
+        self, plan: InsertionPlan, keys: Mapping[int, Key], some: Sequence[int]
+    ) -> bool:
+        """Predict some windows, and keep them; return False where all should be.
+
+        Args:
+            plan: The points of the program.
+            keys: What it puts on the windows.
+            some: These windows.
+        """
+        windows = self.windows
+        inside, seeds = windows.cover(some)
+        if np.count_nonzero(inside) > changed_windows.MOST * len(inside):
+            return False
+        own = {v: at for v, at in plan.points.items() if inside[v]}
+        plan = replace(plan, points=own)
+        reading, rows = self._insert(plan)
+        reading, mine, taken = take_windows(reading, rows, inside, seeds, windows.q)
+        reading, kept = self._correct(reading)
+        values = kept.decisions.corrected
+        again = replace(reading, visits=replace(reading.visits, values=values))
+        owner = np.searchsorted(rows, taken)
+        with self.setting.clock("time"):
+            told = run_in_time(
+                reading, again, kept.position, self.setting, owner,
+                self.list_wanted_arcs(plan), self.corners.at(mine, len(owner)),
+            )  # fmt: skip
+        part = Part(reading.visits, kept, told, mine)
+        if not self._is_where_it_was(part, inside):
+            return False
+        self._parts.update({(k, keys[k]): part for k in some})
+        return True
+
+    def _is_where_it_was(self, part: Part, inside: Bools) -> bool:
+        """Return True if the joints are at the source's targets as they were."""
+        rows = np.flatnonzero(inside & ~self.visits.via)
+        q = part.in_time.before.path.q[part.own[rows]]
+        off = np.abs(q - self.windows.q[rows])
+        return bool(np.nan_to_num(off).max(initial=0.0) < changed_windows.SAME)
+
+    def _insert(self, plan: InsertionPlan) -> tuple[ParsedProgram, Ints]:
+        """Put the points of a plan into the program, see `insert`."""
+        with self.setting.clock("insert"):
+            return insert(
+                self.source.reading, plan.points, plan.preloads, self.splitter,
+                self.setting.cell, plan.chords, plan.approaches,
+                self._list_meant_sides(plan), self._joints_along,
+            )  # fmt: skip
+
+    def _correct(self, reading: ParsedProgram) -> tuple[ParsedProgram, WindowResult]:
+        options = self.setting.options.without_clones()
+        return correct(reading, replace(self.setting, options=options))
 
     def _joints_along(self, v: int, share: Floats) -> Floats:
         """Return the joint angles at shares (k,) of the way to a visit, (k, 6)."""
@@ -165,12 +284,18 @@ class InsertionTask:
             own = [paths.samples_to(v) for v in move]
             side = np.array(paths.side[own[0].start : own[-1].stop])
             side[:, sharp] = cross_at_once(side[:, sharp])
-            if plan.halved.intersection(move):
+            half = bool(plan.halved.intersection(move))
+            if half:
                 side = (side + _evenly(side, [paths.way[rows] for rows in own])) / 2
             for v, rows in zip(move, own, strict=True):
                 if v in plan.points:
                     there = side[rows.start - own[0].start :]
-                    found[v] = self._mean(v, plan.points[v], rows, side[0], there)
+                    key = v, plan.points[v], half
+                    if key not in self._meant:
+                        self._meant[key] = self._mean(
+                            v, plan.points[v], rows, side[0], there
+                        )
+                    found[v] = self._meant[key]
         return found
 
     def _mean(
@@ -209,24 +334,55 @@ class PathPrediction:
     Attributes:
         task: The program without points.
         plan: What is on its ways.
-        program: It with these points, corrected; the source where there are none.
-        own: The visits of it that the source makes, (n,).
+        parts: What was predicted of it, and when.
+        part: Which of these tells of each visit of the source, (n,).
+        written: The program with these points; None where it was not written.
     """
 
     task: InsertionTask
     plan: InsertionPlan
-    program: CompensatedProgram
-    own: Ints
+    parts: tuple[Part, ...]
+    part: Ints
+    written: CompensatedProgram | None = None
+
+    @property
+    def program(self) -> CompensatedProgram:
+        """Return it with its points, corrected; the source where there are none."""
+        return self.whole().written or self.task.source
+
+    @property
+    def own(self) -> Ints:
+        """Return the visits of it that the source makes, (n,)."""
+        return self.whole().parts[0].own
 
     @property
     def in_time(self) -> InTime:
         """Return the program in time."""
-        return self.program.in_time or self.task.first
+        return self.whole().parts[0].in_time
 
-    @property
-    def paths(self) -> PathAccuracy:
-        """Return how the program keeps to its paths."""
-        return self.in_time.paths
+    def whole(self) -> PathPrediction:
+        """Return the same, written and predicted as a whole."""
+        return self if self.written else self.task.predict_whole(self.plan)
+
+    def part_of(self, v: int) -> Part:
+        """Return what tells of a visit of the source."""
+        return self.parts[int(self.part[v])]
+
+    def path_to(self, v: int) -> tuple[PathAccuracy, int]:
+        """Return paths among which is that to a visit, and which it is."""
+        paths = self.part_of(v).paths
+        return paths, paths.row_of(v)
+
+    @cached_property
+    def sizes(self) -> dict[int, float]:
+        """Return how far each move leaves its path at the most [m], by visit."""
+        found: dict[int, float] = {}
+        for k, part in enumerate(self.parts):
+            paths = part.paths
+            mine = np.flatnonzero(self.part[paths.visit] == k)
+            sizes = paths.after.sizes[mine].tolist()
+            found.update(zip(paths.visit[mine].tolist(), sizes, strict=True))
+        return dict(sorted(found.items()))
 
     @property
     def room(self) -> int:
@@ -234,22 +390,15 @@ class PathPrediction:
         return self.task.setting.options.max_inserted - self.plan.count
 
     @property
-    def too_far(self) -> Ints:
-        """The paths that are left too far, the worst first."""
-        sizes = self.paths.after.sizes
-        order = np.argsort(-sizes, kind="stable")
-        return order[sizes[order] > self.task.tolerance]
+    def too_far(self) -> list[int]:
+        """The moves that leave their paths too far, the worst first."""
+        tolerance, sizes = self.task.tolerance, self.sizes
+        return [v for v in self.worst_first if sizes[v] > tolerance]
 
     @property
-    def to_split(self) -> Ints:
-        """The paths that are left too far, or most of whose way is not near enough."""
-        paths, tolerance = self.paths, self.task.tolerance
-        step = np.diff(paths.way, prepend=0.0)
-        step[paths.first[:-1]] = 0.0
-        far = np.where(paths.after.across > tolerance / 2, step, 0.0)
-        off, whole = (np.add.reduceat(each, paths.first[:-1]) for each in (far, step))
-        far_off = off > (1.0 - MOST) * whole
-        return np.flatnonzero(far_off | (paths.after.sizes > tolerance))
+    def worst_first(self) -> list[int]:
+        """The moves, the one that leaves its path the farthest first."""
+        return sorted(self.sizes, key=lambda v: -self.sizes[v])
 
     @property
     def cut_arcs(self) -> list[int]:
@@ -262,23 +411,22 @@ class PathPrediction:
         return {v: why for v in self.plan.points if (why := self._refusal(v))}
 
     def _refusal(self, v: int) -> str:
-        decided = self.program.kept.decisions
-        rows = self._on_way(v)
+        part = self.part_of(v)
+        decided, rows = part.decisions, part.rows_on_way(v)
         left = rows[decided.status[rows] != Status.CORRECTED]
         if len(left):
             why = decided.reasons[decided.why[left[0]]]
             return f"points inserted into it cannot be corrected: {why}"
-        visits = self.program.reading.visits
+        visits = part.visits
         passed = rows[~visits.via[rows]][v in self.plan.stops :]
         sized = visits.fly[passed] & (visits.zone_mm[passed] > 0.0)
         return "" if sized.all() else self.task.splitter.unsized
 
     def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""
-        decided, via = self.program.kept.decisions, self.program.reading.visits.via
-        steps = [one.code is Code.CORRECTION_STEP for one in decided.reasons]
-        marked = np.array(steps)[decided.why]
-        begin = int(self.own[self.task.visits.before[v]])
+        part = self.part_of(v)
+        marked, via = part.steep, part.visits.via
+        begin = int(part.own[self.task.visits.before[v]])
         pieces = enumerate(pairwise([begin, *self.ends(v)]))
         return [
             k for k, (a, b) in pieces
@@ -288,37 +436,35 @@ class PathPrediction:
     @cached_property
     def flat(self) -> dict[Cut, float]:
         """What the pieces of arcs bend that are too flat for arcs [m]."""
-        visits, points = self.program.reading.visits, self.plan.points
-        values = self.program.kept.decisions.corrected
-        moved = (values - visits.values)[:, :3] * MM
-        ends = {
-            row: (half, share)
-            for via in self.cut_arcs
-            for half in (via, via + 1)
-            for row, share in zip(
-                self.ends(half), (*points.get(half, ()), 1.0), strict=False
-            )
-        }
-        arcs = [row - 1 for row in sorted(ends) if visits.via[row - 1]]
-        found = flat_pieces(visits, moved, np.array(arcs, dtype=np.int64))
-        return {ends[row]: bent for row, bent in found}
+        found: dict[Cut, float] = {}
+        for via in self.cut_arcs:
+            part, points = self.part_of(via), self.plan.points
+            visits = part.visits
+            ends = {
+                row: (half, share)
+                for half in (via, via + 1)
+                for row, share in zip(
+                    self.ends(half), (*points.get(half, ()), 1.0), strict=False
+                )
+            }
+            arcs = [row - 1 for row in sorted(ends) if visits.via[row - 1]]
+            flat = flat_pieces(visits, part.moves, np.array(arcs, dtype=np.int64))
+            found.update({ends[row]: bent for row, bent in flat})
+        return found
 
     def may_be_chord(self, cut: Cut) -> bool:
         """Return True if a piece that is too flat may be a chord, but the last."""
         last = cut[1] == 1.0 and not self.task.visits.via[cut[0]]
         return self.flat[cut] <= STRAIGHT * self.task.tolerance and not last
 
-    def _on_way(self, v: int) -> Ints:
-        """Return the visits with points on the way to one, without it."""
-        return np.arange(int(self.own[v - 1]) + 1 if v else 0, int(self.own[v]))
-
     def ends(self, v: int) -> list[int]:
         """Return the visits with points at which the pieces of a move end, itself too.
 
-        Those of the program with points.
+        Those of the part that tells of the move.
         """
-        rows = np.append(self._on_way(v), self.own[v])
-        ends: list[int] = rows[~self.program.reading.visits.via[rows]].tolist()
+        part = self.part_of(v)
+        rows = np.append(part.rows_on_way(v), part.own[v])
+        ends: list[int] = rows[~part.visits.via[rows]].tolist()
         return ends
 
 

@@ -26,6 +26,8 @@ class Insertions:
         without: How far each move leaves its path without points, by visit [m].
         promises: What 95 % of each move stays within by all open hypotheses [m].
         tolerance: Asked for [m]; infinite where nobody did.
+        limit_mm_s: Largest speed by the cell, at which moves with points are judged
+            whose speed is not known; 0 where there are none.
         approaches: Share of the way at which targets are approached anew, by visit: to
             a stop, and on to the target.
         unconfirmed: Moves before which play is not taken up, as no measured path
@@ -43,6 +45,7 @@ class Insertions:
     unconfirmed: Collection[int] = ()
     cures: Mapping[int, str] = field(default_factory=dict)
     cell_mm_s: float = 0.0
+    limit_mm_s: float = 0.0
 
     @property
     def count(self) -> int:

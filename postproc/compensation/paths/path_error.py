@@ -17,6 +17,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
 from postproc.compensation.paths.arcs import NO_ARCS, WantedArcs
 from postproc.compensation.paths.flank_cases import UNSURE, FlankCases
+from postproc.compensation.paths.moved_corners import SourceCorners
 from postproc.compensation.paths.path_samples import PathSamples, measure_along, ways_of
 from postproc.compensation.paths.path_states import (
     AlongWays,
@@ -150,6 +151,7 @@ def predict_paths(
     temperature: float,
     owner: Ints | None = None,
     arcs: WantedArcs = NO_ARCS,
+    corners: SourceCorners | None = None,
 ) -> PathAccuracy:
     """Predict how far a program leaves its paths, as written and as compensated.
 
@@ -164,6 +166,7 @@ def predict_paths(
         owner: The move of the source that every visit belongs to, (n,), where points
             were inserted on its way; each move is then one path.
         arcs: The arcs of the source that were cut.
+        corners: How the source passes the visits; None: as the program does.
     """
     cartesian = (before.targets.move != Motion.JOINT) & ~before.targets.curved
     known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
@@ -184,6 +187,8 @@ def predict_paths(
         nearest = np.where(2 * way < whole, ways.source[ways.way], ways.visit[ways.way])
         on_arc = arcs.pieces(owner, before.targets.fly)[nearest]
         moved += arcs.off(wanted, owner[ways.visit][ways.way], on_arc)
+        if corners is not None:
+            moved += corners.off(cell.arm, before, ways, way)
     found = PathAccuracy(
         rows, pair[0].first, way, tangent,
         _deviations(runs[0], error, -off, tangent, way),

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.compensation.paths.flank_cases import FlankCase
+from postproc.compensation.paths.flank_cases import FlankCase, Key
 from postproc.compensation.paths.path_error import PathAccuracy
 from postproc.compensation.paths.plan_rule import (
     PlanOutcome,
@@ -17,16 +16,13 @@ from postproc.compensation.paths.plan_rule import (
     negligible,
     resolution,
 )
-from postproc.model.flank_hypotheses import OPEN, FlankKind
+from postproc.model.flank_hypotheses import OPEN
 from postproc.robot.pose import MM
 
 ALONG = 0.95  # of a way: what the deviation of a plan is taken of
 BEGINS = 5e-3  # [m] in which drives cross their gaps, where a move begins
 
 LAST = 1.0 - 1e-9  # share of a way that is still on it
-
-Key = tuple[int, FlankKind, int]
-"""A joint (from 1), what it does, and which of its cases of that kind it is."""
 
 
 @dataclass(frozen=True)
@@ -143,21 +139,17 @@ class _Move:
 
     paths: PathAccuracy
     parts: tuple[slice, ...]
-    cases: dict[Key, FlankCase]
+    cases: Mapping[Key, FlankCase]
     usually: Floats
 
     @classmethod
     def of(cls, paths: PathAccuracy, rows: Sequence[int]) -> _Move:
         parts = tuple(map(paths.samples_to, rows))
-        cases: dict[Key, FlankCase] = {}
+        cases: Mapping[Key, FlankCase] = {}
         usually = np.ones(6)
         if paths.cases is not None:
             usually = paths.cases.usually
-            kinds = groupby(paths.cases.cases, key=lambda case: (case.joint, case.kind))
-            for kind, own in kinds:
-                for number, case in enumerate(own):
-                    if any(_length(case.within(part)) for part in parts):
-                        cases[*kind, number] = case
+            cases = paths.cases.on_moves([paths.row_of(v) for v in rows])
         return cls(paths, parts, cases, usually)
 
     @property
@@ -206,10 +198,6 @@ class _Move:
             ways.append(np.diff(way, prepend=0.0))
             sizes.append(far)
         return _within(np.concatenate(sizes), np.concatenate(ways)), worst, at
-
-
-def _length(part: slice) -> int:
-    return int(part.stop - part.start)
 
 
 def _within(far: Floats, length: Floats) -> float:

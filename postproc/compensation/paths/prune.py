@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, any_in_rows
+from postproc.arrays import Floats
 from postproc.compensation.paths.arcs import (
     halves,
     is_arc,
@@ -16,6 +16,7 @@ from postproc.compensation.paths.arcs import (
     measure_passing,
     zone_sizes,
 )
+from postproc.compensation.paths.changed_windows import Part
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
 from postproc.compensation.paths.path_error import apart, sizes_of
@@ -26,7 +27,6 @@ from postproc.robot.pose import lengths
 
 JUDGED = 8  # rounds in which points are taken back
 NEAR = 4  # visits behind a move that may be worse for its points
-MOVED = 5e-6  # [m] that a rounded corner may move
 
 
 def judge(now: PathPrediction) -> PathPrediction:
@@ -35,8 +35,7 @@ def judge(now: PathPrediction) -> PathPrediction:
     now = task.predict(choose_plans(now))
     without = _of_moves(now, sizes_of(task.first.paths))
     for k in range(JUDGED):
-        bad = dict([*_harmful(now, without), *_bad(now, without)])
-        anew = bad_approaches(now)
+        now, bad, anew = _find_bad(now, without)
         if not bad and not anew:
             return now
         plan = now.plan
@@ -51,6 +50,27 @@ def judge(now: PathPrediction) -> PathPrediction:
     return task.predict(replace(now.plan, left=left, points={}, approaches={}))
 
 
+def _find_bad(
+    now: PathPrediction, without: dict[int, float]
+) -> tuple[PathPrediction, dict[int, Removal], set[int]]:
+    """Find what must go: in changed windows first, and in the whole if nothing there.
+
+    Args:
+        now: The program.
+        without: How far each move leaves its path without points [m].
+
+    Returns:
+        What was looked at, the moves whose points must go, and the targets whose stops
+        before them must.
+    """
+    while True:
+        bad = dict([*_harmful(now, without), *_bad(now, without)])
+        anew = bad_approaches(now) if now.plan.approaches else set()
+        if bad or anew or now.written:
+            return now, bad, anew
+        now = now.whole()
+
+
 def choose_plans(now: PathPrediction) -> InsertionPlan:
     """Choose for every move with points how much of them it gets.
 
@@ -60,9 +80,10 @@ def choose_plans(now: PathPrediction) -> InsertionPlan:
     """
     task, chosen = now.task, now.plan
     plans = [*_variants(now)]
-    made = [now.paths, *(task.predict(plan).paths for plan in plans[1:])]
+    made = [now, *map(task.predict, plans[1:])]
     for rows in _moves_with_points(now):
-        compared = compare((task.first.paths, *made), rows, task.tolerance)
+        paths = [one.part_of(rows[0]).paths for one in made]
+        compared = compare((task.first.paths, *paths), rows, task.tolerance)
         best, _ = compared.choose()
         if best:
             for v in rows:
@@ -122,18 +143,11 @@ def _bad(
     now: PathPrediction, without: dict[int, float]
 ) -> Iterator[tuple[int, Removal]]:
     """Yield the moves with points that must go, and why."""
-    task, plan = now.task, now.plan
+    plan = now.plan
     if not plan.points:
         return
     bent = {cut[0] for cut in now.flat if not now.may_be_chord(cut)}
-    moved = now.in_time.before.path.aside[now.own] - task.first.before.path.aside
-    there = any_in_rows(np.abs(np.nan_to_num(moved)) > MOVED)
-    there[now.cut_arcs] = False  # judged as the points that they are
-    before = task.visits.before
-    judged = _Judged(
-        now, without, _worst(now), _objections(now),
-        there | (there[before] & (before >= 0)), bent,
-    )  # fmt: skip
+    judged = _Judged(now, without, _worst(now), _objections(now), bent)
     for v in sorted(_with_points(now)):
         if reason := judged.why_not(v):
             yield v, reason
@@ -148,7 +162,6 @@ class _Judged:
         without: How far each move leaves its path without points [m].
         worst: .. and with them at the most, however they are rounded, and where.
         objections: Which hypotheses make moves worse, and where.
-        corner: Moves with a rounded corner at an end that is passed otherwise, (n,).
         bent: Arcs with pieces that bend too little.
     """
 
@@ -156,7 +169,6 @@ class _Judged:
     without: dict[int, float]
     worst: dict[int, tuple[float, float]]
     objections: dict[int, Objection]
-    corner: Bools
     bent: set[int]
 
     def why_not(self, v: int) -> Removal | None:
@@ -173,8 +185,6 @@ class _Judged:
         if v in self.objections:
             objection = self.objections[v]
             return Removal(str(objection), objection.place % 1.0, objection.cure)
-        if self.corner[v]:
-            return Removal("a rounded corner at one of its ends would move")
         return None
 
 
@@ -188,22 +198,28 @@ def _harmful(
 ) -> Iterator[tuple[int, Removal]]:
     """Yield moves with points behind which moves without any are worse for them.
 
-    From which flank a joint leaves is a matter of the moves before.
+    From which flank a joint leaves is a matter of the moves before, and how a corner is
+    rounded one of both moves beside it.
     """
-    far = _of_moves(now, sizes_of(now.paths))
+    far = _of_moves(now, now.sizes)
     cut = np.array(sorted(now.plan.points), dtype=np.int64)
     for v in far.keys() - _with_points(now) - now.plan.approaches.keys():
         last = int(np.searchsorted(cut, v)) - 1
         near = last >= 0 and v - cut[last] <= NEAR
-        if near and far[v] > without.get(v, np.inf) + WORSE:
+        if far[v] <= without.get(v, np.inf) + WORSE:
+            continue
+        if near:
             yield int(cut[last]), Removal("a later move would be worse")
+        if v + 1 in now.plan.points and now.task.visits.fly[v]:
+            yield v + 1, Removal("the corner where it begins would move")
 
 
 def _objections(now: PathPrediction) -> dict[int, Objection]:
     """Say which hypotheses make moves with points worse, and at what share."""
     found, task = dict[int, Objection](), now.task
     for rows in _moves_with_points(now):
-        compared = compare((task.first.paths, now.paths), rows, task.tolerance)
+        paths = task.first.paths, now.part_of(rows[0]).paths
+        compared = compare(paths, rows, task.tolerance)
         objection = compared.objection(1)
         if objection is not None:
             found[rows[int(objection.place)]] = objection
@@ -253,8 +269,8 @@ def _worst(now: PathPrediction) -> dict[int, tuple[float, float]]:
         The distance [m], and where, as a share of the way.
     """
     rounded, found = _list_roundings(now), dict[int, tuple[float, float]]()
-    paths = now.paths
-    for k, v in enumerate(paths.visit.tolist()):
+    for v in _with_points(now) & now.sizes.keys():
+        paths, k = now.path_to(v)
         samples = paths.samples(k)
         way, off = paths.way[samples], paths.after.off[samples]
         tangent = paths.tangent[samples]
@@ -273,8 +289,20 @@ def _list_roundings(now: PathPrediction) -> dict[int, list[_Corner]]:
     No corner is larger than half of a neighbouring piece; what cuts it off straight
     passes the point farthest. On an arc it is no larger than zones are, by any law.
     """
-    task, plan, told = now.task, now.plan, now.in_time
-    arm, found = task.setting.cell.arm, dict[int, list[_Corner]]()
+    found: dict[int, list[_Corner]] = {}
+    for number, part in enumerate(now.parts):
+        moves = [v for v in now.plan.points if now.part[v] == number]
+        if moves:
+            found.update(_roundings_in(now, part, moves))
+    return found
+
+
+def _roundings_in(
+    now: PathPrediction, part: Part, moves: list[int]
+) -> Iterator[tuple[int, list[_Corner]]]:
+    """Yield the moves that a part tells of, and how their points may be rounded."""
+    task, plan, told = now.task, now.plan, part.in_time
+    arm = task.setting.cell.arm
     p, c = (
         arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
         for cycle in (told.after, told.before)
@@ -282,13 +310,14 @@ def _list_roundings(now: PathPrediction) -> dict[int, list[_Corner]]:
     visits, arcs = task.visits, task.list_wanted_arcs(plan)
     zone = largest_zones(arm, told.after) if len(arcs) else None
     planned = zone_sizes(arm, told.after, told.after.targets)
-    for v, shares in plan.points.items():
-        rows = [int(now.own[visits.before[v]]), *now.ends(v)]
+    for v in moves:
+        shares = plan.points[v]
+        rows = [int(part.own[visits.before[v]]), *now.ends(v)]
         if shares[-1] == 1.0:
             rows.append(now.ends(v + 1)[0])
         rows = rows[: len(shares) + 2]
         size = np.maximum(lengths(np.diff(p[rows], axis=0)), 1e-9)
-        slope = np.diff((p - c)[rows], axis=0) / size[:, None]
+        slope = np.diff(p[rows] - c[rows], axis=0) / size[:, None]
         half = np.minimum(size[1:], size[:-1]) / 2
         beside = np.zeros(len(half))
         if zone is not None and is_arc(visits, v):
@@ -298,8 +327,7 @@ def _list_roundings(now: PathPrediction) -> dict[int, list[_Corner]]:
         done = np.minimum(planned[rows[1:-1]] / np.maximum(half, 1e-12), 1.0)
         stop = int(v in plan.stops)
         moved[:stop] = beside[:stop] = 0.0
-        found[v] = [*map(_Corner, half, moved, done, beside)]
-    return found
+        yield v, [*map(_Corner, half, moved, done, beside)]
 
 
 # How far moves are from their paths, by the visit at their end.

@@ -54,7 +54,7 @@ def _worse_paths(now: PathPrediction) -> set[int]:
     Only where a path was asked for, and where it is farther off than that.
     """
     task, before = now.task, now.task.visits.before
-    was, far = sizes_of(task.first.paths), sizes_of(now.paths)
+    was, far = sizes_of(task.first.paths), now.sizes
     worse = {
         v
         for v, size in far.items()

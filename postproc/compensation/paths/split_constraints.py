@@ -20,9 +20,10 @@ from postproc.compensation.payload import payload_of
 from postproc.language.language import ArcPiece, Splitter
 from postproc.language.source import CloneError
 from postproc.language.visits import Meaning, OrientationLaw, Visits
+from postproc.model.model import Model
 from postproc.motion.cycle_time import ProgramCycle
 from postproc.robot.cell import Cell
-from postproc.robot.pose import MM, has_unknown
+from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
 CLOSEST = 1e-3  # [m] length of the shortest piece, however slow the move is
@@ -37,6 +38,7 @@ def hindrances(
     decisions: Decisions,
     cycle: ProgramCycle,
     cell: Cell,
+    speed: Floats,
     keeps_aux: bool = False,
 ) -> dict[int, str]:
     """Say why moves of a program must stay in one piece, by their visit.
@@ -46,6 +48,7 @@ def hindrances(
         decisions: How its targets are corrected.
         cycle: .. in time.
         cell: Its payload is the one that paths are predicted with.
+        speed: Of its moves, see `speeds_of_pieces`, (n,) [m/s].
         keeps_aux: See `Splitter.keeps_aux`.
     """
     status, before = decisions.status, np.maximum(v.before, 0)
@@ -74,7 +77,7 @@ def hindrances(
         (v.tool_remote, "the arm holds the part"),
         *hindrances_of_arcs(v, alike),
         (_turns_otherwise(v, before), "it is uncertain how the tool turns along it"),
-        (has_unknown(cycle.targets.linear_speed[:, None]), "its speed is not known"),
+        (np.isnan(speed), "its speed is not known"),
         (v.reason > 0, "it is not corrected"),
     ):
         for row in np.flatnonzero(rows).tolist():
@@ -84,6 +87,20 @@ def hindrances(
             if one in found:
                 found.setdefault(other, found[one])
     return found
+
+
+def speeds_of_pieces(cycle: ProgramCycle, cell: Cell, model: Model) -> Floats:
+    """Return the largest speed that each move may have, (n,) [m/s], NaN: not known.
+
+    That is the programmed one. Where it is not known it is the largest that the
+    controller allows, if the cell tells it, and if the error is the same at all speeds.
+    How a point is rounded may depend on it: points are judged for all roundings.
+    """
+    speed = np.array(cycle.targets.linear_speed)
+    largest = cell.file.motion.linear_limit_mm_s
+    if largest is not None and "speed" not in model.needs:
+        speed[np.isnan(speed)] = largest * MM
+    return speed
 
 
 def _carries_otherwise(v: Visits, cell: Cell) -> Bools:
@@ -134,7 +151,7 @@ def _turns_otherwise(visits: Visits, before: Ints) -> Bools:
 
 
 def shortest_pieces(
-    visits: Visits, cycle: ProgramCycle, shortest: float
+    visits: Visits, cycle: ProgramCycle, shortest: float, speed: Floats
 ) -> list[tuple[float, float, float]]:
     """Return the shortest piece of every move, and what stays clear at its ends [m].
 
@@ -143,10 +160,10 @@ def shortest_pieces(
     Args:
         visits: The program.
         cycle: .. in time.
-        shortest: What a piece lasts at the programmed speed, at least [s].
+        shortest: What a piece lasts at the largest speed, at least [s].
+        speed: That of the moves, see `speeds_of_pieces`, (n,) [m/s].
     """
-    speed = np.nan_to_num(cycle.targets.linear_speed)
-    least: Floats = np.maximum(shortest * speed, CLOSEST)
+    least: Floats = np.maximum(shortest * np.nan_to_num(speed), CLOSEST)
     size = np.maximum(2 * np.nan_to_num(np.abs(visits.zone_mm) * MM), CLEAR)
     flown = visits.fly & ~visits.via  # the point on the way of an arc is no corner
     round_ = np.where(flown, np.maximum(size, least), least)

@@ -17,24 +17,28 @@ from postproc.compensation.paths.insertion_prediction import (
 from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.split_constraints import shortest_pieces
 
-SPEED = "Set the speed before the move, or [motion] linear_mm_s in the cell"
+MOST = 0.95  # of a way: that much is to be within half of the tolerance
+SPEED = (
+    "Set the speed before the move, or in the cell [motion] linear_mm_s, or "
+    "linear_limit_mm_s where the speed is a value at run time"
+)
 
 
 def find_split(now: PathPrediction) -> InsertionPlan:
     """Say which of the moves that leave their paths may be split."""
     task, plan = now.task, now.plan
     shortest = task.setting.cell.limits.segment_ms / 1e3
-    pieces = shortest_pieces(task.visits, task.first.before, shortest)
-    far = set(now.paths.visit[now.to_split].tolist())
+    pieces = shortest_pieces(task.visits, task.first.before, shortest, task.speeds)
+    far = _list_far(now)
     open_, stops = dict(plan.open), dict[int, BacklashPreload | None]()
     for v in sorted({half for row in far for half in halves(task.visits, row)}):
         if told := _explain_refusal(now, v):
             if v in far:
-                unknown = np.isnan(task.first.before.targets.linear_speed[v])
+                unknown = np.isnan(task.speeds[v])
                 plan = plan.leave(v, told, SPEED if unknown else None)
             continue
         open_[v] = pieces[v]
-        if task.setting.options.preload_backlash and _can_stop(task, v):
+        if task.setting.options.preload_backlash and can_stop(task, v):
             taken = take_up(task.first.after, task.setting, task.visits, v)
             if taken.crossing:
                 fits = _is_within_lag(task, v, taken.crossing)
@@ -48,6 +52,17 @@ def find_split(now: PathPrediction) -> InsertionPlan:
     )
 
 
+def _list_far(now: PathPrediction) -> set[int]:
+    """List the moves that are left too far, or most of whose way is not near enough."""
+    paths, tolerance = now.in_time.paths, now.task.tolerance
+    step = np.diff(paths.way, prepend=0.0)
+    step[paths.first[:-1]] = 0.0
+    far = np.where(paths.after.across > tolerance / 2, step, 0.0)
+    off, whole = (np.add.reduceat(each, paths.first[:-1]) for each in (far, step))
+    far_off = (off > (1.0 - MOST) * whole) | (paths.after.sizes > tolerance)
+    return set(paths.visit[far_off].tolist())
+
+
 def _explain_refusal(now: PathPrediction, v: int) -> str:
     """Say why a path that is left too far gets no points, "" where it may."""
     task = now.task
@@ -56,7 +71,7 @@ def _explain_refusal(now: PathPrediction, v: int) -> str:
     return task.find_hindrance(v)
 
 
-def _can_stop(task: InsertionTask, v: int) -> bool:
+def can_stop(task: InsertionTask, v: int) -> bool:
     """Tell whether the arm stands where a move begins, and may stop once more."""
     visits = task.visits
     before = int(visits.before[v])

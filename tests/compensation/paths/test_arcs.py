@@ -153,7 +153,7 @@ def test_the_tool_is_turned_at_the_point_on_the_way_as_well() -> None:
 def test_the_last_piece_of_an_arc_is_long_enough_to_bend() -> None:
     visits = read().visits
     cycle = run(CELL.arm, plan_visits(visits, CELL).targets)
-    pieces = shortest_pieces(visits, cycle, 0.0)
+    pieces = shortest_pieces(visits, cycle, 0.0, cycle.targets.linear_speed)
     assert [behind for _, _, behind in pieces[VIA : END + 2]] == [
         CLOSEST,
         pytest.approx(np.sqrt(16.0 * RADIUS * MM * FLAT), rel=1e-6),

@@ -13,13 +13,12 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from postproc.arrays import Floats, Ints
-from postproc.compensation.paths import insertion_loop, prune
+from postproc.arrays import Floats
+from postproc.compensation.paths import insertion_loop, prune, split_selection
 from postproc.compensation.paths.arcs import is_arc
 from postproc.compensation.paths.insertion_loop import TAKEN
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import AIM, PathPrediction
-from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.plan_outcomes import BEGINS
 from postproc.model.backlash_width import ahead
 from postproc.model.model import load_model
@@ -360,21 +359,69 @@ def test_both_halves_of_an_arc_are_open_where_one_is(
 ) -> None:
     judged: list[PathPrediction] = []
     monkeypatch.setattr(insertion_loop, "judge", lambda p: judged.append(p) or p)
-    monkeypatch.setattr(PathPrediction, "to_split", property(one_half_of_every_arc))
+    monkeypatch.setattr(split_selection, "_list_far", one_half_of_every_arc)
     compensated(shop, "job.pdl", "halves", "--path-tolerance", TOLERANCE)
     (now,) = judged
     via = np.flatnonzero(now.task.visits.via)
     assert len(via) > 1 and {*via, *(via + 1)} == set(now.plan.open)
     assert now.plan.beside == set(via.tolist())
-    sizes = sizes_of(now.paths)
+    sizes = now.sizes
     for half in now.plan.beside:  # it gets points of its own where it leaves its path
         alone = now.plan.points.get(half, ()) in ((), (1.0,))
         assert not alone or sizes[half] <= TOLERANCE * MM / 2
 
 
-def one_half_of_every_arc(now: PathPrediction) -> Ints:
-    behind = np.flatnonzero(now.task.visits.via) + 1
-    return np.searchsorted(now.paths.visit, behind)
+def one_half_of_every_arc(now: PathPrediction) -> set[int]:
+    return {*(np.flatnonzero(now.task.visits.via) + 1).tolist()}
+
+
+def test_pieces_of_unknown_speed_are_as_long_as_the_fastest_needs(shop: Path) -> None:
+    (shop / "unknown.pdl").write_text(job())
+    cell = shop / "limit.toml"
+    left = compensated(shop, "unknown.pdl", "left", "--path-tolerance", TOLERANCE)
+    assert not any(path["inserted"] for path in left["path"])
+    assert "linear_limit_mm_s" in (messages(left, "path-tolerance-exceeded"))[0]
+    points = {}
+    for limit in (SPEED, 20.0 * SPEED):
+        cell.write_text(f"[motion]\nlinear_limit_mm_s = {limit}\n" + CELL.read_text())
+        done("compensate", shop / "unknown.pdl", "--cell", cell, "--model",
+             shop / "confirmed.json", "-o", shop / "limit.pdl", "--report",
+             shop / "limit.json", "--path-tolerance", TOLERANCE)  # fmt: skip
+        found = told(shop, "limit")
+        assert f"as {limit:g} mm/s needs" in messages(found, "path-points")[0]
+        points[limit] = [path["points"] for path in found["path"]]
+    for limit, moves in points.items():
+        least = limit * SHORTEST_MS / 1e3
+        for own in moves:
+            at = [0.0, *(point["at_mm"] for point in own)]
+            assert (np.diff(at) >= least - 1e-3).all()
+    slow, fast = (sum(map(len, points[limit])) for limit in points)
+    assert slow > fast > 0
+
+
+LARGEST = (
+    r"the predicted path error of the move is 0\.\d{3} mm, \d+ mm from its start "
+    r"\((joint \d 0\.\d{3} mm.*|no joint that changes .*)\): .+\. [A-Z].+"
+)
+
+
+def test_every_move_left_too_far_names_joints_and_a_remedy(shop: Path) -> None:
+    (shop / "untimed.pdl").write_text(job())
+    asked = ("--path-tolerance", TOLERANCE)
+    few = compensated(
+        shop, "job.pdl", "few", *asked, "--set", "compensation.max_inserted=1"
+    )
+    unknown = compensated(shop, "untimed.pdl", "slow", *asked)
+    for report in (unknown, few):
+        found = messages(report, "path-tolerance-exceeded")
+        sizes = [path["max_mm"]["after"] for path in report["path"]]
+        assert len(found) == sum(size > TOLERANCE for size in sizes) > 0
+        assert all(re.fullmatch(LARGEST, text) for text in found), found
+
+
+def messages(report: dict[str, Any], code: str) -> list[str]:
+    """Return the messages of the findings with a code."""
+    return [one["message"] for one in report["diagnostics"] if one["code"] == code]
 
 
 def test_of_two_points_too_close_for_the_error_the_one_with_more_room_goes() -> None:
@@ -695,16 +742,16 @@ def test_an_arc_that_loses_all_points_is_whole_again() -> None:
 
 
 def test_points_behind_which_a_move_would_be_worse_are_taken_back() -> None:
-    def paths(*mm: float) -> Mock:
-        return Mock(visit=np.array([3, 4, 9]), after=Mock(sizes=np.array(mm) * MM))
+    def sizes(*mm: float) -> dict[int, float]:
+        return dict(zip([3, 4, 9], np.array(mm) * MM, strict=True))
 
     now = Mock(plan=InsertionPlan(points={3: (0.5,)}), cut_arcs=[])
     now.task.visits.motion = [Motion.LINEAR] * 10
-    without = sizes_of(paths(0.3, 0.01, 0.01))
-    now.paths = paths(0.02, 0.07, 0.09)
+    without = sizes(0.3, 0.01, 0.01)
+    now.sizes = sizes(0.02, 0.07, 0.09)
     ((v, (why, *_)),) = prune._harmful(now, without)  # 9 is too far behind
     assert v == 3 and "a later move would be worse" in why
-    now.paths = paths(0.02, 0.05, 0.09)
+    now.sizes = sizes(0.02, 0.05, 0.09)
     assert not [*prune._harmful(now, without)]
 
 

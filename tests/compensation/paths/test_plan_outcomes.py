@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from postproc.compensation.paths.flank_cases import FlankCase
+from postproc.arrays import Floats
+from postproc.compensation.paths.flank_cases import FlankCase, FlankCases
 from postproc.compensation.paths.plan_outcomes import BEGINS, compare
 from postproc.model.flank_hypotheses import FlankKind
 from postproc.robot.pose import MM
@@ -17,11 +18,22 @@ TOLERANCE = 0.1 * MM
 WAY = np.linspace(0.0, 0.1, 101)  # [m], a sample a millimetre
 
 
+class _Known(FlankCases):
+    """Cases of one move that were not predicted."""
+
+    def __init__(self, cases: tuple[FlankCase, ...]) -> None:
+        vars(self).update(cases=cases, first=np.array([0, len(WAY)]))
+
+    @property
+    def usually(self) -> Floats:
+        return np.full(6, 0.55)
+
+
 def program(off: float, *cases: FlankCase) -> Any:
     """A program of one move, as far off everywhere."""
-    known = SimpleNamespace(cases=cases, usually=np.full(6, 0.55))
     return SimpleNamespace(
-        way=WAY, cases=known, samples_to=lambda v: slice(0, len(WAY)),
+        way=WAY, cases=_Known(cases), samples_to=lambda v: slice(0, len(WAY)),
+        row_of=lambda v: 0,
         after=SimpleNamespace(across=np.full(len(WAY), off * MM)),
     )  # fmt: skip
 

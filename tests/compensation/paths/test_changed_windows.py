@@ -1,0 +1,106 @@
+"""Only windows that a plan changes are predicted, and as the whole program is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.compensation.paths import changed_windows, insertion_loop
+from postproc.compensation.paths.changed_windows import Windows, _find_run_ups
+from postproc.compensation.paths.insertion_plan import InsertionPlan
+from postproc.compensation.paths.insertion_prediction import PathPrediction
+from postproc.robot.pose import MM
+from tests.compensation.paths.test_insertion_loop import (
+    STOPS,
+    TOLERANCE,
+    compensated,
+    shop,
+)
+
+__all__ = ["shop"]
+ALONE = 1e-3 * MM  # by how much a window may differ that is predicted alone
+
+
+@pytest.fixture
+def in_windows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Predict short programs in windows too; count those that were."""
+    counted: list[int] = []
+    taken = changed_windows.take_windows
+
+    def count(reading, own, inside, seeds, q):  # type: ignore[no-untyped-def]
+        counted.append(int(inside.sum()))
+        return taken(reading, own, inside, seeds, q)
+
+    name = "postproc.compensation.paths.insertion_prediction.take_windows"
+    monkeypatch.setattr(name, count)
+    monkeypatch.setattr(changed_windows, "LEAST", 0)
+    monkeypatch.setattr(changed_windows, "MOST", 1.0)
+    return counted
+
+
+@pytest.mark.parametrize("name", ["points", "stops"])
+def test_the_output_is_that_of_whole_predictions(
+    shop: Path, in_windows: list[int], name: str
+) -> None:
+    more = ("--set", STOPS) if name == "stops" else ()
+    asked = ("--path-tolerance", TOLERANCE, *more)
+    compensated(shop, "job.pdl", f"windows-{name}", *asked)
+    assert in_windows, "nothing was predicted in windows"
+    own, other = (shop / f"{one}.pdl" for one in (f"windows-{name}", name))
+    assert own.read_bytes() == other.read_bytes()
+
+
+def test_windows_come_out_as_in_the_whole_program(
+    shop: Path, in_windows: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[PathPrediction] = []
+
+    def look(now: PathPrediction) -> PathPrediction:
+        if now.plan.points:
+            found.append(now)
+        return now.whole()
+
+    monkeypatch.setattr(insertion_loop, "judge", look)
+    compensated(shop, "job.pdl", "looked", "--path-tolerance", TOLERANCE)
+    (now,) = found
+    assert now.written is None and len(now.parts) > 1
+    whole = now.whole()
+    assert now.sizes.keys() == whole.sizes.keys()
+    for v, size in now.sizes.items():
+        assert size == pytest.approx(whole.sizes[v], abs=ALONE)
+    assert now.refusals == whole.refusals and now.flat.keys() == whole.flat.keys()
+
+
+def test_a_run_up_lets_every_joint_turn_by_its_gap() -> None:
+    q = np.zeros((6, 6))
+    q[:, :] = np.array([0.0, 1.0, 1.0, 1.05, 1.05, 2.0])[:, None]
+    q[:, 5] = 0.0  # a joint that never turns tells nothing
+    need = np.array([0.1] * 5 + [-1.0])
+    np.testing.assert_array_equal(_find_run_ups(q, need, None), [0, 1, 2, 3, 4, 1])
+    assert not _find_run_ups(q, np.full(6, 0.1), None).any()
+    long = np.full(q.shape, 1.5)
+    assert _find_run_ups(q[:, :5], need[:5], long[:, :5]).tolist() == [0, 0, 0, 0, 0, 5]
+
+
+def windows(end: list[int], lead: list[int]) -> Windows:
+    """Make windows of a program whose arm stands still."""
+    column = [np.array(one, dtype=np.int64) for one in (end, lead)]
+    return Windows(column[0], column[1], np.zeros((end[-1] + 1, 6)))
+
+
+def test_a_window_is_predicted_again_if_its_run_up_changes() -> None:
+    cut = windows([1, 3, 5, 8], [-1, -1, 1, 5])
+    plan = InsertionPlan(points={3: (0.5,)})
+    assert cut.list_keys(plan).keys() == {1, 2}
+    other = cut.list_keys(InsertionPlan(points={3: (0.5,)}, stops=frozenset({3})))
+    assert other.keys() == {1, 2} and other[1] != cut.list_keys(plan)[1]
+
+
+def test_run_ups_are_taken_with_their_windows() -> None:
+    cut = windows([1, 3, 5, 8, 9], [-1, -1, 1, 3, 8])
+    inside, seeds = cut.cover([2])
+    assert np.flatnonzero(inside).tolist() == [2, 3, 4, 5] and seeds.tolist() == [1]
+    inside, seeds = cut.cover([0, 4])
+    assert np.flatnonzero(inside).tolist() == [0, 1, 9] and seeds.tolist() == [8]
