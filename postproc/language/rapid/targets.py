@@ -175,7 +175,7 @@ def operands_of(said: SourceStatement) -> Sequence[Operand]:
         case Assignment(value=value):
             return [value]
         case Instruction(arguments=arguments) | LateCall(arguments=arguments):
-            return _given(arguments)
+            return _list_operands(arguments)
         case CompactIf(statement=inside):
             return operands_of(inside)
         case _:
@@ -186,5 +186,5 @@ def _drop_none(values: Sequence[T | None]) -> list[T]:
     return [value for value in values if value is not None]
 
 
-def _given(arguments: Sequence[Argument]) -> Sequence[Operand]:
+def _list_operands(arguments: Sequence[Argument]) -> Sequence[Operand]:
     return _drop_none([argument.value for argument in arguments])
