@@ -20,8 +20,9 @@ class ProgramPage {
     await new Promise((resolve) => setTimeout(resolve));
     if (this.view) this.controls();
     this.histogram(data.histogram);
-    this.predicted(data.predicted);
     if (data.paths.length) new Paths(document.getElementById("path-rows"), data.paths);
+    window.addEventListener("beforeprint", () => this.table.print());
+    window.addEventListener("afterprint", () => this.table.forgetPrint());
     window.addEventListener("hashchange", () => this.follow());
     const idle = window.requestIdleCallback || ((f) => setTimeout(f, 200));
     idle(() => this.table.haystack());
@@ -74,20 +75,6 @@ class ProgramPage {
       hovertemplate: "%{x:.3f} mm: %{y}<extra></extra>" }], {
       bargap: 0, xaxis: { title: { text: "length of the correction [mm]" }, rangemode: "tozero" },
       yaxis: { title: { text: "targets" } },
-    });
-  }
-
-  predicted({ before, after }) {
-    const node = document.getElementById("predicted");
-    if (!before.n) { node.remove(); return; }
-    const keys = ["mean_mm", "p95_mm", "max_mm"], names = ["mean", "95 %", "max"];
-    const bars = (from, name, colour, shape) => ({ type: "bar", orientation: "h", name, y: names, x: keys.map((k) => from[k]),
-      text: keys.map((k) => Page.number(from[k], from[k] < 0.01 ? 4 : 3)), textposition: "outside", cliponaxis: false,
-      marker: { color: colour, line: { color: colour, width: 1 }, pattern: { shape, fgcolor: colour, bgcolor: "#fff", solidity: 0.4 } } });
-    Page.draw(node, [bars(before, "before", Page.COLOURS.vermillion, "/"), bars(after, "after", Page.COLOURS.blue, "")], {
-      barmode: "group", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", traceorder: "normal" },
-      margin: { l: 48, r: 56, t: 30, b: 44 },
-      xaxis: { title: { text: "predicted error [mm]" }, rangemode: "tozero" }, yaxis: { autorange: "reversed", type: "category" },
     });
   }
 }
