@@ -71,7 +71,7 @@ def report_pieces(outcome: Outcome) -> Iterator[bytes]:
     yield ("],\n" + json.dumps(finite(tail))[1:] + "\n").encode()
 
 
-def expected_of(outcome: Outcome) -> dict[str, object]:
+def expected_of(outcome: Outcome) -> dict[str, Any]:
     """Describe the expected true errors."""
     from postproc.report.tolerance import expected_json
 

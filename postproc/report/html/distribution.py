@@ -90,7 +90,8 @@ def distribution(
     labels = [s * 10.0**e for e in range(-5, 5) for s in STEPS]
     shown = [x for x in labels if low <= np.log10(x) <= high]
     return Distribution(
-        *bars,
+        before=bars[0],
+        after=bars[1],
         ticks=tuple((place(x), f"{x:g}") for x in shown),
         limits=tuple((place(x), f"tolerance {x:g} mm") for x in limits),
         most=most,

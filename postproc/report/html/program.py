@@ -682,7 +682,9 @@ def program_report_from_json(
     return _page(program)
 
 
-LOOKED_AT = 200  # exceptions that stand on the page
+WIDE = "what the model and the repeatability of the arm leave open"
+UNUSUAL = "its bound is more than twice the usual one"
+LOOKED_AT = 20  # exceptions that stand on the page
 
 
 def _verdict(program: ProgramPage) -> tuple[str, str]:
@@ -728,6 +730,7 @@ def _page(program: ProgramPage) -> str:
             sorted(set(program.tolerance.get("tolerances_mm", ()))),
         ),
         verdict=_verdict(program),
+        unexplained=WIDE if program.tolerance else UNUSUAL,
         exceptions=finite(list(program.expected.get("exceptions", ())))[:LOOKED_AT],
         stages=seconds(program.stages),
         shown=len(carried),

@@ -75,7 +75,7 @@ class Elements(HTMLParser):
 def test_the_page_needs_nothing_else() -> None:
     page = Elements(program_report(outcome_of()))
     assert page.fetched == []
-    assert page.tags.count("script") == 10  # data, settings, plotly, seven of ours
+    assert page.tags.count("script") == 11  # data, settings, plotly, eight of ours
     assert not {"iframe", "object", "embed", "img", "form", "base"} & set(page.tags)
 
 
@@ -83,7 +83,7 @@ def test_names_stay_text() -> None:
     outcome = outcome_of(name=f"{NASTY}.pdl", names=("", NASTY), extra=NASTY)
     text = program_report(outcome)
     page = Elements(text)
-    assert page.tags.count("script") == 10
+    assert page.tags.count("script") == 11
     assert "<script>alert(" not in text
     assert not set("\x00\x1b\u202e\u2028") & set(text)
     shown = '<script>alert("x")</script>\'\\x1b[31m\\u202e'

@@ -28,6 +28,7 @@ class ProgramPage {
     idle(() => this.table.haystack());
     if (this.view) await this.redraw();
     performance.mark("view");
+    if (this.columns.length) this.show(this.worst());
     this.follow();
   }
 
@@ -50,11 +51,25 @@ class ProgramPage {
     this.waiting = setTimeout(() => this.redraw(), 250);
   }
 
-  select(i, focus) {
-    this.table.select(i, focus);
+  show(i) {
     this.detail.show(i);
     if (this.view) this.view.select(i);
+  }
+
+  select(i, focus) {
+    this.table.select(i, focus);
+    this.show(i);
     document.body.dataset.selected = this.columns.visit[i];
+  }
+
+  // The target with the largest bound of its error, else with the largest correction.
+  worst() {
+    const c = this.columns, key = (i) => c.of("expected_mm", i)[2] || 0;
+    let worst = 0;
+    for (let i = 1; i < c.length; i++) {
+      if (key(i) > key(worst) || (key(i) === key(worst) && c.size[i] > c.size[worst])) worst = i;
+    }
+    return worst;
   }
 
   // A link to #target-12 selects visit 12.

@@ -53,7 +53,10 @@ const Sheets = {
       const button = Page.element("button", { type: "button", className: "save", title: `Save the table "${title}" as CSV` }, "CSV");
       button.addEventListener("click", () => Sheets.save(Sheets.file(`${title.replace(/\W+/g, "_")}.csv`),
         ["\ufeff", Sheets.csv(Sheets.rows(table))], "text/csv"));
-      (table.closest(".scroll") || table).before(button);
+      const heading = table.closest("section")?.querySelector("h2"), scroll = table.closest(".scroll");
+      if (heading) heading.after(button);
+      else if (scroll?.previousElementSibling?.classList.contains("bar")) scroll.previousElementSibling.append(button);
+      else table.before(button);
     }
     document.getElementById("save-tables")?.addEventListener("click", () => Workbook.save());
     document.getElementById("print")?.addEventListener("click", () => window.print());
