@@ -316,15 +316,15 @@ def facts_of(outcome: Outcome) -> dict[str, Any]:
         "largest_mm": _largest(outcome),
         "before_mm": _figures(asdict(outcome.before)),
         "after_mm": _figures(asdict(outcome.after)),
-        **_expected(outcome),
+        **_error_facts(outcome),
     }
 
 
-def _expected(outcome: Outcome) -> dict[str, Any]:
+def _error_facts(outcome: Outcome) -> dict[str, Any]:
     """Sum up the expected true errors, and the verdict against a tolerance."""
-    found = headline(outcome)
-    if found is None:
+    if outcome.errors is None:
         return {}
+    found = headline(outcome.errors)
     worst = None if found.worst is None else found.worst.expected_mm
     figures = {
         "before": found.before_mm,

@@ -38,7 +38,7 @@ from postproc.compensation.options import (
 )
 from postproc.compensation.outcome import (
     Outcome,
-    judged_visits,
+    find_judged,
     largest_motion,
     list_uncorrected_elsewhere,
     tell_arrivals,
@@ -304,7 +304,7 @@ def report(
         sources={source.name: source.data for source, _ in reading.originals},
         arrivals=arrivals,
         expected=expect_errors(
-            arrivals, kept.decisions.correction, judged_visits(visits, kept.decisions)
+            arrivals, kept.decisions.correction, find_judged(visits, kept.decisions)
         ),
         in_time=draft.in_time,
     )

@@ -132,11 +132,11 @@ def expect_errors(
     high[rows] = law.quantile(BOUND)
     return ExpectedErrors(
         judged, mean, std, np.asarray(outside[:, 0] > 0.0), before, after, high,
-        below=mixed_quantile(last), below_before=mixed_quantile(first),
+        below=pool_quantile(last), below_before=pool_quantile(first),
     )  # fmt: skip
 
 
-def mixed_quantile(lengths: Floats, share: float = BOUND) -> float:
+def pool_quantile(lengths: Floats, share: float = BOUND) -> float:
     """Return the length that a share of the errors of n visits is within; NaN for none.
 
     Args:

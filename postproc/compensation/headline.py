@@ -6,17 +6,75 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints, any_in_rows
+from postproc.arrays import Bools, Floats, Indices
 from postproc.compensation.expected_error import ExpectedErrors
 from postproc.compensation.findings import SURE
-from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.tolerance import ToleranceCheck, Verdict
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language.visits import Visits
 from postproc.robot.pose import MM
 
 FAR = 2.0  # times what is usual: an error that is larger is an exception
 OUTSIDE = Reason(Code.OUTSIDE_SURVEY, "the target is outside of what was surveyed")
 UNCERTAIN = Reason(Code.DIRECTION_UNCERTAIN, "the approach direction is uncertain")
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramErrors:
+    """What is known of the errors of a compensated program of n visits.
+
+    Attributes:
+        visits: The visits.
+        corrected: Which of them were corrected, (n,).
+        kept: Which kept their value although they hold a target, (n,).
+        why: Index into `reasons`, (n,).
+        reasons: Why visits keep their values.
+        side: Where every joint lies in its play, (n, 6) from -1 to 1.
+        expected: The expected errors.
+        tolerance: Their verdict against a tolerance, None where nobody asked.
+    """
+
+    visits: Visits
+    corrected: Bools
+    kept: Bools
+    why: Indices
+    reasons: tuple[Reason, ...]
+    side: Floats
+    expected: ExpectedErrors
+    tolerance: ToleranceCheck | None
+
+    def exceptional(self) -> Bools:
+        """Return which visits `list_exceptions` lists, (n,)."""
+        errors = self.expected
+        if self.tolerance is not None:
+            return np.isin(self.tolerance.verdict, (Verdict.FAIL, Verdict.UNKNOWN))
+        found = errors.unknown | errors.outside | self.kept
+        if errors.known.any():
+            found |= errors.high > FAR * np.median(errors.high[errors.known])
+        return np.asarray(found & errors.judged)
+
+    def reason_of(self, row: int) -> Reason:
+        """Return why a visit is an exception, false where only its size says so."""
+        reason: Reason = self.reasons[self.why[row]]
+        if self.kept[row] or reason:
+            return reason
+        if self.expected.outside[row]:
+            return OUTSIDE
+        side = self.side[row]
+        return UNCERTAIN if ((-SURE < side) & (side < SURE)).any() else NO_REASON
+
+    def describe(self, row: int) -> TargetException:
+        """Describe a visit as an exception."""
+        v, errors = self.visits, self.expected
+        place = f"{v.files[v.file[row]]}:{v.line[row]} {v.names[v.name[row]]}"
+        return TargetException(
+            row=row,
+            place=place.rstrip(),
+            reason=self.reason_of(row),
+            corrected=not self.kept[row],
+            expected_mm=float(errors.after[row]) / MM,
+            bound_mm=float(errors.high[row]) / MM,
+        )
 
 
 @dataclass(frozen=True)
@@ -55,7 +113,7 @@ class TargetException:
 
 
 def list_exceptions(
-    outcome: Outcome, most: int | None = None
+    program: ProgramErrors, most: int | None = None
 ) -> tuple[TargetException, ...]:
     """List the visits to look at: first those of unknown error, then the largest bound.
 
@@ -63,54 +121,13 @@ def list_exceptions(
     were not corrected, are outside of the survey, or have twice the usual bound.
 
     Args:
-        outcome: What came of a program.
+        program: Its errors.
         most: How many to list; default: all.
     """
-    errors = outcome.expected
-    if errors is None:
-        return ()
-    rows = np.flatnonzero(_exceptional(outcome, errors))
-    size = np.nan_to_num(errors.high[rows], nan=np.inf)
+    rows = np.flatnonzero(program.exceptional())
+    size = np.nan_to_num(program.expected.high[rows], nan=np.inf)
     rows = rows[np.argsort(-size, kind="stable")][:most]
-    return tuple(describe_targets(outcome, errors, rows))
-
-
-def count_exceptions(outcome: Outcome) -> int:
-    """Count the visits that `list_exceptions` lists."""
-    errors = outcome.expected
-    return 0 if errors is None else int(_exceptional(outcome, errors).sum())
-
-
-def _exceptional(outcome: Outcome, errors: ExpectedErrors) -> Bools:
-    if outcome.tolerance is not None:
-        return np.isin(outcome.tolerance.verdict, (Verdict.FAIL, Verdict.UNKNOWN))
-    found = errors.unknown | errors.outside
-    found[outcome.list_uncorrected_rows()] = True
-    if errors.known.any():
-        found |= errors.high > FAR * np.median(errors.high[errors.known])
-    return np.asarray(found & errors.judged)
-
-
-def describe_targets(
-    outcome: Outcome, errors: ExpectedErrors, rows: Ints
-) -> list[TargetException]:
-    """Describe visits as exceptions."""
-    v, d = outcome.visits, outcome.decisions
-    kept = outcome.list_uncorrected_rows()
-    corrected = ~np.isin(rows, kept)
-    uncertain = any_in_rows((-SURE < d.side[rows]) & (d.side[rows] < SURE))
-    found = []
-    for at, k in enumerate(rows.tolist()):
-        reason = d.reasons[d.why[k]]
-        if corrected[at] and not reason:
-            reason = UNCERTAIN if uncertain[at] else NO_REASON
-            reason = OUTSIDE if errors.outside[k] else reason
-        place = f"{v.files[v.file[k]]}:{v.line[k]} {v.names[v.name[k]]}".rstrip()
-        sizes = errors.after[k] / MM, errors.high[k] / MM
-        found.append(
-            TargetException(k, place, reason, bool(corrected[at]), *map(float, sizes))
-        )
-    return found
+    return tuple(map(program.describe, rows.tolist()))
 
 
 @dataclass(frozen=True)
@@ -213,22 +230,19 @@ def _against(check: ToleranceCheck, targets: int) -> str:
     )
 
 
-def headline(outcome: Outcome) -> Headline | None:
-    """Put the verdict into figures; None where the errors are not known."""
-    errors = outcome.expected
-    if errors is None:
-        return None
-    corrected = outcome.decisions.status == Status.CORRECTED
+def headline(program: ProgramErrors) -> Headline:
+    """Put the verdict into figures."""
+    errors = program.expected
     known = np.flatnonzero(errors.known)
     sizes, worst = np.full(4, np.nan), None
     if len(known):
         before, after = errors.before[known], errors.after[known]
         most = errors.high[known].max()
         sizes = np.array([before.mean(), after.mean(), np.median(after), most]) / MM
-        (worst,) = describe_targets(outcome, errors, known[[np.argmax(after)]])
+        worst = program.describe(int(known[np.argmax(after)]))
     return Headline(
         targets=int(errors.judged.sum()),
-        corrected=int((corrected & errors.judged).sum()),
+        corrected=int((program.corrected & errors.judged).sum()),
         unknown=int(errors.unknown.sum()),
         before_mm=float(sizes[0]),
         after_mm=float(sizes[1]),

@@ -49,6 +49,7 @@ if TYPE_CHECKING:  # it loads all of the planning, which a record does not want
     from postproc.arrays import DataFrame
     from postproc.compensation.arrivals import ArrivalStates
     from postproc.compensation.expected_error import ExpectedErrors
+    from postproc.compensation.headline import ProgramErrors
     from postproc.compensation.timing_comparison import InTime
     from postproc.compensation.tolerance import JobTolerance, ToleranceCheck
     from postproc.verify.opinion import Opinion
@@ -274,6 +275,25 @@ class Outcome:
         record = replace(self.record, tolerance=found.to_record())
         return replace(self, tolerance=found, record=record)
 
+    @property
+    def errors(self) -> ProgramErrors | None:
+        """What is known of its expected errors; None where nobody knows."""
+        if self.expected is None:
+            return None
+        from postproc.compensation.headline import ProgramErrors
+
+        d = self.decisions
+        return ProgramErrors(
+            visits=self.visits,
+            corrected=np.asarray(d.status == Status.CORRECTED),
+            kept=np.isin(d.status, LEFT_ALONE),
+            why=d.why,
+            reasons=d.reasons,
+            side=d.side,
+            expected=self.expected,
+            tolerance=self.tolerance,
+        )
+
     def summary(self) -> str:
         """Say what came of the program, the worst first."""
         from postproc.compensation.headline import headline
@@ -282,10 +302,13 @@ class Outcome:
         counts = ", ".join(
             f"{d.count(s)} {s.name.lower()}" for s in Status if d.count(s)
         )
-        found = headline(self)
+        errors = self.errors
+        lines: list[str] = []
         parts = [f"{len(d.status)} visits ({counts or 'no targets'})"]
-        parts += [] if found is None else [str(found)]
-        lines = [] if found is None or not found.first else [found.first]
+        if errors is not None:
+            found = headline(errors)
+            parts.append(str(found))
+            lines += filter(None, [found.first])
         if self.before.n:
             parts.append(f"residual of the correction {self.after.max_mm:.4f} mm")
         lines.append(f"{self.program}: {'; '.join(filter(None, parts))}")
@@ -323,7 +346,7 @@ def largest_motion(departure: Floats) -> dict[str, float]:
     }
 
 
-def judged_visits(visits: Visits, decisions: Decisions) -> Bools:
+def find_judged(visits: Visits, decisions: Decisions) -> Bools:
     """Return which visits have a target that they can miss, (n,)."""
     changed = decisions.status != Status.UNCHANGED
     return np.asarray(changed | (visits.literal >= 0))

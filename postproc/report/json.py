@@ -63,7 +63,7 @@ def report_pieces(outcome: Outcome) -> Iterator[bytes]:
             if outcome.opinion is None
             else {"second_opinion": outcome.opinion.to_dict()}
         ),
-        **expected_of(outcome),
+        **error_summary_of(outcome),
         **tolerance_of(outcome),
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
         "stages_s": dict(outcome.stages),
@@ -71,11 +71,11 @@ def report_pieces(outcome: Outcome) -> Iterator[bytes]:
     yield ("],\n" + json.dumps(finite(tail))[1:] + "\n").encode()
 
 
-def expected_of(outcome: Outcome) -> dict[str, Any]:
+def error_summary_of(outcome: Outcome) -> dict[str, Any]:
     """Describe the expected true errors."""
-    from postproc.report.tolerance import expected_json
+    from postproc.report.tolerance import describe_errors
 
-    return expected_json(outcome)
+    return describe_errors(outcome)
 
 
 def tolerance_of(outcome: Outcome) -> dict[str, object]:
@@ -149,7 +149,7 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
         "std_error_mm": [_format_rows(d.std_error[rows] / MM, 5)],
         **({} if told is None else {"share_mm": _shares(told, rows)}),
         **({} if told is None else _free(told, rows)),
-        **_expected(outcome, rows),
+        **_errors(outcome, rows),
         **_speed(outcome, rows),
     }
 
@@ -159,7 +159,7 @@ def _quote(name: str) -> str:
     return encode_basestring_ascii(name) if name else "null"
 
 
-def _expected(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
+def _errors(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
     """Write the expected true error before and after, and its 95 % bound."""
     errors = outcome.expected
     if errors is None:

@@ -9,7 +9,6 @@ import numpy as np
 
 from postproc.compensation.headline import (
     TargetException,
-    count_exceptions,
     headline,
     list_exceptions,
 )
@@ -38,10 +37,13 @@ def describe_verdict(check: ToleranceCheck) -> str:
 
 
 def _list_worst(outcome: Outcome, check: ToleranceCheck) -> Iterator[str]:
-    for one in list_exceptions(outcome, WORST):
+    errors = outcome.errors
+    if errors is None:
+        return
+    for one in list_exceptions(errors, WORST):
         word = WORDS[Verdict(check.verdict[one.row])]
         yield f"  {one.place}: {word}, {one.size()}{one.why()}"
-    if (more := count_exceptions(outcome) - WORST) > 0:
+    if (more := int(errors.exceptional().sum()) - WORST) > 0:
         yield f"  and {more} more"
 
 
@@ -62,15 +64,16 @@ def tolerance_json(check: ToleranceCheck) -> dict[str, Any]:
     }
 
 
-def expected_json(outcome: Outcome) -> dict[str, Any]:
+def describe_errors(outcome: Outcome) -> dict[str, Any]:
     """Describe the expected true errors and the exceptions; lengths in mm.
 
     The key is left out where they are not known.
     """
-    found = headline(outcome)
-    if found is None:
+    errors = outcome.errors
+    if errors is None:
         return {}
-    exceptions = [describe_exception(one) for one in list_exceptions(outcome, MOST)]
+    found = headline(errors)
+    exceptions = [describe_exception(one) for one in list_exceptions(errors, MOST)]
     figures = {
         "before_mm": found.before_mm,
         "after_mm": found.after_mm,
@@ -86,7 +89,7 @@ def expected_json(outcome: Outcome) -> dict[str, Any]:
             "corrected": found.corrected,
             "unknown": found.unknown,
             **{name: round(size, 5) for name, size in figures.items()},
-            "exceptions_count": count_exceptions(outcome),
+            "exceptions_count": int(errors.exceptional().sum()),
             "exceptions": exceptions,
         }
     }

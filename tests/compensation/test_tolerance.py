@@ -12,7 +12,7 @@ from scipy.stats import chi, ncx2
 from postproc.compensation.expected_error import (
     LengthLaw,
     expect_errors,
-    mixed_quantile,
+    pool_quantile,
 )
 from postproc.compensation.tolerance import JobTolerance, Verdict, check_tolerance
 from postproc.exceptions import PostprocError
@@ -62,7 +62,7 @@ def test_the_law_of_lengths_is_that_of_drawn_errors():
     )
     at = np.quantile(drawn, 0.9, axis=1)
     assert law.beyond(at) == pytest.approx(np.full(40, 0.1), abs=0.01)
-    whole = mixed_quantile(law.at_nodes())
+    whole = pool_quantile(law.at_nodes())
     assert whole == pytest.approx(np.quantile(drawn, 0.95), rel=0.03)
 
 

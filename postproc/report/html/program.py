@@ -17,7 +17,7 @@ from postproc.language.visits import Meaning
 from postproc.report.head import ReportHead
 from postproc.report.html.distribution import distribution
 from postproc.report.html.page import render, short, visible
-from postproc.report.json import JOINTS, expected_of, finite, in_time_of
+from postproc.report.json import JOINTS, error_summary_of, finite, in_time_of
 from postproc.report.second_opinion import opinion_table
 from postproc.report.tolerance import ALL_WORDS, tolerance_json
 from postproc.robot.pose import MM
@@ -185,14 +185,14 @@ def columns_of(outcome: Outcome) -> PageColumns:
         position_mm=position,
         correction_mm=d.correction / MM,
         std_mm=d.std_error / MM,
-        expected_mm=_expected(outcome),
+        expected_mm=_stack_errors(outcome),
         verdict=np.full(n, len(ALL_WORDS))
         if outcome.tolerance is None
         else np.asarray(outcome.tolerance.verdict, dtype=np.int64),
     )
 
 
-def _expected(outcome: Outcome) -> Floats:
+def _stack_errors(outcome: Outcome) -> Floats:
     """Stack expected errors and their bounds, (n, 3) [mm]."""
     errors = outcome.expected
     if errors is None:
@@ -642,7 +642,7 @@ def program_report(outcome: Outcome, sources: Mapping[str, bytes] | None = None)
         in_time=in_time_of(outcome),
         opinion=outcome.opinion,
         head=ReportHead.of_outcome(outcome),
-        expected=expected_of(outcome).get("expected", {}),
+        expected=error_summary_of(outcome).get("expected", {}),
         tolerance={}
         if outcome.tolerance is None
         else tolerance_json(outcome.tolerance),
