@@ -582,6 +582,7 @@ def load_cell(
 CHANGEABLE: Mapping[str, type[Strict]] = {
     "compensation": CompensationSection,
     "environment": EnvironmentSection,
+    "job": JobSection,
     "measurements": MeasurementSection,
     "payload": PayloadSection,
     "simulation": SimulationSection,
