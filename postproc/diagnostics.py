@@ -795,6 +795,12 @@ class Code(StrEnum):
         "The file was written with another model than the current one.",
         "Compensate it again.",
     )
+    TOLERANCE_MISSED = (
+        "tolerance-missed",
+        ERROR,
+        "Targets of the program do not pass the tolerance of the job.",
+        "Look at each in the report; correct the cause, or widen the tolerance.",
+    )
     MIXED_MODELS = (
         "mixed-models",
         ERROR,

@@ -59,6 +59,32 @@ def study(seed: int, folder: Path) -> tuple[np.ndarray, np.ndarray]:
     return error[known], bound[known]
 
 
+def report_share(name: str, within: np.ndarray) -> None:
+    """Print how many of some targets are within their bounds."""
+    share = f"{100 * within.mean():.1f} %" if len(within) else "none"
+    print(f"{name}: {share} of {len(within)} within")
+
+
+def report_coverage(error: np.ndarray, bound: np.ndarray) -> None:
+    """Print the coverage of all targets, by quartile of the bound, and of passes."""
+    report_share("all", error <= bound)
+    quartile = np.searchsorted(np.quantile(bound, [0.25, 0.5, 0.75]), bound)
+    for k in range(4):
+        own = quartile == k
+        low, high = bound[own].min(), bound[own].max()
+        name = f"quartile {k + 1}, bound {low:.3f} to {high:.3f} mm"
+        report_share(name, (error <= bound)[own])
+    for tolerance in TOLERANCES:
+        passes, near = bound <= tolerance, np.abs(bound / tolerance - 1.0) <= 0.1
+        told = []
+        for own in (passes, passes & near):
+            beyond = 100 * (error[own] > tolerance).mean() if own.any() else np.nan
+            told.append(f"{own.sum()} ({beyond:.2f} % of them outside)")
+        print(
+            f"{tolerance} mm: pass {told[0]}, with a bound within 10 % of it {told[1]}"
+        )
+
+
 def main() -> None:
     """Print one line an arm, then the coverage and the targets that pass."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -75,12 +101,7 @@ def main() -> None:
               f"{bound.mean():.4f} |", flush=True)  # fmt: skip
         errors.append(error)
         bounds.append(bound)
-    error, bound = np.concatenate(errors), np.concatenate(bounds)
-    print(f"all: {100 * (error <= bound).mean():.1f} % of {len(error)} within")
-    for tolerance in TOLERANCES:
-        own = error[bound <= tolerance]
-        beyond = 100 * (own > tolerance).mean() if len(own) else np.nan
-        print(f"{tolerance} mm: {len(own)} pass, {beyond:.2f} % of them are outside")
+    report_coverage(np.concatenate(errors), np.concatenate(bounds))
 
 
 if __name__ == "__main__":

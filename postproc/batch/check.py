@@ -30,7 +30,7 @@ from postproc.files import (
     schema,
 )
 from postproc.language.languages import file_named
-from postproc.language.stamp import read_stamp
+from postproc.language.stamp import Stamp, read_stamp
 from postproc.language.visits import line_ranges
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import load_cell
@@ -302,6 +302,7 @@ class _Look:
             yield CheckFinding(place, Code.NO_RECORD, str(exc))
             return
         yield from self._model(place, sidecar)
+        yield from _find_missed(place, sidecar)
         if self.assume_motion:
             for file, line, message in sidecar.assumed:
                 text = f"line {line} of {file}: {message}; compensate it with "
@@ -336,7 +337,7 @@ class _Look:
             yield CheckFinding(
                 place, Code.CHANGED, "was changed after it was compensated"
             )
-        elif stamp is None or not _agree(stamp.source, stamp.model, record, sidecar):
+        elif not _is_stamp_right(stamp, record, sidecar):
             yield CheckFinding(
                 place, Code.NO_RECORD, "its stamp is not that of its record"
             )
@@ -355,6 +356,19 @@ class _Look:
         elif sha256(read_input(path)) != digest:
             text = "its source has changed since: compensate it again"
             yield CheckFinding(place, Code.SOURCE_CHANGED, text)
+
+
+def _find_missed(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
+    """Find targets that do not pass the tolerance that they were held against."""
+    counts = {name: int(sidecar.tolerance.get(name, 0)) for name in ("fail", "unknown")}
+    if any(counts.values()):
+        sizes = sidecar.tolerance.get("tolerance_mm", ())
+        size = " to ".join(f"{float(size):g}" for size in sizes)
+        text = (
+            f"{counts['fail']} targets fail and {counts['unknown']} are not known "
+            f"against a tolerance of {size} mm. Look at each in the report"
+        )
+        yield CheckFinding(place, Code.TOLERANCE_MISSED, text)
 
 
 def _find_uncorrected(
@@ -387,6 +401,11 @@ def _by_reason(rows: list[tuple[str, int, int]], told: Mapping[str, Any]) -> str
     )
 
 
-def _agree(source: str, model: str, record: FileRecord, sidecar: Sidecar) -> bool:
-    """Tell whether a stamp and a record say the same."""
-    return (source, model) == (record.source_sha256, sidecar.model)
+def _is_stamp_right(stamp: Stamp | None, record: FileRecord, sidecar: Sidecar) -> bool:
+    """Return True if a stamp and a record say the same.
+
+    A program in which nothing was corrected has no stamp.
+    """
+    if stamp is None:
+        return record.source_sha256 == record.output_sha256
+    return (stamp.source, stamp.model) == (record.source_sha256, sidecar.model)

@@ -23,6 +23,7 @@ from postproc.robot.cell import (
     ArmNumber,
     Cell,
     FrameSection,
+    JobSection,
     LimitSection,
     MotionSection,
     load_cell,
@@ -57,6 +58,8 @@ class JobSetup:
         cell = _in_first_words(self.cell.file.model_dump(mode="json"))
         if self.cell.file.motion == MotionSection():
             del cell["motion"]
+        if self.cell.file.job == JobSection():
+            del cell["job"]
         parts = {
             "version": __version__,
             "cell": cell,

@@ -26,9 +26,11 @@ import numpy as np
 
 from postproc import __version__
 from postproc.batch.plan import JobSetup, Result, Task, Unit, make_failure
+from postproc.compensation.headline import headline
 from postproc.compensation.micro_batch import Given, compensate_batch
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.sidecar import SUFFIX
+from postproc.compensation.tolerance import JobTolerance
 from postproc.exceptions import PostprocError
 from postproc.language.languages import file_named
 from postproc.operating_system import end_with_parent, start_worker_server
@@ -233,7 +235,12 @@ def outcomes_of(tasks: Sequence[Task], setup: JobSetup) -> list[Outcome | Except
     """Compensate the programs of tasks; what fails for all of them is told of each."""
     given = [_name_files(task) for task in tasks]
     try:
-        return compensate_batch(given, setup.cell, setup.model, setup.options)
+        found = compensate_batch(given, setup.cell, setup.model, setup.options)
+        wanted = JobTolerance.of_cell(setup.cell)
+        return [
+            one.with_tolerance(wanted) if isinstance(one, Outcome) else one
+            for one in found
+        ]
     except Exception as exc:
         return [exc for _ in tasks]
 
@@ -309,7 +316,25 @@ def facts_of(outcome: Outcome) -> dict[str, Any]:
         "largest_mm": _largest(outcome),
         "before_mm": _figures(asdict(outcome.before)),
         "after_mm": _figures(asdict(outcome.after)),
+        **_error_facts(outcome),
     }
+
+
+def _error_facts(outcome: Outcome) -> dict[str, Any]:
+    """Sum up the expected true errors, and the verdict against a tolerance."""
+    if outcome.errors is None:
+        return {}
+    found = headline(outcome.errors)
+    worst = None if found.worst is None else found.worst.expected_mm
+    figures = {
+        "before": found.before_mm,
+        "after": found.after_mm,
+        "below_95": found.below_mm,
+        "largest": np.nan if worst is None else worst,
+    }
+    check = outcome.tolerance
+    facts: dict[str, Any] = {} if check is None else {"tolerance": check.to_record()}
+    return {"expected_mm": _figures(figures), "worst": found.first, **facts}
 
 
 def _largest(outcome: Outcome) -> float | None:

@@ -111,7 +111,8 @@ def compensate(
         typer.Option(
             "--tolerance",
             metavar="MM",
-            help="Exit 0 only if every target is expected within it.",
+            help="Exit 0 only if every target is expected within it. Default: the "
+            "cell's, job.tolerance_mm.",
         ),
     ] = None,
     changes: SetOption = None,
@@ -128,6 +129,7 @@ def compensate(
     from postproc.compensation.compensate import compensate as run
     from postproc.compensation.options import Options
     from postproc.compensation.program_files import ProgramFiles
+    from postproc.compensation.tolerance import JobTolerance
     from postproc.model.model import as_model
     from postproc.report.json import report_text
     from postproc.robot.cell import load_cell
@@ -143,6 +145,7 @@ def compensate(
         place = None if output is not None else _project_place(given)
         asked = changes_of(changes, orientation, shared_points, path_tolerance)
         loaded = load_cell(cell, changes=asked)
+        wanted = JobTolerance.of_cell(loaded, tolerance)
         options = Options(timing=loaded.compensation.timing)
         fitted = as_model(model, loaded.arm)
         files = ProgramFiles.open(program, variables)
@@ -154,7 +157,7 @@ def compensate(
                 files, loaded, fitted, options=options, progress=progress,
                 processes=crowd,
             )  # fmt: skip
-        outcome = outcome.with_tolerance(tolerance)
+        outcome = outcome.with_tolerance(wanted)
         if strict and outcome.exit_code:
             _print_outcome(outcome, every)
             raise PostprocError(f"--strict: {_why_nothing(outcome)}")

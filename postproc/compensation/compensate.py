@@ -11,6 +11,7 @@ import numpy as np
 from postproc.arrays import release_memory
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.base_frame_check import check_base
+from postproc.compensation.expected_error import expect_errors
 from postproc.compensation.findings import (
     controller_unknown,
     flank_steps,
@@ -37,6 +38,7 @@ from postproc.compensation.options import (
 )
 from postproc.compensation.outcome import (
     Outcome,
+    find_judged,
     largest_motion,
     list_uncorrected_elsewhere,
     tell_arrivals,
@@ -281,6 +283,7 @@ def report(
         setting: What it was compensated with.
     """
     kept, output, visits = draft.kept, draft.output, reading.visits
+    arrivals = _arrivals(visits, kept, setting)
     off = (
         report_controller_assumption(name, setting.cell),
         *controller_unknown(name, setting.cell),
@@ -299,7 +302,10 @@ def report(
         motion=largest_motion(kept.departure),
         position=kept.position,
         sources={source.name: source.data for source, _ in reading.originals},
-        arrivals=_arrivals(visits, kept, setting),
+        arrivals=arrivals,
+        expected=expect_errors(
+            arrivals, kept.decisions.correction, find_judged(visits, kept.decisions)
+        ),
         in_time=draft.in_time,
     )
 
@@ -349,10 +355,8 @@ def _findings(
     )
 
 
-def _arrivals(visits: Visits, kept: WindowResult, setting: Job) -> ArrivalStates | None:
-    """Say what every visit is corrected for, None where nobody explains it."""
-    if len(kept.travel) < len(visits):
-        return None
+def _arrivals(visits: Visits, kept: WindowResult, setting: Job) -> ArrivalStates:
+    """Describe the states that the visits are corrected for."""
     return ArrivalStates(
         visits,
         q=kept.decisions.q,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -205,8 +205,8 @@ def explain(
     given = program_files(program, name, variables, pages)
     cell = as_cell(cell)
     if model is not None:
-        fitted, told = as_model(model, cell.arm), replace(options, explained=True)
-        return Explanation.of_outcome(compensate_files(given, cell, fitted, told))
+        fitted = as_model(model, cell.arm)
+        return Explanation.of_outcome(compensate_files(given, cell, fitted, options))
     cell = assuming(cell, options)
     reading = read_program(given.by_name, cell)
     return Explanation.of_plan(reading, plan_visits(reading.visits, cell))

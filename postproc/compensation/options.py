@@ -35,7 +35,6 @@ class Options:
 
     Attributes:
         temperature: Arm temperature [deg C]; default: the cell's.
-        explained: Keep what explains every target, of long programs too.
         timing: Plan the program in time, before and after; None: if it is no longer
             than `IN_TIME`. Where neither this nor the cell says so, it is not.
 
@@ -47,7 +46,6 @@ class Options:
     temperature: float | None = None
     orientation: bool = AS_IN_CELL
     assume_motion: bool = AS_IN_CELL
-    explained: bool = False
     timing: bool | None = AS_IN_CELL
     path_tolerance_mm: float | None = AS_IN_CELL
     max_inserted: int = AS_IN_CELL
@@ -91,7 +89,7 @@ class Options:
     def to_dict(self) -> dict[str, object]:
         """Return them for a record: what is rarely asked for only if it is."""
         said = asdict(self)
-        del said["explained"], said["timing"]  # they change no output
+        del said["timing"]  # it changes no output
         if not self.assume_motion:
             del said["assume_motion"]
         if self.path_tolerance_mm is None:

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, Indices, Ints, Signs, columns_of, data_frame
+from postproc.arrays import (
+    Bools,
+    Floats,
+    Indices,
+    Ints,
+    Signs,
+    columns_of,
+    data_frame,
+)
 from postproc.compensation.sidecar import (
     LeftLine,
     Sidecar,
@@ -40,8 +48,10 @@ from postproc.robot.pose import MM
 if TYPE_CHECKING:  # it loads all of the planning, which a record does not want
     from postproc.arrays import DataFrame
     from postproc.compensation.arrivals import ArrivalStates
+    from postproc.compensation.expected_error import ExpectedErrors
+    from postproc.compensation.headline import ProgramErrors
     from postproc.compensation.timing_comparison import InTime
-    from postproc.compensation.tolerance import ToleranceCheck
+    from postproc.compensation.tolerance import JobTolerance, ToleranceCheck
     from postproc.verify.opinion import Opinion
 
 # What came of a program: every visit with its status, and the exit code.
@@ -115,7 +125,8 @@ class Outcome:
         record: What `restore` needs.
         visits: What was found in the program.
         decisions: What was decided for every visit.
-        before, after: Predicted error on the visits that could be compensated.
+        before, after: Predicted error on the visits that could be compensated. After
+            is the residual of the correction: what the arm will miss is `expected`.
         diagnostics: What else was found, in order of line.
         stages: Seconds spent in every stage, by all processes together.
         motion: The largest change on the ways between targets: ``joint_deg``,
@@ -125,6 +136,7 @@ class Outcome:
         sources: The bytes of the source files by name, for showing lines.
         arrivals: The states that the visits are corrected for, with the shares of the
             effects in their errors; None where nobody knows.
+        expected: Their expected true errors; None likewise.
         in_time: The program run in time, before and after; None where nobody asked.
         opinion: A second opinion on it; None where nobody asked.
         tolerance: Expected true errors against a tolerance; None where nobody asked.
@@ -145,6 +157,7 @@ class Outcome:
     position: Floats = field(default_factory=lambda: np.empty((0, 3)))
     sources: Mapping[str, bytes] = field(default_factory=dict)
     arrivals: ArrivalStates | None = None
+    expected: ExpectedErrors | None = None
     in_time: InTime | None = None
     opinion: Opinion | None = None
     tolerance: ToleranceCheck | None = None
@@ -246,38 +259,60 @@ class Outcome:
         missed |= bool(np.array(far)[self.decisions.why].any())
         return NOT_ALL if missed or np.isin(self.decisions.status, left).any() else DONE
 
-    def with_tolerance(self, tolerance_mm: float | None) -> Outcome:
+    def with_tolerance(self, tolerance: JobTolerance | None) -> Outcome:
         """Judge every visit by its expected true error, see `check_tolerance`.
 
         Raises:
-            PostprocError: The tolerance is no positive number, or how the arm arrives
-                is not known.
+            PostprocError: How the arm arrives is not known.
         """
-        if tolerance_mm is None:
+        if tolerance is None:
             return self
         from postproc.compensation.tolerance import check_tolerance
 
-        if self.arrivals is None:
+        if self.expected is None:
             raise PostprocError("--tolerance: how the arm arrives is not known")
+        found = check_tolerance(self.expected, tolerance.of_visits(self.visits))
+        record = replace(self.record, tolerance=found.to_record())
+        return replace(self, tolerance=found, record=record)
+
+    @property
+    def errors(self) -> ProgramErrors | None:
+        """What is known of its expected errors; None where nobody knows."""
+        if self.expected is None:
+            return None
+        from postproc.compensation.headline import ProgramErrors
+
         d = self.decisions
-        judged = (d.status != Status.UNCHANGED) | (self.visits.literal >= 0)
-        found = check_tolerance(self.arrivals, d.correction, judged, tolerance_mm)
-        return replace(self, tolerance=found)
+        return ProgramErrors(
+            visits=self.visits,
+            corrected=np.asarray(d.status == Status.CORRECTED),
+            kept=np.isin(d.status, LEFT_ALONE),
+            why=d.why,
+            reasons=d.reasons,
+            side=d.side,
+            expected=self.expected,
+            tolerance=self.tolerance,
+        )
 
     def summary(self) -> str:
-        """Say in one line what came of the program."""
+        """Say what came of the program, the worst first."""
+        from postproc.compensation.headline import headline
+
         d = self.decisions
         counts = ", ".join(
             f"{d.count(s)} {s.name.lower()}" for s in Status if d.count(s)
         )
-        line = f"{self.program}: {len(d.status)} visits ({counts or 'no targets'})"
+        errors = self.errors
+        lines: list[str] = []
+        parts = [f"{len(d.status)} visits ({counts or 'no targets'})"]
+        if errors is not None:
+            found = headline(errors)
+            parts.append(str(found))
+            lines += filter(None, [found.first])
         if self.before.n:
-            line += (
-                f"; predicted error mean {self.before.mean_mm:.3f} -> "
-                f"{self.after.mean_mm:.3f} mm, max {self.before.max_mm:.3f} -> "
-                f"{self.after.max_mm:.3f} mm"
-            )
-        return line
+            parts.append(f"residual of the correction {self.after.max_mm:.4f} mm")
+        lines.append(f"{self.program}: {'; '.join(filter(None, parts))}")
+        return "\n".join(lines)
 
     def list_uncorrected_rows(self) -> list[int]:
         """Return the visits that kept their value although they hold a target."""
@@ -309,6 +344,12 @@ def largest_motion(departure: Floats) -> dict[str, float]:
         "wrist_centre_mm": float(wrist),
         "tcp_mm": float(tcp),
     }
+
+
+def find_judged(visits: Visits, decisions: Decisions) -> Bools:
+    """Return which visits have a target that they can miss, (n,)."""
+    changed = decisions.status != Status.UNCHANGED
+    return np.asarray(changed | (visits.literal >= 0))
 
 
 # What came of the targets on every line: kept beside an output, told by `diff`.

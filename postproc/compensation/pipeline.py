@@ -44,7 +44,6 @@ from postproc.compensation.options import (
     Job,
 )
 from postproc.compensation.outcome import (
-    SHARED,
     Decisions,
     Status,
 )
@@ -92,9 +91,8 @@ class WindowResult:
         overruled: The path does not follow the configuration string, and nobody said
             that it must, (n,).
         untimed: No time law was found, (n,).
-        travel: Of every joint since its last reversal, (n, 6) [rad]; empty where
-            nobody explains it.
-        speed: Of the TCP, (n,) [m/s], NaN where nobody asked; likewise.
+        travel: Of every joint since its last reversal, (n, 6) [rad].
+        speed: Of the TCP, (n,) [m/s], NaN where nobody asked.
         departure: Largest change on the way to every visit of a joint [rad], elbow,
             wrist centre and TCP [m], (n, 4), NaN where not known; of a part its
             largest, one row.
@@ -114,13 +112,12 @@ class WindowResult:
     speed: Floats
     departure: Floats
 
-    def part(self, visits: Visits, own: slice, explained: bool) -> WindowResult:
+    def part(self, visits: Visits, own: slice) -> WindowResult:
         """Keep some of these visits, which share no number with the others.
 
         Args:
             visits: All visits.
             own: Those to keep.
-            explained: Keep what explains them as well.
         """
         moved = np.flatnonzero(self.corrected)
         rows = slice(*np.searchsorted(moved, [own.start, own.stop]).tolist())
@@ -137,10 +134,9 @@ class WindowResult:
             before=self.before[rows], after=self.after[rows],
             decisions=self.decisions.part(own),
             departure=np.fmax.reduce(self.departure[own], axis=0, keepdims=True),
-            **{name: np.array(getattr(self, name)[own]) for name in BY_VISIT},
             **{
-                name: np.array(getattr(self, name)[own if explained else slice(0)])
-                for name in EXPLAINING
+                name: np.array(getattr(self, name)[own])
+                for name in (*BY_VISIT, *EXPLAINING)
             },
         )  # fmt: skip
 
@@ -401,10 +397,9 @@ class _WindowWork:
             part, setting, lead, arrived, doubtful, trail
         )
         at, rows = after - own.begin, own.rows(after, own.end)
-        explained = setting.options.explained or len(self.quiet) <= SHARED
         return Corrected(
             window=own,
-            kept=kept.part(visits, own.own, explained),
+            kept=kept.part(visits, own.own),
             trail=trail,
             left=kept.rows(trail.left),
             right=kept.rows(trail.right),

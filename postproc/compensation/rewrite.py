@@ -41,7 +41,7 @@ class Output:
 
     Attributes:
         files: All files of the program by name, the program first.
-        stamps: Where those that changed are stamped.
+        stamps: Where those that changed are stamped; `NO_STAMP` where nothing did.
         edits: Numbers that were changed in every file, in the order of the files.
     """
 
@@ -85,13 +85,16 @@ class Output:
         return Sidecar(__version__, model, records, options)
 
 
+NO_STAMP = Span(0, 0)
+
+
 def write_edits(
     reading: ParsedProgram, edits: tuple[Replacements, ...], model: str
 ) -> Output:
     """Make edits of numbers, file by file.
 
-    A file is stamped when it changes; the program also when nothing changes at all, so
-    that it shows that it was looked at.
+    A file is stamped when it changes. Where nothing changes at all, nothing is stamped:
+    the program has an empty stamp, with which the record speaks of it.
 
     Args:
         reading: The program.
@@ -103,7 +106,9 @@ def write_edits(
     comment = language_of(reading.sources[0].name).comment
     for number, (source, own) in enumerate(all_edits(reading, edits)):
         files[source.name] = source.data
-        if own or (number == 0 and nothing):
+        if number == 0 and nothing:
+            stamps[source.name] = NO_STAMP
+        if own:
             stamp = stamp_line(__version__, model, source, comment)
             at = stamp_place(source.data)
             text = memoryview(apply(source.data, own))  # its header is as it was
@@ -128,8 +133,8 @@ def record(
     targets: Mapping[str, object],
 ) -> FileRecord:
     """Record how an output differs from its source, in the output's offsets."""
-    stamped = Replacements.of([Edit(stamp, b"")])
     length = stamp.end - stamp.start
+    stamped = Replacements.of([Edit(stamp, b"")] if length else [])
     undone = Replacements.join([stamped, edits.invert(source.data, length)])
     checksums = block_checksums(output)
     return FileRecord(sha256(source.data), sha256(output), checksums, undone, targets)

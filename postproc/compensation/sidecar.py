@@ -149,6 +149,8 @@ class Sidecar:
             that are not understood.
         assumed: routines that were assumed motionless because the shipped list says so:
             where the first call of each stands, and its message.
+        tolerance: How many targets pass which tolerance, as
+            `ToleranceCheck.to_record` writes it; empty where nobody asked.
     """
 
     version: str
@@ -157,6 +159,7 @@ class Sidecar:
     options: Mapping[str, Any] = field(default_factory=dict)
     left: tuple[LeftLine, ...] = ()
     assumed: tuple[AssumedLine, ...] = ()
+    tolerance: Mapping[str, Any] = field(default_factory=dict)
 
     def list_uncorrected_in(self, name: str) -> tuple[LeftLine, ...]:
         """Return what was left in a file, beside what its own record tells."""
@@ -168,6 +171,7 @@ class Sidecar:
         left = [(file, line, why.text, why.name) for file, line, why in self.left]
         head |= {"uncorrected": left} if left else {}
         head |= {"assumed": self.assumed} if self.assumed else {}
+        head |= {"tolerance": dict(self.tolerance)} if self.tolerance else {}
         head["options"] = dict(self.options)
         yield (json.dumps(head)[:-1] + ', "files": {').encode()
         for number, (name, record) in enumerate(self.files.items()):
@@ -243,7 +247,8 @@ def _record(path: Path, text: bytes) -> Sidecar:
         assumed = tuple(
             (str(f), int(n), str(text)) for f, n, text in data.get("assumed", ())
         )
-        return Sidecar(version, model, files, data.get("options", {}), left, assumed)
+        options, tolerance = data.get("options", {}), dict(data.get("tolerance", {}))
+        return Sidecar(version, model, files, options, left, assumed, tolerance)
     except (
         *(ValueError, KeyError, TypeError, AttributeError),
         *(RecursionError, OverflowError),

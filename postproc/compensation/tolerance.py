@@ -1,27 +1,79 @@
-"""The expected true error of every target, against a tolerance.
-
-The error of an arrival is e = m + c + d: m is what the model predicts, c the
-correction that was applied, and d is normal with the standard error of the model, what
-is left of the model, and repeatability. The length of e is judged by its quantiles.
-Errors of the part and of the frames are not in it.
-"""
+"""The expected true error of every target, against a tolerance."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import IntEnum
+from fnmatch import fnmatchcase
 from functools import cache
+from typing import Any
 
 import numpy as np
+from scipy.special import ndtri
 
-from postproc.arrays import Bools, Floats, Signs, chunks
-from postproc.compensation.arrivals import ArrivalStates
+from postproc.arrays import Floats, Signs, chunks
+from postproc.compensation.expected_error import ExpectedErrors
 from postproc.exceptions import PostprocError
+from postproc.language.visits import Visits
+from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, lengths
 
-LOW, HIGH = 5.0, 95.0  # bounds of the length of the error [%]
+LOW = 5.0  # the other bound of the length of the error [%]
 DRAWS = 1024  # of a normal error, the same for every target
 AT_ONCE = 1_000  # visits
+GOLDEN = 1.2207440846057596  # x^4 = x + 1: its powers fill a cube evenly
+
+
+@dataclass(frozen=True)
+class JobTolerance:
+    """The largest true error that the targets of a job may have.
+
+    Attributes:
+        default_mm: Of targets that no pattern names.
+        patterns: Tolerances [mm] by patterns of target names and of program files, such
+            as ``p_drill*`` and ``weld*.pdl``; the last one that fits counts.
+    """
+
+    default_mm: float
+    patterns: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no length.
+
+        Raises:
+            PostprocError: A tolerance is no positive number.
+        """
+        for name, size in {"--tolerance": self.default_mm, **self.patterns}.items():
+            if not 0.0 < size < np.inf:
+                raise PostprocError(f"{name} {size:g}: give a length in mm above 0")
+
+    @classmethod
+    def of_cell(cls, cell: Cell, given_mm: float | None = None) -> JobTolerance | None:
+        """Return the tolerance of [job], None without one.
+
+        Args:
+            cell: The cell.
+            given_mm: The tolerance of all targets for this run, instead.
+        """
+        if given_mm is not None:
+            return cls(given_mm)
+        job = cell.file.job
+        if job.tolerance_mm is None:
+            return None
+        return cls(job.tolerance_mm, job.tolerances_mm)
+
+    def of_visits(self, visits: Visits) -> Floats:
+        """Return the tolerance of every visit, (n,) [m]."""
+        found = np.full(len(visits), self.default_mm * MM)
+        for pattern, size in self.patterns.items():
+            for texts, index in (
+                (visits.names, visits.name),
+                (visits.files, visits.file),
+            ):
+                fits = [fnmatchcase(text.lower(), pattern.lower()) for text in texts]
+                found[np.array(fits, dtype=bool)[index]] = size * MM
+        return found
 
 
 class Verdict(IntEnum):
@@ -35,23 +87,20 @@ class Verdict(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class ToleranceCheck:
-    """Expected true errors of n visits; lengths in metres, NaN where not known.
+    """Expected true errors of n visits against tolerances; lengths in metres.
 
     Attributes:
-        tolerance: What they are held against.
+        errors: The expected errors.
+        tolerance: What each is held against, (n,).
         verdict: `Verdict` of every visit, (n,).
-        before: Expected length of the error without any correction, (n,).
-        expected: .. with the corrections that were made, (n,).
-        low, high: Its 5 % and 95 % bounds, (n,).
-        risk: Probability that it is beyond the tolerance, (n,).
+        low: The 5 % bound of the error's length, (n,), NaN where not known.
+        risk: Probability that it is beyond the tolerance, (n,), likewise.
     """
 
-    tolerance: float
+    errors: ExpectedErrors
+    tolerance: Floats
     verdict: Signs
-    before: Floats
-    expected: Floats
     low: Floats
-    high: Floats
     risk: Floats
 
     @property
@@ -63,6 +112,17 @@ class ToleranceCheck:
         """Count the visits of one verdict."""
         return int((self.verdict == verdict).sum())
 
+    def to_record(self) -> dict[str, Any]:
+        """Return what a record says of it."""
+        words = {v.name.lower(): self.count(v) for v in Verdict if v != Verdict.NONE}
+        return {"tolerance_mm": self.range_mm, **words}
+
+    @property
+    def range_mm(self) -> list[float]:
+        """Return the least and the largest tolerance, once where they are the same."""
+        own = np.round(self.tolerance / MM, 9)
+        return sorted({float(own.min()), float(own.max())}) if len(own) else []
+
     @property
     def outside(self) -> float:
         """How many visits of known error are expected beyond the tolerance.
@@ -73,54 +133,26 @@ class ToleranceCheck:
         return float(np.nansum(self.risk))
 
 
-def check_tolerance(
-    arrivals: ArrivalStates, correction: Floats, judged: Bools, tolerance_mm: float
-) -> ToleranceCheck:
+def check_tolerance(errors: ExpectedErrors, tolerance: Floats) -> ToleranceCheck:
     """Judge every visit by what it keeps of its error.
 
     Args:
-        arrivals: How the arm arrives at n visits.
-        correction: Change of their commanded TCP, base frame, (n, 3) [m]; zero where
-            nothing was corrected.
-        judged: Whether visits have a target that they can miss, (n,).
-        tolerance_mm: Largest length of the true error.
-
-    Raises:
-        PostprocError: The tolerance is no positive number.
+        errors: The expected errors of n visits.
+        tolerance: Largest length of each true error, (n,) [m].
     """
-    if not 0.0 < tolerance_mm < np.inf:
-        raise PostprocError(
-            f"--tolerance {tolerance_mm:g}: give a length in mm above 0"
-        )
-    n, tolerance = len(arrivals.visits), tolerance_mm * MM
-    found = arrivals.predict(np.arange(n))
-    error, std, outside = np.moveaxis(found, 1, 0)
-    known = judged & ~np.isnan(error + std + correction).any(axis=1)
-    kept = error + correction
-    columns = np.full((5, n), np.nan)
-    for rows in chunks(n, AT_ONCE):
-        size = _sizes(kept[rows], std[rows])
-        columns[0, rows] = _sizes(error[rows], std[rows]).mean(axis=1)
-        columns[1, rows] = size.mean(axis=1)
-        columns[2:4, rows] = np.percentile(size, [LOW, HIGH], axis=1)
-        columns[4, rows] = (size > tolerance).mean(axis=1)
-    columns[:, ~known] = np.nan
-    beyond = np.asarray(outside[:, 0] > 0.0)
-    verdict = _verdicts(columns[2], columns[3], tolerance, beyond)
-    verdict[~judged] = Verdict.NONE
-    return ToleranceCheck(tolerance, verdict, *columns)
-
-
-def _verdicts(low: Floats, high: Floats, tolerance: float, outside: Bools) -> Signs:
-    """Compare bounds with the tolerance.
-
-    Outside of what was surveyed nothing says how wide the bounds are: no visit passes
-    there.
-    """
-    verdict = np.full(len(low), Verdict.UNKNOWN, dtype=np.int8)
-    verdict[(high <= tolerance) & ~outside] = Verdict.PASS
+    known = errors.known
+    low = np.full(len(known), np.nan)
+    rows = np.flatnonzero(known)
+    for some in chunks(len(rows), AT_ONCE):
+        own = rows[some]
+        low[own] = np.percentile(_sizes(errors.mean[own], errors.std[own]), LOW, axis=1)
+    risk = np.where(known, errors.law.beyond(tolerance), np.nan)
+    # Outside of what was surveyed nothing says how wide the bounds are.
+    verdict = np.full(len(known), Verdict.UNKNOWN, dtype=np.int8)
+    verdict[(errors.high <= tolerance) & ~errors.outside] = Verdict.PASS
     verdict[low > tolerance] = Verdict.FAIL
-    return verdict
+    verdict[~errors.judged] = Verdict.NONE
+    return ToleranceCheck(errors, tolerance, verdict, low, risk)
 
 
 def _sizes(mean: Floats, std: Floats) -> Floats:
@@ -131,7 +163,5 @@ def _sizes(mean: Floats, std: Floats) -> Floats:
 @cache
 def _normal() -> Floats:
     """Return points that fill the normal distribution evenly, (DRAWS, 3)."""
-    from scipy.stats import norm, qmc  # slow to load
-
-    cube = qmc.Sobol(3, rng=np.random.default_rng(0)).random(DRAWS)
-    return np.asarray(norm.ppf(np.clip(cube, 1e-9, 1.0 - 1e-9)))
+    steps = np.arange(1, DRAWS + 1)[:, None] * GOLDEN ** -np.arange(1.0, 4.0)
+    return np.asarray(ndtri((0.5 + steps) % 1.0))

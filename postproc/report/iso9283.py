@@ -145,7 +145,7 @@ def iso_page(report: IsoReport) -> str:
         "iso9283.html.j2",
         "Figures after ISO 9283",
         {"figures": {}},
-        ("page.js", "figures.js"),
+        ("page.js", "sheets.js", "figures.js"),
         rows=list(report.rows),
         paired=report.before is not None,
         conditions=report.conditions,

@@ -25,6 +25,7 @@ from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.outcome import Outcome, Status
 from postproc.files import schema
 from postproc.language.visits import Meaning, Visits
+from postproc.report.head import ReportHead
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -53,6 +54,7 @@ def report_pieces(outcome: Outcome) -> Iterator[bytes]:
         yield b",\n" if rows.start else b"\n"
         yield _objects(outcome, np.arange(rows.start, rows.stop))
     tail = {
+        "head": ReportHead.of_outcome(outcome).to_json(),
         "predicted": {"before": asdict(outcome.before), "after": asdict(outcome.after)},
         "motion": {key: round(size, 5) for key, size in outcome.motion.items()},
         **in_time_of(outcome),
@@ -61,11 +63,19 @@ def report_pieces(outcome: Outcome) -> Iterator[bytes]:
             if outcome.opinion is None
             else {"second_opinion": outcome.opinion.to_dict()}
         ),
+        **error_summary_of(outcome),
         **tolerance_of(outcome),
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
         "stages_s": dict(outcome.stages),
     }
     yield ("],\n" + json.dumps(finite(tail))[1:] + "\n").encode()
+
+
+def error_summary_of(outcome: Outcome) -> dict[str, Any]:
+    """Describe the expected true errors."""
+    from postproc.report.tolerance import describe_errors
+
+    return describe_errors(outcome)
 
 
 def tolerance_of(outcome: Outcome) -> dict[str, object]:
@@ -139,6 +149,7 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
         "std_error_mm": [_format_rows(d.std_error[rows] / MM, 5)],
         **({} if told is None else {"share_mm": _shares(told, rows)}),
         **({} if told is None else _free(told, rows)),
+        **_errors(outcome, rows),
         **_speed(outcome, rows),
     }
 
@@ -146,6 +157,19 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
 def _quote(name: str) -> str:
     """Write a name as JSON, null where there is none."""
     return encode_basestring_ascii(name) if name else "null"
+
+
+def _errors(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
+    """Write the expected true error before and after, and its 95 % bound."""
+    errors = outcome.expected
+    if errors is None:
+        return {}
+    columns = {
+        "expected_before_mm": errors.before,
+        "expected_mm": errors.after,
+        "bound_95_mm": errors.high,
+    }
+    return {name: [format_fixed(x[rows] / MM, 5)] for name, x in columns.items()}
 
 
 def _speed(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:

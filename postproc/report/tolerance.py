@@ -7,77 +7,102 @@ from typing import Any
 
 import numpy as np
 
-from postproc.compensation.outcome import Outcome, Status
+from postproc.compensation.headline import (
+    TargetException,
+    headline,
+    list_exceptions,
+)
+from postproc.compensation.outcome import Outcome
 from postproc.compensation.tolerance import ToleranceCheck, Verdict
 from postproc.robot.pose import MM
 
 WORST = 10  # visits that are listed
+MOST = 1000  # .. in JSON
 WORDS = {Verdict.PASS: "pass", Verdict.FAIL: "fail", Verdict.UNKNOWN: "not known"}
 ALL_WORDS = {**WORDS, Verdict.NONE: "no target"}
+NOTE = "errors of the part and of its frame are not in these figures"
 
 
 def tell_tolerance(outcome: Outcome, check: ToleranceCheck) -> str:
     """Write the verdict, and the visits that do not pass, the worst first."""
-    counts = ", ".join(f"{check.count(one)} {word}" for one, word in WORDS.items())
-    lines = [
-        f"tolerance {check.tolerance / MM:g} mm: {counts}; "
-        f"{check.outside:.1f} expected outside",
-        _headline(outcome, check),
-        *_list_worst(outcome, check),
-        "errors of the part and of its frame are not in these figures",
-    ]
+    lines = [describe_verdict(check), *_list_worst(outcome, check), NOTE]
     return "\n".join(lines)
 
 
-def _headline(outcome: Outcome, check: ToleranceCheck) -> str:
-    """State the expected true error before and after."""
-    known = ~np.isnan(check.expected)
-    if not known.any():
-        return "expected true error not known at any visit"
-    before, after = (x[known].mean() / MM for x in (check.before, check.expected))
-    bound = np.percentile(check.high[known], 95) / MM
-    text = (
-        f"expected true error mean {before:.3f} -> {after:.3f} mm, "
-        f"95 % bounds of 95 % of the visits below {bound:.3f} mm"
-    )
-    if not outcome.decisions.count(Status.CORRECTED):
-        text = f"nothing was corrected; {text}"
-    return text
-
-
-def worst_rows(check: ToleranceCheck) -> list[int]:
-    """List the visits that do not pass, the largest upper bound first."""
-    missed = (Verdict.FAIL, Verdict.UNKNOWN)
-    rows = np.flatnonzero(np.isin(check.verdict, missed))
-    size = np.nan_to_num(check.high[rows], nan=np.inf)
-    return [int(k) for k in rows[np.argsort(-size, kind="stable")]]
+def describe_verdict(check: ToleranceCheck) -> str:
+    """Write how many visits pass."""
+    counts = ", ".join(f"{check.count(one)} {word}" for one, word in WORDS.items())
+    sizes = " to ".join(f"{size:g}" for size in check.range_mm)
+    return f"tolerance {sizes} mm: {counts}; {check.outside:.1f} expected outside"
 
 
 def _list_worst(outcome: Outcome, check: ToleranceCheck) -> Iterator[str]:
-    v, d, rows = outcome.visits, outcome.decisions, worst_rows(check)
-    for k in rows[:WORST]:
-        name, reason = v.names[v.name[k]], d.reasons[d.why[k]].text
-        size = "error not known"
-        if not np.isnan(check.expected[k]):
-            size = f"{check.expected[k] / MM:.3f} mm, 95 % below "
-            size += f"{check.high[k] / MM:.3f}"
-        place = f"{v.files[v.file[k]]}:{v.line[k]}" + (f" {name}" if name else "")
-        told = f"  {place}: {WORDS[Verdict(check.verdict[k])]}, {size}"
-        yield f"{told}: {reason}" if reason else told
-    if len(rows) > WORST:
-        yield f"  and {len(rows) - WORST} more"
+    errors = outcome.errors
+    if errors is None:
+        return
+    for one in list_exceptions(errors, WORST):
+        word = WORDS[Verdict(check.verdict[one.row])]
+        yield f"  {one.place}: {word}, {one.size()}{one.why()}"
+    if (more := int(errors.exceptional().sum()) - WORST) > 0:
+        yield f"  and {more} more"
 
 
 def tolerance_json(check: ToleranceCheck) -> dict[str, Any]:
     """Describe the verdict, one entry a visit in every list; lengths in mm."""
+    errors, sizes = check.errors, check.range_mm
     return {
-        "tolerance_mm": check.tolerance / MM,
+        "tolerance_mm": sizes[-1] if sizes else None,
+        "tolerances_mm": np.round(check.tolerance / MM, 9).tolist(),
         "passes": check.passes,
         **{word.replace(" ", "_"): check.count(one) for one, word in WORDS.items()},
         "expected_outside": check.outside,
         "verdict": [ALL_WORDS[Verdict(k)] for k in check.verdict.tolist()],
-        "before_mm": np.round(check.before / MM, 5).tolist(),
-        "expected_mm": np.round(check.expected / MM, 5).tolist(),
+        "before_mm": np.round(errors.before / MM, 5).tolist(),
+        "expected_mm": np.round(errors.after / MM, 5).tolist(),
         "bound_5_mm": np.round(check.low / MM, 5).tolist(),
-        "bound_95_mm": np.round(check.high / MM, 5).tolist(),
+        "bound_95_mm": np.round(errors.high / MM, 5).tolist(),
+    }
+
+
+def describe_errors(outcome: Outcome) -> dict[str, Any]:
+    """Describe the expected true errors and the exceptions; lengths in mm.
+
+    The key is left out where they are not known.
+    """
+    errors = outcome.errors
+    if errors is None:
+        return {}
+    found = headline(errors)
+    exceptions = [describe_exception(one) for one in list_exceptions(errors, MOST)]
+    figures = {
+        "before_mm": found.before_mm,
+        "after_mm": found.after_mm,
+        "below_95_before_mm": found.below_before_mm,
+        "below_95_mm": found.below_mm,
+        "largest_mm": np.nan if found.worst is None else found.worst.expected_mm,
+        "largest_bound_95_mm": found.bound_mm,
+    }
+    return {
+        "expected": {
+            "verdict": found.verdict(outcome.tolerance),
+            "targets": found.targets,
+            "corrected": found.corrected,
+            "unknown": found.unknown,
+            **{name: round(size, 5) for name, size in figures.items()},
+            "exceptions_count": int(errors.exceptional().sum()),
+            "exceptions": exceptions,
+        }
+    }
+
+
+def describe_exception(one: TargetException) -> dict[str, Any]:
+    """Describe a visit that somebody has to look at."""
+    return {
+        "visit": one.row + 1,
+        "place": one.place,
+        "corrected": one.corrected,
+        "code": one.reason.name,
+        "reason": one.reason.text,
+        "expected_mm": round(one.expected_mm, 5),
+        "bound_95_mm": round(one.bound_mm, 5),
     }

@@ -319,6 +319,27 @@ class CompensationSection(Strict):
     timing: bool | None = None
 
 
+class JobSection(Strict):
+    """What the programs of this cell must keep to.
+
+    Attributes:
+        tolerance_mm: Largest true error of a target.
+        tolerances_mm: .. of targets whose name, or whose program file, fits a pattern.
+        operator: Who is responsible for the programs, for reports.
+    """
+
+    tolerance_mm: PositiveFloat | None = None
+    tolerances_mm: dict[str, PositiveFloat] = Field(default_factory=dict)
+    operator: str | None = None
+
+    @model_validator(mode="after")
+    def _has_a_default(self) -> JobSection:
+        """Refuse patterns without a tolerance of all other targets."""
+        if self.tolerances_mm and self.tolerance_mm is None:
+            raise ValueError("tolerances_mm needs tolerance_mm, for all other targets")
+        return self
+
+
 class MeasurementSection(Strict):
     """How measurement files of this cell are written; what is not stated is detected.
 
@@ -388,6 +409,7 @@ class CellFile(Strict):
     aux: dict[str, Literal["gun", "track", "positioner"]] = Field(default_factory=dict)
     limits: LimitSection = LimitSection()
     compensation: CompensationSection = CompensationSection()
+    job: JobSection = JobSection()
     measurements: MeasurementSection = MeasurementSection()
     routines: dict[str, Effect | list[str]] = Field(default_factory=dict)
     frames: FramesSection = FramesSection()
@@ -562,6 +584,7 @@ def load_cell(
 CHANGEABLE: Mapping[str, type[Strict]] = {
     "compensation": CompensationSection,
     "environment": EnvironmentSection,
+    "job": JobSection,
     "measurements": MeasurementSection,
     "payload": PayloadSection,
     "simulation": SimulationSection,

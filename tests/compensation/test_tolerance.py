@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi, ncx2
 
-from postproc.compensation.tolerance import Verdict, check_tolerance
+from postproc.compensation.expected_error import (
+    LengthLaw,
+    expect_errors,
+    pool_quantile,
+)
+from postproc.compensation.tolerance import JobTolerance, Verdict, check_tolerance
+from postproc.exceptions import PostprocError
 from tests.written import FIRST, NEXT, POSE, cli, program
 
 STD = 0.02e-3
@@ -26,20 +32,58 @@ def arrivals(error, std=STD, outside=0.0):
 def check(error, correction, tolerance, **given):
     judged = np.ones(len(error), dtype=bool)
     made = arrivals(error, **given)
-    return check_tolerance(made, np.asarray(correction, dtype=float), judged, tolerance)
+    found = expect_errors(made, np.asarray(correction, dtype=float), judged)
+    return check_tolerance(found, np.full(len(error), tolerance * 1e-3))
 
 
 def test_bounds_are_those_of_the_length_of_a_normal_error():
     error = np.array([[1e-3, 0, 0], [0.05e-3, 0, 0]])
     found = check(error, [-error[0], [0, 0, 0]], 0.1)
-    assert found.high[0] == pytest.approx(STD * chi(3).ppf(0.95), rel=0.01)
-    assert found.expected[0] == pytest.approx(STD * chi(3).mean(), rel=0.01)
+    assert found.errors.high[0] == pytest.approx(STD * chi(3).ppf(0.95), rel=0.01)
+    assert found.errors.after[0] == pytest.approx(STD * chi(3).mean(), rel=0.01)
     length = ncx2(3, (error[1, 0] / STD) ** 2)
-    for bound, share in ((found.low[1], 0.05), (found.high[1], 0.95)):
+    for bound, share in ((found.low[1], 0.05), (found.errors.high[1], 0.95)):
         assert bound == pytest.approx(STD * np.sqrt(length.ppf(share)), rel=0.02)
     beyond = length.sf((0.1e-3 / STD) ** 2)
     assert found.risk[1] == pytest.approx(beyond, abs=0.003)
     assert found.outside == pytest.approx(found.risk.sum())
+
+
+def test_the_law_of_lengths_is_that_of_drawn_errors():
+    rng = np.random.default_rng(56)
+    mean = rng.normal(size=(40, 3)) * rng.choice([0.0, 0.02, 0.3], size=(40, 1))
+    std = 0.02 * np.exp(rng.normal(size=(40, 3)))
+    drawn = np.linalg.norm(
+        mean[:, None] + std[:, None] * rng.normal(size=(40, 50_000, 3)), axis=2
+    )
+    law = LengthLaw.of_normal(mean, std)
+    assert law.quantile(0.95) == pytest.approx(
+        np.quantile(drawn, 0.95, axis=1), rel=0.03
+    )
+    at = np.quantile(drawn, 0.9, axis=1)
+    assert law.beyond(at) == pytest.approx(np.full(40, 0.1), abs=0.01)
+    whole = pool_quantile(law.at_nodes())
+    assert whole == pytest.approx(np.quantile(drawn, 0.95), rel=0.03)
+
+
+def test_an_error_that_does_not_scatter_has_its_own_length():
+    law = LengthLaw.of_normal(np.array([[3e-3, 0, 4e-3]]), np.zeros((1, 3)))
+    assert law.quantile(0.95) == pytest.approx([5e-3], rel=2e-3)
+    assert law.beyond(4.9e-3) == pytest.approx([1.0])
+
+
+def test_the_last_pattern_that_fits_a_name_counts():
+    class Visits:
+        names, name = ("", "P_drill1", "q"), np.array([0, 1, 2])
+        files, file = ("a.pdl", "b.pdl"), np.array([0, 0, 1])
+
+        def __len__(self):
+            return 3
+
+    job = JobTolerance(0.3, {"b.*": 0.5, "p_*": 0.1})
+    assert job.of_visits(Visits()) == pytest.approx([0.3e-3, 0.1e-3, 0.5e-3])
+    with pytest.raises(PostprocError, match="above 0"):
+        JobTolerance(0.3, {"p": -1.0})
 
 
 def test_verdicts():
@@ -47,7 +91,9 @@ def test_verdicts():
     correction = [-error[0], [0, 0, 0], [-0.9e-3, 0, 0]]
     found = check(error, correction, 0.1)
     assert found.verdict.tolist() == [Verdict.PASS, Verdict.FAIL, Verdict.UNKNOWN]
-    assert not found.passes and found.before == pytest.approx([1e-3] * 3, rel=0.01)
+    assert not found.passes and found.errors.before == pytest.approx(
+        [1e-3] * 3, rel=0.01
+    )
     assert check(error[:1], correction[:1], 0.1).passes
 
 

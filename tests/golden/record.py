@@ -21,7 +21,9 @@ WEIGHTS = (0.7390851, 1.8954943, 2.7682811)
 TIMES = (
     (re.compile(r'("stages_s": *)\{[^{}]*\}'), r'\1"<times>"'),
     (re.compile(r'("(?:seconds|time)": *)[\d.eE+-]+'), r'\1"<time>"'),
-    (re.compile(r'("date": *)"[\d-]+"'), r'\1"<date>"'),
+    (re.compile(r'("(?:model_)?date": *)"[\d-]+"'), r'\1"<date>"'),
+    (re.compile(r"(<dt>date</dt><dd>)[\d-]+"), r"\1<date>"),
+    (re.compile(r"(, fitted on )[\d-]{10}(?=<)"), r"\1<date>"),
     (re.compile(r"fitted on [\d-]{10} by postproc \S+"), "fitted on <date>"),
     (re.compile(r'">[\d.]+ s(</td><td class="wide"><meter )[^<]*'), r'"><time>\1'),
 )  # fmt: skip

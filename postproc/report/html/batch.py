@@ -11,7 +11,7 @@ import numpy as np
 from postproc.report.html.figure import BINS, Figure, bars, figure
 from postproc.report.html.page import render
 
-SCRIPTS = ("page.js", "figures.js")
+SCRIPTS = ("page.js", "sheets.js", "figures.js")
 Entry = tuple[str, str, Mapping[str, Any]]  # path, status and facts of a file
 
 PROGRAM = (
@@ -73,6 +73,8 @@ class BatchRow:
         error = self.facts.get("error")
         lists = (self.facts.get("uncorrected_lines"), self.facts.get("findings"))
         found = [str(line) for part in lists for line in part or ()]
+        if worst := self.facts.get("worst"):
+            found.insert(0, str(worst))
         return [str(error), *found] if error else found
 
 

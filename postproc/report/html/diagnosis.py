@@ -21,7 +21,7 @@ from postproc.report.html.figure import (
 from postproc.report.html.model import name_of, steps
 from postproc.report.html.page import render
 
-SCRIPTS = ("page.js", "figures.js")
+SCRIPTS = ("page.js", "sheets.js", "figures.js")
 VERDICTS = {
     "effect": "The model lacks a named effect.",
     "noise": "The remaining error is noise: these rows show no missing effect.",

@@ -13,6 +13,7 @@ from postproc.calibration.measurements import Measurements
 from postproc.calibration.report import FitReport
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model
+from postproc.report.head import ReportHead
 from postproc.report.html.figure import (
     AFTER,
     OTHER,
@@ -70,7 +71,7 @@ def _step(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 # The page of a model: what was fitted, how well, and what the rows could not see.
 
-SCRIPTS = ("page.js", "figures.js")
+SCRIPTS = ("page.js", "sheets.js", "figures.js")
 SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "rad/(N m)": ("urad/(N m)", 1e6)}
 CORRELATED = 0.9
 UNSEEN = 0.1  # a parameter known less than this is at its prior
@@ -107,6 +108,9 @@ def calibration_report(
         {"figures": figures},
         SCRIPTS,
         model=model,
+        head=ReportHead.of_model(
+            model["id"], model["data_sha256"], model.get("provenance") or {}
+        ).rows(),
         fit=told,
         parameters=parameters,
         unseen=told.get("unseen")

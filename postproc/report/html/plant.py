@@ -73,7 +73,7 @@ def plant_page(record: Record) -> str:
     rows.sort(key=lambda row: (row.state != "act", row.robot.serial))
     count = {state: sum(r.state == state for r in rows) for state in STYLES}
     return render(
-        "plant.html.j2", "Robots", {}, (), rows=rows, count=count,
+        "plant.html.j2", "Robots", {}, ("page.js", "sheets.js"), rows=rows, count=count,
         stale=sum(r.stale for r in rows), wide=WIDE, high=HIGH, limit=HIGH / MOST,
         stale_mm=STALE_MM,
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Self
 
 import numpy as np
@@ -14,15 +14,19 @@ from postproc.compensation.outcome import Outcome, Status
 from postproc.language.languages import language_of
 from postproc.language.source import Source
 from postproc.language.visits import Meaning
+from postproc.report.head import ReportHead
+from postproc.report.html.distribution import distribution
 from postproc.report.html.page import render, short, visible
-from postproc.report.json import JOINTS, finite, in_time_of
+from postproc.report.json import JOINTS, error_summary_of, finite, in_time_of
 from postproc.report.second_opinion import opinion_table
+from postproc.report.tolerance import ALL_WORDS, tolerance_json
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 from postproc.verify.opinion import Opinion
 
 # What the program page knows of every visit, as columns.
 
+VERDICTS = (*ALL_WORDS.values(), "")  # against a tolerance
 MOVES = (*(m.name for m in Motion), "VIA")
 VIA = len(Motion)
 
@@ -47,6 +51,8 @@ class PageColumns:
         position_mm: Where the target lies, base frame, (n, 3).
         correction_mm: Change of the commanded TCP, base frame, (n, 3).
         std_mm: Standard error of the correction, per axis, (n, 3).
+        expected_mm: Expected true error before and after, and the 95 % bound, (n, 3).
+        verdict: Index into `VERDICTS`, (n,), the last one where nobody asked.
     """
 
     files: tuple[str, ...]
@@ -69,6 +75,8 @@ class PageColumns:
     position_mm: Floats
     correction_mm: Floats
     std_mm: Floats
+    expected_mm: Floats
+    verdict: Ints
 
     def __len__(self) -> int:
         """Return the number of visits."""
@@ -122,6 +130,9 @@ class ProgramPage:
         motion: Largest changes of joints, elbow and wrist centre; empty likewise.
         in_time: The keys of the report that tell of time and paths; empty likewise.
         opinion: The second opinion; None likewise.
+        head: Which robot, program, model, and when.
+        expected: The keys of the report that tell of expected errors; empty likewise.
+        tolerance: .. of the tolerance.
     """
 
     name: str
@@ -135,6 +146,9 @@ class ProgramPage:
     motion: Mapping[str, float]
     in_time: Mapping[str, Any]
     opinion: Opinion | None
+    head: ReportHead
+    expected: Mapping[str, Any] = field(default_factory=dict)
+    tolerance: Mapping[str, Any] = field(default_factory=dict)
 
 
 def columns_of(outcome: Outcome) -> PageColumns:
@@ -171,7 +185,19 @@ def columns_of(outcome: Outcome) -> PageColumns:
         position_mm=position,
         correction_mm=d.correction / MM,
         std_mm=d.std_error / MM,
+        expected_mm=_stack_errors(outcome),
+        verdict=np.full(n, len(ALL_WORDS))
+        if outcome.tolerance is None
+        else np.asarray(outcome.tolerance.verdict, dtype=np.int64),
     )
+
+
+def _stack_errors(outcome: Outcome) -> Floats:
+    """Stack expected errors and their bounds, (n, 3) [mm]."""
+    errors = outcome.expected
+    if errors is None:
+        return np.full((len(outcome.visits), 3), np.nan)
+    return np.stack([errors.before, errors.after, errors.high], axis=1) / MM
 
 
 def shares_of(outcome: Outcome) -> PageShares:
@@ -214,8 +240,17 @@ class Texts:
         return tuple(self._number)
 
 
-def columns_from(targets: Sequence[Mapping[str, Any]]) -> PageColumns:
+EXPECTED = ("expected_before_mm", "expected_mm", "bound_95_mm")
+
+
+def columns_from(
+    targets: Sequence[Mapping[str, Any]], verdicts: Sequence[str] = ()
+) -> PageColumns:
     """Take the columns out of the targets of a report.
+
+    Args:
+        targets: The targets.
+        verdicts: Of each against a tolerance; none where nobody asked.
 
     Raises:
         KeyError, ValueError, TypeError: They are not the targets of a report.
@@ -243,6 +278,12 @@ def columns_from(targets: Sequence[Mapping[str, Any]]) -> PageColumns:
         position_mm=_numbers(targets, "position_mm", 3),
         correction_mm=_numbers(targets, "correction_mm", 3),
         std_mm=_numbers(targets, "std_error_mm", 3),
+        expected_mm=np.array(
+            [[t.get(name) for name in EXPECTED] for t in targets], dtype=np.float64
+        ).reshape(len(targets), 3),
+        verdict=np.array(
+            [VERDICTS.index(v) for v in verdicts or [""] * len(targets)], dtype=np.int64
+        ),
         files=files.all,
         names=names.all,
         reasons=reasons.all,
@@ -292,6 +333,7 @@ STEPS = {
     "position_mm": 1e-2,
     "correction_mm": 1e-4,
     "std_mm": 1e-4,
+    "expected_mm": 1e-4,
     "share_mm": 1e-4,
     "nonparametric_mm": 1e-4,
     "nonparametric_std_mm": 1e-4,
@@ -327,6 +369,9 @@ def _evenly(rows: Ints, most: int) -> Ints:
     return rows[np.arange(most) * len(rows) // most]
 
 
+DECIDED = ("status", "why", "verdict")
+
+
 def pack(columns: PageColumns, shares: PageShares) -> dict[str, Any]:
     """Write columns as lists of integers, with the size of a step beside them.
 
@@ -342,6 +387,7 @@ def pack(columns: PageColumns, shares: PageShares) -> dict[str, Any]:
         "position_mm": columns.position_mm,
         "correction_mm": columns.correction_mm,
         "std_mm": columns.std_mm,
+        "expected_mm": columns.expected_mm,
         "share_mm": shares.size_mm[columns.visit - 1],
         "nonparametric_mm": shares.free_mm[columns.visit - 1],
         "nonparametric_std_mm": shares.free_std_mm[columns.visit - 1],
@@ -363,7 +409,8 @@ def pack(columns: PageColumns, shares: PageShares) -> dict[str, Any]:
         "statuses": [s.name.lower() for s in Status],
         "effects": effects,
         "heads": list(columns.heads),
-        "index": {k: getattr(columns, k).tolist() for k in (*indices, "status", "why")},
+        "verdicts": list(VERDICTS),
+        "index": {k: getattr(columns, k).tolist() for k in (*indices, *DECIDED)},
         "direction": _signs(columns.direction),
         "numbers": packed,
     }
@@ -570,8 +617,8 @@ def worst_paths(in_time: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 SCRIPTS = (
-    "page.js", "columns.js", "view.js", "table.js", "source.js", "paths.js",
-    "program.js",
+    "page.js", "sheets.js", "columns.js", "view.js", "table.js", "source.js",
+    "paths.js", "program.js",
 )  # fmt: skip
 
 
@@ -594,6 +641,11 @@ def program_report(outcome: Outcome, sources: Mapping[str, bytes] | None = None)
         motion=outcome.motion,
         in_time=in_time_of(outcome),
         opinion=outcome.opinion,
+        head=ReportHead.of_outcome(outcome),
+        expected=error_summary_of(outcome).get("expected", {}),
+        tolerance={}
+        if outcome.tolerance is None
+        else tolerance_json(outcome.tolerance),
     )
     return _page(program)
 
@@ -610,10 +662,11 @@ def program_report_from_json(
     Raises:
         KeyError, ValueError, TypeError: It is no such report.
     """
+    tolerance = data.get("tolerance", {})
     program = ProgramPage(
         name=str(data["program"]),
         model=str(data["model"]),
-        columns=columns_from(data["targets"]),
+        columns=columns_from(data["targets"], tolerance.get("verdict", ())),
         predicted={when: data["predicted"][when] for when in ("before", "after")},
         diagnostics=tuple(data.get("diagnostics", ())),
         stages=data.get("stages_s", {}),
@@ -622,8 +675,31 @@ def program_report_from_json(
         motion=data.get("motion", {}),
         in_time={key: data[key] for key in IN_TIME if key in data},
         opinion=Opinion.of_report(told) if (told := data.get(OPINION)) else None,
+        head=ReportHead.from_json(data.get("head", {})),
+        expected=data.get("expected", {}),
+        tolerance=tolerance,
     )
     return _page(program)
+
+
+WIDE = "what the model and the repeatability of the arm leave open"
+UNUSUAL = "its bound is more than twice the usual one"
+LOOKED_AT = 20  # exceptions that stand on the page
+
+
+def _verdict(program: ProgramPage) -> tuple[str, str]:
+    """Return what the page says first, and the class of its mark."""
+    expected, tolerance = program.expected, program.tolerance
+    if not expected:
+        return "The expected true errors of this report are not known.", "unknown"
+    if tolerance:
+        kind = "fail" if tolerance.get("fail") else "unknown"
+        kind = "pass" if tolerance.get("passes") else kind
+    else:
+        kind = "unknown" if expected.get("exceptions_count") else "plain"
+    if not expected.get("corrected"):
+        kind = "fail" if kind == "fail" else "unknown"
+    return str(expected.get("verdict", "")), kind
 
 
 def _page(program: ProgramPage) -> str:
@@ -634,7 +710,6 @@ def _page(program: ProgramPage) -> str:
         "columns": pack(carried, program.shares),
         "listing": listing(program.sources, carried),
         "histogram": histogram(columns),
-        "predicted": finite(program.predicted),
         "paths": worst_paths(program.in_time),
     }
     return render(
@@ -648,6 +723,15 @@ def _page(program: ProgramPage) -> str:
         groups=group_uncorrected(columns),
         predicted=finite(program.predicted),
         sigma=uncertainty(columns),
+        head=program.head.rows(),
+        picture=distribution(
+            columns.expected_mm[:, 0],
+            columns.expected_mm[:, 1],
+            sorted(set(program.tolerance.get("tolerances_mm", ()))),
+        ),
+        verdict=_verdict(program),
+        unexplained=WIDE if program.tolerance else UNUSUAL,
+        exceptions=finite(list(program.expected.get("exceptions", ())))[:LOOKED_AT],
         stages=seconds(program.stages),
         shown=len(carried),
         paths=worst_paths(program.in_time),

@@ -13,6 +13,8 @@ DONE = {
     "largest_mm": 1.625,
     "before_mm": FIGURES,
     "after_mm": {**FIGURES, "mean": 0.004},
+    "expected_mm": {"before": 1.3, "after": 0.034, "below_95": 0.05, "largest": 0.07},
+    "worst": "",
 }
 LEFT = {
     **DONE,
@@ -43,7 +45,7 @@ def test_programs_are_listed_with_their_figures_the_absent_first():
     assert list(rows) == ["z/bad.pdl", "a/left.pdl", "b/done.pdl"]
     assert "is no program text" in rows["z/bad.pdl"] and "–" in rows["z/bad.pdl"]
     assert "a.pdl:3: rejected: too near" in rows["a/left.pdl"]
-    assert "1.625" in rows["b/done.pdl"] and "1.200 → 0.0040" in rows["b/done.pdl"]
+    assert "1.625" in rows["b/done.pdl"] and "1.300 → 0.034" in rows["b/done.pdl"]
     assert '<span class="value">3</span><span class="note">2 compensated' in html
 
 

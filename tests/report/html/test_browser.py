@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import base64
+import io
 import json
 import os
 import time
@@ -378,3 +379,26 @@ def test_100_000_targets_are_usable(browser: Any, folder: Path) -> None:
     until(browser, note.replace("return ", "return !"))  # all 2,500 are drawn now
     click(browser, "#targets tbody tr")
     assert browser.find_element("css selector", "#detail .here").text
+
+
+def test_all_targets_are_printed(program: Any) -> None:
+    count = "return document.querySelectorAll('#all-targets tbody tr').length"
+    program.execute_script("window.dispatchEvent(new Event('beforeprint'))")
+    assert program.execute_script(count) == 250
+    program.execute_script("window.dispatchEvent(new Event('afterprint'))")
+    assert program.execute_script(count) == 0
+
+
+def test_a_workbook_holds_every_table(program: Any) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    program.set_script_timeout(30)
+    data = program.execute_async_script(
+        "const done = arguments[0]; new Blob(Workbook.make()).arrayBuffer().then((a) "
+        "=> done([...new Uint8Array(a)]))"
+    )
+    book = openpyxl.load_workbook(io.BytesIO(bytes(data)))
+    assert book["targets"].max_row == 251
+    row = [cell.value for cell in book["targets"][2]]
+    assert row[0] == 1 and isinstance(row[1], int | float)
+    text = program.execute_script("return Sheets.csv([['=a', -1, 'b\"c']])")
+    assert text == '\'=a,-1,"b""c"\r\n'

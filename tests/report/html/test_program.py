@@ -75,7 +75,7 @@ class Elements(HTMLParser):
 def test_the_page_needs_nothing_else() -> None:
     page = Elements(program_report(outcome_of()))
     assert page.fetched == []
-    assert page.tags.count("script") == 10  # data, settings, plotly, seven of ours
+    assert page.tags.count("script") == 11  # data, settings, plotly, eight of ours
     assert not {"iframe", "object", "embed", "img", "form", "base"} & set(page.tags)
 
 
@@ -83,7 +83,7 @@ def test_names_stay_text() -> None:
     outcome = outcome_of(name=f"{NASTY}.pdl", names=("", NASTY), extra=NASTY)
     text = program_report(outcome)
     page = Elements(text)
-    assert page.tags.count("script") == 10
+    assert page.tags.count("script") == 11
     assert "<script>alert(" not in text
     assert not set("\x00\x1b\u202e\u2028") & set(text)
     shown = '<script>alert("x")</script>\'\\x1b[31m\\u202e'
@@ -319,3 +319,20 @@ def test_without_a_second_opinion_there_is_none() -> None:
     assert "Second opinion" not in program_report_from_json(data, outcome.sources)
     agrees = replace(outcome, opinion=Opinion("panel.pdl", ROWS[:1], 1.0))
     assert "Do not upload" not in program_report(agrees)
+
+
+def test_the_page_leads_with_the_verdict():
+    html = program_report(outcome_of(60))
+    assert (
+        html.index('id="verdict"') < html.index('id="left"') < html.index('id="view"')
+    )
+    assert "are not known" in html  # of an outcome without arrivals
+
+
+def test_a_report_says_who_and_what():
+    data = json.loads(report_text(outcome_of(8)))
+    data["head"] |= {"serial_number": "R010", "instrument": "AT960", "operator": None}
+    html = program_report_from_json(data)
+    assert "<dt>serial number</dt><dd>R010</dd>" in html and "AT960" in html
+    assert html.count('<dt>operator</dt><dd><span class="blank"></span></dd>') == 2
+    assert "signature: released by" in html

@@ -172,7 +172,7 @@ def test_pages_are_whole_and_inert(name: str) -> None:
     text = PAGES[name]()
     page = Elements(text)
     assert page.fetched == []
-    assert page.tags.count("script") == 5  # data, settings, plotly, two of ours
+    assert page.tags.count("script") == 6  # data, settings, plotly, three of ours
     assert not set("\x00\x1b\u202e") & set(text)
     drawn = set(page.payload()["figures"])
     wanted = {part.split('"')[0] for part in text.split('data-figure="')[1:]}

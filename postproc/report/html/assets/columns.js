@@ -10,6 +10,7 @@ class Columns {
     this.statuses = packed.statuses;
     this.effects = packed.effects;
     this.heads = packed.heads;
+    this.verdicts = packed.verdicts;
     Object.assign(this, packed.index);
     this.length = this.visit.length;
     this.direction = packed.direction;

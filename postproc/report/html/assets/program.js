@@ -20,13 +20,15 @@ class ProgramPage {
     await new Promise((resolve) => setTimeout(resolve));
     if (this.view) this.controls();
     this.histogram(data.histogram);
-    this.predicted(data.predicted);
     if (data.paths.length) new Paths(document.getElementById("path-rows"), data.paths);
+    window.addEventListener("beforeprint", () => this.table.print());
+    window.addEventListener("afterprint", () => this.table.forgetPrint());
     window.addEventListener("hashchange", () => this.follow());
     const idle = window.requestIdleCallback || ((f) => setTimeout(f, 200));
     idle(() => this.table.haystack());
     if (this.view) await this.redraw();
     performance.mark("view");
+    if (this.columns.length) this.show(this.worst());
     this.follow();
   }
 
@@ -49,11 +51,25 @@ class ProgramPage {
     this.waiting = setTimeout(() => this.redraw(), 250);
   }
 
-  select(i, focus) {
-    this.table.select(i, focus);
+  show(i) {
     this.detail.show(i);
     if (this.view) this.view.select(i);
+  }
+
+  select(i, focus) {
+    this.table.select(i, focus);
+    this.show(i);
     document.body.dataset.selected = this.columns.visit[i];
+  }
+
+  // The target with the largest bound of its error, else with the largest correction.
+  worst() {
+    const c = this.columns, key = (i) => c.of("expected_mm", i)[2] || 0;
+    let worst = 0;
+    for (let i = 1; i < c.length; i++) {
+      if (key(i) > key(worst) || (key(i) === key(worst) && c.size[i] > c.size[worst])) worst = i;
+    }
+    return worst;
   }
 
   // A link to #target-12 selects visit 12.
@@ -74,20 +90,6 @@ class ProgramPage {
       hovertemplate: "%{x:.3f} mm: %{y}<extra></extra>" }], {
       bargap: 0, xaxis: { title: { text: "length of the correction [mm]" }, rangemode: "tozero" },
       yaxis: { title: { text: "targets" } },
-    });
-  }
-
-  predicted({ before, after }) {
-    const node = document.getElementById("predicted");
-    if (!before.n) { node.remove(); return; }
-    const keys = ["mean_mm", "p95_mm", "max_mm"], names = ["mean", "95 %", "max"];
-    const bars = (from, name, colour, shape) => ({ type: "bar", orientation: "h", name, y: names, x: keys.map((k) => from[k]),
-      text: keys.map((k) => Page.number(from[k], from[k] < 0.01 ? 4 : 3)), textposition: "outside", cliponaxis: false,
-      marker: { color: colour, line: { color: colour, width: 1 }, pattern: { shape, fgcolor: colour, bgcolor: "#fff", solidity: 0.4 } } });
-    Page.draw(node, [bars(before, "before", Page.COLOURS.vermillion, "/"), bars(after, "after", Page.COLOURS.blue, "")], {
-      barmode: "group", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", traceorder: "normal" },
-      margin: { l: 48, r: 56, t: 30, b: 44 },
-      xaxis: { title: { text: "predicted error [mm]" }, rangemode: "tozero" }, yaxis: { autorange: "reversed", type: "category" },
     });
   }
 }

@@ -13,6 +13,7 @@ class Table {
     this.selected = -1;
     this.words = null;
     this.body = document.querySelector("#targets tbody");
+    Sheets.whole.set(this.body.parentElement, () => this.sheet());
     this.head();
     this.controls();
   }
@@ -129,6 +130,31 @@ class Table {
     return row;
   }
 
+  // All targets as rows of a sheet, in program order.
+  sheet() {
+    const rows = [Table.FIELDS.map((f) => f.title && f.kind === "number" ? `${f.label} (${f.title})` : f.label)];
+    for (let i = 0; i < this.columns.length; i++) {
+      rows.push(Table.FIELDS.map((f) => Sheets.value(f.cell(this.columns, i))));
+    }
+    return rows;
+  }
+
+  // All targets for a printer, in program order; nothing of them stays on the screen.
+  print() {
+    const head = document.querySelector("#all-targets thead tr");
+    head.replaceChildren(...Table.PRINTED.map((f) => Page.element("th", { scope: "col" }, f.label)));
+    const rows = [];
+    for (let i = 0; i < this.columns.length; i++) {
+      rows.push(Page.element("tr", { className: this.columns.status_of(i) },
+        ...Table.PRINTED.map((f) => Page.element("td", { className: f.kind || "" }, f.cell(this.columns, i)))));
+    }
+    document.querySelector("#all-targets tbody").replaceChildren(...rows);
+  }
+
+  forgetPrint() {
+    document.querySelector("#all-targets tbody").replaceChildren();
+  }
+
   // Show a row: turn to its page, mark it.
   select(i, focus) {
     this.selected = i;
@@ -157,6 +183,14 @@ Table.LENGTH = 100;
     { key: "move", label: "move", value: (c, i) => c.moves[c.move[i]], cell: (c, i) => c.moves[c.move[i]] },
     { key: "status", label: "status", kind: "status", value: (c, i) => Table.URGENCY.indexOf(c.status_of(i)),
       cell: (c, i) => `${Columns.STATUS[c.status_of(i)].mark} ${c.status_of(i)}` },
+    { key: "expected", label: "error mm", kind: "number", down: true, title: "Expected true error with the correction [mm]",
+      value: (c, i) => c.of("expected_mm", i)[1], cell: (c, i) => Page.number(c.of("expected_mm", i)[1], 3) },
+    { key: "bound", label: "95 % mm", kind: "number", down: true, title: "The error is below this with a probability of 95 % [mm]",
+      value: (c, i) => c.of("expected_mm", i)[2], cell: (c, i) => Page.number(c.of("expected_mm", i)[2], 3) },
+    { key: "verdict", label: "verdict", title: "Against the tolerance of the job",
+      value: (c, i) => c.verdicts[c.verdict[i]], cell: (c, i) => c.verdicts[c.verdict[i]] },
+    { key: "before", label: "before mm", kind: "number", down: true, title: "Expected true error without any correction [mm]",
+      value: (c, i) => c.of("expected_mm", i)[0], cell: (c, i) => Page.number(c.of("expected_mm", i)[0], 3) },
     { key: "size", label: "|c| mm", kind: "number", down: true, title: "Length of the correction [mm]",
       value: (c, i) => (c.size[i] > 0 ? c.size[i] : NaN), cell: (c, i) => (c.size[i] > 0 ? Page.number(c.size[i], 3) : "") },
     axis(0, "dx"), axis(1, "dy"), axis(2, "dz"),
@@ -166,5 +200,9 @@ Table.LENGTH = 100;
       value: (c, i) => c.arrows(i), cell: (c, i) => c.arrows(i) },
     { key: "why", label: "reason", kind: "why", value: (c, i) => c.reasons[c.why[i]], cell: (c, i) => c.reasons[c.why[i]] },
   ];
+}
+{
+  const printed = ["visit", "line", "name", "status", "before", "expected", "bound", "verdict", "dx", "dy", "dz", "why"];
+  Table.PRINTED = printed.map((key) => Table.FIELDS.find((f) => f.key === key));
 }
 Table.URGENCY = ["conflict", "rejected", "runtime", "corrected", "unchanged"];
