@@ -44,11 +44,13 @@ impl Chain {
     }
 
     /// Return sines and cosines of the D-H angles.
+    #[inline(always)]
     pub fn sin_cos(&self, q: &Six) -> (Six, Six) {
         sin_cos(&std::array::from_fn(|i| self.0[i].angle(q)))
     }
 
     /// Express a point of the flange frame in the base frame.
+    #[inline(always)]
     pub fn placed(&self, q: &Six, point: &Three) -> Three {
         let [mut x, mut y, mut z] = *point;
         let (sin, cos) = self.sin_cos(q);
@@ -83,6 +85,7 @@ impl Chain {
     }
 
     /// Walk along the D-H frames 0 (base) to 6 (flange), without Hayati's rotations.
+    #[inline(always)]
     pub fn frames(&self, q: &Six) -> [Frame; 7] {
         let mut at =
             Frame { axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], origin: [0.0; 3] };
@@ -104,6 +107,7 @@ impl Chain {
     }
 
     /// Convert what belongs to the D-H angles to what belongs to the controller's.
+    #[inline(always)]
     pub fn to_controller<const K: usize>(&self, per_axis: &[[f64; K]; 6]) -> [[f64; K]; 6] {
         let mut out = [[0.0; K]; 6];
         for (link, axis) in self.0.iter().zip(per_axis) {
@@ -126,6 +130,7 @@ pub struct Frame {
 
 impl Frame {
     /// Rows of a pose (4, 4).
+    #[inline(always)]
     fn pose(&self) -> [f64; 16] {
         let mut pose = [0.0; 16];
         for k in 0..3 {
@@ -137,6 +142,7 @@ impl Frame {
     }
 
     /// Express a point of this frame in the base frame.
+    #[inline(always)]
     pub fn place(&self, point: &Three) -> Three {
         let [x, y, z] = &self.axes;
         let turned = |k: usize| x[k] * point[0] + y[k] * point[1] + z[k] * point[2];

@@ -184,8 +184,9 @@ def mark_disagreement(
     apart_by = Reason(code, SHIFTED_APART.format(limit))
     reasons.mark(differ & own_shifts(visits), apart_by)
     text = f"its arrivals differ by more than conflict_mm = {limit:g}: "
-    alone = has & _by_one_move(visits, agreement.group, len(together))[at]
-    reasons.mark(differ & alone, Reason(code, f"{text}{_ONE_MOVE}"))
+    if differ.any():
+        alone = _by_one_move(visits, agreement.group, len(together))[at]
+        reasons.mark(differ & alone, Reason(code, f"{text}{_ONE_MOVE}"))
     cloning = visits.dialect.terms.cloning
     text += f"give each move a point of its own ({cloning})"
     reasons.mark(differ, Reason(code, text))

@@ -48,7 +48,7 @@ from postproc.language.number_edits import edits as number_edits
 from postproc.language.source import Replacements
 from postproc.language.visits import Visits
 from postproc.motion.deviation import JointDeviation, departure, path_departure
-from postproc.motion.joint_path import NOWHERE, StartState, trace
+from postproc.motion.joint_path import NOWHERE, StartState
 from postproc.motion.planner import Plan
 from postproc.motion.replan import Reached, Replanned, replan, replan_all
 from postproc.motion.targets import Targets
@@ -539,8 +539,8 @@ def _read_back(
     with setting.clock("verify"):
         job, plan = iteration.setting, iteration.planned.plan
         arm, tool, offset = job.cell.arm, plan.tool[:, :3, 3], job.offset
-        new = trace(arm, last.targets, course.lead.begin.known)
-        moved = path_departure(arm, last.targets.move, tool, plan.exact, new, offset)
+        old, new = plan.exact, last.exact_path
+        moved = path_departure(arm, last.targets.move, tool, old, new, offset)
     return Converged(proposal, edits, last.reached, moved), flipped
 
 

@@ -63,6 +63,8 @@ class Replanned:
         passages: What the rounded paths between do to the joints' play.
         sides: On which sides the joints arrive.
         begin: Where the arm stands at the first target, if that is known beforehand.
+        traced: The way as if the arm stopped at each target; None where only parts of
+            it are new.
     """
 
     arm: Arm
@@ -74,11 +76,17 @@ class Replanned:
     passages: Passages
     sides: FlankState
     begin: StartState = NOWHERE
+    traced: Trace | None = None
 
     @property
     def side(self) -> Floats:
         """Return where every joint lies in its play, as in `Reached`."""
         return self.sides.side
+
+    @property
+    def exact_path(self) -> Trace:
+        """Return the way as if the arm stopped at every target."""
+        return self.traced or trace(self.arm, self.targets, self.begin.known)
 
     @property
     def reached(self) -> Reached:
@@ -108,7 +116,7 @@ def replan_all(
     found = sides_on_curves(arm, targets, traced.q, found)
     return Replanned(
         arm, targets, points_of_plan(exact), traced.q, traced.aside, exact.slot, ways,
-        found, begin,
+        found, begin, exact,
     )  # fmt: skip
 
 
@@ -142,7 +150,7 @@ def where_passed(arm: Arm, exact: PlannedPoints, q: Floats) -> Floats:
 CHANGED = 2  # targets on each side of a moved one whose passing may change
 TRACED = 3  # targets on each side that must be traced for that
 SAME = 1e-9  # [rad] arriving on the same branch and turn
-MOST = 0.85  # of all targets; if more have to be traced, all are
+MOST = 0.6  # of all targets; tracing more takes longer than tracing all anew
 STEPS = (
     TargetKind.TOOL_STEP,
     TargetKind.BASE_STEP,
