@@ -161,7 +161,8 @@ def test_tables_of_other_columns_are_refused() -> None:
 
 # Bytes are looked at in the core alone.
 
-DOORS = {"arrays.py": 1, "language/source.py": 1}  # the type, and texts as rows of it
+# The type, and texts as rows of it.
+DOORS = {"arrays.py": 1, "language/text/source.py": 1}
 
 
 def test_no_array_of_bytes_is_handled_outside_the_doors() -> None:

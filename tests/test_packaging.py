@@ -31,7 +31,7 @@ PIN = re.compile(
 PROBE = """
 from pathlib import Path
 import postproc
-from postproc.language.grammars import grammar
+from postproc.language.text.grammars import grammar
 print(Path(postproc.__file__).resolve())
 print(grammar("pdl2").strip().splitlines()[0])
 """

@@ -12,7 +12,7 @@ from postproc.arrays import Floats, Ints
 from postproc.cli.commands import app
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.rewrite import Output, write_edits
-from postproc.language.number_edits import edits as number_edits
+from postproc.language.text.number_edits import edits as number_edits
 
 FIRST = "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 50.0, 30.0}"
 POSE = "MOVE LINEAR TO POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')"

@@ -30,7 +30,7 @@ from postproc.files import (
     schema,
 )
 from postproc.language.languages import file_named
-from postproc.language.stamp import Stamp, read_stamp
+from postproc.language.text.stamp import Stamp, read_stamp
 from postproc.language.visits import line_ranges
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import load_cell

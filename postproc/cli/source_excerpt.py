@@ -8,7 +8,7 @@ from pathlib import Path
 
 from postproc.compensation.outcome import Outcome
 from postproc.exceptions import FileError, printable
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from postproc.language.visits import Visits
 
 WIDTH = 96  # characters of a line that are shown

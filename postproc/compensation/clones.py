@@ -16,7 +16,7 @@ from postproc.compensation.program import ParsedProgram, read_program
 from postproc.diagnostics import Code
 from postproc.language.language import Cloner, NamedPoint
 from postproc.language.languages import language_of
-from postproc.language.source import CloneError, Edit, Source, apply
+from postproc.language.text.source import CloneError, Edit, Source, apply
 from postproc.language.visits import Diagnostic, Visits
 from postproc.robot.cell import Cell
 

@@ -65,8 +65,8 @@ from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.language import Language
 from postproc.language.languages import UNNAMED, language_of
-from postproc.language.source import Source
-from postproc.language.stamp import is_stamped
+from postproc.language.text.source import Source
+from postproc.language.text.stamp import is_stamped
 from postproc.language.visits import Diagnostic, Visits, deduplicate
 from postproc.model.model import Model, as_model
 from postproc.model.statistics import ErrorStatistics

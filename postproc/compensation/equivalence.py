@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats, Interned, Ints, chunks
-from postproc.language.templates import number_in_order
+from postproc.language.text.templates import number_in_order
 from postproc.language.visits import Visits
 
 SAME = 1e-6  # [mm] and [deg]: what adding constants to numbers may round off

@@ -44,8 +44,8 @@ from postproc.compensation.options import Clock, Job
 from postproc.compensation.program import ParsedProgram, PlannedProgram
 from postproc.compensation.rewrite import read_back
 from postproc.compensation.targets import move_targets
-from postproc.language.number_edits import edits as number_edits
-from postproc.language.source import Replacements
+from postproc.language.text.number_edits import edits as number_edits
+from postproc.language.text.source import Replacements
 from postproc.language.visits import Visits
 from postproc.motion.deviation import JointDeviation, departure, path_departure
 from postproc.motion.joint_path import NOWHERE, StartState

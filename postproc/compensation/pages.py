@@ -12,7 +12,7 @@ from pathlib import Path
 from postproc.compensation.sidecar import sidecar_path
 from postproc.files import read_if_readable
 from postproc.language.languages import file_named
-from postproc.language.stamp import read_stamp
+from postproc.language.text.stamp import read_stamp
 
 HEAD = 1 << 14  # bytes: the stamp of an output stands near its first line
 OUTPUT = ".compensated"  # ends the name of an output, before its suffix

@@ -60,7 +60,7 @@ from postproc.compensation.taught_frames import correct_taught
 from postproc.compensation.windowing import Window, cut_points, seams, windows
 from postproc.compensation.workers import in_processes
 from postproc.diagnostics import NO_REASON
-from postproc.language.source import Replacements
+from postproc.language.text.source import Replacements
 from postproc.language.visits import Visits
 from postproc.model.model import Model
 from postproc.motion.joint_path import StartState

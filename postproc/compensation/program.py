@@ -23,8 +23,8 @@ from postproc.compensation.payload import payload_of
 from postproc.compensation.targets import targets_from_visits, with_tracks
 from postproc.language.language import Start
 from postproc.language.languages import language_of
-from postproc.language.number_edits import Skeleton
-from postproc.language.source import Edit, Source, source_from_bytes
+from postproc.language.text.number_edits import Skeleton
+from postproc.language.text.source import Edit, Source, source_from_bytes
 from postproc.language.visits import Diagnostic, Visits
 from postproc.model.backlash_width import play_of_model
 from postproc.model.model import Model

@@ -34,7 +34,7 @@ from postproc.language.languages import (
     language_of,
     language_of_text,
 )
-from postproc.language.stamp import read_stamp
+from postproc.language.text.stamp import read_stamp
 from postproc.language.visits import Diagnostic
 from postproc.robot.cell import Cell
 from postproc.robot.pose import record_from_pose

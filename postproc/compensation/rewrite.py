@@ -17,8 +17,8 @@ from postproc.compensation.sidecar import FileRecord, Sidecar, block_checksums, 
 from postproc.compensation.workers import in_background
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
-from postproc.language.number_edits import difference
-from postproc.language.source import (
+from postproc.language.text.number_edits import difference
+from postproc.language.text.source import (
     UTF8_MARK,
     Edit,
     Replacements,
@@ -27,7 +27,12 @@ from postproc.language.source import (
     apply,
     compose,
 )
-from postproc.language.stamp import stamp_line, stamp_place, stamp_span, strip_stamp
+from postproc.language.text.stamp import (
+    stamp_line,
+    stamp_place,
+    stamp_span,
+    strip_stamp,
+)
 from postproc.language.visits import Literals, Visits
 from postproc.motion.deviation import JointDeviation
 from postproc.robot.cell import LimitSection

@@ -18,8 +18,8 @@ from postproc.arrays import Cells, shortest, text_of, whole
 from postproc.diagnostics import Reason
 from postproc.exceptions import ProgramError
 from postproc.files import LARGEST, check_places, read_input, write_all
-from postproc.language.source import Replacements, Source, apply, as_bytes
-from postproc.language.stamp import read_stamp
+from postproc.language.text.source import Replacements, Source, apply, as_bytes
+from postproc.language.text.stamp import read_stamp
 
 # The record beside an output that gives the source back, byte for byte.
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from postproc.arrays import Floats
-from postproc.language.comment_directives import AT_APPROACH, AT_VIA, INSERTED
 from postproc.language.language import ArcPiece, Splitter
-from postproc.language.source import (
+from postproc.language.text.comment_directives import AT_APPROACH, AT_VIA, INSERTED
+from postproc.language.text.source import (
     LONGEST_LINE,
     CloneError,
     Edit,

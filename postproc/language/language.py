@@ -11,11 +11,15 @@ from typing import Any, Protocol
 from postproc.arrays import Floats, Ints
 from postproc.files import FolderListing
 from postproc.language.archive import Archive
-from postproc.language.comment_directives import AT_APPROACH, AT_VIA, insertion_mark
 from postproc.language.measuring_program import MeasuringProgram
-from postproc.language.number_edits import Skeleton
 from postproc.language.pose_encoding import Dialect
-from postproc.language.source import Edit, Source
+from postproc.language.text.comment_directives import (
+    AT_APPROACH,
+    AT_VIA,
+    insertion_mark,
+)
+from postproc.language.text.number_edits import Skeleton
+from postproc.language.text.source import Edit, Source
 from postproc.language.visits import Diagnostic, Literals, Visits
 
 Record = tuple[float, ...] | None

@@ -28,8 +28,8 @@ from postproc.files import (
     read_input,
 )
 from postproc.language.languages import UNNAMED, file_named, language_of
-from postproc.language.lexer import BLANKS, mask_of, scan_lines
-from postproc.language.stamp import read_stamp, stamp_span, strip_stamp
+from postproc.language.text.lexer import BLANKS, mask_of, scan_lines
+from postproc.language.text.stamp import read_stamp, stamp_span, strip_stamp
 
 if TYPE_CHECKING:
     from postproc.arrays import DataFrame

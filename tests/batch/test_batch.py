@@ -15,7 +15,7 @@ from postproc.batch.workers import LocalPool
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.sidecar import restore_file
 from postproc.exceptions import CellError, DiskFullError, OutputError, PostprocError
-from postproc.language.stamp import read_stamp
+from postproc.language.text.stamp import read_stamp
 from tests.inline import InlinePool
 from tests.plant import contents, grow, pages, program
 

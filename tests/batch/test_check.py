@@ -16,8 +16,8 @@ from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.outcome import Status
 from postproc.exceptions import ProgramError
 from postproc.files import TEMPORARY
-from postproc.language.source import Source
-from postproc.language.stamp import stamp_line
+from postproc.language.text.source import Source
+from postproc.language.text.stamp import stamp_line
 from postproc.model.model import load_model
 from tests.inline import InlinePool
 from tests.plant import grow, program

@@ -13,10 +13,10 @@ from scipy.optimize import least_squares
 from postproc.compensation.compensate import compensate
 from postproc.compensation.inverse_model import solve
 from postproc.compensation.program import plan_visits, read_program, states_of
-from postproc.language.grammars import line_parser
-from postproc.language.logical_lines import read_lines
 from postproc.language.pdl2.program import parse
-from postproc.language.source import source_from_bytes
+from postproc.language.text.grammars import line_parser
+from postproc.language.text.logical_lines import read_lines
+from postproc.language.text.source import source_from_bytes
 from postproc.model.model import Model, load_model
 from postproc.robot.arm import Arm
 from postproc.robot.cell import load_cell

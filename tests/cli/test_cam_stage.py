@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from postproc.language.stamp import read_stamp, strip_stamp
+from postproc.language.text.stamp import read_stamp, strip_stamp
 from tests.plant import contents, pages, program
 
 ROOT = Path(__file__).parents[2]

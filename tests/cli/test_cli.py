@@ -9,7 +9,7 @@ import pytest
 
 from postproc import __version__
 from postproc.cli.commands import app
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 from postproc.model.model import load_model
 from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 

@@ -20,7 +20,7 @@ from postproc.compensation.windowing import (
 from postproc.language.language import Start
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 from postproc.language.visits import Visits
 from tests.bench.made import drilling, milling
 from tests.language.pdl2.reachable import reachable

@@ -12,7 +12,7 @@ from postproc.compensation.expected_error import expect_errors
 from postproc.compensation.headline import ProgramErrors, headline, list_exceptions
 from postproc.compensation.tolerance import check_tolerance
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.stamp import read_stamp
+from postproc.language.text.stamp import read_stamp
 from tests.written import FIRST, NEXT, POSE, cli, program
 
 N = 40

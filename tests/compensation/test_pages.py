@@ -7,8 +7,8 @@ import pytest
 from postproc.compensation.pages import names_in
 from postproc.compensation.program_files import find_pages
 from postproc.compensation.sidecar import sidecar_path
-from postproc.language.source import Source
-from postproc.language.stamp import stamp_line
+from postproc.language.text.source import Source
+from postproc.language.text.stamp import stamp_line
 
 MAIN = b"MODULE main\nPROC main()\nENDPROC\nENDMODULE\n"
 PART = b"MODULE part\nPROC edge()\nENDPROC\nENDMODULE\n"

@@ -15,8 +15,8 @@ from postproc.compensation.sidecar import (
     sidecar_path,
 )
 from postproc.exceptions import OutputError, ProgramError
-from postproc.language.source import Edit, Replacements, Source, Span
-from postproc.language.stamp import stamp_line
+from postproc.language.text.source import Edit, Replacements, Source, Span
+from postproc.language.text.stamp import stamp_line
 
 SOURCE = b"PROGRAM x\r\nMOVE TO {1.0, \xe4 2}\r\nEND x"
 OUTPUT = b"-- stamp\r\nPROGRAM x\r\nMOVE TO {1.25, \xe4 2}\r\nEND x"

@@ -15,7 +15,7 @@ from postproc.compensation.sidecar import (
     read_without_edits,
 )
 from postproc.exceptions import ProgramError
-from postproc.language.source import Replacements
+from postproc.language.text.source import Replacements
 
 NASTY = (b'], "targets": {', b'"edits": [', b"\\", b'"', b'\\"edits": [', b"1.5", b"}")
 

@@ -24,7 +24,7 @@ from tests.written import FIRST, POSE, program, write_numbers
 def window(request, monkeypatch):
     """Check as many rows at a time."""
     monkeypatch.setattr("postproc.compensation.equivalence.ROWS", request.param)
-    monkeypatch.setattr("postproc.language.number_edits.AT_ONCE", request.param)
+    monkeypatch.setattr("postproc.language.text.number_edits.AT_ONCE", request.param)
 
 
 SHIFTED = (

@@ -11,8 +11,8 @@ from postproc.compensation.rewrite import (
     check_output,
     read_back,
 )
-from postproc.language.number_edits import Skeleton, difference
-from postproc.language.source import NumberSpans, Replacements, Source, apply
+from postproc.language.text.number_edits import Skeleton, difference
+from postproc.language.text.source import NumberSpans, Replacements, Source, apply
 from postproc.robot.cell import load_cell
 from tests.bench.__main__ import CELL
 from tests.bench.made import spot

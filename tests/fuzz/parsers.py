@@ -7,11 +7,11 @@ import contextlib
 import numpy as np
 
 from postproc.exceptions import PostprocError
-from postproc.language.logical_lines import Lines, read_lines
-from postproc.language.number_edits import difference
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.source import Replacements, Source, apply, source_from_bytes
+from postproc.language.text.logical_lines import Lines, read_lines
+from postproc.language.text.number_edits import difference
+from postproc.language.text.source import Replacements, Source, apply, source_from_bytes
 
 
 def program(data: bytes) -> None:

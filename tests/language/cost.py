@@ -6,7 +6,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 GRAMMARS = {"PDL2": ("pdl2", "lsv"), "RAPID": ("rapid",), "KRL": ("krl",)}
-FOLDERS = {"PDL2": "pdl2/", "RAPID": "rapid/", "KRL": "krl/", "all languages": ""}
+FOLDERS = {
+    "PDL2": ("pdl2/",),
+    "RAPID": ("rapid/",),
+    "KRL": ("krl/",),
+    "all languages": ("", "text/", "analysis/"),
+}
 
 
 def lines(path: Path) -> int:
@@ -17,13 +22,14 @@ def lines(path: Path) -> int:
 def table() -> list[str]:
     """Write the table of docs/studies/languages.md, Python to the hundred lines."""
     rows = ["| | grammar | Python |", "|---|---|---|"]
-    for name, folder in FOLDERS.items():
+    for name, folders in FOLDERS.items():
         names = [f"{part}.lark" for part in GRAMMARS.get(name, ())]
         count = sum(lines(ROOT / "grammars" / one) for one in names)
         grammar = f"{count} lines ({', '.join(f'`{one}`' for one in names)})"
-        place = f"postproc/language/{folder}"
-        code = round(sum(lines(p) for p in (ROOT / place).glob("*.py")), -2)
-        told = f"`{place}`" if folder else f"`{place}*.py`"
+        places = [ROOT / "postproc/language" / folder for folder in folders]
+        paths = (path for place in places for path in place.glob("*.py"))
+        code = round(sum(map(lines, paths)), -2)
+        told = ", ".join(f"`language/{folder}`" for folder in folders)
         rows.append(
             f"| {name} | {grammar if names else ''} | {code:,} lines ({told}) |"
         )

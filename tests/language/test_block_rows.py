@@ -2,8 +2,8 @@
 
 import pytest
 
-from postproc.language.logical_lines import read_lines
-from postproc.language.source import source_from_bytes
+from postproc.language.text.logical_lines import read_lines
+from postproc.language.text.source import source_from_bytes
 
 
 def rows(text: str) -> list[tuple[str, int, list[float]]]:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from postproc import _native
-from postproc.language.source import Edit, Replacements, Span, apply
+from postproc.language.text.source import Edit, Replacements, Span, apply
 from tests.language.digits import number_texts
 from tests.reference.text import decimals_of, number_value
 

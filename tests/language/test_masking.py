@@ -8,9 +8,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from postproc.exceptions import ProgramError
-from postproc.language.lexer import NAME_MARK, WHOLE, scan_lines
-from postproc.language.logical_lines import read_lines
-from postproc.language.source import Source, source_from_bytes
+from postproc.language.text.lexer import NAME_MARK, WHOLE, scan_lines
+from postproc.language.text.logical_lines import read_lines
+from postproc.language.text.source import Source, source_from_bytes
 from tests.reference.text import form_of, mask_line, number_value
 
 PIECES = (

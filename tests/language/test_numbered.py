@@ -5,9 +5,9 @@ import random
 import numpy as np
 import pytest
 
-from postproc.language.lexer import NAME_MARK, form_of, mask_of, scan_lines
-from postproc.language.logical_lines import Lines, read_lines
-from postproc.language.source import Source, source_from_bytes
+from postproc.language.text.lexer import NAME_MARK, form_of, mask_of, scan_lines
+from postproc.language.text.logical_lines import Lines, read_lines
+from postproc.language.text.source import Source, source_from_bytes
 from tests.reference import text as plain
 from tests.reference.text import mask_line
 

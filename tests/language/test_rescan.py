@@ -5,9 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from postproc.exceptions import ProgramError
-from postproc.language.lexer import rescan_lines, scan_lines
-from postproc.language.logical_lines import read_lines, reread_lines
-from postproc.language.source import Source
+from postproc.language.text.lexer import rescan_lines, scan_lines
+from postproc.language.text.logical_lines import read_lines, reread_lines
+from postproc.language.text.source import Source
 from tests.language.test_masking import TEXT
 
 NUMBERS = st.lists(st.sampled_from(["7", "-0.25", "12.5e3", "1.0"]), min_size=1)

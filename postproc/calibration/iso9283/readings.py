@@ -17,8 +17,8 @@ from postproc.calibration.tables import DETECT
 from postproc.calibration.text_table import TextTable, read_table
 from postproc.exceptions import MeasurementError, ProgramError
 from postproc.files import read_input
-from postproc.language.source import Source
-from postproc.language.stamp import is_stamped
+from postproc.language.text.source import Source
+from postproc.language.text.stamp import is_stamped
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 

@@ -18,7 +18,7 @@ from postproc.compensation.paths.arcs import (
 )
 from postproc.compensation.payload import payload_of
 from postproc.language.language import ArcPiece, Splitter
-from postproc.language.source import CloneError
+from postproc.language.text.source import CloneError
 from postproc.language.visits import Meaning, OrientationLaw, Visits
 from postproc.model.model import Model
 from postproc.motion.cycle_time import ProgramCycle

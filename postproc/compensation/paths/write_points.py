@@ -24,8 +24,8 @@ from postproc.compensation.rewrite import VerificationError
 from postproc.compensation.windowing import SHARED
 from postproc.language.language import Splitter
 from postproc.language.languages import language_of
-from postproc.language.source import Edit, Source, apply, compose
-from postproc.language.symbol_column import NameColumn
+from postproc.language.text.source import Edit, Source, apply, compose
+from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import Literals, Visits
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, lengths, rotation_from_vector, rotation_vector

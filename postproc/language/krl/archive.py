@@ -10,13 +10,13 @@ import numpy as np
 
 from postproc.exceptions import ProgramError
 from postproc.files import read_input
+from postproc.language.analysis.assigned_points import Scope
 from postproc.language.archive import Archive
-from postproc.language.assigned_points import Scope
 from postproc.language.krl.files import SHARED_LIST
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.symbols import AXES, OUTSIDE, KrlRecord, KrlTask
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 from postproc.robot.pose import record_from_pose
 
 MACHINE = "$machine.dat"

@@ -13,7 +13,7 @@ from postproc.language.krl.moves import HOMES
 from postproc.language.krl.program import KrlDatum, KrlFile
 from postproc.language.krl.symbols import KrlTask
 from postproc.language.language import Cloner, NamedPoint
-from postproc.language.source import (
+from postproc.language.text.source import (
     CloneError,
     Edit,
     Source,

@@ -10,7 +10,8 @@ import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
-from postproc.language.assigned_points import Scope
+from postproc.language.analysis.assigned_points import Scope
+from postproc.language.analysis.to_visits import IDENTITY, Pose, compose_poses, flat
 from postproc.language.krl.abstract_state import (
     CORRECTIONS,
     NOTHING_SET,
@@ -31,7 +32,6 @@ from postproc.language.krl.symbols import (
     KrlTask,
     KrlValue,
 )
-from postproc.language.to_visits import IDENTITY, Pose, compose_poses, flat
 from postproc.robot.pose import MM
 
 

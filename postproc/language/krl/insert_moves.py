@@ -22,7 +22,7 @@ from postproc.language.krl.clones import is_of_form
 from postproc.language.krl.modal_state import PLANNED
 from postproc.language.krl.pose_encoding import COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
-from postproc.language.source import CloneError, Span
+from postproc.language.text.source import CloneError, Span
 
 LINES = {"lin": "LIN", "circ": "LIN", "slin": "SLIN", "scirc": "SLIN"}
 _HEAD = re.compile(r"\s*(S?LIN|S?CIRC)\b", re.I)

@@ -9,15 +9,16 @@ from functools import cached_property
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
+from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.assigned_points import Scope
-from postproc.language.interpreter import (
+from postproc.language.analysis.task_machine import (
     NOWHERE,
     Arrived,
     TaskMachine,
 )
+from postproc.language.analysis.to_visits import FoundGoal, cell_pose
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import HELD
 from postproc.language.krl.external_routines import AHEAD, ASSUMED, package_routines
@@ -41,7 +42,6 @@ from postproc.language.krl.symbols import (
     operands_of,
 )
 from postproc.language.language import Start
-from postproc.language.to_visits import FoundGoal, cell_pose
 from postproc.language.visits import START
 
 _PASSED = (

@@ -11,10 +11,8 @@ import numpy as np
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing
 from postproc.language import ir
+from postproc.language.analysis.task_machine import follow
 from postproc.language.archive import Archive
-from postproc.language.blocks import read_once
-from postproc.language.grammars import line_parser
-from postproc.language.interpreter import follow
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
 from postproc.language.krl.clones import KrlCloner
@@ -37,8 +35,10 @@ from postproc.language.measuring_program import (
     MeasuringProgram,
     refuse_other_name,
 )
-from postproc.language.number_edits import Skeleton
-from postproc.language.source import Source
+from postproc.language.text.blocks import read_once
+from postproc.language.text.grammars import line_parser
+from postproc.language.text.number_edits import Skeleton
+from postproc.language.text.source import Source
 from postproc.language.visits import never_reached
 
 _BEGIN = re.compile(

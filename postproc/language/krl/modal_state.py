@@ -10,7 +10,7 @@ from typing import Any
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.assigned_points import Scope
+from postproc.language.analysis.assigned_points import Scope
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import (
     CORRECTION_FRAMES,

@@ -11,11 +11,20 @@ import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
-from postproc.language.assigned_points import (
+from postproc.language.analysis.assigned_points import (
     NO_POINTS,
     AssignedPoint,
     Points,
     Scope,
+)
+from postproc.language.analysis.to_visits import (
+    FoundGoal,
+    FoundShift,
+    FoundVisit,
+    explain_components,
+    hold_numbers,
+    not_reached,
+    spell_element,
 )
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame, six_numbers
@@ -38,15 +47,6 @@ from postproc.language.krl.symbols import (
     KrlTask,
 )
 from postproc.language.shifts import Shift, ShiftKind
-from postproc.language.to_visits import (
-    FoundGoal,
-    FoundShift,
-    FoundVisit,
-    explain_components,
-    hold_numbers,
-    not_reached,
-    spell_element,
-)
 from postproc.language.visits import Meaning
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion

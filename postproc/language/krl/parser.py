@@ -9,7 +9,7 @@ from typing import Any
 from postproc.language import ir
 from postproc.language.analysis.control_flow import EXIT
 from postproc.language.krl import syntax as said
-from postproc.language.template_parser import Children, FormParser, Word
+from postproc.language.text.template_parser import Children, FormParser, Word
 
 # From trees to statements, rule by rule. Every function here is named after a rule of
 # ``grammars/krl.lark`` and takes what its children gave.

@@ -10,11 +10,11 @@ from postproc.diagnostics import Code
 from postproc.files import base_name
 from postproc.language import ir
 from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.blocks import BlockWords, Outline
 from postproc.language.krl import syntax as said
 from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.statements import KrlText, read_krl_statements
-from postproc.language.source import Source
+from postproc.language.text.blocks import BlockWords, Outline
+from postproc.language.text.source import Source
 from postproc.language.visits import Diagnostic
 
 _WORDS = BlockWords(

@@ -12,8 +12,7 @@ import numpy as np
 
 from postproc.diagnostics import Code
 from postproc.language import ir
-from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.assigned_points import (
+from postproc.language.analysis.assigned_points import (
     AssignedPoint,
     FunctionBody,
     NamesUsed,
@@ -22,7 +21,8 @@ from postproc.language.assigned_points import (
     TaskSymbols,
     is_point,
 )
-from postproc.language.functions import ALIKE, apply_function
+from postproc.language.analysis.control_flow import HeadedRows
+from postproc.language.analysis.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import TABLES

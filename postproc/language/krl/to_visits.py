@@ -8,7 +8,14 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language import to_visits
+from postproc.language.analysis import to_visits
+from postproc.language.analysis.to_visits import (
+    Conditions,
+    FoundGoal,
+    Pose,
+    cell_pose,
+    not_reached,
+)
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.modal_state import (
     LOST_LOAD,
@@ -21,13 +28,6 @@ from postproc.language.krl.modal_state import (
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
 from postproc.language.krl.pose_encoding import COMMENTS, KRL_DIALECT
 from postproc.language.krl.syntax import SplineBlock
-from postproc.language.to_visits import (
-    Conditions,
-    FoundGoal,
-    Pose,
-    cell_pose,
-    not_reached,
-)
 from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
 from postproc.robot.trajectory import Motion
 

@@ -13,7 +13,7 @@ from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.symbols import KrlTask
 from postproc.language.language import Start
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 
 USER_SOURCES = ("user_grp.src", "userspot.src")
 FOLDERS = ("System", "TP", "Program")  # of an archive

@@ -11,13 +11,13 @@ import numpy as np
 
 from postproc.language import ir
 from postproc.language.language import Cloner, NamedPoint
-from postproc.language.lexer import scan_lines
-from postproc.language.logical_lines import read_lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.entries import is_nested, last_head
 from postproc.language.pdl2.parser import parse_value_form
 from postproc.language.pdl2.program import Body, Program, Variable
-from postproc.language.source import (
+from postproc.language.text.lexer import scan_lines
+from postproc.language.text.logical_lines import read_lines
+from postproc.language.text.source import (
     CloneError,
     Edit,
     Source,
@@ -26,7 +26,7 @@ from postproc.language.source import (
     find_free_name,
     insert_after,
 )
-from postproc.language.templates import parse_shapes
+from postproc.language.text.templates import parse_shapes
 from postproc.language.visits import Literals
 
 # The variable that a move names as where it goes, as far as it can be cloned.

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Indices, Interned, Ints, chunks, is_one_value, slim, spans
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.comment_directives import MEASURE
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Settings
 from postproc.language.pdl2.job import base_variable
@@ -24,8 +23,9 @@ from postproc.language.pdl2.untracked_settings import (
     weaves,
 )
 from postproc.language.pdl2.values import Nothing, Position, Value
-from postproc.language.symbol_column import NameColumn
-from postproc.language.templates import number_in_order
+from postproc.language.text.comment_directives import MEASURE
+from postproc.language.text.symbol_column import NameColumn
+from postproc.language.text.templates import number_in_order
 from postproc.language.visits import (
     Blend,
     Meaning,

@@ -10,10 +10,15 @@ from typing import Self
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Indices, Ints, chunks, slim
-from postproc.language.logical_lines import Lines
 from postproc.language.pdl2.parser import EntryPart
-from postproc.language.symbol_column import NameColumn
-from postproc.language.templates import ParsedShapes, alike, name_index, number_in_order
+from postproc.language.text.logical_lines import Lines
+from postproc.language.text.symbol_column import NameColumn
+from postproc.language.text.templates import (
+    ParsedShapes,
+    alike,
+    name_index,
+    number_in_order,
+)
 
 # The entries of a variable file as columns; single ones are made when asked for.
 

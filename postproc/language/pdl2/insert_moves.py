@@ -16,7 +16,7 @@ from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.clones import code_of
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import Program
-from postproc.language.source import CloneError, Span
+from postproc.language.text.source import CloneError, Span
 
 _EVENT = re.compile(r"\b(AT|TIME|DISTANCE|PERCENT|SEGMENT|EVENT)\b", re.I)
 _ENABLE = re.compile(r"\bENABLE\b(?!\s+CONDITION\s*\[\s*\d+\s*\])", re.I)

@@ -65,7 +65,7 @@ from postproc.language.pdl2.values import (
 )
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
-from postproc.language.symbol_column import NameColumn
+from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import (
     ELSEWHERE,
     START,

@@ -28,7 +28,7 @@ from postproc.language.pdl2.program import (
 )
 from postproc.language.pdl2.values import Nothing, Position, Value
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
-from postproc.language.symbol_column import NameColumn
+from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import Diagnostic
 
 # What variables hold when a program starts, by key.

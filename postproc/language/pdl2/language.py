@@ -12,7 +12,6 @@ import numpy as np
 from postproc.arrays import release_memory
 from postproc.exceptions import ProgramError
 from postproc.files import base_name
-from postproc.language.grammars import line_parser
 from postproc.language.language import (
     Cloner,
     JobReading,
@@ -21,7 +20,6 @@ from postproc.language.language import (
     Start,
 )
 from postproc.language.measuring_program import MeasuringProgram
-from postproc.language.number_edits import Skeleton
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
@@ -32,7 +30,9 @@ from postproc.language.pdl2.variable_file import (
     read_variables,
     read_variables_again,
 )
-from postproc.language.source import Source
+from postproc.language.text.grammars import line_parser
+from postproc.language.text.number_edits import Skeleton
+from postproc.language.text.source import Source
 from postproc.language.visits import never_reached
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")

@@ -10,7 +10,6 @@ import numpy as np
 
 from postproc.arrays import Bools, Ints
 from postproc.language import ir
-from postproc.language.logical_lines import Lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import call_statement, calls_in_expressions
 from postproc.language.pdl2.external_routines import stays_still
@@ -32,8 +31,9 @@ from postproc.language.pdl2.side_effects import (
     references,
 )
 from postproc.language.pdl2.values import Nothing
-from postproc.language.symbol_column import NameColumn
-from postproc.language.templates import alike, name_index, number_in_order
+from postproc.language.text.logical_lines import Lines
+from postproc.language.text.symbol_column import NameColumn
+from postproc.language.text.templates import alike, name_index, number_in_order
 from postproc.robot.trajectory import Motion
 
 # Lines that are run a thousand at a time: moves to known places, idle calls.

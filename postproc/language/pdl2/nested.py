@@ -10,7 +10,6 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.diagnostics import Code
-from postproc.language.logical_lines import Lines
 from postproc.language.pdl2.entries import (
     NESTED,
     POSITIONS,
@@ -21,8 +20,9 @@ from postproc.language.pdl2.entries import (
 )
 from postproc.language.pdl2.parser import EntryPart
 from postproc.language.pdl2.values import COMPONENTS
-from postproc.language.symbol_column import NameColumn
-from postproc.language.templates import ParsedShapes
+from postproc.language.text.logical_lines import Lines
+from postproc.language.text.symbol_column import NameColumn
+from postproc.language.text.templates import ParsedShapes
 from postproc.language.visits import Diagnostic
 
 # A field of a record or of a node, as a variable file lists it.

@@ -12,11 +12,11 @@ from typing import Any
 import lark
 
 from postproc.language import ir
-from postproc.language.grammars import line_parser
 from postproc.language.ir import Num
-from postproc.language.lexer import NAME_MARK, UNREADABLE
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.templates import open_name
+from postproc.language.text.grammars import line_parser
+from postproc.language.text.lexer import NAME_MARK, UNREADABLE
+from postproc.language.text.templates import open_name
 
 # Parts of a line on their way from tree to statement, told apart by type.
 

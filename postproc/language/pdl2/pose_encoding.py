@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.language.comment_directives import Comments
 from postproc.language.pose_encoding import Dialect, Terms
+from postproc.language.text.comment_directives import Comments
 from postproc.robot.pose import angles_near, pose_from_record, rotation_from_zyz
 
 MM_DECIMALS, DEGREE_DECIMALS, JOINT_DECIMALS = 3, 4, 5

@@ -15,13 +15,13 @@ from postproc.arrays import Bools, Indices, Ints
 from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.control_flow import ControlFlow, FlowReader
-from postproc.language.logical_lines import Lines, read_lines, reread_lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_form
 from postproc.language.pdl2.pose_encoding import COMMENTS
-from postproc.language.source import Source
-from postproc.language.symbol_column import NameColumn
-from postproc.language.templates import ParsedShapes, parse_shapes
+from postproc.language.text.logical_lines import Lines, read_lines, reread_lines
+from postproc.language.text.source import Source
+from postproc.language.text.symbol_column import NameColumn
+from postproc.language.text.templates import ParsedShapes, parse_shapes
 from postproc.language.visits import Diagnostic
 
 # Block structure of one body: which line closes which, and where jumps lead.

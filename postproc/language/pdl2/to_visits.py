@@ -28,8 +28,8 @@ from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColum
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.machine import Key, Machine, MoveRun
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
-from postproc.language.source import NumberSpans, Source
-from postproc.language.symbol_column import NameColumn
+from postproc.language.text.source import NumberSpans, Source
+from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import (
     ELSEWHERE,
     Literals,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnostics import Code
-from postproc.language.functions import apply_function
+from postproc.language.analysis.functions import apply_function
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
 # What the analysis knows of a value: a number, a text, a position, or why nothing.

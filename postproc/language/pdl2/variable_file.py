@@ -10,7 +10,6 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.diagnostics import Code
-from postproc.language.logical_lines import Lines, read_lines, reread_lines
 from postproc.language.pdl2.abstract_state import root_of
 from postproc.language.pdl2.entries import (
     NESTED,
@@ -26,9 +25,10 @@ from postproc.language.pdl2.entries import (
 )
 from postproc.language.pdl2.nested import complete_entries, find_fields, with_fields
 from postproc.language.pdl2.parser import EntryPart, parse_value_form
-from postproc.language.source import Source
-from postproc.language.symbol_column import NameColumn
-from postproc.language.templates import ParsedShapes, parse_shapes
+from postproc.language.text.logical_lines import Lines, read_lines, reread_lines
+from postproc.language.text.source import Source
+from postproc.language.text.symbol_column import NameColumn
+from postproc.language.text.templates import ParsedShapes, parse_shapes
 from postproc.language.visits import Diagnostic
 
 Finding = tuple[int, Diagnostic]

@@ -17,7 +17,7 @@ from postproc.language.archive import Archive
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import read_rapid
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 from postproc.robot.pose import record_from_pose
 
 PROGRAMS, SYSTEM = "progmod", "sysmod"  # folders of a task

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from postproc.language import ir
-from postproc.language.assigned_points import Scope
+from postproc.language.analysis.assigned_points import Scope
 from postproc.language.language import Cloner, NamedPoint
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.program import Datum, MotionCall, RapidFile
 from postproc.language.rapid.symbols import TARGETS, RapidTask
-from postproc.language.source import (
+from postproc.language.text.source import (
     CloneError,
     Edit,
     Source,

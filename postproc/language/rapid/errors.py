@@ -12,7 +12,7 @@ from postproc.language.analysis.control_flow import CLOSING, ControlFlow
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.symbols import SHIFTS, functions_in, inside
 from postproc.language.rapid.targets import operands_of
-from postproc.language.statement_table import StatementText
+from postproc.language.text.statement_table import StatementText
 
 Numbers = frozenset[str] | None
 """Names of error numbers; None: any."""

@@ -18,7 +18,7 @@ from postproc.language.rapid.clones import ends_line
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile
 from postproc.language.rapid.symbols import RapidTask
-from postproc.language.source import CloneError, Span
+from postproc.language.text.source import CloneError, Span
 
 LONGEST_STATEMENT = 400  # characters, as an arc to two written targets has them
 ZONE = "z0"  # the smallest that passes a point

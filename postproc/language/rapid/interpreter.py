@@ -11,15 +11,16 @@ from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
+from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.assigned_points import Scope
-from postproc.language.interpreter import (
+from postproc.language.analysis.task_machine import (
     NOWHERE,
     Arrived,
     TaskMachine,
 )
+from postproc.language.analysis.to_visits import FoundGoal
 from postproc.language.language import Start
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.error_paths import ErrorExit, ErrorHandlers, exits_of
@@ -57,7 +58,6 @@ from postproc.language.rapid.symbols import (
     inside,
     parameters_of,
 )
-from postproc.language.to_visits import FoundGoal
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")

@@ -12,10 +12,8 @@ from postproc.arrays import Floats
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing
+from postproc.language.analysis.task_machine import follow
 from postproc.language.archive import Archive
-from postproc.language.blocks import read_once
-from postproc.language.grammars import line_parser
-from postproc.language.interpreter import follow
 from postproc.language.language import (
     Cloner,
     JobReading,
@@ -24,7 +22,6 @@ from postproc.language.language import (
     Start,
 )
 from postproc.language.measuring_program import MeasuringProgram
-from postproc.language.number_edits import Skeleton
 from postproc.language.rapid.backup import (
     modules_beside,
     read_backup,
@@ -39,7 +36,10 @@ from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.rapid.statements import RapidText
 from postproc.language.rapid.symbols import RapidTask, other_tasks
 from postproc.language.rapid.to_visits import visits_of
-from postproc.language.source import Source
+from postproc.language.text.blocks import read_once
+from postproc.language.text.grammars import line_parser
+from postproc.language.text.number_edits import Skeleton
+from postproc.language.text.source import Source
 from postproc.language.visits import never_reached
 
 # What the interpreter says of a statement where it is reached, knowing all modules.

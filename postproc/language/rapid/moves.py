@@ -12,11 +12,25 @@ import numpy as np
 from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
-from postproc.language.assigned_points import (
+from postproc.language.analysis.assigned_points import (
     NO_POINTS,
     AssignedPoint,
     Points,
     Scope,
+)
+from postproc.language.analysis.to_visits import (
+    IDENTITY,
+    FoundGoal,
+    FoundShift,
+    FoundVisit,
+    Pose,
+    compose_poses,
+    explain_components,
+    explain_disagreement,
+    flat,
+    hold_numbers,
+    not_reached,
+    spell_element,
 )
 from postproc.language.rapid.instructions import POINT, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
@@ -33,20 +47,6 @@ from postproc.language.rapid.symbols import (
 )
 from postproc.language.rapid.targets import COUNTS
 from postproc.language.shifts import Shift, ShiftKind
-from postproc.language.to_visits import (
-    IDENTITY,
-    FoundGoal,
-    FoundShift,
-    FoundVisit,
-    Pose,
-    compose_poses,
-    explain_components,
-    explain_disagreement,
-    flat,
-    hold_numbers,
-    not_reached,
-    spell_element,
-)
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from postproc.language import ir
 from postproc.language.rapid import syntax as said
-from postproc.language.template_parser import Children, FormParser, Word
+from postproc.language.text.template_parser import Children, FormParser, Word
 
 # From trees to statements, rule by rule. Every function here is named after a rule of
 # ``grammars/rapid.lark`` and takes what its children gave.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.language.comment_directives import Comments
 from postproc.language.pose_encoding import WIDEST, Dialect, Terms
+from postproc.language.text.comment_directives import Comments
 from postproc.robot.pose import MM
 
 MM_DECIMALS, QUATERNION_DECIMALS, JOINT_DECIMALS = 3, 6, 5

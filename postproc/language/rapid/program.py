@@ -7,7 +7,6 @@ from functools import cached_property
 
 from postproc.diagnostics import Code
 from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.blocks import BlockWords, Outline
 from postproc.language.ir import (
     Argument,
     BlockWord,
@@ -33,7 +32,8 @@ from postproc.language.rapid.syntax import (
     RecordHead,
     RoutineHead,
 )
-from postproc.language.source import Source
+from postproc.language.text.blocks import BlockWords, Outline
+from postproc.language.text.source import Source
 from postproc.language.visits import Diagnostic
 
 _SYSTEM = "sysmodule"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from postproc import _native
 from postproc.language.ir import SourceStatement
 from postproc.language.rapid.parser import parse_statement
-from postproc.language.source import Source
-from postproc.language.statement_table import StatementText, read_text
+from postproc.language.text.source import Source
+from postproc.language.text.statement_table import StatementText, read_text
 
 RapidText = StatementText[SourceStatement]
 

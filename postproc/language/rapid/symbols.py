@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.language import ir
-from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.assigned_points import (
+from postproc.language.analysis.assigned_points import (
     AssignedPoint,
     FunctionBody,
     NamesUsed,
@@ -23,7 +22,8 @@ from postproc.language.assigned_points import (
     is_point,
     source_of,
 )
-from postproc.language.functions import ALIKE, apply_function
+from postproc.language.analysis.control_flow import HeadedRows
+from postproc.language.analysis.functions import ALIKE, apply_function
 from postproc.language.ir import is_odd
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.files import RapidFileName

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language import to_visits
+from postproc.language.analysis import to_visits
+from postproc.language.analysis.to_visits import (
+    Conditions,
+    Pose,
+    cell_pose,
+    compose_poses,
+)
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.modal_state import NO_SHIFT, UNKNOWN_SHIFT
 from postproc.language.rapid.moves import (
@@ -15,7 +21,6 @@ from postproc.language.rapid.moves import (
     pose_of_numbers,
 )
 from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
-from postproc.language.to_visits import Conditions, Pose, cell_pose, compose_poses
 from postproc.language.visits import Meaning, Visits
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from postproc.arrays import Floats, Indices, Ints
 from postproc.compensation.outcome import Outcome, Status
 from postproc.language.languages import language_of
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from postproc.language.visits import Meaning
 from postproc.report.head import ReportHead
 from postproc.report.html.distribution import distribution

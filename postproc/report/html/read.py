@@ -16,8 +16,8 @@ from postproc.compensation.sidecar import (
 )
 from postproc.exceptions import ProgramError
 from postproc.files import schema, write_all
-from postproc.language.source import Source
-from postproc.language.stamp import is_stamped
+from postproc.language.text.source import Source
+from postproc.language.text.stamp import is_stamped
 from postproc.report.html.diagnosis import diagnosis_report
 from postproc.report.html.model import calibration_report, comparison_report
 from postproc.report.html.program import program_report_from_json

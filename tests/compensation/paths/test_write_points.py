@@ -19,7 +19,7 @@ from postproc.compensation.rewrite import VerificationError
 from postproc.language.pdl2.insert_moves import Pdl2Splitter
 from postproc.language.pdl2.language import Pdl2
 from postproc.language.pdl2.program import parse
-from postproc.language.source import Edit
+from postproc.language.text.source import Edit
 from postproc.robot.cell import load_cell
 from tests.written import program
 

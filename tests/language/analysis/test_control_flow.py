@@ -13,7 +13,7 @@ from postproc.language.analysis.control_flow import (
 )
 from postproc.language.language import Start
 from postproc.language.rapid.language import Rapid
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from tests.golden.rapid_cases import go, module
 from tests.language.krl.test_visits import job, origins
 

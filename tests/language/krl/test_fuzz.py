@@ -7,7 +7,7 @@ from collections import Counter
 
 import pytest
 
-from postproc.language.stamp import read_stamp
+from postproc.language.text.stamp import read_stamp
 from tests.fuzz.case import check_bytes, compensated, records_of, rewrite
 from tests.fuzz.originals import cell, damaged_job, jobs, krl_moves
 from tests.language import neutral_job

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from postproc.language.source import Source
-from postproc.language.stamp import (
+from postproc.language.text.source import Source
+from postproc.language.text.stamp import (
     is_stamped,
     read_stamp,
     stamp_line,

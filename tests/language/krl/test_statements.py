@@ -15,7 +15,7 @@ from postproc.language.krl import syntax as said
 from postproc.language.krl.language import skeleton_of
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.statements import read_krl_statements
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from tests.reference.krl_lines import krl_lines
 
 PIECES = st.sampled_from([

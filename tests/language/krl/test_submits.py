@@ -11,7 +11,7 @@ from postproc.files import FolderListing
 from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.language import Krl
 from postproc.language.language import Start
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from postproc.language.visits import ZoneRule
 from tests.language.krl.test_visits import CONFIG, DATA, codes, reasons
 

@@ -8,7 +8,7 @@ import pytest
 from postproc.exceptions import ProgramError
 from postproc.language.krl.language import Krl
 from postproc.language.language import Start
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from postproc.language.visits import (
     ELSEWHERE,
     START,

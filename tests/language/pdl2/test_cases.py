@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.language.number_edits import difference, edits
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import parse
-from postproc.language.source import Source, apply, source_from_bytes
+from postproc.language.text.number_edits import difference, edits
+from postproc.language.text.source import Source, apply, source_from_bytes
 
 CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.pdl"))
 

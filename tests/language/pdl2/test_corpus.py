@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from postproc.language.language import Start
-from postproc.language.number_edits import edits
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.source import apply, source_from_bytes
+from postproc.language.text.number_edits import edits
+from postproc.language.text.source import apply, source_from_bytes
 from postproc.language.visits import ELSEWHERE, START, Meaning
 from postproc.robot.trajectory import Motion
 

@@ -6,7 +6,7 @@ from postproc.diagnostics import Code
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.side_effects import dead_lines
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from postproc.language.visits import never_reached
 
 POINT = "MOVE LINEAR TO POS(1, 2, 3, 0, 180, 0, '')"

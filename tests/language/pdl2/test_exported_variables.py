@@ -8,7 +8,7 @@ from postproc.language.language import Start
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.source import Source, source_from_bytes
+from postproc.language.text.source import Source, source_from_bytes
 from postproc.language.visits import Meaning
 from tests.language.pdl2.test_opaque_calls import handler, program, routine
 

@@ -11,7 +11,7 @@ from postproc.language.language import Start
 from postproc.language.pdl2.external_routines import list_motionless
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.program import parse
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from postproc.language.visits import ELSEWHERE, START
 from tests.language.pdl2.test_opaque_calls import handler, program, routine
 

@@ -7,7 +7,7 @@ import pytest
 
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 from postproc.language.visits import ELSEWHERE, START, Meaning, Visits
 from tests.language.pdl2.executed import PAGE, Executed, Generated
 from tests.language.pdl2.interpreter import Interpreter

@@ -7,7 +7,7 @@ import pytest
 from postproc.exceptions import PostprocError
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 from tests.fuzz import parsers
 from tests.fuzz.case import compensated, rewrite
 from tests.fuzz.originals import damaged

@@ -8,7 +8,7 @@ import pytest
 from postproc.language.language import ArcPiece
 from postproc.language.languages import language_of
 from postproc.language.pdl2.language import Pdl2
-from postproc.language.source import CloneError, Source, apply
+from postproc.language.text.source import CloneError, Source, apply
 from tests.written import program
 
 PLACE = "POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')"

@@ -6,7 +6,7 @@ import pytest
 from postproc.language.language import Start
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.program import Program, parse
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 from postproc.language.visits import START, Blend, OrientationLaw, Switch, ZoneRule
 from postproc.robot.pose import pose_from_record, record_from_pose
 

@@ -7,7 +7,7 @@ import pytest
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 from postproc.language.visits import Meaning, Visits
 
 FILE = b"""p POS Priv

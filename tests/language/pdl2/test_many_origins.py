@@ -6,7 +6,7 @@ from postproc.language.analysis.interpreter import Interpreter
 from postproc.language.pdl2.abstract_state import MOST_ORIGINS
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.program import parse
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 from postproc.language.visits import ELSEWHERE, START
 
 MAYBE = "IF $DIN[1] THEN\nMOVE LINEAR TO POS({0},2,3,4,5,6,'')\nENDIF\n"

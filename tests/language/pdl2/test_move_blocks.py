@@ -10,7 +10,7 @@ from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.move_blocks import MoveBlocks
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 from postproc.language.visits import Visits
 
 PROGRAMS = 120

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from postproc.language.language import Start
-from postproc.language.number_edits import edits
 from postproc.language.pdl2.clones import copy_entry
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
-from postproc.language.source import CloneError, apply, source_from_bytes
+from postproc.language.text.number_edits import edits
+from postproc.language.text.source import CloneError, apply, source_from_bytes
 
 HEAD = """PROGRAM job
 VAR pth, other : PATH OF nd

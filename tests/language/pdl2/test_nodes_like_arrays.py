@@ -12,7 +12,7 @@ from postproc.language.language import Start
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 
 HEAD = """PROGRAM job
 VAR tab, other : ARRAY[4] OF POSITION

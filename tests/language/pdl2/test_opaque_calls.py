@@ -6,7 +6,7 @@ import pytest
 
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.program import parse
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from postproc.language.visits import ELSEWHERE, Meaning
 
 AT = "POS(1, 2, 3, 0, 180, 0, '')"

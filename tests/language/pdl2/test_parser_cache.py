@@ -8,10 +8,10 @@ from pathlib import Path
 import lark
 import pytest
 
-from postproc.language import grammars
-from postproc.language.lexer import form_of
-from postproc.language.logical_lines import read_lines
-from postproc.language.source import source_from_bytes
+from postproc.language.text import grammars
+from postproc.language.text.lexer import form_of
+from postproc.language.text.logical_lines import read_lines
+from postproc.language.text.source import source_from_bytes
 
 ROOT = Path(__file__).parents[3]
 

@@ -9,7 +9,7 @@ import pytest
 from postproc.language.language import Start
 from postproc.language.pdl2 import language
 from postproc.language.pdl2.language import Pdl2
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 
 PROGRAMS = Path(__file__).parents[3] / "programs"
 HEAD = b"PROGRAM job\nVAR p, q : POSITION\n n : INTEGER\nBEGIN\n"

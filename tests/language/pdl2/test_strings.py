@@ -6,7 +6,7 @@ import pytest
 
 from postproc.language import ir
 from postproc.language.pdl2.program import parse
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from tests.language.pdl2.test_external_routines import FIRST, codes, followed, reasons
 
 STRINGS = {

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from postproc.language.grammars import grammar
+from postproc.language.text.grammars import grammar
 from postproc.language.visits import ELSEWHERE, ZoneRule
 from tests.language.pdl2.test_external_routines import (
     FIRST,

@@ -5,7 +5,7 @@ import pytest
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.source import source_from_bytes
+from postproc.language.text.source import source_from_bytes
 
 VALUES = b"""p POS Priv
  X: 1.5  Y: 2.5  Z: 3.5  A: 4.5  E: 5.5  R: 6.5

@@ -3,12 +3,12 @@
 import numpy as np
 
 from postproc.language.language import Start
-from postproc.language.number_edits import edits
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.source import apply, source_from_bytes
+from postproc.language.text.number_edits import edits
+from postproc.language.text.source import apply, source_from_bytes
 
 LSV = b"""--$$  ARM: 1 AXES: 8 AUX: 1 MASK: 191
 one XTND Arm: 1 Ax:1 Priv X: 1093.44 Y: 636.79  Z:345.13 A: -135 E: 56 R: 38 1: 90

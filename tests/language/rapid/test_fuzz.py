@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from postproc.language.stamp import read_stamp
+from postproc.language.text.stamp import read_stamp
 from tests.fuzz.case import check_bytes, compensated, rewrite
 from tests.fuzz.originals import cell, damaged_of, damaged_task, moves, tasks
 

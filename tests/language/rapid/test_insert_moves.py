@@ -7,7 +7,7 @@ import pytest
 
 from postproc.language.language import ArcPiece
 from postproc.language.rapid.language import Rapid
-from postproc.language.source import CloneError, Source, apply
+from postproc.language.text.source import CloneError, Source, apply
 
 HERE = "[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
 LINE = 5  # of the move that is asked about

@@ -8,7 +8,7 @@ from postproc.compensation.program_files import ProgramFiles
 from postproc.language.language import Start
 from postproc.language.rapid.backup import modules_beside
 from postproc.language.rapid.language import Rapid
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from tests.golden.rapid_cases import DATA, go, module, proc
 
 BESIDE = "TASKS/TASK2/PROGMOD/plc.mod"

@@ -15,7 +15,7 @@ from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import MOTIONS, read_known_instructions
 from postproc.language.rapid.program import read_rapid
 from postproc.language.rapid.targets import WIDTH, RecordKind, find_literals
-from postproc.language.source import Edit, Replacements, Source, Span, apply
+from postproc.language.text.source import Edit, Replacements, Source, Span, apply
 from tests.language.rapid.test_statements import TEXTS
 from tests.reference.statements import statements
 

@@ -6,7 +6,7 @@ import pytest
 
 from postproc.language.language import Start
 from postproc.language.rapid.language import Rapid
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from tests.golden.rapid_cases import DATA, TARGETS, go, module
 
 POINT = next(line for line in DATA if "robtarget p1:" in line)

@@ -14,7 +14,7 @@ from postproc.language.rapid.pose_encoding import (
     quaternion_from_rotation,
     rotation_from_quaternion,
 )
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from postproc.language.visits import (
     ELSEWHERE,
     START,

@@ -5,12 +5,12 @@ from typing import cast
 import pytest
 
 from postproc.language import ir
-from postproc.language.lexer import form_of
-from postproc.language.logical_lines import read_lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_form, parse_value_form
-from postproc.language.source import source_from_bytes
-from postproc.language.templates import filler, parse_shapes
+from postproc.language.text.lexer import form_of
+from postproc.language.text.logical_lines import read_lines
+from postproc.language.text.source import source_from_bytes
+from postproc.language.text.templates import filler, parse_shapes
 
 
 def parse_line(mask: str) -> ir.SourceStatement:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.language.assigned_points import (
+from postproc.language.analysis.assigned_points import (
     NO_POINTS,
     AssignedPoint,
     Component,

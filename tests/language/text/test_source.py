@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from postproc.exceptions import ProgramError
-from postproc.language.source import (
+from postproc.language.text.source import (
     Edit,
     NumberSpans,
     Replacements,
@@ -67,7 +67,7 @@ def test_empty_files_are_refused(data: bytes) -> None:
 
 
 def test_a_text_whose_places_cannot_be_told_is_refused(monkeypatch) -> None:
-    monkeypatch.setattr("postproc.language.source.LAST", 99)
+    monkeypatch.setattr("postproc.language.text.source.LAST", 99)
     assert source_from_bytes("x.pdl", b"a" * 99).data
     with pytest.raises(
         ProgramError, match=r"x\.pdl: has 100 bytes; at most 99 .*\. Divide"

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Indices, Interned, Ints, spans
 from postproc.exceptions import ProgramError
-from postproc.language.lexer import (
+from postproc.language.text.lexer import (
     NAME_MARK,
     NUMBER_MARK,
     WHOLE,
@@ -18,8 +18,8 @@ from postproc.language.lexer import (
     rescan_lines,
     scan_lines,
 )
-from postproc.language.source import NumberSpans, Source
-from postproc.language.templates import (
+from postproc.language.text.source import NumberSpans, Source
+from postproc.language.text.templates import (
     Shapes,
     alike,
     find_shapes,

@@ -2,8 +2,8 @@
 
 import pytest
 
-from postproc.language.source import Source, source_from_bytes
-from postproc.language.stamp import (
+from postproc.language.text.source import Source, source_from_bytes
+from postproc.language.text.stamp import (
     Stamp,
     is_stamped,
     read_stamp,

@@ -15,6 +15,12 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, all_in_rows
 from postproc.diagnostics import Code
 from postproc.language import ir
+from postproc.language.analysis.assigned_points import (
+    NO_POINTS,
+    Points,
+    Scope,
+    TaskSymbols,
+)
 from postproc.language.analysis.call_context import CALLED, Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import (
@@ -29,11 +35,10 @@ from postproc.language.analysis.interpreter import (
     Interpreter,
     calls_around,
 )
-from postproc.language.assigned_points import NO_POINTS, Points, Scope, TaskSymbols
-from postproc.language.comment_directives import Comments
+from postproc.language.analysis.move_runs import Runs, find_runs, rows_of_lines
 from postproc.language.language import Start
-from postproc.language.move_runs import Runs, find_runs, rows_of_lines
-from postproc.language.statement_table import StatementText
+from postproc.language.text.comment_directives import Comments
+from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import ELSEWHERE, Diagnostic
 
 DEEPEST = 60  # calls within calls

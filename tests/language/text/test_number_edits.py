@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from postproc.exceptions import ProgramError
-from postproc.language.number_edits import difference, edits
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import parse
-from postproc.language.source import (
+from postproc.language.text.number_edits import difference, edits
+from postproc.language.text.source import (
     Edit,
     Replacements,
     Source,

@@ -10,8 +10,8 @@ from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.ir import SourceStatement
-from postproc.language.source import Source
-from postproc.language.statement_table import StatementText
+from postproc.language.text.source import Source
+from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Diagnostic
 
 

@@ -6,7 +6,7 @@ import hashlib
 import re
 from dataclasses import dataclass
 
-from postproc.language.source import UTF8_MARK, Source, Span
+from postproc.language.text.source import UTF8_MARK, Source, Span
 
 _INDENT = 400  # blanks before a stamp that an editor has moved
 _STAMP = re.compile(

@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, slim
 from postproc.language.analysis.control_flow import ControlFlow
-from postproc.language.statement_table import StatementText
+from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Visits
 
 LEAST = 8  # statements that are worth it

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Indices, Interned, Ints
-from postproc.language.lexer import NAME_MARK, WHOLE, form_of, mask_of
-from postproc.language.symbol_column import NameColumn
+from postproc.language.text.lexer import NAME_MARK, WHOLE, form_of, mask_of
+from postproc.language.text.symbol_column import NameColumn
 
 # Rows that are alike, numbered in the order in which they appear.
 

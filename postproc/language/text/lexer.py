@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from postproc import _native
 from postproc.arrays import Bools, Floats, Indices
-from postproc.language.source import NumberSpans
-from postproc.language.symbol_column import NameColumn
+from postproc.language.text.source import NumberSpans
+from postproc.language.text.symbol_column import NameColumn
 
 # A *mask* is the code of a line in which every number is one NUL (no program holds
 # any), the comment is gone and idle blanks are dropped. In its *form* every numbered

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from postproc.compensation.program import read_program
-from postproc.language import move_runs
-from postproc.language.move_runs import rows_of_lines, within
+from postproc.language.analysis import move_runs
+from postproc.language.analysis.move_runs import rows_of_lines, within
 from postproc.language.rapid.statements import read_statements
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 from postproc.language.visits import Visits
 from postproc.robot.cell import Cell, load_cell
 from tests.any_controller import any_controller, told
@@ -79,7 +79,7 @@ def folded(
         return plain(visits, counts, *rest)  # type: ignore[arg-type]
 
     with patch.context() as one:
-        one.setattr("postproc.language.to_visits.unfold", unfold)
+        one.setattr("postproc.language.analysis.to_visits.unfold", unfold)
         read(files, cell, 3, patch)
     return found
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import lark
 
-from postproc.language.grammars import line_parser
 from postproc.language.ir import Num
-from postproc.language.lexer import NAME_MARK, UNREADABLE
-from postproc.language.templates import open_name
+from postproc.language.text.grammars import line_parser
+from postproc.language.text.lexer import NAME_MARK, UNREADABLE
+from postproc.language.text.templates import open_name
 
 Children = Sequence[Any]
 

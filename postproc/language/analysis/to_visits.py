@@ -23,14 +23,14 @@ import numpy as np
 
 from postproc.arrays import Floats, Interned, Ints, slim
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language.analysis.assigned_points import AssignedPoint, Scope
 from postproc.language.analysis.call_context import in_program_order
-from postproc.language.assigned_points import AssignedPoint, Scope
-from postproc.language.comment_directives import MEASURE, Comments
-from postproc.language.interpreter import TaskMachine
-from postproc.language.move_runs import unfold, within
+from postproc.language.analysis.move_runs import unfold, within
+from postproc.language.analysis.task_machine import TaskMachine
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
-from postproc.language.statement_table import StatementText
+from postproc.language.text.comment_directives import MEASURE, Comments
+from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import (
     Blend,
     Literals,

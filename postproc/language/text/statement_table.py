@@ -12,9 +12,9 @@ import numpy as np
 from postproc.arrays import Floats, Indices
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
-from postproc.language.number_edits import Skeleton
-from postproc.language.source import NumberSpans, Source, Span
-from postproc.language.templates import ParsedShapes, find_shapes, parse_shapes
+from postproc.language.text.number_edits import Skeleton
+from postproc.language.text.source import NumberSpans, Source, Span
+from postproc.language.text.templates import ParsedShapes, find_shapes, parse_shapes
 from postproc.language.visits import Diagnostic
 
 _WORD = re.compile(r"[A-Za-z_$]\w*")

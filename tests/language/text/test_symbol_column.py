@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.language.symbol_column import NameColumn
+from postproc.language.text.symbol_column import NameColumn
 
 LETTERS = "aAbB_1[.\xe4\xc4\xb5\xff"  # of Latin-1, as programs are
 TEXTS = st.lists(st.text(LETTERS, max_size=4), max_size=40)

@@ -11,10 +11,16 @@ from numpy.typing import NDArray
 from postproc import _native
 from postproc.arrays import Floats, Indices, Ints, chunks, floats
 from postproc.exceptions import ProgramError
-from postproc.language.logical_lines import Lines, read_lines
 from postproc.language.pose_encoding import Dialect
-from postproc.language.source import NumberSpans, Replacements, Source, apply, as_texts
-from postproc.language.templates import Shapes
+from postproc.language.text.logical_lines import Lines, read_lines
+from postproc.language.text.source import (
+    NumberSpans,
+    Replacements,
+    Source,
+    apply,
+    as_texts,
+)
+from postproc.language.text.templates import Shapes
 from postproc.language.visits import Literals
 
 # What new numbers must leave alone: the shapes of lines and where numbers stand.

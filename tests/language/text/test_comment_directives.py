@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.language.comment_directives import MEASURE, TAUGHT, Comments
-from postproc.language.source import source_from_bytes
+from postproc.language.text.comment_directives import MEASURE, TAUGHT, Comments
+from postproc.language.text.source import source_from_bytes
 
 TEXT = """say "{sign} MEASURE no" move
 {sign} MEASURE P1

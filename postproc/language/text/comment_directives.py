@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from postproc import _native
-from postproc.language.source import Source
+from postproc.language.text.source import Source
 
 MEASURE, TAUGHT = "MEASURE", "TAUGHT"
 INSERTED = "postproc: inserted"  # ends a line with a point on the way of a move
