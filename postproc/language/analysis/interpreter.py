@@ -333,7 +333,7 @@ class Interpreter(ABC, Generic[S]):
         """Go to a label, or out of a loop."""
         if to is None:
             return self.lose_way(context, row, one, state)
-        self.enter(context, to, state)
+        self.go_on(context, to, state)
         return None
 
     # Loops that count: round by round where the bounds are known, else over and over.

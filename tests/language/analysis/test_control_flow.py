@@ -14,6 +14,7 @@ from postproc.language.analysis.control_flow import (
 from postproc.language.language import Start
 from postproc.language.rapid.language import Rapid
 from postproc.language.text.source import Source
+from postproc.language.visits import START
 from tests.golden.rapid_cases import go, module
 from tests.language.krl.test_visits import job, origins
 
@@ -83,3 +84,11 @@ def test_what_stands_behind_an_endless_loop_leads_nowhere():
     assert len(rapid("IF FALSE THEN", go("p1"), "ENDIF", go("p2"))) == 3
     found = job("LIN XP1", "WHILE TRUE", "LIN XP2", "ENDWHILE", "LIN XP1")
     assert origins(found)[1] == [0, 1] and len(found.visits) == 2
+
+
+def test_who_leaves_a_loop_at_the_end_of_a_branch_does_not_enter_the_next() -> None:
+    loop = ["LOOP", "LIN XP2", "IF $IN[1] THEN", "EXIT", "ENDIF", "ENDLOOP"]
+    found = job(
+        "LIN XP1", "IF $IN[2] THEN", *loop, "ELSE", "LIN XP2", "ENDIF", "LIN XP1"
+    )
+    assert origins(found) == [[START], [0, 1], [0], [1, 2]]
