@@ -135,6 +135,26 @@ def test_what_is_seen_along_the_chain(chain, random, laid_out):
         _native.torque(packed, given[0], links, np.ones((7, 4)))
 
 
+def test_how_far_joint_angles_lead_from_others(chain, random, laid_out):
+    """10,000 rows are dealt to threads; unknown angles and points stay unknown."""
+    old = random.uniform(-3, 3, (10_000, 6))
+    new, points = (
+        old + random.normal(0, 1e-3, old.shape),
+        random.normal(size=(10_000, 3)),
+    )
+    old[3, 2], new[5, 0], points[9, 1] = np.nan, np.nan, np.nan
+    offset = np.array([1e-3, -1e-3, 0, 5e-4, 0, -2e-3])
+    old, new, points = laid_out(old), laid_out(new), laid_out(points)
+    given = (floats(old), floats(new)), floats(points), offset
+    found = _native.departure(chain.pack(), *given)
+    few = np.r_[:20, max(len(old) - 20, 0) : len(old)] if len(old) > 40 else slice(None)
+    plain = kinematics.departure(chain, old[few], new[few], points[few], offset)
+    for seen, meant in zip(found, plain, strict=True):
+        assert np.allclose(seen[few], meant, **CLOSE)
+    with pytest.raises(ValueError, match="columns of"):
+        _native.departure(chain.pack(), given[0], np.ones((2, 3)), offset)
+
+
 def test_whole_turns(random, laid_out):
     q, turns = random.uniform(-20, 20, (90, 6)), random.integers(-2, 3, (90, 3)) / 2.0
     q[:4] = [[0.0], [-0.0], [np.pi], [-np.pi]]

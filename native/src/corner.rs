@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
 use crate::edges::{Edges, Paths, Way};
-use crate::rows::{array, at_best, each, flat, rows, same_length, Lanes, Six, Three, SIDE};
+use crate::rows::{array, each, flat, rows, same_length, Lanes, Six, Three, SIDE};
 
 const GRID: usize = 8; // steps of the first search for the nearest point
 const ROUNDS: usize = 5; // of Newton's method
@@ -279,6 +279,23 @@ fn pass(mut group: Group<'_, '_>, within: &[f64]) -> Vec<Passed> {
     group.corners.iter().enumerate().map(one).collect()
 }
 
+/// The same with registers for four numbers.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+unsafe fn pass_wide(group: Group<'_, '_>, within: &[f64]) -> Vec<Passed> {
+    pass(group, within)
+}
+
+/// Choose what this machine can do; the numbers are the same.
+fn pass_at_best(group: Group<'_, '_>, within: &[f64]) -> Vec<Passed> {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: this machine has what the function is compiled for.
+        return unsafe { pass_wide(group, within) };
+    }
+    pass(group, within)
+}
+
 type Column<'py> = Bound<'py, PyArray1<f64>>;
 type Block<'py> = Bound<'py, PyArray2<f64>>;
 
@@ -308,7 +325,7 @@ pub fn passed<'py>(
         let (own, others) = std::mem::take(&mut rest).split_at_mut(some.len());
         rest = others;
         let group = Group::new(&chain, own, &tool[some.clone()], &point[some.clone()]);
-        found.extend(at_best(|| pass(group, &within[some])));
+        found.extend(pass_at_best(group, &within[some]));
     })?;
     let column = |value: fn(&Passed) -> f64| -> Column<'py> {
         found.iter().map(value).collect::<Vec<_>>().into_pyarray(py)

@@ -10,7 +10,7 @@ use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3, PyUntyped
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, at_best, each, flat, groups, same_length, Three};
+use crate::rows::{array, each, flat, groups, same_length, Three};
 
 /// Splines of one joint that differ from 0 at a row.
 const LOCAL: usize = 4;
@@ -274,6 +274,38 @@ impl Form<'_> {
     }
 }
 
+/// The same with registers for four numbers.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+unsafe fn sum_wide(sums: &mut Gram, of: &Features<'_>, n: usize) {
+    sums.add(of, n);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+unsafe fn value_wide(form: &mut Form<'_>, of: &Features<'_>, n: usize) -> Three {
+    form.value(of, n)
+}
+
+/// Choose what this machine can do; the numbers are the same.
+fn summed(sums: &mut Gram, of: &Features<'_>, n: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: this machine has what the function is compiled for.
+        return unsafe { sum_wide(sums, of, n) };
+    }
+    sums.add(of, n);
+}
+
+fn valued(form: &mut Form<'_>, of: &Features<'_>, n: usize) -> Three {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: as above.
+        return unsafe { value_wide(form, of, n) };
+    }
+    form.value(of, n)
+}
+
 /// Sum products of features over all rows, (m + d + s, m + d) and (s, s).
 ///
 /// Of the first, the upper half of what are no splines stays 0; of the second, what stands
@@ -287,7 +319,7 @@ pub fn gram<'py>(
 ) -> PyResult<Sums<'py>> {
     let of = Features::new(&moving, &turning, &splines)?;
     let mut sums = Gram::new(&of);
-    each(py, of.len(), |n| at_best(|| sums.add(&of, n)))?;
+    each(py, of.len(), |n| summed(&mut sums, &of, n))?;
     let square = |values: Vec<f64>, width: usize, rows: usize| {
         Array2::from_shape_vec((rows, width), values).expect("as many sums").into_pyarray(py)
     };
@@ -313,6 +345,6 @@ pub fn uncertainty<'py>(
     }
     let (with, own) = (std::array::from_fn(|_| vec![0.0; width]), vec![0.0; width]);
     let mut form = Form { plain: flat(&form.0)?, splines: flat(&form.1)?, with, own };
-    let out = each(py, of.len(), |n| at_best(|| form.value(&of, n)))?;
+    let out = each(py, of.len(), |n| valued(&mut form, &of, n))?;
     Ok(array(py, out))
 }

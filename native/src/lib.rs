@@ -10,6 +10,7 @@ mod chain;
 mod compare;
 mod corner;
 mod design;
+mod deviation;
 mod direction;
 mod edges;
 mod evidence;
@@ -77,6 +78,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(pose::times, module)?)?;
     module.add_function(wrap_pyfunction!(profile::profile, module)?)?;
     module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;
+    module.add_function(wrap_pyfunction!(deviation::departure, module)?)?;
     module.add_function(wrap_pyfunction!(design::gram, module)?)?;
     module.add_function(wrap_pyfunction!(design::uncertainty, module)?)?;
     module.add_function(wrap_pyfunction!(evidence::by_groups, module)?)?;

@@ -70,7 +70,7 @@ pub fn each<T: Send>(
 
 /// Do something with the widest registers of this machine; the numbers are the same.
 ///
-/// Only what is inlined into the work gains by it.
+/// Only what is inlined into the work gains by it: large loops have functions of their own.
 #[inline(always)]
 pub fn at_best<T>(work: impl FnOnce() -> T) -> T {
     #[cfg(target_arch = "x86_64")]

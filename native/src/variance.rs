@@ -10,7 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
-use crate::rows::{array, at_best, each, flat, rows, same_length, Lanes, Three, SIDE};
+use crate::rows::{array, each, flat, rows, same_length, Lanes, Three, SIDE};
 use crate::walk::{Base, Walk};
 
 /// Three components of each.
@@ -18,14 +18,12 @@ type Column = [Lanes; 3];
 
 const NOTHING: Column = [[0.0; SIDE]; 3];
 
-#[inline(always)]
 fn add(sum: &mut Lanes, factor: f64, of: &Lanes) {
     for k in 0..SIDE {
         sum[k] += factor * of[k];
     }
 }
 
-#[inline(always)]
 fn add_product(sum: &mut Lanes, a: &Lanes, b: &Lanes) {
     for k in 0..SIDE {
         sum[k] += a[k] * b[k];
@@ -97,7 +95,6 @@ impl Form {
         &self.lower[k * self.size..(k + 1) * self.size]
     }
 
-    #[inline(always)]
     fn value(&self, block: &Block) -> Column {
         let mut total = NOTHING;
         for (u, column) in block.fixed.iter().enumerate() {
@@ -198,7 +195,7 @@ pub fn variance<'py>(
                 phi[lane] = *value;
             }
         }
-        let value = at_best(|| form.value(&block));
+        let value = form.value(&block);
         out.extend((0..count).map(|lane| value.map(|component| component[lane])));
     })?;
     Ok(array(py, out))

@@ -6,7 +6,16 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, any_in_rows, largest_in_rows, spans
+from postproc import _native
+from postproc.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    any_in_rows,
+    floats,
+    largest_in_rows,
+    spans,
+)
 from postproc.motion.joint_path import STRAIGHT, Trace
 from postproc.robot.arm import Arm
 from postproc.robot.trajectory import Motion
@@ -65,26 +74,23 @@ def departure(
             are compensated), (6,) [rad]: all of it or a part swings nothing, though it
             moves elbow and wrist.
     """
-    joints = _measure_excess(new - old, offset)
-    known = ~any_in_rows(np.isnan(old) | np.isnan(new))
-    out = np.full((len(old), 3), np.nan)
-    rows = np.flatnonzero(known)
-    out[rows] = _measure_displacement(arm, old[rows], new[rows], tool[rows])
+    joints, sizes = _measure(arm, old, new, tool, offset)
+    rows = np.flatnonzero(~np.isnan(sizes[:, 0]))
     branch = np.zeros(len(old), dtype=bool)
     branch[rows] = other_branch(arm, old[rows], new[rows])
-    return JointDeviation(joints, out[:, 0], out[:, 1], out[:, 2], branch)
+    elbow, wrist_centre, tcp = sizes.T
+    return JointDeviation(joints, elbow, wrist_centre, tcp, branch)
 
 
-def _measure_excess(change: Floats, offset: Floats) -> Floats:
-    """Tell how far changes (n, 6) lie outside of 0 to their offsets (6,) [rad]."""
-    low, high = np.minimum(offset, 0.0), np.maximum(offset, 0.0)
-    return np.maximum(np.maximum(low - change, change - high), 0.0)
+def _measure(
+    arm: Arm, old: Floats, new: Floats, tool: Floats, offset: Floats
+) -> tuple[Floats, Floats]:
+    """Measure what joints change by beyond offsets, (n, 6), and move, (n, 3).
 
-
-def _measure_displacement(arm: Arm, old: Floats, new: Floats, tool: Floats) -> Floats:
-    """Tell how far elbow, wrist centre and TCP move, (n, 3) [m]."""
-    a, b = arm.landmarks(old, tool), arm.landmarks(new, tool)
-    return np.asarray(np.linalg.norm(b - a, axis=2))
+    The args are those of `departure`; what moves are elbow, wrist centre and TCP.
+    """
+    angles, point = (floats(old), floats(new)), floats(tool)
+    return _native.departure(arm.dh.pack(), angles, point, floats(offset))
 
 
 def other_branch(arm: Arm, old: Floats, new: Floats) -> Bools:
@@ -130,31 +136,22 @@ def path_departure(
         offset: See `departure`.
 
     Returns:
-        The largest on the ways to every target, itself included. Displacements inside
-        of ways are looked at only where they may be the largest there.
+        The largest on the ways to every target, itself included.
     """
     at = departure(arm, old.q, new.q, tool, offset)
     some = _samples(move, old, new)
     if len(some.visit) == 0:
         return at
     joints, branch = np.array(at.joints), np.array(at.branch)
-    np.fmax.at(joints, some.visit, _measure_excess(some.new - some.old, offset))
+    sizes = np.column_stack([at.elbow, at.wrist_centre, at.tcp])
+    inside = _measure(arm, some.old, some.new, tool[some.visit], offset)
+    for largest, found in zip((joints, sizes), inside, strict=True):
+        np.fmax.at(largest, some.visit, found)
     way = move[some.visit] != Motion.JOINT  # joints may pass a singularity as they like
     other = other_branch(arm, some.old[way], some.new[way])
     branch[some.visit[way][other]] = True
-    sizes = np.column_stack([at.elbow, at.wrist_centre, at.tcp])
-    # How far a turn of every joint can move the TCP at most, (6,) [m/rad].
-    length = np.abs(arm.dh.a) + np.abs(arm.dh.d)
-    beyond: Floats = np.cumsum(length[::-1])[::-1] + np.nan_to_num(
-        np.linalg.norm(tool, axis=1)
-    ).max(initial=0.0)
-    farthest = np.abs(some.new - some.old) @ beyond
-    rows = np.flatnonzero(~(farthest <= np.nan_to_num(sizes[some.visit].min(axis=1))))
-    inside = _measure_displacement(
-        arm, some.old[rows], some.new[rows], tool[some.visit[rows]]
-    )
-    np.fmax.at(sizes, some.visit[rows], inside)
-    return JointDeviation(joints, sizes[:, 0], sizes[:, 1], sizes[:, 2], branch)
+    elbow, wrist_centre, tcp = sizes.T
+    return JointDeviation(joints, elbow, wrist_centre, tcp, branch)
 
 
 def _samples(move: Ints, old: Trace, new: Trace) -> _Samples:

@@ -150,7 +150,7 @@ def where_passed(arm: Arm, exact: PlannedPoints, q: Floats) -> Floats:
 CHANGED = 2  # targets on each side of a moved one whose passing may change
 TRACED = 3  # targets on each side that must be traced for that
 SAME = 1e-9  # [rad] arriving on the same branch and turn
-MOST = 0.6  # of all targets; tracing more takes longer than tracing all anew
+MOST = 0.85  # of all targets; if more have to be traced, all are
 STEPS = (
     TargetKind.TOOL_STEP,
     TargetKind.BASE_STEP,

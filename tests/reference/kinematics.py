@@ -165,3 +165,21 @@ def on_turns(q, turns):
     moved[:, 2] = np.where(written[:, 2], moved[:, 2], q[:, 2])
     out[:, axes] = moved
     return out
+
+
+def departure(dh, old, new, point, offset):
+    """Compare joint angles: excess of changes, (n, 6), and displacements, (n, 3)."""
+    excess = np.array(new - old)
+    for row in excess:
+        for j, change in enumerate(row):
+            low, high = min(offset[j], 0.0), max(offset[j], 0.0)
+            if not math.isnan(change):
+                row[j] = max(low - change, change - high, 0.0)
+    seen = []
+    for q in (old, new):
+        at = frames(dh, np.nan_to_num(q))
+        tcp = placed(dh, np.nan_to_num(q), point)
+        seen.append(np.stack([at[:, 2, :3, 3], at[:, 4, :3, 3], tcp], axis=1))
+    moved = np.linalg.norm(seen[1] - seen[0], axis=2)
+    moved[np.isnan(old + new).any(axis=1)] = np.nan
+    return excess, moved
