@@ -142,7 +142,8 @@ def test_a_page_shows_every_robot_and_asks_the_network_for_nothing(home: Path) -
     page = (home / "plant.html").read_text()
     assert page.count("<circle") == 4
     assert "remastered 3" in page
-    assert "http" not in page.replace("http-equiv", "")
+    schemas = "http://schemas.openxmlformats.org"  # names, which nothing asks for
+    assert "http" not in page.replace("http-equiv", "").replace(schemas, "")
     found = run("robot", "show", "R010")
     assert [line.split()[1] for line in found.stdout.splitlines()[1:]].count(
         "check:"

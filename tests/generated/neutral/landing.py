@@ -23,7 +23,7 @@ from postproc.robot.trajectory import Motion
 from postproc.simulation import virtual_arm
 from postproc.simulation.program import ProgramRun, run_program
 from tests.conftest import SEED
-from tests.fuzz.case import check_bytes, records_of, without_stamp
+from tests.fuzz.case import check_bytes, records_of, unstamped
 from tests.generated.found import (
     ALONG,
     AVERAGED,
@@ -126,7 +126,7 @@ def given_back(files: Mapping[str, bytes], done: Outcome) -> dict[str, bytes]:
     check_bytes(files, {**files, **done.outputs}, records, done.visits)
     for name, record in records.items():
         assert restore(done.outputs[name], record, name) == files[name], name
-    new = {n: without_stamp(n, done.outputs[n]) for n in records}
+    new = {n: unstamped(n, files[n], done.outputs[n]) for n in records}
     return {**files, **new}
 
 
