@@ -124,10 +124,9 @@ class Pdl2Machine(Machine):
         """Allow for what a line does besides leading elsewhere."""
         here = self.at(context, row, state)
         written = here.place.program.statement(row)
-        odd = isinstance(written, ir.NotUnderstood)
         text = written.text if isinstance(written, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
-        if odd:
+        if text:
             invalidate_names(here, words_in(text), _why_unknown(here))
             if not _is_harmless(here, text):
                 _forget_by_text(here, _why_unknown(here))
@@ -232,9 +231,6 @@ def prepare(
         machine.paused |= here.store.last
     if _lets_others_run(statement) or text:
         let_others_run(here)
-    if ir.divides(statement):
-        values = statement.values if isinstance(statement, ir.Branch) else ()
-        statement = ir.Branch("case", values)
     calls_in_expressions(machine, here, statement)
 
 

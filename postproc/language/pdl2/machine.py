@@ -210,12 +210,20 @@ class Machine(Interpreter[Store]):
     ) -> tuple[ir.FunctionCall, ...]:
         """Return the calls in a statement's expressions that may have effects.
 
-        A function without arguments is called by its name alone.
+        A function without arguments is called by its name alone. What follows ELSE or
+        CASE on its line is a statement of its own.
+
+        Args:
+            place: Where it stands.
+            statement: A statement of its program: it outlives the machine.
         """
         known = self._called.get(id(statement))
         if known is None:
-            found = [c for c in invocations(statement) if c.name not in PURE]
-            names = {r.name for r in references(statement) if not r.steps}
+            own: tuple[ir.Node, ...] = (statement,)
+            if ir.divides(statement):
+                own = statement.values if isinstance(statement, ir.Branch) else ()
+            found = [c for c in invocations(*own) if c.name not in PURE]
+            names = {r.name for r in references(*own) if not r.steps}
             alone = [n for n in names if self.world.is_function(place, n)]
             found += [ir.FunctionCall(name, ()) for name in sorted(alone)]
             known = self._called[id(statement)] = tuple(found)

@@ -4,10 +4,19 @@ import numpy as np
 import pytest
 
 from postproc.language.language import Start
+from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.machine import Machine
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.text.source import source_from_bytes
-from postproc.language.visits import START, Blend, OrientationLaw, Switch, ZoneRule
+from postproc.language.visits import (
+    ELSEWHERE,
+    START,
+    Blend,
+    OrientationLaw,
+    Switch,
+    ZoneRule,
+)
 from postproc.robot.pose import pose_from_record, record_from_pose
 
 
@@ -286,3 +295,30 @@ def test_a_handler_calls_a_routine_where_there_is_no_main_body() -> None:
     found = resolve(library)
     assert found.visits.line.tolist() == [4]
     assert {d.code for d in found.diagnostics} == {"handler-moves"}
+
+
+def test_calls_are_looked_for_in_statements_of_the_program_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They are remembered by the statement: one that is made on the way would be lost,
+    and another one found in its place."""
+    asked: list[object] = []
+    find = Machine.find_calls
+
+    def note(self, place, statement):
+        asked.append(statement)
+        own = place.program.statements
+        lines = [own[k] for k in range(len(own))]
+        parts = [ast.behind(one) for one in lines]
+        assert any(statement is one for one in (*lines, *parts))
+        return find(self, place, statement)
+
+    monkeypatch.setattr(Machine, "find_calls", note)
+    found = resolve(program(
+        "PROGRAM a\nROUTINE f : INTEGER\nBEGIN\nMOVE JOINT TO {1,2,3,4,5,6}\n"
+        "RETURN (1)\nEND f\nBEGIN\nMOVE LINEAR TO POS(1,2,3,4,5,6,'')\n"
+        "SELECT k OF\nCASE (1): n := 1\nCASE (f(2)): n := f(3)\nELSE: n := 4\n"
+        "ENDSELECT\nMOVE LINEAR TO POS(2,2,3,4,5,6,'')\nEND a"
+    ))  # fmt: skip
+    assert len(asked) > 5
+    assert sorted(found.visits.predecessors(2).tolist()) == [ELSEWHERE, 1]
