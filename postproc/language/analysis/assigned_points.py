@@ -148,7 +148,7 @@ class Points:
         """Keep what is the same on another way here."""
         lost = [
             key for key in self.held.differing(other.held)
-            if self.held.get(key) != other.held.get(key)
+            if (mine := self.held.get(key)) and mine != other.held.get(key)
         ]  # fmt: skip
         return self._drop(lost)
 
@@ -160,10 +160,12 @@ class Points:
         return self._drop([key for key in self.held if lost(key)])
 
     def _drop(self, lost: Sequence[Key]) -> Points:
+        if not lost:
+            return self
         held = self.held.copy()
         for key in lost:
             del held[key]
-        return replace(self, held=held) if lost else self
+        return replace(self, held=held)
 
 
 NO_POINTS = Points()

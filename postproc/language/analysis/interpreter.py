@@ -421,7 +421,6 @@ class Interpreter(ABC, Generic[S]):
     def call(self, context: Context, row: int, place: RoutinePlace, state: S) -> None:
         """Go into a routine; it comes back to the row behind this one."""
         inner = context.within(context.place.offset + row, CALLED, place)
-        self.steps += 1
         self.enter(inner, place.flow.first, state)
 
     def return_to_caller(self, context: Context, state: S) -> None:

@@ -160,6 +160,7 @@ class TaskMachine(Interpreter[Arrived]):
     paused: set[int] = field(default_factory=set)
     lost: set[int] = field(default_factory=set)
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
+    _runs_in: dict[Context, Runs] = field(default_factory=dict)
     _numbers: dict[tuple[Context, int], list[int]] = field(default_factory=dict)
     _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
 
@@ -360,17 +361,21 @@ class TaskMachine(Interpreter[Arrived]):
         self.return_to_caller(context, self.at_return(context, state))
 
     def _runs_of(self, context: Context) -> Runs:
-        """Find once which moves of a routine are read at once."""
-        file, flow = context.place.scope.file, context.place.flow
-        key = file, flow.first
-        apart = self.apart(context) if self.at_once else None
-        if apart is None:
-            return {}
+        """Return which moves are read at once in a call, or a round of a loop."""
+        if context not in self._runs_in:
+            apart = self.apart(context) if self.at_once else None
+            own = {} if apart is None else self._find_runs(context.place, apart)
+            self._runs_in[context] = own
+        return self._runs_in[context]
+
+    def _find_runs(self, place: TaskPlace, apart: set[int]) -> Runs:
+        """Find them in the statements of a routine, once for all calls of it."""
+        key = place.scope.file, place.flow.first
         if key not in self._runs:
-            text = self.texts[file]
+            text = place.text
             apart |= rows_of_lines(text, self.comments.list_taught(text.source))
             self._runs[key] = find_runs(
-                text, flow, apart, self.places_of, self.is_plain
+                text, place.flow, apart, self.places_of, self.is_plain
             )
         return self._runs[key]
 
@@ -413,7 +418,7 @@ class TaskMachine(Interpreter[Arrived]):
         What holds behind such a call is not known.
         """
         file, _, routine = found
-        running = self._find_running(context, file, routine)
+        running = self._find_running(context, routine)
         if running is not None:
             first = running.place.flow.first
             self.enter(running, first, self.at_call(running, here))
@@ -424,13 +429,11 @@ class TaskMachine(Interpreter[Arrived]):
         self.call_routine(found, context, row, here)
         return None
 
-    def _find_running(
-        self, context: Context, file: int, routine: HeadedRows
-    ) -> Context | None:
+    def _find_running(self, context: Context, routine: HeadedRows) -> Context | None:
         """Return the call of a routine that is being run here, None without one."""
         for one in calls_around(context):
             if one.place is not None and one.place.routine is routine:
-                return one if one.place.scope.file == file else None
+                return one
         return None
 
     def call_routine(
