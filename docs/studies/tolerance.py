@@ -76,12 +76,13 @@ def report_coverage(error: np.ndarray, bound: np.ndarray) -> None:
         report_share(name, (error <= bound)[own])
     for tolerance in TOLERANCES:
         passes, near = bound <= tolerance, np.abs(bound / tolerance - 1.0) <= 0.1
-        told = []
+        shares = []
         for own in (passes, passes & near):
             beyond = 100 * (error[own] > tolerance).mean() if own.any() else np.nan
-            told.append(f"{own.sum()} ({beyond:.2f} % of them outside)")
+            shares.append(f"{own.sum()} ({beyond:.2f} % of them outside)")
         print(
-            f"{tolerance} mm: pass {told[0]}, with a bound within 10 % of it {told[1]}"
+            f"{tolerance} mm: pass {shares[0]}, "
+            f"with a bound within 10 % of it {shares[1]}"
         )
 
 

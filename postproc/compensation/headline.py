@@ -31,7 +31,7 @@ class ProgramErrors:
         reasons: Why visits keep their values.
         side: Where every joint lies in its play, (n, 6) from -1 to 1.
         expected: The expected errors.
-        tolerance: Their verdict against a tolerance, None where nobody asked.
+        tolerance: Their verdict against a tolerance, None without one.
     """
 
     visits: Visits
@@ -79,7 +79,7 @@ class ProgramErrors:
 
 @dataclass(frozen=True)
 class TargetException:
-    """A visit that somebody has to look at; lengths in mm, NaN where not known.
+    """A visit that needs a look; lengths in mm, NaN where not known.
 
     Attributes:
         row: Which visit.

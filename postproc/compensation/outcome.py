@@ -277,7 +277,7 @@ class Outcome:
 
     @property
     def errors(self) -> ProgramErrors | None:
-        """What is known of its expected errors; None where nobody knows."""
+        """What is known of its expected errors; None where they are not known."""
         if self.expected is None:
             return None
         from postproc.compensation.headline import ProgramErrors

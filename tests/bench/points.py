@@ -5,7 +5,7 @@
 A job of lines of 300 to 900 mm between stops, two targets a line, of development arm
 400 surveyed with reversals, is compensated at its targets and with `--path-tolerance
 0.1`, in one process, in turn. The least processor time of the rounds counts, and the
-stages of both are told. `--max-inserted` lets as many points in as moves need.
+stages of both are printed. `--max-inserted` allows as many points as moves need.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ def describe(name: str, seconds: float, found: Outcome) -> str:
     """Say in one line what a run took, and what came out."""
     stages = ", ".join(f"{key} {value:.1f}" for key, value in found.stages.items())
     inserted = found.in_time.inserted if found.in_time else None
-    told = (
+    points = (
         f"{inserted.count} points in {len(inserted.points)} moves" if inserted else ""
     )
     digest = hashlib.sha256(b"".join(found.outputs.values())).hexdigest()[:12]
-    return f"{name:8} {seconds:6.1f} s {told} bytes {digest} ({stages})"
+    return f"{name:8} {seconds:6.1f} s {points} bytes {digest} ({stages})"
 
 
 def main() -> None:

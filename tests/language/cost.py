@@ -29,9 +29,9 @@ def table() -> list[str]:
         places = [ROOT / "postproc/language" / folder for folder in folders]
         paths = (path for place in places for path in place.glob("*.py"))
         code = round(sum(map(lines, paths)), -2)
-        told = ", ".join(f"`language/{folder}`" for folder in folders)
+        shown = ", ".join(f"`language/{folder}`" for folder in folders)
         rows.append(
-            f"| {name} | {grammar if names else ''} | {code:,} lines ({told}) |"
+            f"| {name} | {grammar if names else ''} | {code:,} lines ({shown}) |"
         )
     return [row.replace("|  |", "| |") for row in rows]
 

@@ -127,10 +127,9 @@ class Windows:
             travel = cycle.arrived.travel
         back = _find_run_ups(driven, 2.0 * wide * half + MARGIN, travel)
         begin = np.append(-1, end[:-1])
-        told = np.where(begin >= 0, begin - back[begin], -1)
-        told = np.where(back[begin] > 0, told, -1)
-        at = np.searchsorted(end, told, side="right") - 1
-        lead = np.where((told >= 0) & (at >= 0), end[at], -1)
+        known = (begin >= 0) & (back[begin] > 0)
+        at = np.searchsorted(end, begin - back[begin], side="right") - 1
+        lead = np.where(known & (at >= 0), end[at], -1)
         return cls(end, lead, q) if n else cls(end, end, q)
 
     def list_keys(self, plan: InsertionPlan) -> dict[int, Key]:
@@ -144,7 +143,7 @@ class Windows:
         chords: dict[int, set[float]] = {}
         for v, share in plan.chords:
             chords.setdefault(v, set()).add(share)
-        told = [
+        puts = [
             (
                 v, plan.points[v], v in plan.stops, v in plan.halved,
                 tuple(sorted(chords.get(v, ()))),
@@ -152,7 +151,7 @@ class Windows:
             for v in moves.tolist()
         ]  # fmt: skip
         rows = np.flatnonzero(high > low).tolist()
-        return {k: tuple(told[low[k] : high[k]]) for k in rows}
+        return {k: tuple(puts[low[k] : high[k]]) for k in rows}
 
     def own(self, k: int) -> slice:
         """Return the visits of a window."""
@@ -255,13 +254,13 @@ def _begin_at(visits: Visits, rows: Ints, q: Floats) -> Visits:
     values = np.array(visits.values)
     values[rows] = np.nan
     values[rows, :6] = np.rad2deg(q)
-    told = {
+    fixed = {
         "motion": int(Motion.JOINT), "target": int(Meaning.JOINTS), "literal": -1,
         "follows": -1, "shift": -1, "block": -1, "via": False, "curved": False,
         "fly": False,
     }  # fmt: skip
-    columns: dict[str, Any] = {n: np.array(getattr(visits, n)) for n in told}
+    columns: dict[str, Any] = {n: np.array(getattr(visits, n)) for n in fixed}
     for name, column in columns.items():
         if len(column):
-            column[rows] = told[name]
+            column[rows] = fixed[name]
     return replace(visits, values=values, **columns)

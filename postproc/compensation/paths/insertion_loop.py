@@ -322,8 +322,8 @@ def _cures(now: PathPrediction) -> dict[int, str]:
         elif v not in plan.open:
             found[v] = BY_HAND
         elif paths.way[paths.after.largest[k]] < BEGINS and v not in plan.stops:
-            told = MEASURE_STARTS if v in plan.unconfirmed else PRELOAD
-            found[v] = told if can_stop(now.task, both[0]) else IN_CORNER
+            start = MEASURE_STARTS if v in plan.unconfirmed else PRELOAD
+            found[v] = start if can_stop(now.task, both[0]) else IN_CORNER
         else:
             found[v] = MORE_ROOM if plan.crowded else SHORTER
     return found

@@ -199,18 +199,33 @@ class InsertionTask:
     def _make(self, plan: InsertionPlan) -> Whole:
         if not (plan.points or plan.approaches):
             return Whole(self._source, self.source)
-        clock = self.setting.clock
         reading, own = self._insert(plan)
         reading, kept = self._correct(reading)
         output, again = self.write(reading, kept, self.setting)
         owner = np.searchsorted(own, np.arange(len(reading.visits)))
-        with clock("time"):
-            told = run_in_time(
+        part = self._run(plan, reading, again, kept, own, owner)
+        return Whole(part, CompensatedProgram(reading, kept, output, part.in_time))
+
+    def _run(
+        self, plan: InsertionPlan, reading: ParsedProgram, again: ParsedProgram,
+        kept: WindowResult, own: Ints, owner: Ints,
+    ) -> Part:  # fmt: skip
+        """Run some visits of a program with points, k in all.
+
+        Args:
+            plan: Its points.
+            reading: They, as they were to be.
+            again: .. and as they are corrected.
+            kept: How they are corrected.
+            own: Which of them each visit of the source is, (n,); -1 where it is none.
+            owner: On the way to which visit of the source each of them is, (k,).
+        """
+        with self.setting.clock("time"):
+            in_time = run_in_time(
                 reading, again, kept.position, self.setting, owner,
                 self.list_wanted_arcs(plan), self.corners.at(own, len(owner)),
             )  # fmt: skip
-        program = CompensatedProgram(reading, kept, output, told)
-        return Whole(Part(reading.visits, kept, told, own), program)
+        return Part(reading.visits, kept, in_time, own)
 
     def _predict_windows(
         self, plan: InsertionPlan, keys: Mapping[int, Key], some: Sequence[int]
@@ -234,12 +249,7 @@ class InsertionTask:
         values = kept.decisions.corrected
         again = replace(reading, visits=replace(reading.visits, values=values))
         owner = np.searchsorted(rows, taken)
-        with self.setting.clock("time"):
-            told = run_in_time(
-                reading, again, kept.position, self.setting, owner,
-                self.list_wanted_arcs(plan), self.corners.at(mine, len(owner)),
-            )  # fmt: skip
-        part = Part(reading.visits, kept, told, mine)
+        part = self._run(plan, reading, again, kept, mine, owner)
         if not self._is_where_it_was(part, inside):
             return False
         self._parts.update({(k, keys[k]): part for k in some})

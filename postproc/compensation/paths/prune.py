@@ -300,16 +300,16 @@ def _list_roundings(now: PathPrediction) -> dict[int, list[_Corner]]:
 def _roundings_in(
     now: PathPrediction, part: Part, moves: list[int]
 ) -> Iterator[tuple[int, list[_Corner]]]:
-    """Yield the moves that a part tells of, and how their points may be rounded."""
-    task, plan, told = now.task, now.plan, part.in_time
+    """Yield the moves of a part, and how their points may be rounded."""
+    task, plan, in_time = now.task, now.plan, part.in_time
     arm = task.setting.cell.arm
     p, c = (
         arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
-        for cycle in (told.after, told.before)
+        for cycle in (in_time.after, in_time.before)
     )
     visits, arcs = task.visits, task.list_wanted_arcs(plan)
-    zone = largest_zones(arm, told.after) if len(arcs) else None
-    planned = zone_sizes(arm, told.after, told.after.targets)
+    zone = largest_zones(arm, in_time.after) if len(arcs) else None
+    planned = zone_sizes(arm, in_time.after, in_time.after.targets)
     for v in moves:
         shares = plan.points[v]
         rows = [int(part.own[visits.before[v]]), *now.ends(v)]
