@@ -110,7 +110,7 @@ def _drilled(survey: Path, seed: int, how: dict[str, object]) -> np.ndarray:
     rows = campaign_length(original)
     arm = virtual_arm(seed, coupling=setup.coupling, rows=rows, tool=setup.tool)
     landing = land(arm, setup, original, executed)
-    targets = original.literal[landing.visit] >= 0
+    targets = original.target.literal[landing.visit] >= 0
     return np.linalg.norm(landing.error[targets], axis=1) * 1e3
 
 
@@ -136,7 +136,7 @@ def solved_and_written(cell: Cell, model: Model) -> tuple[np.ndarray, np.ndarray
     at = at.with_(direction=done.decisions.side)
     exact = solve_visits(model, cell, planned, at)
     rows = (done.decisions.status == Status.CORRECTED) & (
-        done.visits.target == Meaning.POSE
+        done.visits.target.meaning == Meaning.POSE
     )
     shift = done.decisions.corrected - new_numbers(
         reading.visits, cell.arm, planned.plan, exact, planned.plan.aside

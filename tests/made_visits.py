@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from typing import Any
+
 import numpy as np
 
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
-from postproc.language.visits import Literals, NumberPlaces, Visits
+from postproc.language.visits import (
+    FrameColumns,
+    Graph,
+    Literals,
+    MotionColumns,
+    NumberPlaces,
+    PlaceColumns,
+    SpeedColumns,
+    TargetColumns,
+    Visits,
+    ZoneColumns,
+)
 from postproc.robot.pose import pose_from_record
 
 FRAMES = np.array(
@@ -22,28 +36,47 @@ NO_LITERALS = Literals(
 )  # fmt: skip
 
 
-def visits(target: list[int], values: list[list[float]], **more: object) -> Visits:
+PARTS = {
+    "place": PlaceColumns, "target": TargetColumns, "frame": FrameColumns,
+    "motion": MotionColumns, "zone": ZoneColumns, "speed": SpeedColumns, "graph": Graph,
+}  # fmt: skip
+
+
+def assemble(**given: Any) -> Visits:
+    """Make visits of columns and tables, whichever part they belong to."""
+    n = len(given["line"])
+    unset = {"shift": np.full(n, -1), "shifts": (), "weaves": np.zeros(n, bool),
+             "load": np.zeros(n, int), "loads": np.full((1, 4), np.nan)}  # fmt: skip
+    given = unset | given
+    parts: dict[str, Any] = {
+        name: part(**{f.name: given.pop(f.name) for f in fields(part)})
+        for name, part in PARTS.items()
+    }
+    return Visits(**parts, **given)
+
+
+def visits(meaning: list[int], values: list[list[float]], **more: object) -> Visits:
     """One visit after the other, tool 0, base 1, user frame 2."""
-    n = len(target)
+    n = len(meaning)
     zeros, no = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=bool)
     nan = np.full(n, np.nan)
-    given: dict[str, object] = {
+    given: dict[str, Any] = {
         "files": ("job.pdl",), "file": zeros, "line": np.arange(n) + 1,
-        "motion": zeros, "target": np.array(target), "via": no,
+        "kind": zeros, "meaning": np.array(meaning), "via": no,
         "values": np.array(values, dtype=float), "distance_mm": nan,
         "aux": np.empty((n, 0)), "config": zeros, "configs": ("S T1:1",),
         "config_given": ~no, "literal": zeros - 1,
         "follows": zeros - 1, "name": zeros, "names": ("",),
         "tool": zeros, "base": zeros + 1, "uframe": zeros + 2,
-        "frames": pose_from_record(FRAMES),
-        "frame_taught": np.zeros(3, dtype=bool), "tool_remote": no,
+        "poses": pose_from_record(FRAMES),
+        "taught": np.zeros(3, dtype=bool), "tool_remote": no,
         "nearest_turn": no, "care": np.zeros((n, 3), dtype=np.int64), "fly": no,
-        "zone_mm": nan, "overlap_percent": nan,
-        "blend": zeros, "zone_rule": zeros, "lin_spd": nan, "rot_spd": nan,
+        "size_mm": nan, "overlap_percent": nan,
+        "blend": zeros, "rule": zeros, "linear": nan, "turning": nan,
         "override": np.ones(n),
         "wrist_joint": no, "orientation_law": zeros, "arc_angle": nan,
         "block": zeros - 1, "curved": no, "reason": zeros, "reasons": ("",),
         "pred_start": np.arange(n + 1), "pred": np.arange(n) - 1,
         "measure_id": ("",) * n, "literals": NO_LITERALS, "dialect": PDL2_DIALECT,
     }  # fmt: skip
-    return Visits(**(given | more))  # type: ignore[arg-type]
+    return assemble(**(given | more))

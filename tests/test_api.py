@@ -146,7 +146,7 @@ def test_compensates_bytes(job_folder):
     assert outcome.decisions.count(Status.CORRECTED) == 3
     table = outcome.to_frame()
     assert table["status"].tolist().count("corrected") == 3
-    assert set(table["line"]) == set(outcome.visits.line)
+    assert set(table["line"]) == set(outcome.visits.place.line)
     assert str(outcome).startswith("program.pdl: ")
 
 

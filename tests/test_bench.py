@@ -18,7 +18,7 @@ def test_made_programs_are_planned_without_trouble(kind):
     if made.variables is not None:
         files["spot.lsv"] = made.variables
     reading = read_program(files, cell)
-    held = reading.visits.literal >= 0
+    held = reading.visits.target.literal >= 0
     assert 199 <= held.sum() <= 204
     planned = plan_visits(reading.visits, cell, timed=False)
     assert (planned.reasons.index[held] == 0).all()

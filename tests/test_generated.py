@@ -88,8 +88,8 @@ def test_no_point_moves_farther_than_a_correction_may(job_cell, job_model):
     done = compensate(
         made.files["job.pdl"], job_cell, job_model, pages=pages, options=options
     )
-    moved = (done.decisions.corrected - done.visits.values)[:, :3]
-    poses = done.visits.target == Meaning.POSE
+    moved = (done.decisions.corrected - done.visits.target.values)[:, :3]
+    poses = done.visits.target.meaning == Meaning.POSE
     way = np.linalg.norm(np.nan_to_num(moved[poses]), axis=1)
     assert 0 < way.max() <= job_cell.limits.correction_mm
 

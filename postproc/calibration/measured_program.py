@@ -81,7 +81,9 @@ def join_table(points: TextTable, program: Path, cell: Cell) -> Measurements:
     table, references = split_references(points)
     visits = read_program(read_files(program), cell).visits
     planned = plan_visits(visits, cell)
-    places = _places(visits.measure_id, [visits.names[k] for k in visits.name])
+    places = _places(
+        visits.place.measure_id, [visits.target.names[k] for k in visits.target.name]
+    )
     ids = table.text("id")
     comment = language_of(program.name).comment
     rows = np.array([_visit_of(places, i, table.path, line, comment) for i, line in zip(

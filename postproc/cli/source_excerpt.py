@@ -53,17 +53,17 @@ def point_at_visits(outcome: Outcome, rows: Iterable[int]) -> list[str]:
     """
     sources = {name: Source(name, data) for name, data in outcome.sources.items()}
     v = outcome.visits
-    names = ((i, v.files[v.file[i]]) for i in rows)
+    names = ((i, v.file_name(i)) for i in rows)
     return [_at_visit(sources[n], v, i) if n in sources else "" for i, n in names]
 
 
 def _at_visit(source: Source, v: Visits, i: int) -> str:
     """Show the line of visit i's move."""
-    line, literal = int(v.line[i]), int(v.literal[i])
+    line, literal = int(v.place.line[i]), int(v.target.literal[i])
     first = int(source.line_starts[line - 1])
     text = source.data[first : first + LONGEST].decode("latin-1")
     text = re.split(r"[\r\n]", text)[0]
-    if literal >= 0 and v.literals.file[literal] == v.file[i]:
+    if literal >= 0 and v.literals.file[literal] == v.place.file[i]:
         places = v.literals.places[literal : literal + 1]
         start, end = int(places.start.min()) - first, int(places.end.max()) - first
         if v.literals.line[literal] == line and 0 <= start < len(text):

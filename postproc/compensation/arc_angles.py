@@ -60,9 +60,9 @@ class ArcAngles:
     @classmethod
     def of(cls, visits: Visits) -> ArcAngles:
         """Find them."""
-        end = np.flatnonzero(~np.isnan(visits.arc_angle))
-        start = visits.before[end - 1] if len(end) else end
-        return cls(start, end - 1, end, visits.arc_angle[end])
+        end = np.flatnonzero(~np.isnan(visits.motion.arc_angle))
+        start = visits.graph.before[end - 1] if len(end) else end
+        return cls(start, end - 1, end, visits.motion.arc_angle[end])
 
     def __len__(self) -> int:
         """Return the number of such arcs."""
@@ -126,9 +126,9 @@ def place_ends(visits: Visits, tcp: Floats, reasons: Reasons) -> Bools:
     arcs = ArcAngles.of(visits)
     if len(arcs) == 0:
         return lost
-    poses = visits.target == Meaning.POSE
+    poses = visits.target.meaning == Meaning.POSE
     known = (arcs.start >= 0) & poses[arcs.start] & poses[arcs.via] & poses[arcs.end]
-    known &= visits.tool[arcs.start] == visits.tool[arcs.end]
+    known &= visits.frame.tool[arcs.start] == visits.frame.tool[arcs.end]
     turn = np.swapaxes(tcp[arcs.start, :3, :3], 1, 2) @ tcp[arcs.end, :3, :3]
     tilted = known & (lengths(rotation_vector(turn)) > TURNED)
     ends = arcs.ends(tcp)
@@ -145,8 +145,8 @@ def place_ends(visits: Visits, tcp: Floats, reasons: Reasons) -> Bools:
 
 def find_past_start(visits: Visits) -> Bools:
     """Tell which visits are points of arcs that end past where they begin, (n,)."""
-    past: Bools = visits.arc_angle > 2 * np.pi
-    past[:-1] |= visits.via[:-1] & past[1:]
+    past: Bools = visits.motion.arc_angle > 2 * np.pi
+    past[:-1] |= visits.motion.via[:-1] & past[1:]
     return past
 
 

@@ -30,10 +30,10 @@ class ArcTurns:
     @classmethod
     def of(cls, visits: Visits) -> ArcTurns:
         """Find them."""
-        law = visits.orientation_law == OrientationLaw.START_TO_END
-        via = np.flatnonzero(visits.via & law)
-        start, end = visits.before[via], via + 1
-        poses, tool = visits.target == Meaning.POSE, visits.tool
+        law = visits.motion.orientation_law == OrientationLaw.START_TO_END
+        via = np.flatnonzero(visits.motion.via & law)
+        start, end = visits.graph.before[via], via + 1
+        poses, tool = visits.target.meaning == Meaning.POSE, visits.frame.tool
         known = (start >= 0) & poses[start] & poses[via] & poses[end]
         known &= (tool[start] == tool[via]) & (tool[via] == tool[end])
         return cls(start[known], via[known], end[known])
@@ -78,9 +78,9 @@ def turn_between(visits: Visits, tcp: Floats) -> Bools:
     Returns:
         Points of arcs on which it is not known how the tool turns, (n,).
     """
-    law = visits.orientation_law
+    law = visits.motion.orientation_law
     laws = (OrientationLaw.ALONG_PATH, OrientationLaw.START_TO_END)
-    unsure: Bools = np.isin(law, laws) & (visits.motion == Motion.CIRCULAR)
+    unsure: Bools = np.isin(law, laws) & (visits.motion.kind == Motion.CIRCULAR)
     arcs = ArcTurns.of(visits)
     if len(arcs) == 0:
         return unsure

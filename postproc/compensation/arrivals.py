@@ -55,7 +55,7 @@ class ArrivalStates:
         return make_states(
             self.q[rows],
             self.side[rows],
-            self._tools[self.visits.tool[rows]],
+            self._tools[self.visits.frame.tool[rows]],
             travel=self.travel[rows],
             speed=self.speed[rows],
             temperature=self.temperature,

@@ -94,7 +94,10 @@ def check_base(visits: Visits, cell: Cell) -> list[Diagnostic]:
                 "post writes no $BASE, write the frame that the program was made with "
                 "into [base] of the cell"
             )
-            file, line = visits.files[visits.file[first]], int(visits.line[first])
+            file, line = (
+                visits.file_name(first),
+                int(visits.place.line[first]),
+            )
             return [Diagnostic(file, line, Code.BASE_FRAME_MISMATCH, text)]
     return []
 
@@ -121,25 +124,25 @@ def _pairs(visits: Visits, cell: Cell) -> PosePairs:
     pose, joints = _beside(visits)
     apart = np.abs(frames - cell.base.pose).reshape(-1, 16)
     same: Bools = apart.max(axis=1) < 1e-9
-    own, known = same[visits.base[pose]], ~is_unknown(frames)
-    known = known[visits.uframe[pose]] & known[visits.tool[pose]]
-    some = np.flatnonzero(own & known & ~visits.tool_remote[pose])[:MOST]
+    own, known = same[visits.frame.base[pose]], ~is_unknown(frames)
+    known = known[visits.frame.uframe[pose]] & known[visits.frame.tool[pose]]
+    some = np.flatnonzero(own & known & ~visits.frame.tool_remote[pose])[:MOST]
     pose, joints = pose[some], joints[some]
-    flange = cell.arm.flange(np.deg2rad(visits.values[joints, :6]))
-    numbers = visits.dialect.poses(visits.values[pose])
+    flange = cell.arm.flange(np.deg2rad(visits.target.values[joints, :6]))
+    numbers = visits.dialect.poses(visits.target.values[pose])
     return PosePairs(
         pose,
-        flange @ frames[visits.tool[pose]],
-        frames[visits.uframe[pose]] @ numbers,
+        flange @ frames[visits.frame.tool[pose]],
+        frames[visits.frame.uframe[pose]] @ numbers,
     )
 
 
 def _beside(visits: Visits) -> tuple[Ints, Ints]:
     """Return visits of poses, and those of joint angles just before or behind, (k,)."""
-    known = ~np.isnan(visits.values).any(axis=1)
-    pose = known & (visits.target == Meaning.POSE)
-    joints = known & (visits.target == Meaning.JOINTS)
-    after = visits.before == np.arange(len(visits)) - 1
+    known = ~np.isnan(visits.target.values).any(axis=1)
+    pose = known & (visits.target.meaning == Meaning.POSE)
+    joints = known & (visits.target.meaning == Meaning.JOINTS)
+    after = visits.graph.before == np.arange(len(visits)) - 1
     into = np.flatnonzero(after[1:] & pose[1:] & joints[:-1]) + 1
     out = np.flatnonzero(after[1:] & joints[1:] & pose[:-1])
     return np.concatenate([into, out]), np.concatenate([into - 1, out + 1])

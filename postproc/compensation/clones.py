@@ -169,12 +169,13 @@ def with_lines_of(
         The visits; None where a line is not that of the visit before.
     """
     v, w = before.visits, after.visits
-    if _origin(before.sources, after.sources, edits, w) != v.line.tolist():
+    if _origin(before.sources, after.sources, edits, w) != v.place.line.tolist():
         return None
-    has = np.flatnonzero(v.literal >= 0)
+    has = np.flatnonzero(v.target.literal >= 0)
     line = np.zeros(len(w.literals), dtype=np.int64)
-    line[w.literal[has]] = v.literals.line[v.literal[has]]
-    return replace(w, line=v.line, literals=replace(w.literals, line=line))
+    line[w.target.literal[has]] = v.literals.line[v.target.literal[has]]
+    own = w.with_columns(line=v.place.line)
+    return replace(own, literals=replace(w.literals, line=line))
 
 
 def _origin(
@@ -184,10 +185,10 @@ def _origin(
     visits: Visits,
 ) -> list[int]:
     """Give the lines of visits as they were before the edits."""
-    lines = np.array(visits.line)
+    lines = np.array(visits.place.line)
     for file, (old, new, own) in enumerate(zip(before, after, edits, strict=True)):
-        mine = visits.file == file
-        start = new.line_starts[visits.line[mine] - 1]
+        mine = visits.place.file == file
+        start = new.line_starts[visits.place.line[mine] - 1]
         shift = np.zeros(len(start), dtype=np.int64)
         moved = 0
         for (begin, end), text in sorted(own, key=lambda edit: edit.span):
@@ -231,11 +232,11 @@ def give_own_points(
     )
     again = read_program({s.name: s.data for s in sources}, cell)
     v = reading.visits
-    problem = equivalent(v, again.visits, NOTHING, v.values, work.names)
+    problem = equivalent(v, again.visits, NOTHING, v.target.values, work.names)
     visits = None if problem else with_lines_of(reading, again, cloned)
     if visits is not None:  # no other program knows the points of clones
         shared = np.array(visits.literals.shared)
-        shared[visits.literal[list(work.names)]] = False
+        shared[visits.target.literal[list(work.names)]] = False
         visits = replace(visits, literals=replace(visits.literals, shared=shared))
     if visits is None or _stay(visits, list(work.names)):
         text = "clones would change what the program does: nothing is cloned"
@@ -250,13 +251,17 @@ def give_own_points(
 
 def _stay(visits: Visits, rows: Sequence[int]) -> bool:
     """Return True if points of visits must keep their numbers."""
-    return any(visits.literals.pinned[k] for k in visits.literal[rows].tolist())
+    return any(visits.literals.pinned[k] for k in visits.target.literal[rows].tolist())
 
 
 def _stops(visits: Visits) -> dict[MoveSlot, Ints]:
     """Group visits by the places that name where to go."""
     rows: dict[MoveSlot, list[int]] = {}
-    columns = (visits.file.tolist(), visits.line.tolist(), visits.via.tolist())
+    columns = (
+        visits.place.file.tolist(),
+        visits.place.line.tolist(),
+        visits.motion.via.tolist(),
+    )
     for row, place in enumerate(zip(*columns, strict=True)):
         rows.setdefault(MoveSlot(*place), []).append(row)
     return {stop: np.array(found) for stop, found in rows.items()}
@@ -266,8 +271,10 @@ def _list_disputed(work: _CloneWork) -> list[frozenset[int]]:
     """List the literals that arrivals disagree on, with all that share their moves."""
     visits = work.reading.visits
     conflict = work.proposal.decisions.status == Status.CONFLICT
-    disputed = set(visits.literal[conflict & (visits.literal >= 0)].tolist())
-    found = (visits.literal[rows] for rows in work.stops.values())
+    disputed = set(
+        visits.target.literal[conflict & (visits.target.literal >= 0)].tolist()
+    )
+    found = (visits.target.literal[rows] for rows in work.stops.values())
     sets = [frozenset(literal[literal >= 0].tolist()) for literal in found]
     together = unite_overlapping(s for s in sets if len(s) > 1)
     joined = frozenset().union(*together)
@@ -307,7 +314,7 @@ class _CloneWork:
         visits = reading.visits
         stops, at = _stops(visits), defaultdict(set)
         for stop, rows in stops.items():
-            for literal in visits.literal[rows].tolist():
+            for literal in visits.target.literal[rows].tolist():
                 at[literal].add(stop)
         return cls(reading, proposal, cloner, stops, at)
 
@@ -318,7 +325,9 @@ class _CloneWork:
         stays = not literals.isdisjoint(self.proposal.fixed.tolist())
         original, *others = group_arrivals(members, stays, agree_mm)
         visits = self.reading.visits
-        moving = visits.follows[visits.literal < 0]  # others have numbers of their own
+        moving = visits.target.follows[
+            visits.target.literal < 0
+        ]  # others have numbers of their own
         followed = not literals.isdisjoint(moving.tolist())
         if followed and not original.stops:
             place = members[0].stop
@@ -339,10 +348,12 @@ class _CloneWork:
         for stop in sorted(stops, key=lambda stop: int(self.stops[stop][0])):
             rows = self.stops[stop]
             usable = bool(self.proposal.usable[rows].all())
-            name = visits.names[visits.name[rows[0]]]
+            name = visits.target_name(rows[0])
             changes = {
-                literal: self.proposal.change_mm[rows[visits.literal[rows] == literal]]
-                for literal in np.unique(visits.literal[rows]).tolist()
+                literal: self.proposal.change_mm[
+                    rows[visits.target.literal[rows] == literal]
+                ]
+                for literal in np.unique(visits.target.literal[rows]).tolist()
             }
             found = SlotArrivals(stop, "", changes, usable)
             try:
@@ -374,7 +385,7 @@ class _CloneWork:
         text = f"{variable.name}: the moves of lines {lines} go to {name} now"
         self._note(file, declared, Code.CLONED, text)
         for row in np.concatenate([self.stops[stop] for stop in group.stops]).tolist():
-            _, bracket, index = visits.names[visits.name[row]].partition("[")
+            _, bracket, index = visits.target_name(row).partition("[")
             self.names[row] = f"{name}{bracket}{index}"
 
     def _note(self, file: int, line: int, code: Code, text: str) -> None:

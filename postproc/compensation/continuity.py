@@ -49,7 +49,7 @@ def on_path(visits: Visits) -> Ints:
     A line or an arc goes on from a fly point. Nothing runs along a JOINT move: where it
     stops, and how it swings round its fly points, is no path.
     """
-    return np.where(visits.motion != Motion.JOINT, visits.run_mates, -1)
+    return np.where(visits.motion.kind != Motion.JOINT, visits.run_mates, -1)
 
 
 # How much the correction may change on the way.
@@ -176,14 +176,16 @@ class _Wholes:
         Where the start of an arc that ends at an angle moves, so does its end, and the
         start of a curve is one of its points.
         """
-        before, n = visits.before, len(visits)
-        via, arcs = np.flatnonzero(visits.via), ArcAngles.of(visits)
+        before, n = visits.graph.before, len(visits)
+        via, arcs = np.flatnonzero(visits.motion.via), ArcAngles.of(visits)
         arcs = arcs.among(arcs.start >= 0)
-        inside = np.flatnonzero(visits.block >= 0)
-        heads = inside[(visits.block == np.arange(n))[inside] & (before[inside] >= 0)]
+        inside = np.flatnonzero(visits.motion.block >= 0)
+        heads = inside[
+            (visits.motion.block == np.arange(n))[inside] & (before[inside] >= 0)
+        ]
         whole = np.concatenate(
             [via, via, *[arcs.end + n] * 3,
-             visits.block[inside] + 2 * n, heads + 2 * n]
+             visits.motion.block[inside] + 2 * n, heads + 2 * n]
         )  # fmt: skip
         visit = np.concatenate(
             [via, via + 1, arcs.start, arcs.via, arcs.end, inside,
@@ -225,7 +227,7 @@ def keep_whole(
     steps = path.steps & reasons.none
     steps[path.before[steps]] = True
     reasons.mark(steps, Reason(Code.CORRECTION_STEP, STEP.format(step_mm)))
-    wholes, along = _Wholes.of(visits), visits.follows >= 0
+    wholes, along = _Wholes.of(visits), visits.target.follows >= 0
     while True:
         moves = reasons.none | along
         for reason, rows in wholes.find_broken(moves).items():

@@ -47,8 +47,8 @@ from postproc.robot.state import States
 
 def dependants(visits: Visits, agreement: Agreement, among: Bools) -> tuple[Ints, Ints]:
     """Find the visits that move along with a literal, and its row in the agreement."""
-    rows = np.flatnonzero((visits.follows >= 0) & among)
-    return rows, np.searchsorted(agreement.literal, visits.follows[rows])
+    rows = np.flatnonzero((visits.target.follows >= 0) & among)
+    return rows, np.searchsorted(agreement.literal, visits.target.follows[rows])
 
 
 def would_worsen(
@@ -74,17 +74,17 @@ def would_worsen(
         agree_mm: Changes that differ less are the same.
         absorbing: Their move makes up for what the literal changes by, (n,).
     """
-    carries = ~absorbing & (visits.target != Meaning.FOR)
+    carries = ~absorbing & (visits.target.meaning != Meaning.FOR)
     rows, at = dependants(visits, agreement, carries)
     needed = np.where(find_taught(visits)[rows, None], 0.0, change_mm[rows])
     moved = agreement.change_mm[at]
-    shifted = visits.shift[rows] >= 0
+    shifted = visits.target.shift[rows] >= 0
     if shifted.any():
         after = shift_values(
-            visits, agreement.literal, agreement.values, visits.values, own=False
+            visits, agreement.literal, agreement.values, visits.target.values, own=False
         )
         own = rows[shifted]
-        moved[shifted] = (after - visits.values)[own, :3]
+        moved[shifted] = (after - visits.target.values)[own, :3]
     left = np.linalg.norm(moved - needed, axis=1)
     allowed = np.maximum(np.linalg.norm(needed, axis=1), agree_mm)
     worse = ~(trusted[rows] & (left <= allowed))
@@ -97,8 +97,10 @@ def find_taught(visits: Visits) -> Bools:
     """Tell which visits have a literal that holds a taught target, (n,)."""
     if len(visits.literals) == 0:
         return np.zeros(len(visits), dtype=bool)
-    has = visits.literal >= 0
-    return np.asarray(has & visits.literals.taught[np.where(has, visits.literal, 0)])
+    has = visits.target.literal >= 0
+    return np.asarray(
+        has & visits.literals.taught[np.where(has, visits.target.literal, 0)]
+    )
 
 
 def move_dependants(
@@ -112,13 +114,13 @@ def move_dependants(
         chosen: Literals that do change, (m,).
         values: Numbers of every visit, (n, w).
     """
-    rows, at = dependants(visits, agreement, visits.shift < 0)
+    rows, at = dependants(visits, agreement, visits.target.shift < 0)
     rows, at = rows[chosen[at]], at[chosen[at]]
     if len(rows) == 0:
         return
-    direct = np.flatnonzero(visits.literal >= 0)
+    direct = np.flatnonzero(visits.target.literal >= 0)
     written = np.zeros((len(visits.literals), values.shape[1]))
-    written[visits.literal[direct]] = visits.values[direct]
+    written[visits.target.literal[direct]] = visits.target.values[direct]
     values[rows] += agreement.values[at] - written[agreement.literal[at]]
 
 
@@ -129,7 +131,7 @@ def without_target(visits: Visits) -> Bools:
     """Tell which moves go where no target of theirs says, (n,): $HOME, RELATIVE, .."""
     none = np.array([one.code is Code.NO_TARGET for one in visits.reasons])
     named = np.isin(
-        visits.target,
+        visits.target.meaning,
         (Meaning.POSE, Meaning.JOINTS, Meaning.NEAR, Meaning.PARTIAL_POSE,
          Meaning.PARTIAL_JOINTS, Meaning.UNKNOWN),
     )  # fmt: skip
@@ -140,8 +142,8 @@ def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
     """Mark moves without a target, taught points and shared variables, (n,)."""
     empty = without_target(visits)
     reasons.mark(empty, HOLDS_NONE)
-    has = visits.literal >= 0
-    literal = np.where(has, visits.literal, 0)
+    has = visits.target.literal >= 0
+    literal = np.where(has, visits.target.literal, 0)
     if len(visits.literals) == 0:
         return empty
     held = find_taught(visits)
@@ -225,7 +227,7 @@ def _by_one_move(visits: Visits, group: Ints, count: int) -> Bools:
         group: Literal of every visit, (n,), -1 where it has none.
         count: How many there are.
     """
-    places = np.stack([group, visits.file, visits.line])[:, group >= 0]
+    places = np.stack([group, visits.place.file, visits.place.line])[:, group >= 0]
     own = np.unique(places, axis=1)[0]
     return np.asarray(np.bincount(own, minlength=count) == 1)
 
@@ -264,10 +266,12 @@ def with_dependants(
         shift: What those with numbers of their own move by, (n, 3) [m]; else 0.
     """
     moves = np.array(shift)
-    rows = np.flatnonzero((visits.follows >= 0) & any_in_rows(values != visits.values))
+    rows = np.flatnonzero(
+        (visits.target.follows >= 0) & any_in_rows(values != visits.target.values)
+    )
     if len(rows):
         now = move_targets(
-            planned.targets, replace(visits, values=values), cell, rows
+            planned.targets, visits.with_columns(values=values), cell, rows
         ).tcp[rows]
         moves[rows] = np.nan_to_num((now - planned.targets.tcp[rows])[:, :3, 3])
     for v, sources in _steps(planned):
@@ -296,13 +300,15 @@ def with_what_moves_along(
     values, shift = found.corrected, np.where(own, found.correction, 0.0)
     moves = np.nan_to_num(with_dependants(visits, planned, cell, values, shift))
     along = ~own[:, 0] & (lengths(moves) > ALONG)
-    told = np.isin(visits.target, (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS))
+    told = np.isin(
+        visits.target.meaning, (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS)
+    )
     rows = np.flatnonzero(along & ~told)
     if len(rows) == 0:
         return found
     why, reasons = np.array(found.why), Interned(found.reasons)
     for v in rows.tolist():
-        how = WITH_POINT if visits.follows[v] >= 0 else WITH_BEGIN
+        how = WITH_POINT if visits.target.follows[v] >= 0 else WITH_BEGIN
         why[v] = reasons[found.reasons[why[v]].within(f"{{}}; {how}")]
     return replace(found, why=why, reasons=tuple(reasons))
 
@@ -324,8 +330,8 @@ def with_origins(visits: Visits, planned: PlannedProgram, found: Bools) -> Bools
     found = np.array(found)
     for v, sources in reversed([*_steps(planned)]):
         found[sources] |= found[v]
-    literals = visits.follows[found & (visits.follows >= 0)]
-    return np.asarray(found | np.isin(visits.literal, literals))
+    literals = visits.target.follows[found & (visits.target.follows >= 0)]
+    return np.asarray(found | np.isin(visits.target.literal, literals))
 
 
 def _turn_place(way: Floats, distance: float, by: Floats) -> Floats:
@@ -617,7 +623,7 @@ class Round:
             return out
         arm, given, new = (
             self.setting.cell.arm,
-            visits.values,
+            visits.target.values,
             found.decisions.corrected,
         )
         before, q = (
@@ -636,7 +642,7 @@ class Round:
         """
         visits, reasons = self.reading.visits, Reasons(len(self.reading.visits))
         holds = ~without_target(visits)
-        display = holds & ((visits.reason > 0) | (visits.literal < 0))
+        display = holds & ((visits.reason > 0) | (visits.target.literal < 0))
         reasons.adopt(visits.reason, visits.reasons)
         reasons.mark(display, NOT_WRITTEN)
         unchanged = mark_unchanged(visits, reasons, self.setting.options)
@@ -655,7 +661,7 @@ class Round:
         left = np.zeros(len(visits))
         left[corrected] = agreement.radius_mm[agreement.group[corrected]]
         self._mark_averaged(reasons, left)
-        values = np.array(visits.values)
+        values = np.array(visits.target.values)
         values[corrected] = agreement.values[agreement.group[corrected]]
         move_dependants(visits, agreement, chosen, values)
         literals, new = agreement.literal[chosen], agreement.values[chosen]
@@ -708,7 +714,7 @@ class Round:
         rows = np.flatnonzero(poses_with_signs(visits))
         arm, solved = self.setting.cell.arm, self.solved
         q, before = joints_written(arm, self.planned, rows, solved, self.aside)
-        near[rows] |= visits.dialect.near_border(visits.values[rows], q, before)
+        near[rows] |= visits.dialect.near_border(visits.target.values[rows], q, before)
         for axis, found in enumerate(near.T, start=1):
             text = visits.dialect.terms.border.format(axis)
             reasons.mark(found, Reason(Code.CONFIGURATION_BORDER, text))
@@ -728,7 +734,7 @@ class Round:
         visits, limit = self.reading.visits, self.setting.cell.limits.conflict_mm
         numbers, change, both = self._collect_needs()
         points = self._average(
-            agree(visits.literal, usable, numbers, both), numbers, both
+            agree(visits.target.literal, usable, numbers, both), numbers, both
         )
         shifts, lost = own_shifts(visits), np.zeros(len(points.literal), dtype=bool)
         absorbing = shifts & points.usable[points.group] if shifts.any() else shifts
@@ -761,11 +767,13 @@ class Round:
         averages = job.averages and job.options.shared_points != "leave"
         if not (averages and apart.any()):
             return found
-        visits, via = self.reading.visits, self.reading.visits.via
-        other = visits.fly | via | np.append(False, via[:-1]) | visits.curved
-        other |= (visits.block >= 0) | (visits.shift >= 0)
+        visits, via = self.reading.visits, self.reading.visits.motion.via
+        other = (
+            visits.motion.fly | via | np.append(False, via[:-1]) | visits.motion.curved
+        )
+        other |= (visits.motion.block >= 0) | (visits.target.shift >= 0)
         apart[found.group[other & (found.group >= 0)]] = False
-        for frame in (visits.uframe, visits.base, visits.tool):
+        for frame in (visits.frame.uframe, visits.frame.base, visits.frame.tool):
             low, high = np.full(len(apart), 2**31), np.full(len(apart), -1)
             rows = found.group >= 0
             np.minimum.at(low, found.group[rows], frame[rows])
@@ -820,8 +828,10 @@ class Round:
             both = np.concatenate([change, turn * LEVER_MM], axis=1)
         flags = list(visits.dialect.flag_columns)
         if flags:  # arrivals with different flags have no mean
-            poses = (visits.target == Meaning.POSE)[:, None]
-            anew = np.where(poses, numbers[:, flags] - visits.values[:, flags], 0.0)
+            poses = (visits.target.meaning == Meaning.POSE)[:, None]
+            anew = np.where(
+                poses, numbers[:, flags] - visits.target.values[:, flags], 0.0
+            )
             both = np.concatenate([both, anew * FLAG_MM], axis=1)
         return numbers, change, both
 

@@ -121,7 +121,7 @@ class Overruled:
 
     def find_unchecked(self, visits: Visits) -> Bools:
         """Tell where the program leaves open whether the string is checked, (n,)."""
-        unset = visits.care == Switch.UNSET
+        unset = visits.motion.care == Switch.UNSET
         found: Bools = (self.branch & unset[:, CNFG]) | (self.turn & unset[:, TURN])
         return found
 
@@ -144,7 +144,7 @@ def find_stops(visits: Visits, targets: Targets, plan: Plan) -> Bools:
         plan: Where they lead.
     """
     path = find_overruled(targets, plan)
-    checked = (visits.care == Switch.ON) | (visits.care == Switch.UNKNOWN)
+    checked = (visits.motion.care == Switch.ON) | (visits.motion.care == Switch.UNKNOWN)
     found = (path.branch & checked[:, CNFG]) | (path.turn & checked[:, TURN])
     return np.asarray(found | _find_misses(visits, targets, plan))
 
@@ -231,7 +231,7 @@ def _mark_stops(visits: Visits, path: Overruled, reasons: Reasons) -> None:
         (path.branch, terms.branch_stops, terms.branch_may_stop, CNFG),
         (path.turn, terms.turn_stops, terms.turn_may_stop, TURN),
     ):
-        care = visits.care[:, column]
+        care = visits.motion.care[:, column]
         for switch, text in ((Switch.ON, stops), (Switch.UNKNOWN, may_stop)):
             reason = Reason(Code.CONFIGURATION_CONTRADICTED, text)
             reasons.mark(rows & (care == switch), reason)
@@ -241,10 +241,10 @@ def _find_misses(visits: Visits, targets: Targets, plan: Plan) -> Bools:
     """Find checked flags, finer than branch and turn, that are not the plan's, (n,)."""
     off = np.zeros(len(visits), dtype=bool)
     rows = np.flatnonzero((targets.kind == TargetKind.POSE) & (targets.slot >= 0))
-    missed = visits.dialect.misses(visits.values[rows], plan.q[rows])
+    missed = visits.dialect.misses(visits.target.values[rows], plan.q[rows])
     if missed is not None:
         off[rows] = missed & ~np.isnan(plan.q[rows, 0])
-    return np.asarray(off & (visits.care[:, CNFG] != Switch.OFF))
+    return np.asarray(off & (visits.motion.care[:, CNFG] != Switch.OFF))
 
 
 def _mark_either_way(
@@ -255,7 +255,7 @@ def _mark_either_way(
     placed &= ~np.isnan(plan.q[:, 0])
     joint = placed & (targets.move == Motion.JOINT)
     wrist = placed & ~joint & targets.wrist_joint
-    branch = wrist | (joint & _is_doubtful(visits.care[:, CNFG]))
+    branch = wrist | (joint & _is_doubtful(visits.motion.care[:, CNFG]))
     turn = wrist | (joint & _turns_doubted(visits, targets))
     if branch.any():
         edge, source = _edges(visits, plan, branch)
@@ -266,10 +266,10 @@ def _mark_either_way(
     terms, code = visits.dialect.terms, Code.CONFIGURATION_UNKNOWN
     reasons.mark(wrist & (branch | turn), Reason(code, terms.wrist))
     for value in Switch:
-        rows = branch & (visits.care[:, CNFG] == value)
+        rows = branch & (visits.motion.care[:, CNFG] == value)
         reasons.mark(rows, Reason(code, terms.branch.format(SAID[value])))
-    for pair in np.unique(visits.care[turn][:, [TURN, MULTI]], axis=0):
-        rows = turn & (visits.care[:, [TURN, MULTI]] == pair).all(axis=1)
+    for pair in np.unique(visits.motion.care[turn][:, [TURN, MULTI]], axis=0):
+        rows = turn & (visits.motion.care[:, [TURN, MULTI]] == pair).all(axis=1)
         text = terms.nearest.format(*(SAID[Switch(v)] for v in pair))
         reasons.mark(rows, Reason(code, text))
     return np.asarray(branch | turn)
@@ -281,7 +281,7 @@ def _is_doubtful(switch: Ints) -> Bools:
 
 def _turns_doubted(visits: Visits, targets: Targets) -> Bools:
     """Tell where written turns and the nearest ones may both be meant, (n,)."""
-    checked, multi = visits.care[:, TURN], visits.care[:, MULTI]
+    checked, multi = visits.motion.care[:, TURN], visits.motion.care[:, MULTI]
     nearest = (checked == Switch.ON) | (checked == Switch.UNKNOWN)
     written = _is_doubtful(checked) | (multi == Switch.UNKNOWN)
     return np.asarray(np.where(targets.nearest_turn, nearest, written))
@@ -299,10 +299,10 @@ def _other_turn(visits: Visits, targets: Targets, plan: Plan, arm: Arm) -> Bools
 
 def _edges(visits: Visits, plan: Plan, rows: Bools) -> tuple[Ints, Ints]:
     """List the known origins of some visits: visits (e,) and where from (e,)."""
-    edge = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
-    known = rows[edge] & (visits.pred >= 0)
-    known &= ~np.isnan(plan.q[visits.pred, 0])
-    return edge[known], visits.pred[known]
+    edge = np.repeat(np.arange(len(visits)), np.diff(visits.graph.pred_start))
+    known = rows[edge] & (visits.graph.pred >= 0)
+    known &= ~np.isnan(plan.q[visits.graph.pred, 0])
+    return edge[known], visits.graph.pred[known]
 
 
 def _mark_rows(n: int, rows: Ints) -> Bools:
@@ -320,9 +320,9 @@ def _followers(visits: Visits, doubtful: Bools, sure: Bools) -> tuple[Bools, Boo
     Returns:
         What comes from doubtful places, and which places make others doubtful.
     """
-    edge = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
-    order = np.argsort(visits.pred, kind="stable")
-    after, source = edge[order], visits.pred[order]
+    edge = np.repeat(np.arange(len(visits)), np.diff(visits.graph.pred_start))
+    order = np.argsort(visits.graph.pred, kind="stable")
+    after, source = edge[order], visits.graph.pred[order]
     reached, waiting = np.array(doubtful), np.flatnonzero(doubtful).tolist()
     while waiting:
         v = waiting.pop()
@@ -366,7 +366,7 @@ def mark_orientation_interpolation(
         plan: Where they lead.
         reasons: Why visits must not be compensated; more are added.
     """
-    kind, cartesian = visits.orientation_law, targets.move != Motion.JOINT
+    kind, cartesian = visits.motion.orientation_law, targets.move != Motion.JOINT
     law, terms = OrientationLaw, visits.dialect.terms
     unknown = Reason(Code.ORIENTATION_LAW, terms.law_unknown)
     reasons.mark(cartesian & (kind == law.UNKNOWN), unknown)
@@ -392,8 +392,8 @@ def _name_law(terms: Terms, text: str, law: OrientationLaw) -> Reason:
 
 def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bools:
     """Tell which of some moves may turn the tool otherwise than planned, (n,)."""
-    edge = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
-    source = visits.pred
+    edge = np.repeat(np.arange(len(visits)), np.diff(visits.graph.pred_start))
+    source = visits.graph.pred
     known = rows[edge] & (source >= 0)
     known &= ~np.isnan(plan.tcp[source, 0, 0] + plan.tcp[edge, 0, 0])
     edge, source = edge[known], source[known]
@@ -404,8 +404,8 @@ def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bo
     begin = (plan.tcp[source] @ to_flange @ targets.tool[edge])[:, :3, :3]
     end = plan.tcp[edge][:, :3, :3]
     turn = np.linalg.norm(rotation_vector(np.swapaxes(begin, 1, 2) @ end), axis=1)
-    kind = visits.orientation_law[edge]
-    world = visits.frames[visits.base[edge]][:, :3, :3]
+    kind = visits.motion.orientation_law[edge]
+    world = visits.frame.poses[visits.frame.base[edge]][:, :3, :3]
     sine = np.minimum(_sine(world @ begin, kind), _sine(world @ end, kind))
     off = np.minimum(turn**2 / (8.0 * np.maximum(sine, LEAST)), turn)
     both = np.maximum(_sine(world @ begin, kind), _sine(world @ end, kind))

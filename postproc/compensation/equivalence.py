@@ -61,17 +61,19 @@ def equivalent(
 
 def _same_literals(v: Visits, w: Visits, clones: Mapping[int, str]) -> bool:
     """Tell whether visits share literals as they did, but for those of clones."""
-    if not _same(v.shift >= 0, w.shift >= 0):
+    if not _same(v.target.shift >= 0, w.target.shift >= 0):
         return False
     if not clones:
-        return _same(v.literal, w.literal) and _same(v.follows, w.follows)
-    if not np.array_equal(v.literal < 0, w.literal < 0):
+        return _same(v.target.literal, w.target.literal) and _same(
+            v.target.follows, w.target.follows
+        )
+    if not np.array_equal(v.target.literal < 0, w.target.literal < 0):
         return False
     names, own = Interned([""]), np.zeros(len(v), dtype=np.int64)
     own[[*clones]] = names.of([*clones.values()])
-    has = np.flatnonzero(v.literal >= 0)
-    old, _ = number_in_order(v.literal[has] * len(names) + own[has])
-    return np.array_equal(old, number_in_order(w.literal[has])[0])
+    has = np.flatnonzero(v.target.literal >= 0)
+    old, _ = number_in_order(v.target.literal[has] * len(names) + own[has])
+    return np.array_equal(old, number_in_order(w.target.literal[has])[0])
 
 
 def _other_number(v: Visits, w: Visits, edited: Ints, values: Floats) -> str:
@@ -79,11 +81,11 @@ def _other_number(v: Visits, w: Visits, edited: Ints, values: Floats) -> str:
     changes = np.append(np.zeros(len(v.literals), dtype=bool), False)  # none: -1
     changes[edited] = True
     for rows in chunks(len(v), ROWS):
-        kept = ~(changes[v.literal[rows]] | changes[v.follows[rows]])
-        wanted, read = values[rows], w.values[rows]
-        if not _same(v.values[rows][kept], read[kept]):
+        kept = ~(changes[v.target.literal[rows]] | changes[v.target.follows[rows]])
+        wanted, read = values[rows], w.target.values[rows]
+        if not _same(v.target.values[rows][kept], read[kept]):
             return "a target changed that was to be kept"
-        computed = (v.follows[rows] >= 0) | (v.shift[rows] >= 0)
+        computed = (v.target.follows[rows] >= 0) | (v.target.shift[rows] >= 0)
         if not _same(wanted[~computed], read[~computed]):
             return "a number does not read as it was meant"
         own = wanted[computed], read[computed]
@@ -94,14 +96,16 @@ def _other_number(v: Visits, w: Visits, edited: Ints, values: Floats) -> str:
 
 def _other_text(v: Visits, w: Visits, clones: Mapping[int, str]) -> str:
     """Say which column of texts differs; reasons may speak of lines."""
-    if not _same_texts(v.configs, v.config, w.configs, w.config):
+    if not _same_texts(
+        v.target.configs, v.target.config, w.target.configs, w.target.config
+    ):
         return "the output has another config"
-    texts, name = v.names, v.name
+    texts, name = v.target.names, v.target.name
     if clones:
         own, name = Interned(texts), np.array(name)
         name[[*clones]] = own.of([*clones.values()])
         texts = tuple(own)
-    if not _same_texts(texts, name, w.names, w.name):
+    if not _same_texts(texts, name, w.target.names, w.target.name):
         return "the output has another name"
     if not np.array_equal(v.reason > 0, w.reason > 0):
         return "the output has another reason"
@@ -117,11 +121,15 @@ def _same_texts(a: Sequence[str], i: Ints, b: Sequence[str], j: Ints) -> bool:
 
 def _other_column(v: Visits, w: Visits) -> str:
     """Say which of the other columns differs."""
-    for column in fields(Visits):
-        if column.name not in _OTHERWISE:
-            a, b = getattr(v, column.name), getattr(w, column.name)
+    if v.files != w.files or v.dialect != w.dialect:
+        return "the output has other files"
+    for part in (*v.parts, "graph"):
+        before, after = vars(getattr(v, part)), vars(getattr(w, part))
+        for name in (f.name for f in fields(getattr(v, part))
+                     if f.name not in _OTHERWISE):  # fmt: skip
+            a, b = before[name], after[name]
             if not (_same(a, b) if isinstance(a, np.ndarray) else a == b):
-                return f"the output has another {column.name}"
+                return f"the output has another {part}: {name}"
     return ""
 
 

@@ -121,7 +121,7 @@ class Explanation:
         v, rows = self.visits, range(len(self.visits))
         columns: dict[str, object] = {
             "line": [self.line_of(i) for i in rows],
-            "target": [v.names[k] for k in v.name.tolist()],
+            "target": [v.target.names[k] for k in v.target.name.tolist()],
             "from": [self.name_origins(i) for i in rows],
             **columns_of([f"q{k}_deg" for k in range(1, 7)], np.rad2deg(self.q)),
             **columns_of([f"lambda{k}" for k in range(1, 7)], self.direction),
@@ -146,26 +146,26 @@ class Explanation:
     def name_origins(self, i: int) -> str:
         """Name the lines that visit i is reached from."""
         names = {START: "start", ELSEWHERE: "unknown"}
-        before = self.visits.predecessors(i)
+        before = self.visits.graph.predecessors(i)
         told = [names.get(int(p)) or self.line_of(int(p), "line ") for p in before]
         return ", ".join(dict.fromkeys(told))
 
     def line_of(self, i: int, word: str = "") -> str:
         """Name the line of visit i; that of a page with the page's name."""
         v = self.visits
-        return f"{f'{v.files[v.file[i]]}:' if v.file[i] else word}{v.line[i]}"
+        return f"{f'{v.file_name(i)}:' if v.place.file[i] else word}{v.place.line[i]}"
 
     def choose_visits(self, line: int | None) -> Ints:
         """Choose the visits to show: those whose move or literal is on a line."""
         v = self.visits
         if line is None:
             return np.arange(len(v))
-        found = v.line == line
+        found = v.place.line == line
         if len(v.literals):
             found = found | (
-                (v.literal >= 0)
-                & (v.literals.line[v.literal] == line)
-                & (v.literals.file[v.literal] == 0)
+                (v.target.literal >= 0)
+                & (v.literals.line[v.target.literal] == line)
+                & (v.literals.file[v.target.literal] == 0)
             )
         if not found.any():
             raise ProgramError(

@@ -48,17 +48,17 @@ def tool_in_metres(visits: Visits) -> list[Diagnostic]:
 
     Tools are tens of millimetres long and more; written in metres none reaches two.
     """
-    longest = np.abs(visits.frames[:, :3, 3]).max(axis=1, initial=0.0) / MM
+    longest = np.abs(visits.frame.poses[:, :3, 3]).max(axis=1, initial=0.0) / MM
     short = (longest > 0.0) & (longest < SHORTEST)
-    known = np.flatnonzero(visits.tool >= 0)
-    first = known[short[visits.tool[known]]][:1]
+    known = np.flatnonzero(visits.frame.tool >= 0)
+    first = known[short[visits.frame.tool[known]]][:1]
     return [
         Diagnostic(
-            visits.files[visits.file[i]],
-            int(visits.line[i]),
+            visits.file_name(i),
+            int(visits.place.line[i]),
             Code.TOOL_LENGTH,
-            f"the tool here is {longest[visits.tool[i]]:g} mm long, by the program or "
-            "by [tool] of the cell: are these metres? Write millimetres",
+            f"the tool here is {longest[visits.frame.tool[i]]:g} mm long, by the "
+            "program or by [tool] of the cell: are these metres? Write millimetres",
         )
         for i in first
     ]
@@ -103,7 +103,7 @@ def missing_file(visits: Visits) -> list[Diagnostic]:
         f"targets without a value: {lost.sum()}, and there is no {name}. Put it beside "
         "the program, or give it with --variables"
     )
-    first = visits.line[np.flatnonzero(lost)[:1]].tolist()
+    first = visits.place.line[np.flatnonzero(lost)[:1]].tolist()
     return [
         Diagnostic(visits.files[0], line, Code.NO_VARIABLE_FILE, text) for line in first
     ]
@@ -143,10 +143,10 @@ def flank_steps(
         arm: Its accelerations may be guesses of the arm file.
     """
     before = on_path(visits)
-    rows = np.flatnonzero(corrected & (before >= 0) & (visits.lin_spd > 0.0))
+    rows = np.flatnonzero(corrected & (before >= 0) & (visits.speed.linear > 0.0))
     last = before[rows]
     way = np.linalg.norm(place[rows] - place[last], axis=1)
-    time = way / (visits.lin_spd[rows] * visits.override[rows])
+    time = way / (visits.speed.linear[rows] * visits.speed.override[rows])
     found = []
     for j in range(len(gap)):
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -161,8 +161,8 @@ def flank_steps(
             f"than its acceleration allows (here {over[i]:.1f} times, as far as the "
             "arm file knows it): the controller may slow down or round the step off"
         )
-        line = int(visits.line[rows[i]])
-        name = visits.files[visits.file[rows[i]]]
+        line = int(visits.place.line[rows[i]])
+        name = visits.file_name(rows[i])
         found.append(Diagnostic(name, line, Code.FLANK_ACCELERATION, text))
     return found
 
@@ -181,9 +181,9 @@ def listing_cost(
     if len(visits.literals) == 0:
         return []
     files = np.array([file_named(name).is_variables for name in visits.files])
-    rows = corrected & files[visits.literals.file[visits.literal]]
+    rows = corrected & files[visits.literals.file[visits.target.literal]]
     found = []
-    poses = rows & (visits.target != Meaning.JOINTS)
+    poses = rows & (visits.target.meaning != Meaning.JOINTS)
     if poses.any():
         lever = np.linalg.norm(_tool(visits, poses), axis=1).max() / MM
         lost = np.sqrt(3) * LISTED / 2
@@ -191,7 +191,7 @@ def listing_cost(
             f"up to {lost:.4f} mm of position and, in orientation, {LISTED / 2:g} deg "
             f"an angle: {np.deg2rad(LISTED / 2) * lever:.3f} mm over the tool's length"
         )
-    joints = rows & (visits.target == Meaning.JOINTS)
+    joints = rows & (visits.target.meaning == Meaning.JOINTS)
     if joints.any():
         at, tool = q[joints], _tool(visits, joints)
         reach = map_chunks(lambda some: _reach(arm, at[some], tool[some]), len(at))
@@ -200,8 +200,8 @@ def listing_cost(
     first = np.flatnonzero(rows)[:1]
     return [
         Diagnostic(
-            visits.files[visits.literals.file[visits.literal[v]]],
-            int(visits.literals.line[visits.literal[v]]),
+            visits.files[visits.literals.file[visits.target.literal[v]]],
+            int(visits.literals.line[visits.target.literal[v]]),
             Code.LSV_PRECISION,
             f"a listing by the controller has 2 decimals (0.01 mm, 0.01 deg): to list "
             f"these values and load them again costs {'; '.join(found)}",
@@ -212,7 +212,7 @@ def listing_cost(
 
 def _tool(visits: Visits, rows: Bools) -> Floats:
     """Return the TCP in the flange frame at some visits, (k, 3) [m]."""
-    return np.asarray(visits.frames[visits.tool[rows], :3, 3])
+    return np.asarray(visits.frame.poses[visits.frame.tool[rows], :3, 3])
 
 
 def _reach(arm: Arm, q: Floats, tool: Floats) -> float:
@@ -227,8 +227,8 @@ def _each(visits: Visits, rows: Bools, code: Code, text: str) -> list[Diagnostic
     if len(found) > SINGLY:
         text, found = f"{len(found)} targets from here on: {text}", found[:1]
     return [
-        Diagnostic(visits.files[visits.file[i]], int(visits.line[i]), code, text)
-        for i in found
+        Diagnostic(visits.file_name(i), int(visits.place.line[i]), code, text)
+        for i in found.tolist()
     ]
 
 
@@ -243,10 +243,10 @@ def report_uncertain_frames(
         std_error: Standard error of the correction, (n, 3) [m].
         cell: Says which frames were taught, and from which sides.
     """
-    found, poses = [], np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
+    found, poses = [], np.isin(visits.target.meaning, (Meaning.POSE, Meaning.NEAR))
     for frame, record in find_taught_records(visits, cell).items():
         sides = cell.taught_sides.get(record)
-        rows = np.flatnonzero(corrected & poses & (visits.uframe == frame))
+        rows = np.flatnonzero(corrected & poses & (visits.frame.uframe == frame))
         if cell.taught_frames[record] is None or len(rows) == 0:
             continue
         if sides is not None and sides.all():
@@ -258,7 +258,10 @@ def report_uncertain_frames(
             "apart, each reached by a move of all joints in one direction, and write "
             "these directions as taught_direction in the cell file"
         )
-        where = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
+        where = (
+            visits.file_name(rows[0]),
+            int(visits.place.line[rows[0]]),
+        )
         found.append(Diagnostic(*where, Code.DIRECTION_UNCERTAIN, text))
     return found
 
@@ -277,10 +280,13 @@ def report_averaged_points(
     for code in (Code.ARRIVALS_AVERAGED, Code.ARRIVALS_FAR_APART):
         averaged = np.array([one.code is code for one in reasons])
         rows = np.flatnonzero(averaged[why])
-        _, first = np.unique(visits.literal[rows], return_index=True)
+        _, first = np.unique(visits.target.literal[rows], return_index=True)
         for i in rows[np.sort(first)].tolist():
-            name, text = visits.names[visits.name[i]], reasons[why[i]].text
-            place = visits.files[visits.file[i]], int(visits.line[i])
+            name, text = (
+                visits.target_name(i),
+                reasons[why[i]].text,
+            )
+            place = visits.file_name(i), int(visits.place.line[i])
             text = f"{name}: {text}" if name else text
             found.append(Diagnostic(*place, code, text))
     return found
@@ -315,7 +321,7 @@ def report_uncertain_sides(
     cure = "start the approach farther away, or so that the axis does not reverse"
     if len(rows) > SINGLY:
         worst = rows[np.argsort(-size[rows])[:5]]
-        lines = ", ".join(str(line) for line in np.unique(visits.line[worst]))
+        lines = ", ".join(str(line) for line in np.unique(visits.place.line[worst]))
         text = (
             f"the approach direction of {len(rows)} targets is uncertain, because an "
             f"axis reversed shortly before (up to +-{size[rows].max():.3f} mm, for "
@@ -324,7 +330,7 @@ def report_uncertain_sides(
         return [
             Diagnostic(
                 visits.files[0],
-                int(visits.line[rows[0]]),
+                int(visits.place.line[rows[0]]),
                 Code.DIRECTION_UNCERTAIN,
                 text,
             )
@@ -332,8 +338,8 @@ def report_uncertain_sides(
     told = advice(rows)
     return [
         Diagnostic(
-            visits.files[visits.file[i]],
-            int(visits.line[i]),
+            visits.file_name(i),
+            int(visits.place.line[i]),
             Code.DIRECTION_UNCERTAIN,
             f"the approach direction is uncertain (+-{size[i]:.3f} mm), because "
             f"{_how(side[i])}: {told.get(i, cure)}",

@@ -61,9 +61,9 @@ def first_cause(
 
 def _count_targets(visits: Visits) -> int:
     """Count the targets that hold numbers."""
-    return int((visits.literal >= 0).sum())
+    return int((visits.target.literal >= 0).sum())
 
 
 def _count_known(visits: Visits) -> int:
     """Count the targets that nothing unknown leaves."""
-    return int(np.sum((visits.literal >= 0) & (visits.reason == 0)))
+    return int(np.sum((visits.target.literal >= 0) & (visits.reason == 0)))

@@ -35,7 +35,9 @@ def poses_with_signs(visits: Visits) -> Bools:
     """Tell at which visits flags tell the controller the signs of axes, (n,)."""
     if not visits.dialect.sign_flags:
         return np.zeros(len(visits), dtype=bool)
-    return np.asarray(visits.config_given & (visits.target == Meaning.POSE))
+    return np.asarray(
+        visits.target.config_given & (visits.target.meaning == Meaning.POSE)
+    )
 
 
 def joints_written(
@@ -99,7 +101,7 @@ def turn_from_borders(
     plan, arm = planned.plan, cell.arm
     tool = take_rows(plan.tool, some)
     q, before = joints_written(arm, planned, some, solved, aside)
-    moves = visits.dialect.leave_border(visits.values[some], q, before)
+    moves = visits.dialect.leave_border(visits.target.values[some], q, before)
     if not moves.any():
         return solved
     moving = any_in_rows(moves != 0.0)

@@ -66,7 +66,7 @@ class ProgramErrors:
     def describe(self, row: int) -> TargetException:
         """Describe a visit as an exception."""
         v, errors = self.visits, self.expected
-        place = f"{v.files[v.file[row]]}:{v.line[row]} {v.names[v.name[row]]}"
+        place = f"{v.file_name(row)}:{v.place.line[row]} {v.target_name(row)}"
         return TargetException(
             row=row,
             place=place.rstrip(),

@@ -376,10 +376,10 @@ def new_numbers(
     it where it should. An orientation that does not change keeps its written numbers.
     Flags that small moves decide are those of the numbers as they are rounded.
     """
-    numbers = np.array(visits.values)
-    joints = visits.target == Meaning.JOINTS
+    numbers = np.array(visits.target.values)
+    joints = visits.target.meaning == Meaning.JOINTS
     numbers[joints, :6] += np.rad2deg(solved.q[joints] - plan.q[joints])
-    poses = np.flatnonzero(visits.target == Meaning.POSE)
+    poses = np.flatnonzero(visits.target.meaning == Meaning.POSE)
     placed = base_in_uframe(visits, poses)
     command = np.array(solved.command[:, :, 3])
     command[:, :3] -= aside
@@ -388,7 +388,7 @@ def new_numbers(
     point = np.einsum("nij,nj->ni", placed, command[poses])
     numbers[poses, :3] = point[:, :3] / MM
     rows, dialect = solved.turned, visits.dialect
-    rows = rows[visits.target[rows] == Meaning.POSE]
+    rows = rows[visits.target.meaning[rows] == Meaning.POSE]
     if len(rows):
         by = rotation_from_vector(turns_in_file(visits, solved)[rows])
         numbers[rows] = dialect.rotate(numbers[rows], by)
@@ -421,7 +421,7 @@ def _end_at_angles(
         return arcs, np.empty((0, 3)), np.empty((0, 3))
     ways = np.stack([arcs.start, arcs.via, arcs.end])
     before = plan.tcp[ways, :3, 3] - plan.aside[ways]
-    pose = visits.dialect.poses(visits.values[arcs.end])
+    pose = visits.dialect.poses(visits.target.values[arcs.end])
     third = (inverse(base_in_uframe(visits, arcs.end)) @ pose)[:, :3, 3]
     return arcs, *points_to_write(before, command[ways, :3], third)
 
@@ -433,7 +433,7 @@ def angles_astray(visits: Visits, plan: Plan, solved: Commands, aside: Floats) -
     the corrections there differ much from that of the point between, it is left aside.
     """
     out = np.zeros(len(visits), dtype=bool)
-    if not visits.via.any():
+    if not visits.motion.via.any():
         return out
     command = np.array(solved.command[:, :, 3])
     command[:, :3] -= aside
@@ -459,7 +459,7 @@ def solve_written(
     """
     scale = 10.0 ** np.array(visits.dialect.pose_decimals)
     pose = visits.dialect.poses(np.rint(numbers * scale) / scale)
-    from_tcp = inverse(few_frames(visits))[visits.tool[rows]]
+    from_tcp = inverse(few_frames(visits))[visits.frame.tool[rows]]
     flange = inverse(base_in_uframe(visits, rows)) @ pose @ from_tcp
     found = np.array(near)
     known = np.isfinite(near).all(axis=1) & np.isfinite(flange).all(axis=(1, 2))
@@ -474,13 +474,15 @@ def base_in_uframe(visits: Visits, rows: Ints) -> Floats:
     if len(rows) == 0:
         return np.empty((0, 4, 4))
     frames = few_frames(visits)
-    return products(inverse(frames), frames, visits.uframe[rows], visits.base[rows])
+    return products(
+        inverse(frames), frames, visits.frame.uframe[rows], visits.frame.base[rows]
+    )
 
 
 def turns_in_file(visits: Visits, solved: Commands) -> Floats:
     """Give the commands' rotations in the frame of the numbers, (n, 3) [rad]."""
     out = np.array(solved.turn)
-    poses = solved.turned[visits.target[solved.turned] == Meaning.POSE]
+    poses = solved.turned[visits.target.meaning[solved.turned] == Meaning.POSE]
     axes = base_in_uframe(visits, poses)[:, :3, :3]
     out[poses] = np.einsum("nij,nj->ni", axes, out[poses])
     return out
@@ -492,9 +494,9 @@ def change_mm(visits: Visits, numbers: Floats, correction: Floats) -> Floats:
     For a pose it is that of its numbers (the same literal may be reached in two user
     frames), for joint angles that of the TCP.
     """
-    poses = (visits.target == Meaning.POSE)[:, None]
-    moved = numbers[:, :3] - visits.values[:, :3]
-    near = np.flatnonzero(visits.target == Meaning.NEAR)
+    poses = (visits.target.meaning == Meaning.POSE)[:, None]
+    moved = numbers[:, :3] - visits.target.values[:, :3]
+    near = np.flatnonzero(visits.target.meaning == Meaning.NEAR)
     axes = base_in_uframe(visits, near)[:, :3, :3]
     change = np.where(poses, moved, correction / MM)
     change[near] = np.einsum("nij,nj->ni", axes, correction[near]) / MM

@@ -333,8 +333,8 @@ class Replanner:
             values: The numbers, (n, w) in the program's units.
             lead: What is known of the first sides, see `direction.arrivals`.
         """
-        new = replace(self._visits, values=values)
-        old = self._visits.values
+        new = self._visits.with_columns(values=values)
+        old = self._visits.target.values
         moved = any_in_rows((values != old) & ~(np.isnan(values) & np.isnan(old)))
         moved |= ArcAngles.of(new).find_moved(moved)
         moved |= ArcTurns.of(new).find_moved(moved)

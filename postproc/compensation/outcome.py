@@ -217,9 +217,9 @@ class Outcome:
         v, d = self.visits, self.decisions
         return data_frame(
             {
-                "file": [v.files[k] for k in v.file.tolist()],
-                "line": v.line,
-                "target": [v.names[k] for k in v.name.tolist()],
+                "file": [v.files[k] for k in v.place.file.tolist()],
+                "line": v.place.line,
+                "target": [v.target.names[k] for k in v.target.name.tolist()],
                 "status": [Status(k).name.lower() for k in d.status.tolist()],
                 "code": [d.reasons[k].name for k in d.why.tolist()],
                 "reason": [d.reasons[k].text for k in d.why.tolist()],
@@ -324,7 +324,7 @@ class Outcome:
         """List every visit that kept its value although it holds a target."""
         d, v = self.decisions, self.visits
         return [
-            f"{v.files[v.file[i]]}:{v.line[i]}: {Status(d.status[i]).name.lower()}: "
+            f"{v.file_name(i)}:{v.place.line[i]}: {Status(d.status[i]).name.lower()}: "
             f"{d.reasons[d.why[i]]}"
             for i in self.list_uncorrected_rows()
         ]
@@ -349,7 +349,7 @@ def largest_motion(departure: Floats) -> dict[str, float]:
 def find_judged(visits: Visits, decisions: Decisions) -> Bools:
     """Return which visits have a target that they can miss, (n,)."""
     changed = decisions.status != Status.UNCHANGED
-    return np.asarray(changed | (visits.literal >= 0))
+    return np.asarray(changed | (visits.target.literal >= 0))
 
 
 # What came of the targets on every line: kept beside an output, told by `diff`.
@@ -520,14 +520,14 @@ def tell_arrivals(
 
 def _lines_of_visits(v: Visits, files: Sequence[str]) -> tuple[Ints, Ints]:
     """Return file and line that tell of every visit: of its numbers, or its move."""
-    has = v.literal >= 0
-    literal = np.where(has, v.literal, 0)
-    file, line = v.file, v.line
+    has = v.target.literal >= 0
+    literal = np.where(has, v.target.literal, 0)
+    file, line = v.place.file, v.place.line
     if len(v.literals):
         written = np.isin(v.literals.file, [v.files.index(f) for f in files])
         has &= written[literal]
-        file = np.where(has, v.literals.file[literal], v.file)
-        line = np.where(has, v.literals.line[literal], v.line)
+        file = np.where(has, v.literals.file[literal], v.place.file)
+        line = np.where(has, v.literals.line[literal], v.place.line)
     return file, line
 
 
@@ -574,13 +574,13 @@ def list_uncorrected_elsewhere(
     """
     v, d = visits, decisions
     rows = np.isin(d.status, LEFT_ALONE)
-    literal = np.where(v.literal >= 0, v.literal, 0)
+    literal = np.where(v.target.literal >= 0, v.target.literal, 0)
     written = np.isin(v.files, [*files])
-    told = written[v.file]
+    told = written[v.place.file]
     if len(v.literals):
-        told |= (v.literal >= 0) & written[v.literals.file[literal]]
+        told |= (v.target.literal >= 0) & written[v.literals.file[literal]]
     found = [
-        (v.files[v.file[i]], int(v.line[i]), d.reasons[d.why[i]])
+        (v.file_name(i), int(v.place.line[i]), d.reasons[d.why[i]])
         for i in np.flatnonzero(rows & ~told).tolist()
     ]
     for name, lines in missed.items():

@@ -34,7 +34,7 @@ def payload_of(
     Returns:
         Mass (n,) [kg] and centre of mass in the flange frame (n, 3) [m].
     """
-    stated = visits.loads[visits.load[rows]]
+    stated = visits.motion.loads[visits.motion.load[rows]]
     mass = np.where(np.isnan(stated[:, 0]), cell.payload_mass, stated[:, 0])
     centre = np.where(np.isnan(stated[:, 1:]), cell.payload_com, stated[:, 1:])
     return mass, centre

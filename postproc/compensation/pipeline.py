@@ -121,7 +121,7 @@ class WindowResult:
         """
         moved = np.flatnonzero(self.corrected)
         rows = slice(*np.searchsorted(moved, [own.start, own.stop]).tolist())
-        literals = np.sort(visits.literal[own])
+        literals = np.sort(visits.target.literal[own])
         mine = isin_sorted(self.edited, literals)
         starts = np.sort(visits.literals.places[self.edited[mine]].start, axis=None)
         edits = tuple(

@@ -159,14 +159,14 @@ def read_back(visits: Visits, edited: Ints, edits: Sequence[Replacements]) -> Fl
         edited: Its literals that are edited, ascending, (m,).
         edits: The edits of their numbers, file by file.
     """
-    values = np.array(visits.values)
+    values = np.array(visits.target.values)
     new, changed = read_edited(visits.literals, edited, edits)
-    plain = visits.shift < 0
-    rows, at = _among(visits.literal, edited, plain)
+    plain = visits.target.shift < 0
+    rows, at = _among(visits.target.literal, edited, plain)
     values[rows] = np.where(changed[at], new[at], values[rows])
-    moved = np.zeros((len(edited), visits.values.shape[1]))
-    moved[at] = values[rows] - visits.values[rows]
-    rows, at = _among(visits.follows, edited, plain)
+    moved = np.zeros((len(edited), visits.target.values.shape[1]))
+    moved[at] = values[rows] - visits.target.values[rows]
+    rows, at = _among(visits.target.follows, edited, plain)
     values[rows] += moved[at]
     return shift_values(visits, edited, np.where(changed, new, np.nan), values)
 
@@ -271,7 +271,8 @@ def check_motion(visits: Visits, moved: JointDeviation, limits: LimitSection) ->
     """
     for text, far in limit_violations(limits, moved).items():
         for row in np.flatnonzero(far)[:1].tolist():
+            name, line = visits.file_name(row), visits.place.line[row]
             raise VerificationError(
-                f"{visits.files[visits.file[row]]}:{visits.line[row]}: {text} on the "
-                "way there, which no guard has held back; nothing is written"
+                f"{name}:{line}: {text} on the way there, which no guard "
+                "has held back; nothing is written"
             )

@@ -45,7 +45,7 @@ class Absorbed:
 
 def own_shifts(visits: Visits) -> Bools:
     """Tell which visits have a literal that holds the numbers of a shift, (n,)."""
-    return np.asarray((visits.shift >= 0) & (visits.literal >= 0))
+    return np.asarray((visits.target.shift >= 0) & (visits.target.literal >= 0))
 
 
 def origins(shifts: Shifts, literals: Ints, values: Floats) -> Floats:
@@ -101,7 +101,7 @@ def absorb(
     change[rows] = 0.0
     change[rows, :3] = moved[:, :3] + 0.0
     change[rows, -3:] = np.deg2rad(moved[:, ANGLES]) * LEVER_MM
-    found = agree(visits.literal, usable, numbers, change)
+    found = agree(visits.target.literal, usable, numbers, change)
     at = {why: np.isin(found.literal, shifts.literal[own & bad])
           for why, bad in stay.items()}  # fmt: skip
     return Absorbed(change, found, {why: k for why, k in at.items() if k.any()})

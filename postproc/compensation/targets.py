@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -40,14 +40,14 @@ FAR = 0.1  # [mm] passing a point farther away than this is worth a note
 
 def rounding_of(visits: Visits) -> tuple[Ints, Floats, Floats]:
     """Tell how fly points are rounded: `Fly`, distances [m] and overlaps, (n,) each."""
-    cartesian = visits.blend == Blend.ZONE
-    passing = cartesian & (visits.zone_rule == ZoneRule.PASS)
-    within = visits.zone_rule == ZoneRule.WITHIN
+    cartesian = visits.zone.blend == Blend.ZONE
+    passing = cartesian & (visits.zone.rule == ZoneRule.PASS)
+    within = visits.zone.rule == ZoneRule.WITHIN
     rounding = np.where(cartesian, np.where(within, Fly.WITHIN, Fly.FROM), Fly.OVERLAP)
-    rounding[passing | (visits.zone_mm < 0)] = Fly.EXACT
+    rounding[passing | (visits.zone.size_mm < 0)] = Fly.EXACT
     rounding[find_open_corners(visits)] = Fly.UNKNOWN
-    distance = np.nan_to_num(visits.zone_mm, nan=USUAL_DISTANCE) * MM
-    overlap = np.nan_to_num(visits.overlap_percent, nan=USUAL_OVERLAP) / 100.0
+    distance = np.nan_to_num(visits.zone.size_mm, nan=USUAL_DISTANCE) * MM
+    overlap = np.nan_to_num(visits.zone.overlap_percent, nan=USUAL_OVERLAP) / 100.0
     return rounding, np.maximum(distance, 0.0), np.clip(overlap, 0.0, 1.0)
 
 
@@ -58,18 +58,22 @@ def find_open_corners(visits: Visits) -> Bools:
     show from where the arm comes or where it goes: they have several ways in or out, or
     one that leads nowhere known.
     """
-    n, pred = len(visits), visits.pred.astype(np.int64)
-    into = np.diff(visits.pred_start)
+    n, pred = len(visits), visits.graph.pred.astype(np.int64)
+    into = np.diff(visits.graph.pred_start)
     to, known = np.repeat(np.arange(n), into), pred >= 0
     out = np.bincount(pred[known], minlength=n)
-    framed = ~np.isin(visits.target, (*JOINTS, Meaning.BY, Meaning.PARTIAL_JOINTS))
-    nowhere = framed & ((visits.tool < 0) | (visits.uframe < 0))
-    nowhere |= visits.target == Meaning.UNKNOWN
+    framed = ~np.isin(
+        visits.target.meaning, (*JOINTS, Meaning.BY, Meaning.PARTIAL_JOINTS)
+    )
+    nowhere = framed & ((visits.frame.tool < 0) | (visits.frame.uframe < 0))
+    nowhere |= visits.target.meaning == Meaning.UNKNOWN
     leads = np.bincount(pred[known & nowhere[to]], minlength=n) > 0
-    rounded = visits.fly & ~visits.via & (visits.zone_rule != ZoneRule.PASS)
-    rounded &= ~(visits.zone_mm < 0)
+    rounded = (
+        visits.motion.fly & ~visits.motion.via & (visits.zone.rule != ZoneRule.PASS)
+    )
+    rounded &= ~(visits.zone.size_mm < 0)
     open_ = rounded & ((into > 1) & (out > 0) | (out > 1) | leads)
-    return np.asarray(open_ | (visits.zone_rule == ZoneRule.UNKNOWN))
+    return np.asarray(open_ | (visits.zone.rule == ZoneRule.UNKNOWN))
 
 
 def report_rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
@@ -79,7 +83,7 @@ def report_rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
         visits: Every arrival.
         away: How far the path passes each, (n,) [mm].
     """
-    rows = np.flatnonzero((away > 0) & ~visits.via)
+    rows = np.flatnonzero((away > 0) & ~visits.motion.via)
     if len(rows) == 0:
         return []
     found = [_note(visits, int(rows[0]), Code.FLY_ASSUMED, text)
@@ -116,22 +120,22 @@ def unknown_blends(visits: Visits, corrected: Bools) -> list[Diagnostic]:
 
 def _list_assumptions(visits: Visits, rows: Ints) -> str:
     """List what fly points take for granted."""
-    cartesian = visits.blend[rows] == Blend.ZONE
-    overlap = ~cartesian | (visits.motion[rows] == Motion.JOINT)
+    cartesian = visits.zone.blend[rows] == Blend.ZONE
+    overlap = ~cartesian | (visits.motion.kind[rows] == Motion.JOINT)
     type_, percent, size, rule = visits.dialect.terms.blend
     untold = [
-        (type_, visits.blend[rows] == Blend.UNSET),
+        (type_, visits.zone.blend[rows] == Blend.UNSET),
         (percent.format(USUAL_OVERLAP),
-         overlap & np.isnan(visits.overlap_percent[rows])),
-        (size.format(USUAL_DISTANCE), cartesian & np.isnan(visits.zone_mm[rows])),
-        (rule, cartesian & (visits.zone_rule[rows] == ZoneRule.UNSET)),
+         overlap & np.isnan(visits.zone.overlap_percent[rows])),
+        (size.format(USUAL_DISTANCE), cartesian & np.isnan(visits.zone.size_mm[rows])),
+        (rule, cartesian & (visits.zone.rule[rows] == ZoneRule.UNSET)),
     ]  # fmt: skip
     taken = ", ".join(text for text, where in untold if where.any())
     return taken and f"fly points are rounded as with {taken}: not set in the program"
 
 
 def _note(visits: Visits, row: int, code: Code, text: str) -> Diagnostic:
-    return Diagnostic(visits.files[visits.file[row]], int(visits.line[row]), code, text)
+    return Diagnostic(visits.file_name(row), int(visits.place.line[row]), code, text)
 
 
 # From what a program says to where the TCP goes: visits to targets of the planner.
@@ -191,20 +195,22 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     frames, reasons = _frames(visits), Reasons(len(visits))
     values = _values(visits, cell)
     kind, tcp, joints = _places(visits, frames.user, values)
-    poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
+    poses = np.isin(visits.target.meaning, (Meaning.POSE, Meaning.NEAR))
     outside = _auxiliary(visits, cell, reasons)
     _explain(visits, values, poses, reasons)
-    lost = (outside | visits.tool_remote) & (kind != TargetKind.JOINTS)
+    lost = (outside | visits.frame.tool_remote) & (kind != TargetKind.JOINTS)
     lost |= _find_unplaced(kind, tcp, joints, frames)
     lost |= place_ends(visits, tcp, reasons)
     # Joint moves to poses of arms whose branches no controller's flags name.
-    of_poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
-    rows = of_poses & (visits.motion == Motion.JOINT) & (cell.arm.file.opw is None)
+    of_poses = np.isin(visits.target.meaning, (Meaning.POSE, Meaning.NEAR))
+    rows = of_poses & (visits.motion.kind == Motion.JOINT) & (cell.arm.file.opw is None)
     reasons.mark(rows, UNNAMED)
     lost |= rows
     along = turn_between(visits, tcp)
-    slot, turns = visits.dialect.flags(visits.config, visits.configs, values)
-    branch = np.where(visits.config_given & poses, slot, -1), turns
+    slot, turns = visits.dialect.flags(
+        visits.target.config, visits.target.configs, values
+    )
+    branch = np.where(visits.target.config_given & poses, slot, -1), turns
     places = np.where(lost, TargetKind.UNKNOWN, kind), tcp, joints
     found = _targets(visits, places, frames.tool, branch, along)
     return found.slim(), reasons
@@ -228,31 +234,35 @@ def _targets(
     """
     kind, tcp, joints = places
     rounding, fly_distance, overlap = rounding_of(visits)
-    starts, before = (v.astype(np.int64) for v in (visits.pred_start, visits.pred))
-    pred_start, pred = arc_per_start(visits.motion, visits.via, starts, before)
+    starts, before = (
+        v.astype(np.int64) for v in (visits.graph.pred_start, visits.graph.pred)
+    )
+    pred_start, pred = arc_per_start(
+        visits.motion.kind, visits.motion.via, starts, before
+    )
     return Targets(
-        move=visits.motion,
+        move=visits.motion.kind,
         kind=kind,
-        via=visits.via,
+        via=visits.motion.via,
         tcp=tcp,
         distance=np.where(
-            visits.target == Meaning.FOR, visits.distance_mm * MM, np.nan
+            visits.target.meaning == Meaning.FOR, visits.target.distance_mm * MM, np.nan
         ),
         joints=joints,
         tool=tool,
         slot=branch[0],
         turns=branch[1],
-        nearest_turn=visits.nearest_turn,
-        fly=visits.fly,
+        nearest_turn=visits.motion.nearest_turn,
+        fly=visits.motion.fly,
         rounding=rounding,
         fly_distance=fly_distance,
         overlap=overlap,
-        linear_speed=visits.lin_spd,
-        rotary_speed=visits.rot_spd,
-        override=visits.override,
-        wrist_joint=visits.wrist_joint,
-        block=visits.block,
-        curved=visits.curved,
+        linear_speed=visits.speed.linear,
+        rotary_speed=visits.speed.turning,
+        override=visits.speed.override,
+        wrist_joint=visits.motion.wrist_joint,
+        block=visits.motion.block,
+        curved=visits.motion.curved,
         along=along,
         past_start=find_past_start(visits),
         stops=np.zeros(len(visits), dtype=bool),
@@ -310,24 +320,26 @@ def _turn_again(targets: Targets, visits: Visits, rows: Ints) -> Targets:
 
 
 def _frames(visits: Visits) -> Frames:
-    return Frames(few_frames(visits)[visits.tool], _user_frames(visits, ALL))
+    return Frames(few_frames(visits)[visits.frame.tool], _user_frames(visits, ALL))
 
 
 def _user_frames(visits: Visits, rows: Rows) -> Floats:
     """Place the user frames of visits in the arm's base frame, (m, 4, 4) [m]."""
     poses = few_frames(visits)
-    return products(inverse(poses), poses, visits.base[rows], visits.uframe[rows])
+    return products(
+        inverse(poses), poses, visits.frame.base[rows], visits.frame.uframe[rows]
+    )
 
 
 def few_frames(visits: Visits) -> Floats:
     """Return the frames that the program uses, and last one that is not known."""
     unknown = np.full((1, 4, 4), np.nan)
-    return np.concatenate([visits.frames, unknown])
+    return np.concatenate([visits.frame.poses, unknown])
 
 
 def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Floats:
     """Fill in home and calibration pose where the program does not tell them."""
-    values, goal = np.array(visits.values[rows]), visits.target[rows]
+    values, goal = np.array(visits.target.values[rows]), visits.target.meaning[rows]
     untold = np.isnan(values).any(axis=1)
     for target, joints in (
         (Meaning.HOME, cell.home),
@@ -343,7 +355,7 @@ def _places(
     visits: Visits, user: Floats, values: Floats, rows: Rows = ALL
 ) -> tuple[Ints, Floats, Floats]:
     """Turn numbers into kinds, TCP poses (m, 4, 4) [m] and joints (m, 6) [rad]."""
-    target = visits.target[rows]
+    target = visits.target.meaning[rows]
     n = len(target)
     if (target == Meaning.POSE).all():  # most programs are nothing else
         tcp = times(user, visits.dialect.poses(values))
@@ -360,7 +372,7 @@ def _places(
     )
     tcp[poses] = times(user[poses], visits.dialect.poses(values[poses]))
     near = target == Meaning.NEAR
-    tcp[near] = tcp[near] @ _along_approach(-visits.distance_mm[rows][near])
+    tcp[near] = tcp[near] @ _along_approach(-visits.target.distance_mm[rows][near])
     away = target == Meaning.AWAY
     kind[away], tcp[away] = TargetKind.TOOL_STEP, _along_approach(-values[away, 0])
     partial = target == Meaning.PARTIAL_POSE
@@ -412,14 +424,14 @@ def with_tracks(visits: Visits, cell: Cell) -> Visits:
     A target that says nothing of a track leaves it where it is, which is not known
     where other targets move it away from 0.
     """
-    aux = np.array(visits.aux)
-    poses = ~np.isin(visits.target, JOINTS)
+    aux = np.array(visits.target.aux)
+    poses = ~np.isin(visits.target.meaning, JOINTS)
     for column in range(aux.shape[1] if aux.ndim == 2 else 0):
         place = aux[:, column]
         away = (place != 0.0) & ~np.isnan(place)
         if cell.aux.get(column + 1) == "track" and away.any():
             place[np.isnan(place) & poses] = STAYS
-    return replace(visits, aux=aux)
+    return visits.with_columns(aux=aux)
 
 
 def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
@@ -428,11 +440,13 @@ def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
     With its track at 0 the arm stands at the base of the cell.
     """
     outside = np.zeros(len(visits), dtype=bool)
-    for column in range(visits.aux.shape[1] if visits.aux.ndim == 2 else 0):
+    for column in range(
+        visits.target.aux.shape[1] if visits.target.aux.ndim == 2 else 0
+    ):
         axis = column + 1
-        given, use = ~np.isnan(visits.aux[:, column]), cell.aux.get(axis)
+        given, use = ~np.isnan(visits.target.aux[:, column]), cell.aux.get(axis)
         if use == "track":
-            given &= visits.aux[:, column] != 0.0
+            given &= visits.target.aux[:, column] != 0.0
         if use == "gun" or not given.any():
             continue
         outside |= given
@@ -443,7 +457,7 @@ def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
             )
         else:
             stays = Reason(Code.EXTERNAL_AXES, _STAYS.format(axis))
-            reasons.mark(given & (visits.aux[:, column] == STAYS), stays)
+            reasons.mark(given & (visits.target.aux[:, column] == STAYS), stays)
             text = f"auxiliary axis {axis} is a {use}: not modelled"
         reasons.mark(given, Reason(Code.EXTERNAL_AXES, text))
     return outside
@@ -452,16 +466,16 @@ def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
 def _explain(visits: Visits, values: Floats, poses: Bools, reasons: Reasons) -> None:
     """Say why visits are not compensated."""
     terms = visits.dialect.terms
-    reasons.mark(visits.tool_remote, Reason(Code.REMOTE_TOOL, terms.tool_remote))
+    reasons.mark(visits.frame.tool_remote, Reason(Code.REMOTE_TOOL, terms.tool_remote))
     reasons.mark(
-        np.isnan(values).any(axis=1) & (poses | np.isin(visits.target, JOINTS)),
+        np.isnan(values).any(axis=1) & (poses | np.isin(visits.target.meaning, JOINTS)),
         Reason(Code.RUNTIME_VALUE, "a value is not known"),
     )
     unknown = is_unknown(few_frames(visits))
     for name, which, who in (
-        (terms.tool, visits.tool, np.ones(len(visits), dtype=bool)),
-        (terms.base, visits.base, poses),
-        (terms.uframe, visits.uframe, poses),
+        (terms.tool, visits.frame.tool, np.ones(len(visits), dtype=bool)),
+        (terms.base, visits.frame.base, poses),
+        (terms.uframe, visits.frame.uframe, poses),
     ):
         text = f"{name} is not known at this move: add it to the cell file"
         reasons.mark(unknown[which] & who, Reason(Code.FRAME_UNKNOWN, text))

@@ -49,16 +49,16 @@ def correct_taught(
         CellError: The points of a frame do not give that frame.
     """
     listed = find_taught_records(visits, cell)
-    taught = sorted({*listed, *np.flatnonzero(visits.frame_taught).tolist()})
+    taught = sorted({*listed, *np.flatnonzero(visits.frame.taught).tolist()})
     if not taught:
         return planned
-    poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
+    poses = np.isin(visits.target.meaning, (Meaning.POSE, Meaning.NEAR))
     shift, variance = np.array(planned.shift), np.array(planned.shift_variance)
     for frame in taught:
-        for column, name in ((visits.tool, "tool"), (visits.base, "base")):
+        for column, name in ((visits.frame.tool, "tool"), (visits.frame.base, "base")):
             other = Reason(Code.TAUGHT_FRAME, _OTHER.format(name))
             planned.reasons.mark(column == frame, other)
-        rows = poses & (visits.uframe == frame)
+        rows = poses & (visits.frame.uframe == frame)
         record = listed.get(frame, ())
         joints = cell.taught_frames.get(record)
         if joints is None:
@@ -78,10 +78,10 @@ def find_taught_records(visits: Visits, cell: Cell) -> dict[int, tuple[float, ..
         The record that the cell has, by index into `Visits.frames`.
     """
     records = list(cell.taught_frames)
-    if not records or not len(visits.frames):
+    if not records or not len(visits.frame.poses):
         return {}
     poses = pose_from_record(np.array(records))
-    apart = np.abs(visits.frames[:, None] - poses).max(axis=(2, 3))
+    apart = np.abs(visits.frame.poses[:, None] - poses).max(axis=(2, 3))
     frame, record = np.nonzero(apart <= SAME)
     return {f: records[r] for f, r in zip(frame.tolist(), record.tolist(), strict=True)}
 

@@ -86,8 +86,8 @@ class InTime:
         before, after = self.paths.before.sizes / MM, self.paths.after.sizes / MM
         worst = int(after.argmax())
         v = int(self.paths.visit[worst])
-        file = f"{visits.files[visits.file[v]]} " if visits.file[v] else ""
-        place = f"{file}line {visits.line[v]}"
+        file = f"{visits.file_name(v)} " if visits.place.file[v] else ""
+        place = f"{file}line {visits.place.line[v]}"
         most = f"{self._largest(worst)}, {place} (before: {before.max():.3f} mm)"
         return (
             f"predicted path accuracy AT_p (systematic part): at most {most}; mean "
@@ -142,8 +142,10 @@ class InTime:
             yield Diagnostic(visits.files[0], 1, Code.CYCLE_TIME_INCREASED, text)
         for v in self._beyond.tolist():
             text = "a joint exceeds a limit that the original program keeps"
-            file = visits.files[visits.file[v]]
-            yield Diagnostic(file, int(visits.line[v]), Code.JOINT_LIMIT_EXCEEDED, text)
+            file = visits.file_name(v)
+            yield Diagnostic(
+                file, int(visits.place.line[v]), Code.JOINT_LIMIT_EXCEEDED, text
+            )
         yield from self._report_slowed(visits)
         if self.inserted is not None:
             yield from self._points(visits, self.inserted)
@@ -167,7 +169,10 @@ class InTime:
         for code, moves, text in said:
             if moves:
                 first = min(moves)
-                place = visits.files[visits.file[first]], int(visits.line[first])
+                place = (
+                    visits.file_name(first),
+                    int(visits.place.line[first]),
+                )
                 yield Diagnostic(*place, code, text)
         for k in self._too_far.tolist():
             v = int(self.paths.visit[k])
@@ -175,7 +180,7 @@ class InTime:
             most = self._largest(k, NO_JOINT)
             text = f"the predicted path error of the move is {most}: {why}"
             text += f". {told.cures[v]}" if v in told.cures else ""
-            place = visits.files[visits.file[v]], int(visits.line[v])
+            place = visits.file_name(v), int(visits.place.line[v])
             yield Diagnostic(*place, Code.PATH_TOLERANCE_EXCEEDED, text)
 
     def _largest(self, k: int, none: str = "") -> str:
@@ -205,8 +210,10 @@ class InTime:
                 "direction in the trajectory over time than along the path; the "
                 "correction is that of the path"
             )
-            file = visits.files[visits.file[v]]
-            yield Diagnostic(file, int(visits.line[v]), Code.DIRECTION_DISAGREES, text)
+            file = visits.file_name(v)
+            yield Diagnostic(
+                file, int(visits.place.line[v]), Code.DIRECTION_DISAGREES, text
+            )
 
     def _report_slowed(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where the joints cannot follow the programmed speed."""
@@ -214,7 +221,7 @@ class InTime:
         if not len(slowed):
             return
         rows = self.source(slowed)
-        lines = dict.fromkeys(visits.line[rows].tolist())
+        lines = dict.fromkeys(visits.place.line[rows].tolist())
         more = f" and {len(lines) - FEW} more" if len(lines) > FEW else ""
         worst = slowed[self.after.clock.allowed[slowed].argmin()]
         least = 100 * self.after.clock.allowed[worst]
@@ -225,7 +232,10 @@ class InTime:
             "or stops there, usually near a singularity "
             f"(lines {', '.join(map(str, [*lines][:FEW]))}{more})"
         )
-        place = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
+        place = (
+            visits.file_name(rows[0]),
+            int(visits.place.line[rows[0]]),
+        )
         yield Diagnostic(*place, Code.SPEED_NOT_REACHED, text)
 
 

@@ -68,8 +68,8 @@ class JobTolerance:
         found = np.full(len(visits), self.default_mm * MM)
         for pattern, size in self.patterns.items():
             for texts, index in (
-                (visits.names, visits.name),
-                (visits.files, visits.file),
+                (visits.target.names, visits.target.name),
+                (visits.files, visits.place.file),
             ):
                 fits = [fnmatchcase(text.lower(), pattern.lower()) for text in texts]
                 found[np.array(fits, dtype=bool)[index]] = size * MM

@@ -11,51 +11,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Ints
-from postproc.language.visits import Literals, Meaning, NumberPlaces, Visits
+from postproc.language.visits import Graph, Literals, Meaning, NumberPlaces, Visits
 
 # The visits of several programs side by side, as if they were one program's.
 #
 # No move leads from one to another, and no number belongs to two of them.
 
-# Which table a column of indices points into, all visits (by any column of them) among
-# these; what is below zero points nowhere.
+# Which table a column of indices points into; what is below zero points nowhere.
 TABLES = {
-    "file": "files",
     "config": "configs",
-    "literal": "literals",
-    "follows": "literals",
     "name": "names",
-    "tool": "frames",
-    "base": "frames",
-    "uframe": "frames",
-    "reason": "reasons",
-    "load": "loads",
     "shift": "shifts",
-    "block": "line",
-    "pred": "line",
-    "pred_start": "pred",
+    "tool": "poses",
+    "base": "poses",
+    "uframe": "poses",
+    "load": "loads",
 }
-NOTHING_FIRST = (
-    "names",
-    "reasons",
-    "loads",
-)  # tables whose first row means that there is none
+NOTHING_FIRST = ("name", "load")  # their table's first row means that there is none
 
 
 def concatenate(programs: Sequence[Visits]) -> Visits:
     """Put the visits of programs of one dialect one after the other."""
-    columns = {
-        f.name: _join_column(f.name, programs)
-        for f in fields(Visits)
-        if f.name not in ("literals", "aux", "pred_start", "dialect")
-    }
-    return Visits(
+    parts = {name: _join_part(name, programs) for name in programs[0].parts}
+    joined = replace(
+        programs[0],
+        files=tuple(chain.from_iterable(program.files for program in programs)),
+        graph=_join_graphs(programs),
+        reason=_join_reasons(programs),
+        reasons=tuple(chain.from_iterable(program.reasons for program in programs)),
         literals=_literals(programs),
-        aux=_aux(programs),
-        pred_start=_starts(programs),
-        dialect=programs[0].dialect,
-        **columns,
+        **parts,
     )
+    return joined.with_columns(**_join_references(programs))
 
 
 def first_visits(programs: Sequence[Visits]) -> tuple[int, ...]:
@@ -72,42 +59,78 @@ def offsets(sizes: Iterable[int]) -> list[int]:
     return list(accumulate(sizes, initial=0))
 
 
-def _join_column(name: str, programs: Sequence[Visits]) -> Any:
-    parts = [getattr(program, name) for program in programs]
-    if isinstance(parts[0], Sequence):
-        return tuple(chain.from_iterable(parts))
-    if name in TABLES:
-        parts = _shift_indices(name, parts, programs)
-    return np.concatenate(parts)
+def _join_part(name: str, programs: Sequence[Visits]) -> Any:
+    """Join a part of the visits, with the tables that it points into."""
+    own = [program.parts[name] for program in programs]
+    columns: dict[str, Any] = {}
+    for column in (f.name for f in fields(own[0])):
+        found = [getattr(part, column) for part in own]
+        if column == "aux":
+            columns[column] = _join_axes(found)
+            continue
+        if isinstance(found[0], Sequence):
+            columns[column] = tuple(chain.from_iterable(found))
+            continue
+        if column in TABLES:
+            rows = [len(getattr(part, TABLES[column])) for part in own]
+            found = _shift_indices(found, rows, column in NOTHING_FIRST)
+        columns[column] = np.concatenate(found)
+    return replace(own[0], **columns)
 
 
 def _shift_indices(
-    name: str, parts: Sequence[NDArray[np.int64]], programs: Sequence[Visits]
+    parts: Sequence[NDArray[np.int64]], rows: Iterable[int], nothing_first: bool = False
 ) -> list[NDArray[np.int64]]:
-    """Let indices point to where their table's rows have come to."""
-    table = TABLES[name]
-    starts = offsets(len(getattr(program, table)) for program in programs)
-    least = 1 if table in NOTHING_FIRST else 0
+    """Let indices point to where the rows of their tables have come to.
+
+    Args:
+        parts: Indices of each program.
+        rows: How many rows the table of each has.
+        nothing_first: The first row of a table means that there is none.
+    """
     return [
-        np.where(part >= least, part + offset, part)
-        for part, offset in zip(parts, starts[:-1], strict=True)
+        np.where(part >= nothing_first, part + offset, part)
+        for part, offset in zip(parts, offsets(rows)[:-1], strict=True)
     ]
 
 
-def _starts(programs: Sequence[Visits]) -> NDArray[np.int64]:
-    """Join the offsets into `pred`, which are one more than there are visits."""
-    parts = [program.pred_start[:-1] for program in programs]
-    moved = _shift_indices("pred_start", parts, programs)
-    return np.append(np.concatenate(moved), sum(len(p.pred) for p in programs))
+def _join_references(programs: Sequence[Visits]) -> dict[str, Ints]:
+    """Join the columns that point to files, literals and visits."""
+    tables = {
+        "file": [len(program.files) for program in programs],
+        "literal": [len(program.literals) for program in programs],
+        "follows": [len(program.literals) for program in programs],
+        "block": [len(program) for program in programs],
+    }
+    columns = [program.columns for program in programs]
+    return {
+        name: np.concatenate(_shift_indices([own[name] for own in columns], rows))
+        for name, rows in tables.items()
+    }
 
 
-def _aux(programs: Sequence[Visits]) -> NDArray[np.float64]:
+def _join_reasons(programs: Sequence[Visits]) -> Ints:
+    rows = [len(program.reasons) for program in programs]
+    own = [program.reason for program in programs]
+    return np.concatenate(_shift_indices(own, rows, nothing_first=True))
+
+
+def _join_graphs(programs: Sequence[Visits]) -> Graph:
+    """Join from where arms come; the offsets are one more than there are visits."""
+    graphs = [program.graph for program in programs]
+    pred = _shift_indices([graph.pred for graph in graphs], map(len, programs))
+    places = [len(graph.pred) for graph in graphs]
+    start = _shift_indices([graph.pred_start[:-1] for graph in graphs], places)
+    return Graph(np.append(np.concatenate(start), sum(places)), np.concatenate(pred))
+
+
+def _join_axes(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Join auxiliary axes: each program has as many as it uses."""
-    axes = max(program.aux.shape[1] for program in programs)
-    out = np.full((sum(map(len, programs)), axes), np.nan)
-    for first, program in zip(first_visits(programs), programs, strict=True):
-        out[first : first + len(program), : program.aux.shape[1]] = program.aux
-    return out
+    axes = max(part.shape[1] for part in parts)
+    wide = [(0, 0), (0, axes)]
+    return np.concatenate(
+        [np.pad(part, wide, constant_values=np.nan)[:, :axes] for part in parts]
+    )
 
 
 def _literals(programs: Sequence[Visits]) -> Literals:
@@ -122,8 +145,9 @@ def _literals(programs: Sequence[Visits]) -> Literals:
         if name == "places":
             columns[name] = NumberPlaces.join(parts)
             continue
-        moved = _shift_indices(name, parts, programs) if name == "file" else parts
-        columns[name] = np.concatenate(moved)
+        if name == "file":
+            parts = _shift_indices(parts, [len(program.files) for program in programs])
+        columns[name] = np.concatenate(parts)
     return Literals(**columns)
 
 
@@ -145,10 +169,6 @@ STEPS = (
     Meaning.ABOUT, Meaning.BY, Meaning.FOR, Meaning.PARTIAL_POSE,
     Meaning.PARTIAL_JOINTS,
 )  # fmt: skip
-SHARED = {
-    "files", "configs", "names", "frames", "frame_taught", "reasons", "loads",
-    "pred_start", "pred", "literals", "dialect", "shifts",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -189,24 +209,23 @@ class Window:
         if self.begin == 0 and self.stop == len(visits):
             return visits
         rows = slice(self.begin, self.stop)
-        values = {
-            f.name: getattr(visits, f.name)[rows]
-            for f in fields(Visits)
-            if f.name not in SHARED
-        }
-        for name in ("literal", "follows", "shift"):
-            values[name] = np.array(values[name])
-            values[name][: self.seeds] = -1
-        block = values["block"]
-        values["block"] = np.where(block >= 0, block - rows.start, block)
-        start = visits.pred_start[self.begin + self.seeds : self.stop + 1]
-        pred = visits.pred[start[0] : start[-1]]
+        start = visits.graph.pred_start[self.begin + self.seeds : self.stop + 1]
+        pred = visits.graph.pred[start[0] : start[-1]]
         pred = np.where(pred >= 0, pred - rows.start, pred)
         start = np.concatenate([np.zeros(self.seeds, dtype=np.int64), start - start[0]])
         if self.seeds and not known:
             start[1:] += 1
             pred = np.append(-1, pred)
-        return replace(visits, **values, pred_start=start, pred=pred)
+        return self._from_a_seed(visits.take(rows, Graph(start, pred)))
+
+    def _from_a_seed(self, taken: Visits) -> Visits:
+        """Let the move where a window begins have no target."""
+        block = taken.motion.block
+        columns = {"block": np.where(block >= 0, block - self.begin, block)}
+        for name in ("literal", "follows", "shift"):
+            columns[name] = np.array(taken.columns[name])
+            columns[name][: self.seeds] = -1
+        return taken.with_columns(**columns)
 
 
 def windows(quiet: Bools, least: int) -> list[Window]:
@@ -255,24 +274,28 @@ def window(quiet: Bools, first: int, end: int, before: int = -1) -> Window:
 
 def cut_points(visits: Visits) -> Bools:
     """Tell behind which visits a program may be cut where the arm stops, (n,)."""
-    return np.asarray(seams(visits) & ~visits.fly)
+    return np.asarray(seams(visits) & ~visits.motion.fly)
 
 
 def seams(visits: Visits) -> Bools:
     """Tell behind which visits a program may be cut, (n,)."""
     n = len(visits)
-    to = np.repeat(np.arange(n), np.diff(visits.pred_start))
-    known = visits.pred >= 0
-    single = (np.diff(visits.pred_start) == 1)[to]
-    goes_on = known & single & (visits.pred == to - 1)
+    to = np.repeat(np.arange(n), np.diff(visits.graph.pred_start))
+    known = visits.graph.pred >= 0
+    single = (np.diff(visits.graph.pred_start) == 1)[to]
+    goes_on = known & single & (visits.graph.pred == to - 1)
     jumps = known & ~goes_on
-    crossed = _find_covered(visits.pred[jumps], to[jumps], n) | _same_numbers(visits)
+    crossed = _find_covered(visits.graph.pred[jumps], to[jumps], n) | _same_numbers(
+        visits
+    )
     quiet = np.zeros(n, dtype=bool)
-    quiet[visits.pred[goes_on]] = True
-    begins = visits.via | np.isin(visits.target, STEPS)  # an arc, or a step
-    quiet &= ~visits.via & ~np.append(begins[1:], False) & ~crossed
-    on = np.flatnonzero(visits.block >= 0)  # a curve, from where it begins
-    quiet &= ~_find_covered(np.maximum(visits.block[on] - 1, 0), on, n)
+    quiet[visits.graph.pred[goes_on]] = True
+    begins = visits.motion.via | np.isin(
+        visits.target.meaning, STEPS
+    )  # an arc, or a step
+    quiet &= ~visits.motion.via & ~np.append(begins[1:], False) & ~crossed
+    on = np.flatnonzero(visits.motion.block >= 0)  # a curve, from where it begins
+    quiet &= ~_find_covered(np.maximum(visits.motion.block[on] - 1, 0), on, n)
     return np.asarray(quiet)
 
 
@@ -280,7 +303,7 @@ def _same_numbers(visits: Visits) -> Bools:
     """Tell behind which visits numbers are used again, (n,)."""
     n, m = len(visits), len(visits.literals)
     first, last = np.full(m, n), np.full(m, -1)
-    for column in (visits.literal, visits.follows):
+    for column in (visits.target.literal, visits.target.follows):
         rows = np.flatnonzero(column >= 0)
         np.minimum.at(first, column[rows], rows)
         np.maximum.at(last, column[rows], rows)

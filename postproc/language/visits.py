@@ -7,15 +7,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cached_property, lru_cache
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Indices, Ints, chunks, narrow, read_only
+from postproc.arrays import (
+    Bools,
+    Floats,
+    Indices,
+    Ints,
+    chunks,
+    narrow,
+    read_only,
+    slim,
+)
 from postproc.diagnostics import Code, Reason
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import ANGLES, Shift, Shifts
@@ -200,74 +209,80 @@ class Literals:
 
 
 @dataclass(frozen=True)
-class Visits:
-    """n arrivals in program order (structure of arrays).
+class VisitPart:
+    """Columns of n visits that belong together, and tables that they point into.
 
-    A CIRCULAR move makes two visits: its VIA point (`via` True), then its end, whose
-    predecessor is the VIA visit. Moves that hold no target are visits too, because they
-    turn the joints; their `literal` is -1.
+    No two parts have a column of the same name.
 
     Attributes:
-        files: Names of the files; index 0 is the program itself.
-        file, line: Where the move statement stands, (n,), line 1-based.
-        motion: `Motion`, (n,).
-        target: `Meaning`, (n,).
-        via: True at the VIA point of an arc, (n,).
-        values: The numbers of the target as `dialect` spells them, (n, w), NaN where
+        TABLES: Names of what is no column.
+    """
+
+    TABLES: ClassVar[frozenset[str]] = frozenset()
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    @classmethod
+    def column_names(cls) -> list[str]:
+        """Return the names of the columns."""
+        return [f.name for f in fields(cls) if f.name not in cls.TABLES]
+
+    def take(self, rows: Ints | slice) -> Self:
+        """Take some visits, (k,); tables stay whole."""
+        taken = {name: _take(getattr(self, name), rows) for name in self.column_names()}
+        return replace(self, **taken)
+
+
+def _take(column: Any, rows: Ints | slice) -> Any:
+    """Take rows of a column; texts are no array."""
+    if isinstance(rows, slice):
+        return column[rows]
+    if isinstance(column, np.ndarray):
+        return slim(column[rows])
+    return tuple(column[k] for k in rows.tolist())
+
+
+@dataclass(frozen=True)
+class PlaceColumns(VisitPart):
+    """Where moves stand.
+
+    Attributes:
+        file: Index into `Visits.files`, (n,).
+        line: 1-based line of the move statement, (n,).
+        measure_id: Ids of ``MEASURE <id>`` comments, n strings or "" where none.
+    """
+
+    file: Indices
+    line: Indices
+    measure_id: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class TargetColumns(VisitPart):
+    """Where moves go.
+
+    Attributes:
+        meaning: `Meaning` of the numbers, (n,).
+        values: The numbers of the target as the dialect spells them, (n, w), NaN where
             not known, or not written (see `Meaning`).
         distance_mm: For NEAR and FOR, (n,).
         aux: Auxiliary axis values, (n, k), NaN where there is none.
         config: Index into `configs`, (n,).
         configs: Configuration strings verbatim; "" where none was written.
         config_given: True where configuration flags were written, (n,).
-        literal: Index into `literals`, (n,), -1 where no number may be edited.
+        literal: Index into `Visits.literals`, (n,), -1 where no number may be edited.
         follows: Literal that a computed target moves along with (its numbers are those
             of the literal plus constants), (n,), -1 where there is none.
         name: Index into `names`, (n,); names[0] is "" (inline literal).
-        tool, base, uframe: Index into `frames`, (n,), -1 where not known.
-        frames: Poses (k, 4, 4) [m].
-        frame_taught: True where the text marks the frame as taught, (k,).
-        tool_remote: The tool stands still and the arm holds the part, (n,).
-        nearest_turn: Joints go to the nearest turn, whatever the flags say, (n,).
-        care: Whether branch and turn are checked, and turns may be far, `Switch`,
-            (n, 3).
-        fly: True where the arm passes the target without stopping, (n,).
-        zone_mm: Size of the zone, (n,), NaN where unset; negative: none.
-        overlap_percent: Overlap of moves [%], (n,), NaN where unset.
-        blend, zone_rule: `Blend` and `ZoneRule`, (n,).
-        lin_spd: Speed along a path [m/s], (n,), NaN where unset.
-        rot_spd: Speed of turning [rad/s], (n,), NaN where unset.
-        override: Product of the speed overrides that hold, (n,) in (0, 1].
-        wrist_joint: On a line the wrist turns joint by joint, (n,).
-        orientation_law: `OrientationLaw`, (n,).
-        arc_angle: Angle at which an arc ends instead of at the point that is written
-            as its end, the way on that its points follow, (n,) [rad]; NaN for all else.
-        block: First visit of the curve that the visit is a point of, (n,), -1 where it
-            is of none: one point alone would change all of the curve.
-        curved: The way to it is a part of a curve whose shape is the controller's own,
-            (n,).
-        reason: Index into `reasons`, (n,); 0 means that the visit may be compensated.
-        reasons: Why a visit keeps its numbers; reasons[0] is `NO_REASON`.
-        pred_start: Offsets into `pred`, (n + 1,).
-        pred: Predecessor visits; START or ELSEWHERE where it is no visit.
-        measure_id: Ids of ``MEASURE <id>`` comments, n strings or "" where none.
-        literals: The places in the text.
-        dialect: What numbers and flags of the program mean, and its words.
-        load: Index into `loads`, (n,).
-        loads: Loads that the program states: mass [kg] and its centre in the flange
-            frame [m], (k, 4), NaN for what it does not state; loads[0] states nothing.
-        weaves: The tool weaves on the way, or may, (n,).
         shift: Index into `shifts`, (n,), -1 where the move shifts no point. Where such
             a visit has a literal, it is that of the numbers of its shift.
         shifts: How moves shift the points that they name.
     """
 
-    files: tuple[str, ...]
-    file: Indices
-    line: Indices
-    motion: Indices
-    target: Indices
-    via: Bools
+    TABLES = frozenset({"configs", "names", "shifts"})
+
+    meaning: Indices
     values: Floats
     distance_mm: Floats
     aux: Floats
@@ -278,88 +293,235 @@ class Visits:
     follows: Indices
     name: Ints
     names: Sequence[str]
+    shift: Ints
+    shifts: tuple[Shift, ...] = ()
+
+
+@dataclass(frozen=True)
+class FrameColumns(VisitPart):
+    """The frames that hold at targets.
+
+    Attributes:
+        tool, base, uframe: Index into `poses`, (n,), -1 where not known.
+        poses: Frames (k, 4, 4) [m].
+        taught: True where the text marks the frame as taught, (k,).
+        tool_remote: The tool stands still and the arm holds the part, (n,).
+    """
+
+    TABLES = frozenset({"poses", "taught"})
+
     tool: Ints
     base: Ints
     uframe: Ints
-    frames: Floats
-    frame_taught: Bools
+    poses: Floats
+    taught: Bools
     tool_remote: Bools
+
+
+@dataclass(frozen=True)
+class MotionColumns(VisitPart):
+    """How the arm moves.
+
+    Attributes:
+        kind: `Motion`, (n,).
+        via: True at the VIA point of an arc, (n,).
+        fly: True where the arm passes the target without stopping, (n,).
+        nearest_turn: Joints go to the nearest turn, whatever the flags say, (n,).
+        care: Whether branch and turn are checked, and turns may be far, `Switch`,
+            (n, 3).
+        wrist_joint: On a line the wrist turns joint by joint, (n,).
+        orientation_law: `OrientationLaw`, (n,).
+        arc_angle: Angle at which an arc ends instead of at the point that is written
+            as its end, the way on that its points follow, (n,) [rad]; NaN for all else.
+        block: First visit of the curve that the visit is a point of, (n,), -1 where it
+            is of none: one point alone would change all of the curve.
+        curved: The way to it is a part of a curve whose shape is the controller's own,
+            (n,).
+        weaves: The tool weaves on the way, or may, (n,).
+        load: Index into `loads`, (n,).
+        loads: Loads that the program states: mass [kg] and its centre in the flange
+            frame [m], (k, 4), NaN for what it does not state; loads[0] states nothing.
+    """
+
+    TABLES = frozenset({"loads"})
+
+    kind: Indices
+    via: Bools
+    fly: Bools
     nearest_turn: Bools
     care: Ints
-    fly: Bools
-    zone_mm: Floats
-    overlap_percent: Floats
-    blend: Ints
-    zone_rule: Ints
-    lin_spd: Floats
-    rot_spd: Floats
-    override: Floats
     wrist_joint: Bools
     orientation_law: Ints
     arc_angle: Floats
     block: Ints
     curved: Bools
-    reason: Ints
-    reasons: tuple[Reason, ...]
+    weaves: Bools
+    load: Ints
+    loads: Floats
+
+
+@dataclass(frozen=True)
+class ZoneColumns(VisitPart):
+    """How targets are passed that the arm does not stop at.
+
+    Attributes:
+        size_mm: Size of the zone, (n,), NaN where unset; negative: none.
+        overlap_percent: Overlap of moves [%], (n,), NaN where unset.
+        blend, rule: `Blend` and `ZoneRule`, (n,).
+    """
+
+    size_mm: Floats
+    overlap_percent: Floats
+    blend: Ints
+    rule: Ints
+
+
+@dataclass(frozen=True)
+class SpeedColumns(VisitPart):
+    """How fast the arm moves.
+
+    Attributes:
+        linear: Along a path [m/s], (n,), NaN where unset.
+        turning: Of the tool [rad/s], (n,), NaN where unset.
+        override: Product of the speed overrides that hold, (n,) in (0, 1].
+    """
+
+    linear: Floats
+    turning: Floats
+    override: Floats
+
+
+@dataclass(frozen=True)
+class Graph:
+    """From where the arm comes to each of n visits.
+
+    Attributes:
+        pred_start: Offsets into `pred`, (n + 1,).
+        pred: Predecessor visits; START or ELSEWHERE where it is no visit.
+    """
+
     pred_start: Indices
     pred: Indices
-    measure_id: tuple[str, ...]
-    literals: Literals
-    dialect: Dialect
-    load: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    loads: Floats = field(default_factory=lambda: np.full((1, 4), np.nan))
-    weaves: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    shift: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    shifts: tuple[Shift, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, nothing in (
-            ("load", np.int8(0)),
-            ("weaves", np.False_),
-            ("shift", np.int8(-1)),
-        ):
-            if len(getattr(self, name)) != len(self.line):
-                none = np.broadcast_to(nothing, (len(self.line),))
-                object.__setattr__(self, name, none)
         read_only(self)
-
-    def __len__(self) -> int:
-        """Return the number of visits."""
-        return len(self.line)
 
     def predecessors(self, visit: int) -> Ints:
         """Return the possible predecessors of a visit."""
         return self.pred[self.pred_start[visit] : self.pred_start[visit + 1]]
 
     @cached_property
-    def shifted(self) -> Shifts:
-        """The targets that are shifted from points, in columns."""
-        rows = np.flatnonzero(self.shift >= 0)
-        own = [self.shifts[k] for k in self.shift[rows].tolist()]
-        literal = self.literal[rows].astype(np.int64)
-        turns = np.zeros(len(rows), dtype=bool)
-        has = np.flatnonzero(literal >= 0)
-        written = self.literals.places.length[literal[has], ANGLES] > 0
-        turns[has] = written.all(axis=1)
-        return Shifts.of(
-            rows, own, literal, self.follows[rows].astype(np.int64),
-            self.values[rows], turns, self.dialect,
-        )  # fmt: skip
-
-    @cached_property
     def before(self) -> Ints:
         """The only visit that leads to each, (n,), -1 where none or several do."""
-        if len(self) == 0:
+        if len(self.pred_start) == 1:
             return np.empty(0, dtype=np.int64)
         single = np.diff(self.pred_start) == 1
         first = self.pred[np.minimum(self.pred_start[:-1], len(self.pred) - 1)]
         return np.where(single & (first >= 0), first, -1)
 
+
+@dataclass(frozen=True)
+class Visits:
+    """n arrivals in program order (structure of arrays).
+
+    A CIRCULAR move makes two visits: its VIA point (`via` True), then its end, whose
+    predecessor is the VIA visit. Moves that hold no target are visits too, because they
+    turn the joints; their `literal` is -1.
+
+    Attributes:
+        files: Names of the files; index 0 is the program itself.
+        place: Where the moves stand.
+        target: Where they go.
+        frame: In which frames.
+        motion, zone, speed: How.
+        graph: Where the arm comes from.
+        reason: Index into `reasons`, (n,); 0 means that the visit may be compensated.
+        reasons: Why a visit keeps its numbers; reasons[0] is `NO_REASON`.
+        literals: The places in the texts.
+        dialect: What numbers and flags of the program mean, and its words.
+    """
+
+    files: tuple[str, ...]
+    place: PlaceColumns
+    target: TargetColumns
+    frame: FrameColumns
+    motion: MotionColumns
+    zone: ZoneColumns
+    speed: SpeedColumns
+    graph: Graph
+    reason: Ints
+    reasons: tuple[Reason, ...]
+    literals: Literals
+    dialect: Dialect
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return len(self.place.line)
+
+    def file_name(self, visit: int) -> str:
+        """Return the name of the file that the move of a visit stands in."""
+        return self.files[int(self.place.file[visit])]
+
+    def target_name(self, visit: int) -> str:
+        """Return the variable of the target of a visit, "" where it is inline."""
+        return str(self.target.names[self.target.name[visit]])
+
+    @property
+    def parts(self) -> dict[str, VisitPart]:
+        """The parts that have columns, by name."""
+        return {
+            k: part for k, part in vars(self).items() if isinstance(part, VisitPart)
+        }
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The columns of all parts, by name."""
+        parts = self.parts.values()
+        return {k: getattr(part, k) for part in parts for k in part.column_names()}
+
+    def take(self, rows: Ints | slice, graph: Graph) -> Visits:
+        """Take some visits, (k,), that come from where a graph says."""
+        parts: dict[str, Any] = {k: part.take(rows) for k, part in self.parts.items()}
+        return replace(self, reason=self.reason[rows], graph=graph, **parts)
+
+    def with_columns(self, **columns: Any) -> Visits:
+        """Put other columns in the place of some, of whichever part.
+
+        Raises:
+            TypeError: No part has such a column.
+        """
+        changed: dict[str, Any] = {}
+        for name, part in self.parts.items():
+            if own := {k: columns.pop(k) for k in vars(part) if k in columns}:
+                changed[name] = replace(part, **own)
+        if columns:
+            raise TypeError(f"visits have no columns {', '.join(columns)}")
+        return replace(self, **changed)
+
+    @cached_property
+    def shifted(self) -> Shifts:
+        """The targets that are shifted from points, in columns."""
+        target = self.target
+        rows = np.flatnonzero(target.shift >= 0)
+        own = [target.shifts[k] for k in target.shift[rows].tolist()]
+        literal = target.literal[rows].astype(np.int64)
+        turns = np.zeros(len(rows), dtype=bool)
+        has = np.flatnonzero(literal >= 0)
+        written = self.literals.places.length[literal[has], ANGLES] > 0
+        turns[has] = written.all(axis=1)
+        return Shifts.of(
+            rows, own, literal, target.follows[rows].astype(np.int64),
+            target.values[rows], turns, self.dialect,
+        )  # fmt: skip
+
     @cached_property
     def run_mates(self) -> Ints:
         """The visit before in the same fly run, (n,), -1 where there is none."""
-        before = self.before
-        return np.where((before >= 0) & self.fly[before], before, -1)
+        before = self.graph.before
+        return np.where((before >= 0) & self.motion.fly[before], before, -1)
 
 
 def line_ranges(lines: Ints | Sequence[int]) -> str:

@@ -62,8 +62,8 @@ def _plan_row(found: Explanation, i: int) -> dict[str, object]:
     """Describe visit i without a model."""
     v = found.visits
     return {
-        "line": int(v.line[i]),
-        "name": v.names[v.name[i]] or None,
+        "line": int(v.place.line[i]),
+        "name": v.target_name(i) or None,
         "q_deg": _degrees_or_none(found.q[i]),
         "lambda": [int(s) for s in found.direction[i]],
         "code": found.reasons[i].name,
@@ -122,7 +122,7 @@ def _print_shares(
 def _cells(found: Explanation, i: int) -> list[str]:
     """Write visit i as the cells of a table row."""
     v = found.visits
-    name = v.names[v.name[i]] or ("VIA" if v.via[i] else "inline")
+    name = v.target_name(i) or ("VIA" if v.motion.via[i] else "inline")
     sides = arrows(found.direction[i])
     angles = " ".join(_format_number(q, 8, 3) for q in np.rad2deg(found.q[i]))
     cells = [found.line_of(i), name, _few(found.name_origins(i)), angles, sides]

@@ -49,7 +49,7 @@ def _timing(told: InTime, visits: Visits) -> dict[str, object]:
     pair = {"before": told.before, "after": told.after}
     slowed = told.after.slow_moves
     share = told.after.clock.allowed[slowed].tolist()
-    lines = visits.line[told.source(slowed)]
+    lines = visits.place.line[told.source(slowed)]
 
     def of(use: Callable[[ProgramCycle], tuple[Floats, Ints]]) -> dict[str, object]:
         before, (shares, rows) = use(told.before), use(told.after)
@@ -73,7 +73,10 @@ def _timing(told: InTime, visits: Visits) -> dict[str, object]:
 def _uses(shares: Floats, rows: Ints, visits: Visits) -> list[dict[str, object]]:
     """Say how much of a limit every joint uses, and on the way to which line."""
     return [
-        {"share": round(share, 4), "line": int(visits.line[row]) if row >= 0 else None}
+        {
+            "share": round(share, 4),
+            "line": int(visits.place.line[row]) if row >= 0 else None,
+        }
         for share, row in zip(shares.tolist(), rows.tolist(), strict=True)
     ]
 
@@ -87,9 +90,9 @@ def _path(paths: PathAccuracy, k: int, visits: Visits) -> dict[str, object]:
         return {key: round(value(told) / MM, 5) for key, told in pair.items()}
 
     return {
-        "line": int(visits.line[visit]),
+        "line": int(visits.place.line[visit]),
         "visit": visit,
-        "move": Motion(visits.motion[visit]).name,
+        "move": Motion(visits.motion.kind[visit]).name,
         "length_mm": round(float(paths.way[samples.stop - 1]) / MM, 3),
         "max_mm": of(lambda told: float(told.across[told.largest[k]])),
         "at_mm": of(lambda told: float(paths.way[told.largest[k]])),

@@ -114,7 +114,7 @@ def _objects(outcome: Outcome, rows: Ints) -> bytes:
 def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
     """Say what stands behind every key, for some visits."""
     v, d, told = outcome.visits, outcome.decisions, outcome.arrivals
-    move = np.where(v.via[rows], len(Motion), v.motion[rows])
+    move = np.where(v.motion.via[rows], len(Motion), v.motion.kind[rows])
     placed, turned = len(outcome.position) > 0, len(d.turn) > 0
     degrees = (
         {"correction_deg": [_format_rows(np.rad2deg(d.turn[rows]), 6)]}
@@ -123,10 +123,10 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
     )
     position = _format_rows(outcome.position[rows] / MM, 4) if placed else Cells(b"[]")
     return {
-        "line": [whole(v.line[rows])],
-        "file": [format_texts(v.files, v.file[rows], json.dumps)],
+        "line": [whole(v.place.line[rows])],
+        "file": [format_texts(v.files, v.place.file[rows], json.dumps)],
         "literal": _literals(outcome, rows),
-        "name": [format_texts(v.names, v.name[rows], _quote)],
+        "name": [format_texts(v.target.names, v.target.name[rows], _quote)],
         "move": [format_texts([*(m.name for m in Motion), "VIA"], move, json.dumps)],
         "q_deg": [_format_rows(np.rad2deg(d.q[rows]), 5)],
         "lambda": [
@@ -140,7 +140,7 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
         ],
         "code": [format_texts([r.name for r in d.reasons], d.why[rows], json.dumps)],
         "reason": [format_texts([r.text for r in d.reasons], d.why[rows], json.dumps)],
-        "original": [_as_written(v, v.values, rows)],
+        "original": [_as_written(v, v.target.values, rows)],
         "corrected": [_as_written(v, d.corrected, rows)],
         "position_mm": [position],
         "correction_mm": [_format_rows(d.correction[rows] / MM, 5)],
@@ -213,7 +213,7 @@ def _free(arrivals: ArrivalStates, rows: Ints) -> dict[str, list[Cells]]:
 def _literals(outcome: Outcome, rows: Ints) -> list[Cells]:
     """Write where the numbers of every visit stand."""
     v = outcome.visits
-    literal = v.literal[rows]
+    literal = v.target.literal[rows]
     has = np.flatnonzero(literal >= 0)
     if not len(has):
         return [Cells(b"null")]
@@ -234,9 +234,9 @@ def _format_rows(values: Floats, decimals: int) -> Cells:
 
 def _as_written(visits: Visits, values: Floats, rows: Ints) -> Cells:
     """Write the numbers of the file (k, w); nothing where the file holds none."""
-    values, none = values[rows], visits.literal[rows] < 0
+    values, none = values[rows], visits.target.literal[rows] < 0
     if values.shape[1] > JOINTS:
-        values[visits.target[rows] == Meaning.JOINTS, JOINTS:] = np.nan
+        values[visits.target.meaning[rows] == Meaning.JOINTS, JOINTS:] = np.nan
     return shortest(values, 9).bracket_rows().unless(none, b"[]")
 
 

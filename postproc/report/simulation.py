@@ -259,7 +259,7 @@ def simulate_file(
     if not path:
         return Simulation(program.name, campaign, error, track=track, left_out=left)
     scores = score_paths(arm, setup, original, visits, own, skipped)
-    lines = tuple(original.line.tolist())
+    lines = tuple(original.place.line.tolist())
     return Simulation(program.name, campaign, error, scores, lines, track, left)
 
 
@@ -278,9 +278,12 @@ def _read(program: Path, cell: Cell) -> tuple[Visits, Ints, Ints]:
     visits = reading.visits
     inserted, stops = np.zeros((2, len(visits)), dtype=bool)
     for file, source in enumerate(reading.sources):
-        language, rows = language_of(source.name), np.flatnonzero(visits.file == file)
+        language, rows = (
+            language_of(source.name),
+            np.flatnonzero(visits.place.file == file),
+        )
         for row in rows.tolist():
-            line = source.line_text(int(visits.line[row])).encode("latin-1")
+            line = source.line_text(int(visits.place.line[row])).encode("latin-1")
             inserted[row] = language.is_inserted(line)
             stops[row] = language.is_approach(line)
     new = points_on_ways(visits, reading.sources, inserted)
@@ -290,5 +293,5 @@ def _read(program: Path, cell: Cell) -> tuple[Visits, Ints, Ints]:
 
 def true_error(landing: Landing, original: Visits) -> ErrorStatistics:
     """Compare where the tool landed with where the original program says."""
-    targets = original.literal[landing.visit] >= 0
+    targets = original.target.literal[landing.visit] >= 0
     return ErrorStatistics.of(landing.error[targets])

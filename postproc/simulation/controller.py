@@ -407,7 +407,11 @@ def frames_at(visits: Visits, i: int, poses: Floats) -> MoveFrames:
     Raises:
         PlanError: A frame is not known.
     """
-    indices = [int(visits.tool[i]), int(visits.base[i]), int(visits.uframe[i])]
+    indices = [
+        int(visits.frame.tool[i]),
+        int(visits.frame.base[i]),
+        int(visits.frame.uframe[i]),
+    ]
     if min(indices) < 0:
         raise PlanError("a frame is not known at this move")
     return MoveFrames(*(poses[k] for k in indices))
@@ -435,19 +439,19 @@ def way_to(
         PlanError: The target is not known or cannot be reached.
     """
     chain = setup.chain
-    if visits.motion[i] == Motion.JOINT:
+    if visits.motion.kind[i] == Motion.JOINT:
         goal = _goal_joints(setup, visits, i, frames, here)
         joints = np.vstack([here, goal])
         tcp = (chain.flange(joints) @ frames.tool)[:, :3, 3]
         return Way(joints, tcp)
     start = chain.flange(here[None])[0] @ frames.tool
     end = _goal_pose(setup, visits, i, frames, here)
-    if visits.motion[i] == Motion.CIRCULAR:
+    if visits.motion.kind[i] == Motion.CIRCULAR:
         began = chain.flange(before[None])[0] @ frames.tool
         samples = _arc_piece(setup, visits, i, frames, (began, start, end))
     else:
         samples = straight(start, end)
-    if visits.wrist_joint[i]:
+    if visits.motion.wrist_joint[i]:
         goal = _goal_joints(setup, visits, i, frames, here)
         joints = joints_with_wrist(chain, samples[:, :3, 3], frames.tool, here, goal)
     else:
@@ -472,7 +476,7 @@ def _arc_piece(
         poses: TCP poses one visit earlier, now, and at visit i.
     """
     began, start, end = poses
-    if not visits.via[i]:
+    if not visits.motion.via[i]:
         return arc(began, start, end)[1]
     if i + 1 >= len(visits):
         raise PlanError("the arc has no end")
@@ -483,7 +487,7 @@ def _arc_piece(
 def _goal_joints(
     setup: VirtualCell, visits: Visits, i: int, frames: MoveFrames, here: Floats
 ) -> Floats:
-    kind, values = Meaning(visits.target[i]), visits.values[i]
+    kind, values = Meaning(visits.target.meaning[i]), visits.target.values[i]
     if kind is Meaning.JOINTS:
         return _check_known(np.radians(values[:6]))
     if kind is Meaning.BY:
@@ -493,10 +497,12 @@ def _goal_joints(
     if kind in (Meaning.HOME, Meaning.CALIBRATION):
         return _place_of(setup, kind)
     config = None
-    if kind in (Meaning.POSE, Meaning.NEAR) and visits.config_given[i]:
-        config = visits.dialect.flag_words(visits.configs[visits.config[i]], values)
+    if kind in (Meaning.POSE, Meaning.NEAR) and visits.target.config_given[i]:
+        config = visits.dialect.flag_words(
+            visits.target.configs[visits.target.config[i]], values
+        )
     goal = _goal_pose(setup, visits, i, frames, here)
-    free = bool(visits.nearest_turn[i])
+    free = bool(visits.motion.nearest_turn[i])
     return joints_of_pose(setup.chain, goal @ undo(frames.tool), here, config, free)
 
 
@@ -504,7 +510,7 @@ def _goal_pose(
     setup: VirtualCell, visits: Visits, i: int, frames: MoveFrames, here: Floats
 ) -> Floats:
     """Return the TCP pose in the arm base, (4, 4), that visit i asks for."""
-    kind, values = Meaning(visits.target[i]), visits.values[i]
+    kind, values = Meaning(visits.target.meaning[i]), visits.target.values[i]
     tool = frames.tool
     if kind in IN_JOINTS:
         joints = _goal_joints(setup, visits, i, frames, here)
@@ -513,9 +519,9 @@ def _goal_pose(
     if kind in (Meaning.POSE, Meaning.NEAR, Meaning.FOR):
         target = pose_of_numbers(_check_known(values))
         if kind is Meaning.NEAR:
-            target = target @ _shift(0.0, 0.0, -visits.distance_mm[i])
+            target = target @ _shift(0.0, 0.0, -visits.target.distance_mm[i])
         goal = flange_of(target, tool, frames.base, frames.uframe) @ tool
-        distance = visits.distance_mm[i] * 1e-3
+        distance = visits.target.distance_mm[i] * 1e-3
         return goal if kind is not Meaning.FOR else _towards(present, goal, distance)
     if kind is Meaning.AWAY:
         return np.asarray(present @ _shift(0.0, 0.0, -_check_known(values[:1])[0]))
@@ -697,8 +703,8 @@ NO_WAY = 1e-9  # [m], [rad]
 
 def in_space(visits: Visits, i: int, j: int) -> bool:
     """Tell whether the corner between moves i and j is a Cartesian one."""
-    cartesian = Motion.JOINT not in (visits.motion[i], visits.motion[j])
-    return bool(cartesian and visits.blend[i] == Blend.ZONE)
+    cartesian = Motion.JOINT not in (visits.motion.kind[i], visits.motion.kind[j])
+    return bool(cartesian and visits.zone.blend[i] == Blend.ZONE)
 
 
 def shares(
@@ -710,9 +716,14 @@ def shares(
     passes at $FLY_DIST (FLY_TOL), or nothing (FLY_PASS); at most half of the shorter
     move. FLY_NORM: the last $FLY_PER % of the braking time.
     """
-    kind, trajectory = visits.blend[i], visits.zone_rule[i]
+    kind, trajectory = visits.zone.blend[i], visits.zone.rule[i]
     passing = kind == Blend.ZONE and trajectory == ZoneRule.PASS
-    if not visits.fly[i] or visits.via[i] or passing or visits.zone_mm[i] < 0:
+    if (
+        not visits.motion.fly[i]
+        or visits.motion.via[i]
+        or passing
+        or visits.zone.size_mm[i] < 0
+    ):
         return 0.0, 0.0
     if not in_space(visits, i, j):
         return _overlapping(chain, visits, (i, j), ways)
@@ -720,7 +731,7 @@ def shares(
     if min(lengths) < NO_WAY:
         return 0.0, 0.0
     zone = 0.5 * min(lengths)
-    distance = _value_or_usual(visits.zone_mm[i], USUAL_DISTANCE) * 1e-3
+    distance = _value_or_usual(visits.zone.size_mm[i], USUAL_DISTANCE) * 1e-3
     if trajectory == ZoneRule.WITHIN:
         # The parabola's vertex is half as far from the point as the middle of its ends.
         turn = np.linalg.norm(_heading(ways[1], 0) - _heading(ways[0], -1))
@@ -734,15 +745,17 @@ def _overlapping(
 ) -> tuple[float, float]:
     """Brake the first move and start the second at the same time."""
     percent = np.clip(
-        _value_or_usual(visits.overlap_percent[moves[0]], USUAL_PERCENT), 0.0, 100.0
+        _value_or_usual(visits.zone.overlap_percent[moves[0]], USUAL_PERCENT),
+        0.0,
+        100.0,
     )
     pushes, times = [], []
     for move, way in zip(moves, ways, strict=True):
         most = np.abs(way.joints[-1] - way.joints[0]) / chain.speed
         lasts = max(float(most.max()), NO_WAY)  # [s] at full joint speed
         cruise = lasts
-        if visits.motion[move] != Motion.JOINT and visits.lin_spd[move] > 0:
-            cruise = max(cruise, way.length / float(visits.lin_spd[move]))
+        if visits.motion.kind[move] != Motion.JOINT and visits.speed.linear[move] > 0:
+            cruise = max(cruise, way.length / float(visits.speed.linear[move]))
         pushes.append(1.0 / (lasts * RAMP))
         times.append(min(lasts * RAMP / cruise, float(np.sqrt(lasts * RAMP))))
     overlap = percent / 100.0 * min(times)
@@ -803,7 +816,7 @@ def plan_drives(
     """
     drives: list[Drive] = []
     for i in range(len(visits)):
-        known = [int(p) for p in visits.predecessors(i) if 0 <= p < i]
+        known = [int(p) for p in visits.graph.predecessors(i) if 0 <= p < i]
         came_from = known[0] if known else START
         begin = start if came_from < 0 else drives[came_from].end
         before = start if came_from < 0 else drives[came_from].begin
@@ -826,7 +839,7 @@ def _first_joints(
     """Return the joints at the first target, for a cell without a home."""
     try:
         frames = frames_at(visits, i, poses)
-        one = replace(visits, motion=np.full_like(visits.motion, Motion.JOINT))
+        one = visits.with_columns(kind=np.full_like(visits.motion.kind, Motion.JOINT))
         return np.asarray(way_to(setup, one, i, frames, start, start).joints[-1])
     except PlanError:
         return start
@@ -836,13 +849,15 @@ def _round_fly_points(
     setup: VirtualCell, visits: Visits, poses: Floats, drives: list[Drive]
 ) -> list[Drive]:
     """Round the fly points that have one way in and one way out."""
-    ways_out = np.bincount(visits.pred[visits.pred >= 0], minlength=len(visits))
+    ways_out = np.bincount(
+        visits.graph.pred[visits.graph.pred >= 0], minlength=len(visits)
+    )
     corners: dict[int, Corner] = {}
     for j, drive in enumerate(drives):
         i = drive.came_from
         if i < 0 or drive.why or drives[i].why or ways_out[i] != 1:
             continue
-        if len(visits.predecessors(i)) == 1 and drives[i].came_from >= 0:
+        if len(visits.graph.predecessors(i)) == 1 and drives[i].came_from >= 0:
             corner = _corner(setup, visits, poses, (i, j), (drives[i].way, drive.way))
             if corner is not None:
                 corners[i] = corner

@@ -108,7 +108,7 @@ def _tracks(
 ) -> Iterator[tuple[int, _Track]]:
     """Follow every Cartesian move, with the gears at every sample."""
     for run in run_moves(arm, setup, visits):
-        if run.why or visits.motion[run.visit] == Motion.JOINT:
+        if run.why or visits.motion.kind[run.visit] == Motion.JOINT:
             continue
         q = _finer(run.path, arm.nominal.flange(run.path)[:, :3, 3])
         gears = gears_along(arm, run, q)

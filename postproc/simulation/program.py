@@ -88,16 +88,16 @@ def run_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> ProgramR
 def _not_passed(visits: Visits, begun: Collection[int]) -> Ints:
     """Find fly points that the program goes on from, but no move of a run."""
     goes_on = np.zeros(len(visits) + 1, dtype=bool)
-    goes_on[visits.pred[visits.pred >= 0]] = True
+    goes_on[visits.graph.pred[visits.graph.pred >= 0]] = True
     for i in range(1, len(visits)):  # before what is not followed
-        goes_on[i - 1] |= ELSEWHERE in visits.predecessors(i)
+        goes_on[i - 1] |= ELSEWHERE in visits.graph.predecessors(i)
     goes_on[[i for i in begun if i >= 0]] = False
-    return np.flatnonzero(goes_on[:-1] & visits.fly & ~visits.via)
+    return np.flatnonzero(goes_on[:-1] & visits.motion.fly & ~visits.motion.via)
 
 
 def _poses(visits: Visits) -> Floats:
     """Return the frames of a program, (k, 4, 4)."""
-    return visits.frames if len(visits.frames) else np.eye(4)[None]
+    return visits.frame.poses if len(visits.frame.poses) else np.eye(4)[None]
 
 
 def _places(
@@ -171,7 +171,7 @@ def run_moves(
     poses, time = _poses(visits), 0.0
     for i, (drive, before, after) in enumerate(_places(arm, setup, visits, poses)):
         path = np.vstack([before.joints, drive.path])
-        tool = poses[visits.tool[i]]
+        tool = poses[visits.frame.tool[i]]
         moves = after.lasted - SETTLE
         yield DrivenMove(
             i, path, before.gears, tool, after.speed, time, moves, after.rate, after.why
@@ -198,7 +198,9 @@ def _go(
     if drive.why:
         return replace(place, why=drive.why, lasted=0.0)
     lasted = _duration(setup, visits, i, drive.way)
-    rate = np.zeros(6) if visits.fly[i] else _last_rate(place.joints, drive, lasted)
+    rate = (
+        np.zeros(6) if visits.motion.fly[i] else _last_rate(place.joints, drive, lasted)
+    )
     gears = move(arm.gears, place.gears, drive.path)
     return _ProgramPlace(
         joints=drive.path[-1],
@@ -223,12 +225,12 @@ def _last_rate(begin: Floats, drive: Drive, lasted: float) -> Floats:
 
 def _duration(setup: VirtualCell, visits: Visits, i: int, way: Way) -> float:
     """Return how long a move takes, without ramps [s]."""
-    override = float(np.nan_to_num(visits.override[i], nan=1.0)) or 1.0
+    override = float(np.nan_to_num(visits.speed.override[i], nan=1.0)) or 1.0
     speed = setup.chain.speed * override
     most = np.abs(np.diff(way.joints, axis=0)).sum(axis=0) / speed
     lasted = float(most.max())
-    if visits.motion[i] != Motion.JOINT:
-        programmed = float(np.nan_to_num(visits.lin_spd[i], nan=USUAL_SPEED))
+    if visits.motion.kind[i] != Motion.JOINT:
+        programmed = float(np.nan_to_num(visits.speed.linear[i], nan=USUAL_SPEED))
         lasted = max(lasted, way.length / max(programmed * override, 1e-6))
     return max(lasted, 1e-3)
 
@@ -246,7 +248,7 @@ def _collect(
     visit = np.array(reached, dtype=np.int64)
     kept = [places[i] for i in reached]
     time = np.cumsum([p.lasted for p in places])[visit] if reached else np.zeros(0)
-    tools = visits.tool[visit].tolist()
+    tools = visits.frame.tool[visit].tolist()
     frames = list(dict.fromkeys(tools))
     probes = [setup.number_of(poses[frame]) for frame in frames]
     if min(probes, default=-1) < 0:
@@ -256,7 +258,7 @@ def _collect(
     arrivals = make_arrivals(
         np.array([p.joints for p in kept]).reshape(-1, 6),
         np.array([p.gears.side for p in kept]).reshape(-1, 6),
-        poses[visits.tool[visit]],
+        poses[visits.frame.tool[visit]],
         travel=np.array([p.gears.travel for p in kept]).reshape(-1, 6),
         loop=np.array([p.gears.loop for p in kept]).reshape(-1, 6),
         flank=np.array([p.gears.flank for p in kept]).reshape(-1, 6),

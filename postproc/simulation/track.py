@@ -82,7 +82,7 @@ def _moves(
     """Yield where the tool is along every move that is driven, (k, 3) [m]."""
     for run in run_moves(arm, setup, visits):
         if not run.why:
-            yield _places(arm, setup, run, bool(visits.fly[run.visit]), rate)
+            yield _places(arm, setup, run, bool(visits.motion.fly[run.visit]), rate)
 
 
 def _places(

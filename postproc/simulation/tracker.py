@@ -262,7 +262,7 @@ class Campaign:
 
 def campaign_length(visits: Visits) -> int:
     """Return how many visits of a program a tracker measures."""
-    return sum(map(bool, visits.measure_id)) or len(visits)
+    return sum(map(bool, visits.place.measure_id)) or len(visits)
 
 
 def measure_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> Campaign:
@@ -272,9 +272,9 @@ def measure_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> Camp
     comment all visits are, under their numbers from 1.
     """
     run = run_program(arm, setup, visits)
-    marked = np.array([bool(visits.measure_id[i]) for i in run.visit], dtype=bool)
+    marked = np.array([bool(visits.place.measure_id[i]) for i in run.visit], dtype=bool)
     if marked.any():
-        ids = [visits.measure_id[i] for i in run.visit[marked]]
+        ids = [visits.place.measure_id[i] for i in run.visit[marked]]
     else:
         marked = np.ones(len(run.visit), dtype=bool)
         ids = [str(i + 1) for i in run.visit]

@@ -109,11 +109,11 @@ def _kind(v: Visits, passage: Passage) -> str:
     Readers mark the point on the way of an arc as passed: that is no fly point.
     """
     passed = np.array([i for run in passage.runs for i in run])
-    if (v.fly & ~v.via)[passed].any():
+    if (v.motion.fly & ~v.motion.via)[passed].any():
         return "fly"
-    if v.motion[passage.last] == Motion.JOINT:
+    if v.motion.kind[passage.last] == Motion.JOINT:
         return "joint"
-    return "arc" if v.via[passed].any() else "line"
+    return "arc" if v.motion.via[passed].any() else "line"
 
 
 def passages(
@@ -125,10 +125,10 @@ def passages(
 ) -> Iterator[Passage]:
     """Join runs to passages from stop to stop of which both sides know the time."""
     v = claim.visits
-    passed = v.fly | v.via
+    passed = v.motion.fly | v.motion.via
     chain: list[list[int]] = []
     for run in runs:
-        before = int(v.before[run[0]])
+        before = int(v.graph.before[run[0]])
         on = bool(chain) and chain[-1][-1] == before
         begins = before >= 0 and not passed[before]
         chain = [*chain, run] if on else [run] if begins else []
@@ -149,13 +149,13 @@ def _passage(
 ) -> Passage | None:
     """Say how long a passage takes; None where the planner does not know."""
     v, visits = claim.visits, [i for run in chain for i in run]
-    ours = claim.time[visits[-1]] - claim.time[v.before[visits[0]]]
+    ours = claim.time[visits[-1]] - claim.time[v.graph.before[visits[0]]]
     if np.isnan(claim.time[visits]).any() or np.isnan(ours):
         return None
-    slow = float(v.override[visits].min())  # a run goes by its lowest override
+    slow = float(v.speed.override[visits].min())  # a run goes by its lowest override
     theirs = sum(timed[run[0]].seconds for run in chain) / slow
     turned = np.abs(ways[visits[-1]].q[-1] - ways[visits[0]].q[0])
-    least = float((turned / speed).max()) / float(v.override[visits].max())
+    least = float((turned / speed).max()) / float(v.speed.override[visits].max())
     return Passage(tuple(chain), float(ours), theirs, least)
 
 
@@ -164,7 +164,9 @@ def _count_lost(
 ) -> dict[str, int]:
     """Count stops whose passage is not compared, and why."""
     v = claim.visits
-    stops = set(np.flatnonzero(~(v.fly | v.via)).tolist()) - {p.last for p in found}
+    stops = set(np.flatnonzero(~(v.motion.fly | v.motion.via)).tolist()) - {
+        p.last for p in found
+    }
     return dict(Counter(
         UNSAID if np.isnan(claim.time[i]) else NO_LAW if i in ways else NOT_DRAWN
         for i in sorted(stops)
@@ -182,8 +184,8 @@ def compare_limits(
     low, high = np.deg2rad(file.joints.lower_deg), np.deg2rad(file.joints.upper_deg)
     sizes, skipped = [], Counter[str]()
     for i in range(len(claim)):
-        before, none = int(claim.visits.before[i]), np.empty((0, 6))
-        whole = [before, i] if before >= 0 and claim.visits.via[before] else [i]
+        before, none = int(claim.visits.graph.before[i]), np.empty((0, 6))
+        whole = [before, i] if before >= 0 and claim.visits.motion.via[before] else [i]
         made = [ways[k].q[1:] for k in whole if k in ways and not ways[k].why]
         q = np.concatenate(made) if len(made) == len(whole) else none
         if not len(q) and claim.within[i] > 0:

@@ -112,7 +112,7 @@ def draw(claim: Claim) -> Ints:
     n = len(claim)
     if n <= MOVES:
         return np.arange(n)
-    digest = hashlib.sha256(claim.visits.values.tobytes()).digest()
+    digest = hashlib.sha256(claim.visits.target.values.tobytes()).digest()
     blocks = np.random.default_rng(list(digest)).permutation(-(-n // BLOCK))
     first = np.sort(blocks[: MOVES // BLOCK]) * BLOCK
     rows = (first[:, None] + np.arange(BLOCK)).ravel()
@@ -125,7 +125,7 @@ def make_ways(maker: WayMaker, rows: Ints, until: float) -> dict[int, MadeWay]:
     for i in rows.tolist():
         if monotonic() > until:
             break
-        before = int(maker.visits.before[i])
+        before = int(maker.visits.graph.before[i])
         if before < 0:
             ways[i] = not_made(SEVERAL)
             continue
@@ -152,9 +152,11 @@ def runs_of(claim: Claim, ways: Mapping[int, MadeWay]) -> Iterator[list[int]]:
 def _goes_on(claim: Claim, ways: Mapping[int, MadeWay], last: int, i: int) -> bool:
     """Tell whether the arm passes a visit on its way to the next one."""
     v = claim.visits
-    passing = bool(v.fly[last] or v.via[last]) and v.before[i] == last
-    in_space = v.motion[last] != Motion.JOINT and v.motion[i] != Motion.JOINT
-    smooth = bool(v.via[last]) or _bend(ways[last].q, ways[i].q) < BENT
+    passing = (
+        bool(v.motion.fly[last] or v.motion.via[last]) and v.graph.before[i] == last
+    )
+    in_space = v.motion.kind[last] != Motion.JOINT and v.motion.kind[i] != Motion.JOINT
+    smooth = bool(v.motion.via[last]) or _bend(ways[last].q, ways[i].q) < BENT
     return passing and bool(in_space) and smooth
 
 
@@ -175,7 +177,7 @@ def runs_in_time(
     """Find the time laws of runs, by the visits that they begin with."""
     found: dict[int, TimedRun] = {}
     for run in runs:
-        joint = bool(claim.visits.motion[run[0]] == Motion.JOINT)
+        joint = bool(claim.visits.motion.kind[run[0]] == Motion.JOINT)
         late = monotonic() > until
         timed = None if late else train.time_run([ways[i] for i in run], joint)
         if timed is not None:
@@ -199,7 +201,7 @@ def arrivals(
         first, last = run[0], run[-1]
         q = np.vstack([timed[first].q, ways[last].q[-1:]])
         start = PlayMemory.at(ways[first].q[0] @ train.coupling.T)
-        before = found.get(int(claim.visits.before[first]), start)
+        before = found.get(int(claim.visits.graph.before[first]), start)
         found[last] = before.pass_angles(q @ train.coupling.T, train.play)
     return found
 
@@ -228,7 +230,7 @@ def _compare_directions(
     """Say how many directions differ, and where the first of them is."""
     differ: list[str] = []
     compared, skipped = 0, Counter[str]()
-    passed = claim.visits.fly | claim.visits.via
+    passed = claim.visits.motion.fly | claim.visits.motion.via
     skipped[FLY] = 6 * int(passed.sum())
     for i in np.flatnonzero(~passed).tolist():
         if i not in arrived:

@@ -100,7 +100,7 @@ class Claim:
     def place(self, visit: int) -> str:
         """Name the line of a visit's move."""
         v = self.visits
-        return f"{self.label} {v.files[v.file[visit]]}:{int(v.line[visit])}"
+        return f"{self.label} {v.file_name(visit)}:{int(v.place.line[visit])}"
 
 
 @dataclass(frozen=True)

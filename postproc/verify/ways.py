@@ -74,10 +74,17 @@ class WayMaker:
             return not_made(NO_BEGIN)
         if np.isnan(self.confirmed[i]).any():
             return not_made(NO_END)
-        if v.motion[i] == Motion.JOINT:
+        if v.motion.kind[i] == Motion.JOINT:
             return MadeWay(np.stack([begin, self.confirmed[i]]))
-        plain = v.orientation_law[i] in PLAIN_LAWS and not v.wrist_joint[i]
-        if not plain or v.curved[i] or v.block[i] >= 0 or v.weaves[i]:
+        plain = (
+            v.motion.orientation_law[i] in PLAIN_LAWS and not v.motion.wrist_joint[i]
+        )
+        if (
+            not plain
+            or v.motion.curved[i]
+            or v.motion.block[i] >= 0
+            or v.motion.weaves[i]
+        ):
             return not_made(NOT_MADE)
         return self._in_space(i, begin)
 
@@ -87,7 +94,7 @@ class WayMaker:
         start, end = self.arm.flange(begin) @ tool, self._end(i)
         points = (
             _line(start, end)
-            if self.visits.motion[i] == Motion.LINEAR
+            if self.visits.motion.kind[i] == Motion.LINEAR
             else self._arc(i, start, end)
         )
         if points is None or np.isnan(points).any():
@@ -95,7 +102,7 @@ class WayMaker:
         turn = np.linalg.norm(self.arm.turn(start, end))
         course = _ToolCourse(points, start, end, tool, float(turn))
         v = self.visits
-        least = course.least(float(v.lin_spd[i]), float(v.rot_spd[i]))
+        least = course.least(float(v.speed.linear[i]), float(v.speed.turning[i]))
         return replace(self._follow(begin, course), least=least)
 
     def _end(self, i: int) -> Floats:
@@ -106,14 +113,14 @@ class WayMaker:
 
     def _arc(self, i: int, start: Floats, end: Floats) -> Floats | None:
         """Place points on the arc to its VIA point, or from there to its end."""
-        via, n = bool(self.visits.via[i]), len(self.visits)
-        before = int(self.visits.before[i])
+        via, n = bool(self.visits.motion.via[i]), len(self.visits)
+        before = int(self.visits.graph.before[i])
         if via:
             if i + 1 >= n:
                 return None
             three = start, end, self._end(i + 1)
-        elif before >= 0 and self.visits.via[before]:
-            first = int(self.visits.before[before])
+        elif before >= 0 and self.visits.motion.via[before]:
+            first = int(self.visits.graph.before[before])
             if first < 0 or np.isnan(self.confirmed[first]).any():
                 return None
             at = self.arm.flange(self.confirmed[first]) @ self.goals.tool[i]

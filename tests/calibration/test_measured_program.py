@@ -41,7 +41,7 @@ def test_rows_take_the_states_of_their_visits_in_program_order(join, job_cell, d
     data = {"job.pdl": (desk.folder / "job.pdl").read_bytes()}
     visits = read_program(data, job_cell).visits
     plan = plan_visits(visits, job_cell).plan
-    at = [visits.measure_id.index(name) for name in ("h1", "h2")]
+    at = [visits.place.measure_id.index(name) for name in ("h1", "h2")]
     np.testing.assert_array_equal(found.states.q, plan.q[at])
     np.testing.assert_array_equal(found.states.direction, plan.side[at])
 

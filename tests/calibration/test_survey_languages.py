@@ -62,12 +62,12 @@ def test_all_languages_are_read_back_as_one_survey(cell, surveys):
     sides = plan_visits(first, cell).plan.direction
     assert len(first) > 4 * POSES  # reversals too
     for other in others:
-        np.testing.assert_array_equal(other.values[:, :6], first.values)
-        assert other.measure_id == first.measure_id
+        np.testing.assert_array_equal(other.target.values[:, :6], first.target.values)
+        assert other.place.measure_id == first.place.measure_id
         np.testing.assert_array_equal(plan_visits(other, cell).plan.direction, sides)
-        tools = [v.frames[v.tool][:, :3, 3] for v in (first, other)]
+        tools = [v.frame.poses[v.frame.tool][:, :3, 3] for v in (first, other)]
         np.testing.assert_allclose(*tools, atol=1e-9)
-        assert not other.fly.any()
+        assert not other.motion.fly.any()
 
 
 @pytest.mark.parametrize(("arm", "suffix"), ARMS.items())
@@ -77,7 +77,7 @@ def test_every_arm_gets_the_language_of_its_controller(tmp_path, arm, suffix):
     own = load_cell(place)
     path = written(tmp_path, own, suffix)
     visits = read(path, own)
-    q = np.deg2rad(visits.values[:, :6])
+    q = np.deg2rad(visits.target.values[:, :6])
     assert (own.arm.lower <= q).all() and (q <= own.arm.upper).all()
     begins, ends = q[0:-1:2], q[1::2]
     np.testing.assert_allclose(np.abs(ends - begins), BACK, atol=1e-6)

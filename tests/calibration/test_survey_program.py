@@ -29,20 +29,20 @@ def visits(survey, job_cell):
 
 
 def test_every_pose_is_measured_twice_under_its_own_id(visits):
-    ids = [name for name in visits.measure_id if name]
+    ids = [name for name in visits.place.measure_id if name]
     assert len(ids) == len(set(ids)) == 2 * POSES
     assert set(ids) == {f"{k + 1}{side}" for k in range(POSES) for side in "ab"}
 
 
 def test_both_arrivals_at_a_pose_come_from_opposite_sides(visits, job_cell):
     planned = plan_visits(visits, job_cell)
-    at = {name: i for i, name in enumerate(visits.measure_id) if name}
+    at = {name: i for i, name in enumerate(visits.place.measure_id) if name}
     for k in range(POSES):
         a, b = at[f"{k + 1}a"], at[f"{k + 1}b"]
-        np.testing.assert_array_equal(visits.values[a], visits.values[b])
+        np.testing.assert_array_equal(visits.target.values[a], visits.target.values[b])
         sides = planned.plan.direction[[a, b]]
         assert (np.abs(sides) == 1).all() and (sides[0] == -sides[1]).all()
-        way = np.abs(visits.values[a] - visits.values[a - 1])
+        way = np.abs(visits.target.values[a] - visits.target.values[a - 1])
         np.testing.assert_allclose(way, np.rad2deg(BACK), atol=2e-5)
     assert not np.isnan(planned.plan.q).any()
     told = {planned.reasons[i].text for i in range(len(visits))} - {""}
@@ -53,7 +53,9 @@ def test_every_probe_point_is_used_and_mounted_once(survey, visits, job_cell):
     mounted = re.findall(r"\$TOOL := POS\(([^)]*), 0, 0, 0, ''\)", survey.read_text())
     xyz = np.array([[float(v) for v in text.split(",")] for text in mounted])
     np.testing.assert_allclose(xyz, job_cell.probes * 1e3, atol=1e-3)
-    used = [visits.tool[i] for i, name in enumerate(visits.measure_id) if name]
+    used = [
+        visits.frame.tool[i] for i, name in enumerate(visits.place.measure_id) if name
+    ]
     assert (np.bincount(used)[np.unique(used)] == 2 * POSES / len(xyz)).all()
 
 
@@ -80,21 +82,23 @@ def test_reversals_turn_one_drive_back_from_where_all_came(
     assert (
         measured
         == 2 * POSES + (1 + len(STEPS)) * many
-        == sum(map(bool, visits.measure_id))
+        == sum(map(bool, visits.place.measure_id))
     )
     steps = [
         (i, *map(int, name.split(".")))
-        for i, name in enumerate(visits.measure_id)
+        for i, name in enumerate(visits.place.measure_id)
         if "." in name
     ]
     assert {drive for _, _, drive, _ in steps} == set(range(1, 7))
-    drives = visits.values @ job_cell.arm.coupling.T
+    drives = visits.target.values @ job_cell.arm.coupling.T
     for i, pose, drive, k in steps:
         if not k:
             begin, came = i, drives[i] - drives[i - 1]
             assert (np.abs(came) > np.rad2deg(BACK) / 2).all()
-            known = visits.measure_id.index(f"{pose}a")
-            np.testing.assert_array_equal(visits.values[i], visits.values[known])
+            known = visits.place.measure_id.index(f"{pose}a")
+            np.testing.assert_array_equal(
+                visits.target.values[i], visits.target.values[known]
+            )
             continue
         turned = np.deg2rad(drives[i] - drives[begin])
         assert turned[drive - 1] * came[drive - 1] < 0

@@ -84,14 +84,14 @@ def test_a_place_to_come_from_is_on_the_way_and_behind(bench_cell) -> None:
     def place(q: np.ndarray) -> np.ndarray:
         return arm.tcp(q[None], tool[None])[0]
 
-    for row in np.flatnonzero(visits.motion == Motion.LINEAR)[1:].tolist():
-        before = int(visits.before[row])
+    for row in np.flatnonzero(visits.motion.kind == Motion.LINEAR)[1:].tolist():
+        before = int(visits.graph.before[row])
         most = 8e-3
         q = place_to_approach(arm, cycle, row, before, unsure, most)
         if q is None:
             continue
         found += 1
-        begin, above, end = cycle.path.q[[visits.before[before], before, row]]
+        begin, above, end = cycle.path.q[[visits.graph.before[before], before, row]]
         share = (q - begin) @ (above - begin) / ((above - begin) @ (above - begin))
         assert 0.0 <= share <= 1.0  # that move is a JOINT move: straight in its joints
         np.testing.assert_allclose(q, begin + share * (above - begin), atol=1e-6)

@@ -152,7 +152,11 @@ def test_the_arm_lands_at_the_ends(bench_cell, bench_model, seed):
     )
     landing = land(virtual_arm(SEED, tool=setup.tool), setup, given, made)
     rows = landing.visit
-    ends = (v.motion == Motion.CIRCULAR) & ~v.via & (d.status == Status.CORRECTED)
+    ends = (
+        (v.motion.kind == Motion.CIRCULAR)
+        & ~v.motion.via
+        & (d.status == Status.CORRECTED)
+    )
     sure = ends & (d.direction != 0).all(axis=1)
     miss = 1e3 * np.linalg.norm(landing.error, axis=1)
     assert ends.sum() >= 6
@@ -166,5 +170,5 @@ def test_an_arc_on_which_the_tool_turns_farther_is_left(bench_cell, bench_model)
         b"    CirPathMode\\CirPointOri;\n", b""
     )
     found = compensate(source, bench_cell, bench_model, name="job.mod")
-    ends = found.visits.motion == Motion.CIRCULAR
+    ends = found.visits.motion.kind == Motion.CIRCULAR
     assert ends.sum() > 3 and (found.decisions.status[ends] != Status.CORRECTED).all()

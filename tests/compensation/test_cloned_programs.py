@@ -51,7 +51,7 @@ def compensated(
     assert len(asked) == len(done) == len(outcome.visits)
     assert "cloned" in {d.code for d in outcome.diagnostics}
     before, after = (visits_of(moves, cell) for moves in (asked, done))
-    moved = (before.values != after.values).any(axis=1)
+    moved = (before.target.values != after.target.values).any(axis=1)
     moved[: len(SWEEP)] = False
     assert moved.sum() > 0.5 * len(moved)
     return before, after, moved & (outcome.decisions.why == 0)

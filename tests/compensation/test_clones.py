@@ -90,7 +90,7 @@ def test_moves_that_disagree_get_points_of_their_own(run, job_cell):
     ]
     assert b"  MOVE JOINT TO p__2\r\nEND" in outcome.outputs["job.pdl"]
     assert notes(outcome, "cloned") == ["p: the moves of lines 9 go to p__2 now"]
-    assert outcome.visits.line.tolist() == [6, 7, 8, 9]
+    assert outcome.visits.place.line.tolist() == [6, 7, 8, 9]
     assert outcome.visits.literals.line.tolist() == [5, 5, 6, 8]
     assert given_back(outcome) == {"job.pdl": source}
     wanted = read_program({"job.pdl": source}, job_cell).visits
@@ -219,7 +219,9 @@ def test_each_value_is_given_to_the_clone(run):
     loop = (SET, "FOR i := 1 TO 2 DO", *body, "ENDFOR")
     outcome = run(text_of(*loop, declared="i : INTEGER\r\n  p : POSITION"))
     visits, status = outcome.visits, outcome.decisions.status
-    named = [visits.names[k] for k in visits.name[status == Status.CORRECTED]]
+    named = [
+        visits.target.names[k] for k in visits.target.name[status == Status.CORRECTED]
+    ]
     assert named.count("p") == named.count("p__2") == 2
     assert outcome.outputs["job.pdl"].count(b"p__2 := POS") == 2
 

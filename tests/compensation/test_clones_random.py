@@ -47,14 +47,18 @@ def made_with(seed: int, exact: bool) -> Generated:
 def all_disagree(reading: ParsedProgram, seed: int) -> Proposal:
     """Let every arrival ask for a change of its own."""
     visits, rng = reading.visits, np.random.default_rng(seed)
-    usable = (visits.reason == 0) & (visits.literal >= 0)
+    usable = (visits.reason == 0) & (visits.target.literal >= 0)
     nothing = np.zeros((len(visits), 6))
     status = np.where(usable, Status.CONFLICT, Status.RUNTIME)
     why = np.zeros(len(visits), dtype=np.int64)
     decisions = Decisions(status, why, (NO_REASON,), nothing, nothing, nothing, nothing,
                           nothing[:, :3], nothing[:, :3])  # fmt: skip
     change = rng.integers(0, 3, (len(visits), 3)).astype(float)
-    places = (visits.file.tolist(), visits.line.tolist(), visits.literal.tolist())
+    places = (
+        visits.place.file.tolist(),
+        visits.place.line.tolist(),
+        visits.target.literal.tolist(),
+    )
     own: dict[tuple[int, ...], np.ndarray] = {}
     for row, place in enumerate(zip(*places, strict=True)):
         change[row] = own.setdefault(place, change[row])  # one move agrees with itself

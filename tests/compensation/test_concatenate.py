@@ -13,14 +13,15 @@ from tests.generated.landing import program
 
 SEEDS = range(40)
 TOLD = (  # columns that mean the same wherever they stand
-    "line", "motion", "target", "via", "distance_mm", "config_given", "tool_remote",
-    "nearest_turn", "care", "fly", "zone_mm", "overlap_percent", "blend", "zone_rule",
-    "lin_spd", "rot_spd", "override", "wrist_joint", "orientation_law",
+    "line", "kind", "meaning", "via", "distance_mm", "config_given", "tool_remote",
+    "nearest_turn", "care", "fly", "size_mm", "overlap_percent", "blend", "rule",
+    "linear", "turning", "override", "wrist_joint", "orientation_law",
     "arc_angle", "curved",
 )  # fmt: skip
 LOOKED_UP = (
-    ("file", "files"), ("config", "configs"), ("name", "names"), ("reason", "reasons"),
-    ("tool", "frames"), ("base", "frames"), ("uframe", "frames"),
+    ("target", "config", "configs"), ("target", "name", "names"),
+    ("frame", "tool", "poses"), ("frame", "base", "poses"),
+    ("frame", "uframe", "poses"),
 )  # fmt: skip
 
 
@@ -32,22 +33,24 @@ def programs(job_cell):
 
 def told(visits: Visits, v: int, first: int) -> list[object]:
     """Tell one visit of a program that begins at `first` without any index."""
-    told: list[object] = [getattr(visits, name)[v].tolist() for name in TOLD]
-    told += [visits.values[v].tolist(), visits.measure_id[v]]
-    told.append([x for x in visits.aux[v].tolist() if x == x])
-    for column, table in LOOKED_UP:
-        row = getattr(visits, column)[v]
-        found = getattr(visits, table)[row] if row >= 0 else None
+    told: list[object] = [visits.columns[name][v].tolist() for name in TOLD]
+    told += [visits.file_name(v), visits.reasons[visits.reason[v]]]
+    told += [visits.target.values[v].tolist(), visits.place.measure_id[v]]
+    told.append([x for x in visits.target.aux[v].tolist() if x == x])
+    for part, column, table in LOOKED_UP:
+        own = getattr(visits, part)
+        row = getattr(own, column)[v]
+        found = getattr(own, table)[row] if row >= 0 else None
         told.append(found.tolist() if isinstance(found, np.ndarray) else found)
     for column in ("literal", "follows"):
-        row, all_ = getattr(visits, column)[v], visits.literals
+        row, all_ = visits.columns[column][v], visits.literals
         places = all_.places[row : row + 1]
         told.append(row >= 0 and [
             visits.files[all_.file[row]], int(all_.line[row]), places.start.tolist(),
             places.end.tolist(), bool(all_.joints[row]), all_.name[row],
             bool(all_.shared[row]), bool(all_.taught[row]), all_.pinned[row],
         ])  # fmt: skip
-    pred = visits.predecessors(v)
+    pred = visits.graph.predecessors(v)
     return [*told, np.where(pred >= 0, pred - first, pred).tolist()]
 
 
@@ -63,7 +66,7 @@ def test_every_visit_says_the_same(programs):
 def test_literals_follow_each_other(programs):
     together = concatenate(programs)
     assert len(together.literals) == sum(len(own.literals) for own in programs)
-    used = together.literal[together.literal >= 0]
+    used = together.target.literal[together.target.literal >= 0]
     assert used.max() < len(together.literals)
 
 
@@ -72,7 +75,7 @@ def test_names_stay_texts(job_cell):
     files = {job.name: job.source, "spot.lsv": job.variables}
     own = read_program(files, job_cell).visits
     together = concatenate([own, own])
-    for names in (together.names, together.literals.name):
+    for names in (together.target.names, together.literals.name):
         assert isinstance(names, tuple) and {type(name) for name in names} == {str}
     assert together.literals.name == (*own.literals.name, *own.literals.name)
 
@@ -90,5 +93,5 @@ def test_each_program_has_as_many_auxiliary_axes_as_it_uses(job_cell):
         read_program({"a.pdl": head + move + tail}, job_cell).visits for move in moves
     ]
     together = concatenate(own)
-    assert [v.aux.shape[1] for v in own] == [0, 2]
-    np.testing.assert_array_equal(together.aux, [[np.nan, np.nan], [7.0, 8.0]])
+    assert [v.target.aux.shape[1] for v in own] == [0, 2]
+    np.testing.assert_array_equal(together.target.aux, [[np.nan, np.nan], [7.0, 8.0]])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 
 from postproc.compensation import windowing as cuts
 from postproc.compensation.windowing import (
-    SHARED,
     Window,
     cut_points,
     seams,
@@ -86,15 +84,15 @@ def test_inside_runs_arcs_are_kept_whole() -> None:
 @pytest.mark.parametrize("seed", range(60))
 def test_nothing_crosses(seed: int) -> None:
     visits = read(reachable(seed, exact=seed % 2 == 0, pages=False).text)
-    assert not (cut_points(visits) & (~seams(visits) | visits.fly)).any()
+    assert not (cut_points(visits) & (~seams(visits) | visits.motion.fly)).any()
     found = np.flatnonzero(seams(visits)).tolist()
-    to = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
-    literals = visits.literal, visits.follows
+    to = np.repeat(np.arange(len(visits)), np.diff(visits.graph.pred_start))
+    literals = visits.target.literal, visits.target.follows
     for c in found:
-        assert not visits.via[c]
-        assert visits.predecessors(c + 1).tolist() == [c]
-        known = visits.pred >= 0
-        across = known & ((visits.pred <= c) != (to <= c))
+        assert not visits.motion.via[c]
+        assert visits.graph.predecessors(c + 1).tolist() == [c]
+        known = visits.graph.pred >= 0
+        across = known & ((visits.graph.pred <= c) != (to <= c))
         assert across.sum() == 1
         left = {k for column in literals for k in column[: c + 1].tolist()}
         right = {k for column in literals for k in column[c + 1 :].tolist()}
@@ -131,18 +129,19 @@ def same_columns(some: Window, visits: Visits) -> None:
     """Compare a window with its program."""
     part = some.of(visits)
     assert len(part) == some.stop - some.begin
-    for f in fields(Visits):
-        column, whole = getattr(part, f.name), getattr(visits, f.name)
-        if f.name not in SHARED:
+    for name, column in part.columns.items():
+        if name != "block":
             rows = slice(some.begin + some.seeds, some.stop)
-            np.testing.assert_array_equal(column[some.seeds :], whole[rows])
+            np.testing.assert_array_equal(
+                column[some.seeds :], visits.columns[name][rows]
+            )
     for v in range(some.seeds, len(part)):
-        wanted = visits.predecessors(v + some.begin)
+        wanted = visits.graph.predecessors(v + some.begin)
         moved = np.where(wanted >= 0, wanted - some.begin, wanted)
-        np.testing.assert_array_equal(part.predecessors(v), moved)
+        np.testing.assert_array_equal(part.graph.predecessors(v), moved)
     if some.seeds:
-        assert part.literal[0] == part.follows[0] == -1
-        assert len(part.predecessors(0)) == 0
+        assert part.target.literal[0] == part.target.follows[0] == -1
+        assert len(part.graph.predecessors(0)) == 0
 
 
 def test_a_short_program_is_one_window() -> None:
@@ -158,8 +157,10 @@ def test_a_run_up_comes_from_anywhere(make) -> None:
     some = window(seams(visits), 250, len(visits), 30)
     assert 30 <= some.first - some.begin - 1 < 40
     found = some.of(visits, known=False)
-    np.testing.assert_array_equal(found.values, visits.values[some.begin :])
-    assert found.literal[0] == -1
-    before = [found.predecessors(v).tolist() for v in range(len(found))]
+    np.testing.assert_array_equal(
+        found.target.values, visits.target.values[some.begin :]
+    )
+    assert found.target.literal[0] == -1
+    before = [found.graph.predecessors(v).tolist() for v in range(len(found))]
     assert before == [[-1], *([v] for v in range(len(found) - 1))]
     assert window(seams(visits), 30, len(visits), 30).begin == 0

@@ -51,7 +51,7 @@ def test_a_computed_target_moves_along(job, computed):
     moved = np.subtract(literal(outcome), [100.0, 200.0, 150.0, 0.0, 175.0, 0.0])
     assert np.linalg.norm(moved) > 0.5
     again = read_program(dict(outcome.outputs), job[0]).visits
-    change = again.values[2] - outcome.visits.values[2]
+    change = again.target.values[2] - outcome.visits.target.values[2]
     assert change == pytest.approx(moved, abs=1e-6)
     planned = [plan_visits(v, job[0]).plan.tcp[2] for v in (outcome.visits, again)]
     step = np.linalg.norm(planned[1][:3, 3] - planned[0][:3, 3])

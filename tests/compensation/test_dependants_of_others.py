@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -33,10 +31,10 @@ def planned(job_cell):
 
 def test_all_that_moves_along_is_foretold(job_cell, planned) -> None:
     visits, before = planned
-    assert visits.follows.tolist() == [-1, -1, 1, 1, -1, -1, -1, 1]
-    values = np.array(visits.values)
+    assert visits.target.follows.tolist() == [-1, -1, 1, 1, -1, -1, -1, 1]
+    values = np.array(visits.target.values)
     values[[*P], :3] += MOVED_MM
-    after = plan_visits(replace(visits, values=values), job_cell)
+    after = plan_visits(visits.with_columns(values=values), job_cell)
     real = (after.plan.tcp - before.plan.tcp)[:, :3, 3]
     shift = np.where(np.arange(len(visits))[:, None] == P[0], real, 0.0)
     found = with_dependants(visits, before, job_cell, values, shift)

@@ -49,27 +49,42 @@ def both(job_cell: Cell) -> tuple[Visits, Visits]:
 
 def test_a_clone_goes_where_the_original_went(both: tuple[Visits, Visits]) -> None:
     before, after = both
-    assert equivalent(before, after, NONE, before.values, {2: "q"}) == ""
-    assert "other moves" in equivalent(before, after, NONE, before.values)
-    assert "other moves" in equivalent(before, after, NONE, before.values, {1: "q"})
-    assert "name" in equivalent(before, after, NONE, before.values, {2: "r"})
+    assert equivalent(before, after, NONE, before.target.values, {2: "q"}) == ""
+    assert "other moves" in equivalent(before, after, NONE, before.target.values)
+    assert "other moves" in equivalent(
+        before, after, NONE, before.target.values, {1: "q"}
+    )
+    assert "name" in equivalent(before, after, NONE, before.target.values, {2: "r"})
     both_cloned = {0: "q", 2: "q"}
-    assert "other moves" in equivalent(before, after, NONE, before.values, both_cloned)
-    assert "other moves" in equivalent(after, before, NONE, after.values)
+    assert "other moves" in equivalent(
+        before, after, NONE, before.target.values, both_cloned
+    )
+    assert "other moves" in equivalent(after, before, NONE, after.target.values)
 
 
-@pytest.mark.parametrize("column", ["motion", "fly", "lin_spd", "pred", "config_given"])
-def test_nothing_else_may_differ(both: tuple[Visits, Visits], column: str) -> None:
+@pytest.mark.parametrize(
+    ("part", "column"),
+    [("motion", "kind"), ("motion", "fly"), ("speed", "linear"), ("graph", "pred"),
+     ("target", "config_given"), ("frame", "poses")],
+)  # fmt: skip
+def test_nothing_else_may_differ(
+    both: tuple[Visits, Visits], part: str, column: str
+) -> None:
     before, after = both
-    other = np.array(getattr(after, column))
+    whole = getattr(after, part)
+    other = np.array(getattr(whole, column))
     other[1] = ~other[1] if other.dtype == bool else 5
-    wrong = replace(after, **{column: other})
-    told = equivalent(before, wrong, NONE, before.values, {2: "q"})
-    assert told == f"the output has another {column}"
-    texts = replace(after, configs=("", "x"), config=np.array([1, 0, 0]))
-    assert "config" in equivalent(before, texts, NONE, before.values, {2: "q"})
+    wrong = replace(after, **{part: replace(whole, **{column: other})})
+    told = equivalent(before, wrong, NONE, before.target.values, {2: "q"})
+    assert told == f"the output has another {part}: {column}"
+
+
+def test_nothing_else_may_be_said(both: tuple[Visits, Visits]) -> None:
+    before, after = both
+    texts = after.with_columns(configs=("", "x"), config=np.array([1, 0, 0]))
+    assert "config" in equivalent(before, texts, NONE, before.target.values, {2: "q"})
     display = replace(after, reason=np.array([0, 1, 0]), reasons=(NO_REASON, MOVES))
-    assert "reason" in equivalent(before, display, NONE, before.values, {2: "q"})
-    values = after.values + np.array([0.0, 0.0, 1e-9, 0.0, 0.0, 0.0])
-    moved = replace(after, values=values)
+    assert "reason" in equivalent(before, display, NONE, before.target.values, {2: "q"})
+    values = after.target.values + np.array([0.0, 0.0, 1e-9, 0.0, 0.0, 0.0])
+    moved = after.with_columns(values=values)
     assert "to be kept" in equivalent(before, moved, NONE, values, {2: "q"})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -127,9 +126,9 @@ def test_what_moves_along_is_foretold(cell, model):
     lines += ["LIN {Z 700}", "LIN {X 900,Y 300}", "LIN {X 850,Y 250,Z 650}"]
     ready = prepare_cell(cell, model, DEFAULT_OPTIONS)
     visits = read_program({"job.src": job(*lines)}, ready).visits
-    before, values = plan_visits(visits, ready), np.array(visits.values)
+    before, values = plan_visits(visits, ready), np.array(visits.target.values)
     values[2, :3] += [0.5, -0.3, 0.8]
-    after = plan_visits(replace(visits, values=values), ready)
+    after = plan_visits(visits.with_columns(values=values), ready)
     real = (after.plan.tcp - before.plan.tcp)[:, :3, 3]
     shift = np.where(np.arange(len(visits))[:, None] == 2, real, 0.0)
     found = with_dependants(visits, before, cell, values, shift)

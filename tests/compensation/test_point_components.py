@@ -44,8 +44,8 @@ def compare(done, twin, count):
     """Compare jobs that end with moves whose numbers stand in them, and the others."""
     v, w = done.visits, twin.visits
     assert len(v) == len(w)
-    assert (v.target == w.target).all()
-    assert np.nanmax(np.abs(v.values - w.values)[:, :6]) < 2e-6
+    assert (v.target.meaning == w.target.meaning).all()
+    assert np.nanmax(np.abs(v.target.values - w.target.values)[:, :6]) < 2e-6
     sides = (one.decisions.side[-count:] for one in (done, twin))
     assert np.array_equal(*sides)
     assert (done.decisions.status[-count:] == Status.CORRECTED).all()
@@ -243,7 +243,8 @@ def test_what_is_not_certain_is_not_followed(shop, kind):
     lines, done = rapid_done(shop, UNCERTAIN[kind], BESIDE)
     v, d = done.visits, done.decisions
     last = -2 if kind == "before all is set" else -1
-    assert v.target[last] == Meaning.UNKNOWN and np.isnan(v.values[last]).all()
+    assert v.target.meaning[last] == Meaning.UNKNOWN
+    assert np.isnan(v.target.values[last]).all()
     assert d.status[last] != Status.CORRECTED
     if kind == "before all is set":
         return
@@ -418,7 +419,8 @@ def test_krl_does_not_follow_what_is_not_certain(shop, kind):
     lines, now, done = krl_done(shop, KRL_UNCERTAIN[kind], KRL_BESIDE)
     v, d = done.visits, done.decisions
     last = -2 if lines[-1].startswith("LIN {") else -1
-    assert v.target[last] == Meaning.UNKNOWN and np.isnan(v.values[last]).all()
+    assert v.target.meaning[last] == Meaning.UNKNOWN
+    assert np.isnan(v.target.values[last]).all()
     assert d.status[last] != Status.CORRECTED
     own = f"{{{six(shop.point('p1'))},{flags(shop, 'p1')}}}"
     held = {line for line in lines if own in line and not line.startswith("LIN")}

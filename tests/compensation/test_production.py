@@ -96,7 +96,7 @@ def milling(production) -> Ran:
 
 
 def test_the_spot_job_lands(spot) -> None:
-    targets = spot.outcome.visits.literal >= 0
+    targets = spot.outcome.visits.target.literal >= 0
     miss = np.linalg.norm(spot.landed[targets], axis=1)
     sure = np.abs(spot.outcome.decisions.side[targets]).min(axis=1) >= SURE
     assert targets.sum() == 107 and sure.sum() >= 95

@@ -122,7 +122,7 @@ def test_pages_without_a_name_keep_their_numbers(job_cell):
         files[f"{name}.pdl"] = PAGE.format("7", name, number).encode()
     reading = read_program(files, job_cell)
     assert [source.name for source in reading.sources] == list(reading.visits.files)
-    assert reading.visits.values[:, 0].tolist() == [1.0, 2.0]
+    assert reading.visits.target.values[:, 0].tolist() == [1.0, 2.0]
     assert reading.visits.literals.file.tolist() == [1, 2]
 
 

@@ -160,7 +160,7 @@ def test_joint_angles_are_the_same_anywhere_on_a_track(cell: Cell) -> None:
     aux = np.full((2, 3), np.nan)
     aux[0, 1] = 500.0
     given = visits([Meaning.POSE, Meaning.JOINTS], [POSE, POSE], aux=aux)
-    assert np.isnan(with_tracks(given, cell).aux[1]).all()
+    assert np.isnan(with_tracks(given, cell).target.aux[1]).all()
 
 
 def test_a_remote_tool_is_not_guessed(cell: Cell) -> None:

@@ -45,7 +45,7 @@ def test_the_arm_lands_there_whatever_the_controller_does(
     source = of_any_size(krl(drawn(bench_cell, seed)))
     found = compensated("job.src", source, bench_cell, bench_model)
     v, d = found.visits, found.decisions
-    assert (v.zone_rule == ZoneRule.UNKNOWN).sum() > 5
+    assert (v.zone.rule == ZoneRule.UNKNOWN).sum() > 5
     assert "fly-unknown" in {one.code for one in found.diagnostics}
     body, setup = (
         virtual_arm(SEED, tool=setup_of(bench_cell).tool),
@@ -58,8 +58,8 @@ def test_the_arm_lands_there_whatever_the_controller_does(
         )
         before, after = land(body, setup, given), land(body, setup, given, made)
         rows = after.visit
-        points = (d.status[rows] == Status.CORRECTED) & ~v.via[rows] & (rows > 0)
-        points &= v.zone_rule[rows] == ZoneRule.UNKNOWN
+        points = (d.status[rows] == Status.CORRECTED) & ~v.motion.via[rows] & (rows > 0)
+        points &= v.zone.rule[rows] == ZoneRule.UNKNOWN
         sure = points & (d.direction[rows] != 0).all(axis=1)
         was, is_ = (1e3 * np.linalg.norm(x.error, axis=1) for x in (before, after))
         assert points.sum() > 5
@@ -205,7 +205,7 @@ def test_which_corners_are_not_known(bench_cell, title):
     head += ["ROUTINE rest", "BEGIN", "DELAY 200", "END rest", "BEGIN"]
     text = "\n".join([*head, *lines, "END job", ""]).encode()
     visits = read_program({"job.pdl": text}, bench_cell).visits
-    assert find_open_corners(visits)[visits.fly].tolist() == [wanted]
+    assert find_open_corners(visits)[visits.motion.fly].tolist() == [wanted]
 
 
 def test_a_stop_before_two_ways_is_no_corner(bench_cell):

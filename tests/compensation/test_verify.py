@@ -40,8 +40,8 @@ def written(cell: Cell) -> tuple[ParsedProgram, Output, np.ndarray]:
     rows = np.flatnonzero(~reading.visits.literals.joints)
     values = np.zeros((len(rows), 6))
     for at, row in enumerate(rows):
-        visit = np.flatnonzero(reading.visits.literal == row)[0]
-        values[at] = reading.visits.values[visit] + [1, 0, 0, 0, 0, 0]
+        visit = np.flatnonzero(reading.visits.target.literal == row)[0]
+        values[at] = reading.visits.target.values[visit] + [1, 0, 0, 0, 0, 0]
     return reading, write_numbers(reading, rows, values, "0" * 16), rows
 
 
@@ -85,11 +85,11 @@ def test_a_target_that_was_to_be_kept_is_refused(job_cell: Cell) -> None:
     after = read_program(output.files, job_cell)
     with pytest.raises(VerificationError, match="was to be kept"):
         check(reading, after, output, rows[1:])
-    values = np.array(reading.visits.values)
+    values = np.array(reading.visits.target.values)
     with pytest.raises(VerificationError, match="as it was meant"):
         check_output(reading, after, output, rows, values)
-    frames = after.visits.frames + 1e-3
-    moved = replace(after, visits=replace(after.visits, frames=frames))
+    frames = after.visits.frame.poses + 1e-3
+    moved = replace(after, visits=after.visits.with_columns(poses=frames))
     with pytest.raises(VerificationError, match="another frames"):
         check(reading, moved, output, rows)
     fewer = replace(

@@ -48,8 +48,8 @@ def job(request, cell):
     reading = read_program(files, cell)
     v = reading.visits
     rows = np.arange(len(v.literals))
-    first = [int(np.flatnonzero(v.literal == row)[0]) for row in rows]
-    moved = v.values[first] + np.array([0.25, -11.5, 100.0, 0.5, 0.25, 0.125])
+    first = [int(np.flatnonzero(v.target.literal == row)[0]) for row in rows]
+    moved = v.target.values[first] + np.array([0.25, -11.5, 100.0, 0.5, 0.25, 0.125])
     output = write_numbers(reading, rows, moved, "m")
     return reading, output, rows, read_back(v, rows, output.edits)
 
@@ -74,9 +74,9 @@ def test_another_byte_is_refused(job, cell, old, new) -> None:
 def test_a_number_that_reads_otherwise_is_refused(job, cell) -> None:
     reading, output, rows, values = job
     after = read_program(output.files, cell)
-    read = after.visits.values.copy()
-    read[after.visits.literal >= 0, 3] += 1e-4
-    wrong = replace(after, visits=replace(after.visits, values=read))
+    read = after.visits.target.values.copy()
+    read[after.visits.target.literal >= 0, 3] += 1e-4
+    wrong = replace(after, visits=after.visits.with_columns(values=read))
     with pytest.raises(VerificationError, match="not read as it was meant"):
         check_output(reading, wrong, output, rows, values)
 
@@ -111,10 +111,10 @@ def test_what_was_parsed_is_not_parsed_again(cell) -> None:
     values = made.variables.replace(b"88.100", b"88.125")
     again = read_program({**files, "spot.lsv": values}, cell, reading.programs)
     assert again.programs[0] is program
-    assert not np.array_equal(again.visits.values, reading.visits.values)
+    assert not np.array_equal(again.visits.target.values, reading.visits.target.values)
     other = made.source.replace(b"MOVE JOINT TO WP_3", b"MOVE JOINT TO WP_4")
     again = read_program({**files, "spot.pdl": other}, cell, reading.programs)
     assert again.programs[0] is not program
-    assert again.visits.names[again.visits.name[3]] == "WP_4"
+    assert again.visits.target.names[again.visits.target.name[3]] == "WP_4"
     (kept,) = read_program({"a.pdl": POSES}, cell).programs
     assert len(kept.lines.value) == 0  # they are about to change

@@ -235,4 +235,4 @@ def test_what_was_looked_at_last_is_what_is_read_from_the_output(
 ) -> None:
     outcome = job(made.drilling(400))
     again = read_program(dict(outcome.outputs), bench_cell).visits
-    np.testing.assert_array_equal(again.values, outcome.decisions.corrected)
+    np.testing.assert_array_equal(again.target.values, outcome.decisions.corrected)

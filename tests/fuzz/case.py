@@ -68,12 +68,12 @@ def rewrite(files: Mapping[str, bytes], cell: Cell) -> str:
     visits = reading.visits
     rows = np.arange(len(visits.literals))
     example = np.zeros(len(rows), dtype=np.int64)
-    own = visits.literal >= 0
-    example[visits.literal[own]] = np.flatnonzero(own)
-    known = np.isfinite(visits.values[example]).all(axis=1)
+    own = visits.target.literal >= 0
+    example[visits.target.literal[own]] = np.flatnonzero(own)
+    known = np.isfinite(visits.target.values[example]).all(axis=1)
     known &= np.array([not why for why in visits.literals.pinned], dtype=bool)
     rows, example = rows[known], example[known]
-    new = visits.values[example]
+    new = visits.target.values[example]
     new[:, : len(SHIFT)] += SHIFT
     output = write_numbers(reading, rows, new, "0" * 12)
     values = read_back(visits, rows, output.edits)

@@ -24,4 +24,4 @@ def flows(seed: int) -> None:
     assert all(len(now) == 1 for now in follow(visits, trace, made))
     if made.whole.count("IF n") == 0 and "SELECT" not in made.whole:
         assert len(visits) == len(trace)
-        assert (np.diff(visits.pred_start) == 1).all()
+        assert (np.diff(visits.graph.pred_start) == 1).all()

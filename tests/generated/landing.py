@@ -86,7 +86,7 @@ def count_errors(
             if not all(COMPUTED.search(one) for one in why):
                 text = "is listed as not known, but went to new numbers"
                 found.wrong.append((seed, step.line, f"{text}: {' / '.join(why)}"))
-        elif (visits.fly & ~visits.via)[mine].any():
+        elif (visits.motion.fly & ~visits.motion.via)[mine].any():
             found.error_mm[ROUNDED].append(pair)
         elif is_averaged(d, mine):
             found.error_mm[AVERAGED].append(pair)

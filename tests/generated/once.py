@@ -71,7 +71,7 @@ def count_once(
         lost = bool((np.abs(d.side[mine]) < SURE).any())
         found.once[text + BLIND * lost] += 1
         # The path passes a fly point elsewhere where it goes on elsewhere.
-        rounded = len(steps) > 1 and bool(done.visits.fly[mine].any())
+        rounded = len(steps) > 1 and bool(done.visits.motion.fly[mine].any())
         why -= {one for one in why if rounded and one.startswith(DIFFER)}
         if seed % 2 == 0 and not moved and why and not (lost or allowed(why)):
             found.wrong.append((seed, line, f"{LEFT}: {text}"))

@@ -233,13 +233,17 @@ def reasons_of(unit: Unit, outcome: Outcome) -> dict[Place, str]:
     places = {file.rpartition("/")[2]: file for file in unit.files}
     v, d = outcome.visits, outcome.decisions
     found: dict[Place, str] = {}
-    written = set(v.literal[(d.status == Status.CORRECTED) & (v.literal >= 0)].tolist())
+    written = set(
+        v.target.literal[
+            (d.status == Status.CORRECTED) & (v.target.literal >= 0)
+        ].tolist()
+    )
     for finding in outcome.diagnostics:
         if finding.code in NOT_FOLLOWED and finding.file in places:
             found[places[finding.file], finding.line] = finding.message
     for k in range(len(v)):
-        place = places.get(v.files[v.file[k]], ""), int(v.line[k])
-        safe = d.status[k] == Status.CORRECTED or v.follows[k] in written
+        place = places.get(v.files[v.place.file[k]], ""), int(v.place.line[k])
+        safe = d.status[k] == Status.CORRECTED or v.target.follows[k] in written
         reason = "" if safe else d.reasons[d.why[k]].text or Status(d.status[k]).name
         found[place] = found.get(place) or reason
     return found
@@ -286,7 +290,7 @@ def _landed(outcome: Outcome, cell: Cell) -> Misses:
     )
     before, after = land(arm, setup, given), land(arm, setup, given, made)
     v, d, rows = outcome.visits, outcome.decisions, after.visit
-    stops = (d.status == Status.CORRECTED) & ~v.fly & ~v.via
+    stops = (d.status == Status.CORRECTED) & ~v.motion.fly & ~v.motion.via
     stops[:1] = False  # how the gears lie at first is not known
     sure = stops & (d.direction != 0).all(axis=1)
     was, miss = (1e3 * np.linalg.norm(x.error, axis=1) for x in (before, after))

@@ -31,7 +31,7 @@ def test_a_huge_bound_is_not_followed_round_by_round(first, last, step):
     found = krl(first, last, step, "LIN XP1")
     assert len(found.visits) == 2 and reasons(found)[1]
     visits = rapid(first, last, step, go("p1")).visits
-    assert len(visits) <= 3 and visits.names[visits.name[-1]] == "p2"
+    assert len(visits) <= 3 and visits.target.names[visits.target.name[-1]] == "p2"
 
 
 def test_rounds_within_rounds_are_counted_together():

@@ -35,7 +35,7 @@ def test_loops_without_an_end_are_not_followed_round_by_round(first, last):
 )  # fmt: skip
 def test_targets_of_rapid_that_are_infinitely_far_are_left(goal):
     visits = once(L.format(goal), L.format("p1")).visits
-    assert visits.reason[0] > 0 and np.isnan(visits.values[0, 0])
+    assert visits.reason[0] > 0 and np.isnan(visits.target.values[0, 0])
 
 
 @pytest.mark.filterwarnings("error")
@@ -48,4 +48,4 @@ def test_targets_of_rapid_that_are_infinitely_far_are_left(goal):
 )  # fmt: skip
 def test_targets_of_krl_that_are_infinitely_far_are_left(goal):
     visits = job(f"LIN {goal}", "LIN XP1").visits
-    assert visits.reason[0] > 0 and np.isnan(visits.values[0, 0])
+    assert visits.reason[0] > 0 and np.isnan(visits.target.values[0, 0])

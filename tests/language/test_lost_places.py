@@ -66,5 +66,5 @@ def test_where_it_may_pass_or_stop(
 ) -> None:
     text = JOBS[kind] % line
     visits = read_program({f"job.{kind}": text.encode()}, bench_cell).visits
-    first = next(k for k in range(len(visits)) if visits.values[k, 0] == 100.0)
+    first = next(k for k in range(len(visits)) if visits.target.values[k, 0] == 100.0)
     assert bool(find_open_corners(visits)[first]) == open_

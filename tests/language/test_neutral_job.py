@@ -15,8 +15,7 @@ from tests.conftest import SEED
 from tests.language.neutral_job import LANGUAGES, compensated, drawn, rapid
 
 SAME = {
-    "motion", "target", "via", "fly", "pred_start", "pred", "reason",
-    "tool_remote", "wrist_joint", "nearest_turn",
+    "kind", "meaning", "via", "fly", "tool_remote", "wrist_joint", "nearest_turn"
 }  # fmt: skip
 STOP_MM = 0.1
 
@@ -36,13 +35,16 @@ def test_visits_and_states_are_the_same(bench_cell, seed):
 def assert_same_visits(one, two, bench_cell):
     assert len(one) == len(two) > 40
     for name in SAME:
-        a, b = getattr(one, name), getattr(two, name)
+        a, b = one.columns[name], two.columns[name]
         assert np.array_equal(a, b), name
-    fly = one.fly & ~one.via
-    for name in ("zone_mm", "blend", "zone_rule"):
-        a, b = getattr(one, name)[fly], getattr(two, name)[fly]
+    assert np.array_equal(one.graph.pred, two.graph.pred)
+    assert np.array_equal(one.graph.pred_start, two.graph.pred_start)
+    assert np.array_equal(one.reason, two.reason)
+    fly = one.motion.fly & ~one.motion.via
+    for name in ("size_mm", "blend", "rule"):
+        a, b = one.columns[name][fly], two.columns[name][fly]
         np.testing.assert_array_equal(a, b)
-    np.testing.assert_allclose(one.lin_spd, two.lin_spd)
+    np.testing.assert_allclose(one.speed.linear, two.speed.linear)
     plans = [plan_visits(v, bench_cell) for v in (one, two)]
     more = plans[0].reasons.none & ~plans[1].reasons.none
     # Where the arm has stranded, a line to S and T does not tell the configuration.
@@ -72,7 +74,7 @@ def assert_same_corrections(one, two):
     assert (a.status == b.status).all() and (a.status == 0).mean() > 0.8
     np.testing.assert_allclose(a.correction, b.correction, rtol=0, atol=1e-9)
     # Position [mm] and joint angles have the same decimals in both languages.
-    joints = one.visits.target == 1
+    joints = one.visits.target.meaning == 1
     np.testing.assert_array_equal(a.corrected[~joints, :3], b.corrected[~joints, :3])
     np.testing.assert_array_equal(a.corrected[joints, :6], b.corrected[joints, :6])
 
@@ -98,7 +100,7 @@ def test_the_tool_lands_at_stops(bench_cell, bench_model, name):
     )
     arm = virtual_arm(SEED, tool=setup_of(bench_cell).tool)
     landing = land(arm, setup_of(bench_cell), given, made)
-    stops = ~given.fly[landing.visit] & ~given.via[landing.visit]
+    stops = ~given.motion.fly[landing.visit] & ~given.motion.via[landing.visit]
     stops &= landing.visit > 0  # where the arm begins, its joints lie nobody knows how
     miss = 1000.0 * np.linalg.norm(landing.error[stops], axis=1)
     assert stops.sum() > 15

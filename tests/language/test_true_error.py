@@ -120,10 +120,10 @@ def test_confdata_is_that_of_the_rounded_numbers(bench_cell, bench_model):
         stops = (found.decisions.status[rows] == Status.CORRECTED) & (
             made.target[rows] == Meaning.POSE
         )
-        stops &= ~made.fly[rows]
+        stops &= ~made.motion.fly[rows]
         assert stops.sum() > 5
         turns = np.rad2deg(run.arrivals.q[stops][:, [0, 3, 5]])
-        count = made.values[rows[stops], 7:10]
+        count = made.target.values[rows[stops], 7:10]
         beyond = np.maximum(90.0 * count - turns, turns - 90.0 * (count + 1.0))
         assert beyond.max() <= 0.001  # [deg]
     assert anew > 5
@@ -144,10 +144,10 @@ def test_t_is_that_of_the_rounded_numbers(bench_cell, bench_model):
         made = read_program(output, bench_cell).visits
         run = run_program(virtual_arm(SEED, tool=setup.tool), setup, made)
         rows = run.visit
-        ends = made.config_given[rows] & (made.motion[rows] == Motion.JOINT)
+        ends = made.target.config_given[rows] & (made.motion[rows] == Motion.JOINT)
         safe = ends & (found.decisions.status[rows] == Status.CORRECTED)
         q = np.rad2deg(run.arrivals.q)
-        bits = (made.values[rows, 7].astype(int)[:, None] >> np.arange(6)) & 1
+        bits = (made.target.values[rows, 7].astype(int)[:, None] >> np.arange(6)) & 1
         assert safe.sum() > 0 and (bits == (q < 0))[safe].all()
         assert np.abs(q[safe]).min() > 0.0199
         decisions = found.decisions
@@ -208,9 +208,9 @@ def test_s_need_not_change_where_the_arm_turns_over(
         run = run_program(virtual_arm(SEED, tool=setup.tool), setup, made)
         rows, q = run.visit, run.arrivals.q
         good = found.decisions.status[rows] == Status.CORRECTED
-        good &= made.config_given[rows]
+        good &= made.target.config_given[rows]
         branch = bench_cell.arm.branch(q)
-        s = made.values[rows, 6].astype(int)
+        s = made.target.values[rows, 6].astype(int)
         assert ((s & 1 > 0) == (branch & 2 > 0))[good].all()
         assert ((s & 2 > 0) == (branch & 1 == 0))[good].all()
         turned = np.abs(q - found.decisions.q[rows])[good]

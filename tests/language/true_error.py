@@ -131,7 +131,7 @@ def landed(
         landing = land(body, setup, given, executed)
         misses.append(1000.0 * np.linalg.norm(landing.error, axis=1))
     rows = landing.visit
-    stops = ~given.fly[rows] & ~given.via[rows]
+    stops = ~given.motion.fly[rows] & ~given.motion.via[rows]
     stops &= rows > 0  # where the arm begins, its joints lie nobody knows how
     mended = stops & (found.decisions.status[rows] == Status.CORRECTED)
     before, after = (miss[mended] for miss in misses)

@@ -10,6 +10,7 @@ from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.visits import Literals, Meaning, NumberPlaces, Visits
 from postproc.robot.trajectory import Motion
 from postproc.simulation.kinematics import pose_of_record
+from tests.made_visits import assemble
 
 
 @dataclass
@@ -59,9 +60,9 @@ class Program:
         nothing = np.zeros(n, dtype=np.int64)
         no = np.zeros(n, dtype=bool)
         nan = np.full(n, np.nan)
-        return Visits(
+        return assemble(
             files=("test.pdl",), file=nothing.copy(), line=np.arange(n) + 1,
-            motion=column("motion", np.int64), target=column("target", np.int64),
+            kind=column("motion", np.int64), meaning=column("target", np.int64),
             via=column("via", bool), values=column("values", float).reshape(n, 6),
             distance_mm=column("distance", float), aux=np.zeros((n, 0)),
             config=np.array([configs.index(r["config"] or "") for r in self.rows]),
@@ -70,15 +71,15 @@ class Program:
             literal=nothing - 1, follows=nothing - 1, name=nothing.copy(), names=("",),
             tool=column("tool", np.int64), base=column("base", np.int64),
             uframe=column("uframe", np.int64),
-            frames=pose_of_record(np.array(self.frames, float).reshape(-1, 6)),
-            frame_taught=np.zeros(len(self.frames), dtype=bool),
+            poses=pose_of_record(np.array(self.frames, float).reshape(-1, 6)),
+            taught=np.zeros(len(self.frames), dtype=bool),
             tool_remote=no.copy(), nearest_turn=column("nearest", bool),
             care=np.zeros((n, 3), dtype=np.int64),
-            fly=column("fly", bool), zone_mm=column("fly_dist", float),
+            fly=column("fly", bool), size_mm=column("fly_dist", float),
             overlap_percent=column("overlap_percent", float),
             blend=column("blend", np.int64),
-            zone_rule=column("zone_rule", np.int64), lin_spd=column("speed", float),
-            rot_spd=nan.copy(),
+            rule=column("zone_rule", np.int64), linear=column("speed", float),
+            turning=nan.copy(),
             override=np.ones(n), wrist_joint=column("wrist", bool),
             orientation_law=nothing.copy(), arc_angle=nan.copy(),
             block=nothing - 1, curved=no.copy(),

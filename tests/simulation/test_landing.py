@@ -27,7 +27,7 @@ def test_uncompensated_the_error_is_that_of_the_arm() -> None:
     visits = grid().visits()
     found = land(ARM, SETUP, visits)
     np.testing.assert_array_equal(found.visit, np.arange(9))
-    wanted = visits.values[:, :3] * 1e-3
+    wanted = visits.target.values[:, :3] * 1e-3
     np.testing.assert_allclose(found.wanted, wanted, atol=1e-12)
     run = run_program(ARM, SETUP, visits)
     np.testing.assert_allclose(found.error, ARM.error(run.arrivals), atol=1e-12)

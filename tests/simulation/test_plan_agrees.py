@@ -65,9 +65,9 @@ def program(cell: Cell, rng: np.random.Generator) -> Visits:
             via.append(on_way)
             branch.append(int(q[4] < 0))
     return visits(
-        target, values, motion=np.array(motion), via=np.array(via, dtype=bool),
+        target, values, kind=np.array(motion), via=np.array(via, dtype=bool),
         config=np.array(branch), configs=("T1:0 T2:0", "W"),
-        lin_spd=np.full(len(target), 0.1),
+        linear=np.full(len(target), 0.1),
     )  # fmt: skip
 
 
@@ -92,7 +92,7 @@ def with_steps(cell: Cell, rng: np.random.Generator) -> Visits:
             target.append(int(kind))
             values.append(numbers)
             motion.append(int(Motion.JOINT if joints else Motion.LINEAR))
-    return visits(target, values, motion=np.array(motion))
+    return visits(target, values, kind=np.array(motion))
 
 
 def with_parts(cell: Cell, rng: np.random.Generator) -> Visits:
@@ -113,7 +113,7 @@ def with_parts(cell: Cell, rng: np.random.Generator) -> Visits:
             distance.append(rng.uniform(0.0, 40.0))
     joints = np.array(target) == Meaning.JOINTS
     motion = np.where(joints, Motion.JOINT, Motion.LINEAR)
-    return visits(target, values, motion=motion, distance_mm=np.array(distance))
+    return visits(target, values, kind=motion, distance_mm=np.array(distance))
 
 
 def with_gaps(cell: Cell, rng: np.random.Generator) -> Visits:
@@ -137,7 +137,7 @@ def with_gaps(cell: Cell, rng: np.random.Generator) -> Visits:
             target.append(int(kind))
             values.append(numbers)
             motion.append(int(how))
-    return visits(target, values, motion=np.array(motion))
+    return visits(target, values, kind=np.array(motion))
 
 
 @pytest.mark.parametrize("seed", [0, 1])

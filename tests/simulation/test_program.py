@@ -29,7 +29,7 @@ def test_a_pose_is_reached_through_all_frames() -> None:
     visits = program.visits()
     run = run_program(ARM, SETUP, visits)
     assert run.why == ("",)
-    tool, base, uframe = visits.frames[1:]
+    tool, base, uframe = visits.frame.poses[1:]
     world = base @ NJ220.flange(run.arrivals.q)[0] @ tool
     wanted = uframe @ pose_of_record(np.array(target))
     np.testing.assert_allclose(world, wanted, atol=1e-11)

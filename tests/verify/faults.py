@@ -123,7 +123,7 @@ def wrong_lambda(one: Case, rng: np.random.Generator) -> Wrong:
     direction = np.array(one.output.direction)
     direction[i, j] *= -1
     v = one.output.visits
-    why = FLY if v.fly[i] or v.via[i] else MISSED
+    why = FLY if v.motion.fly[i] or v.motion.via[i] else MISSED
     return f"{one.output.place(i)} axis {j + 1}", one.with_directions(direction), why
 
 
@@ -174,11 +174,11 @@ def _on_branch(claim: Claim, i: int, branch: int, cell: Cell) -> Claim:
 def _free(one: Case, i: int) -> bool:
     """Tell whether nothing says on which branch a visit is."""
     v = one.output.visits
-    behind = np.flatnonzero(v.before == i)
+    behind = np.flatnonzero(v.graph.before == i)
     return bool(
-        v.motion[i] == Motion.JOINT
-        and not v.config_given[i]
-        and (v.motion[behind] == Motion.JOINT).all()
+        v.motion.kind[i] == Motion.JOINT
+        and not v.target.config_given[i]
+        and (v.motion.kind[behind] == Motion.JOINT).all()
     )
 
 
@@ -186,7 +186,7 @@ def _only_where_told(one: Case, told: np.ndarray) -> tuple[Claims, str]:
     """Take directions of another planner, and say whether a stop turns on them."""
     right, v = one.output.direction, one.output.visits
     other = (told != right) & (told != 0) & (right != 0)
-    stops = other[~(v.fly | v.via)].any()
+    stops = other[~(v.motion.fly | v.motion.via)].any()
     return one.with_directions(told), MISSED if stops else NO_STOP
 
 

@@ -82,22 +82,22 @@ def _frames(
     v: Visits, which: str, change: Callable[[np.ndarray], np.ndarray]
 ) -> Visits:
     """Change the frames that visits use as tool, base or uframe."""
-    frames = np.array(v.frames).reshape(-1, 4, 4)
+    frames = np.array(v.frame.poses).reshape(-1, 4, 4)
     rows = np.unique(getattr(v, which))
     for k in rows[rows >= 0]:
         frames[k] = change(frames[k])
-    return replace(v, frames=frames)
+    return v.with_columns(poses=frames)
 
 
 def _poses(v: Visits) -> np.ndarray:
-    return np.isin(v.target, (Meaning.POSE, Meaning.NEAR, Meaning.FOR))
+    return np.isin(v.target.meaning, (Meaning.POSE, Meaning.NEAR, Meaning.FOR))
 
 
 def _values(v: Visits, change: Callable[[np.ndarray], np.ndarray]) -> Visits:
     """Change the numbers of poses, (k, w)."""
-    values, rows = np.array(v.values), _poses(v)
+    values, rows = np.array(v.target.values), _poses(v)
     values[rows] = change(values[rows])
-    return replace(v, values=values)
+    return v.with_columns(values=values)
 
 
 # What is read wrongly.
@@ -125,7 +125,7 @@ def frame_order(one: Case, rng: np.random.Generator) -> Claims:
 
     def swapped(v: Visits) -> Visits:
         inverse = _frames(v, "base", np.linalg.inv)
-        return replace(inverse, base=v.uframe, uframe=v.base)
+        return replace(inverse, base=v.frame.uframe, uframe=v.frame.base)
 
     return read_as(one, swapped)
 
@@ -158,13 +158,13 @@ def inches(one: Case, rng: np.random.Generator) -> Claims:
 
 def approach_sign(one: Case, rng: np.random.Generator) -> Claims:
     """A target that is to be neared is passed by as much."""
-    return read_as(one, lambda v: replace(v, distance_mm=-v.distance_mm))
+    return read_as(one, lambda v: v.with_columns(distance_mm=-v.target.distance_mm))
 
 
 def speed_unit(one: Case, rng: np.random.Generator) -> Claims:
     """Speeds along paths are 20 % higher."""
     return planned_anew(
-        one, one.job.cell, lambda v: replace(v, lin_spd=v.lin_spd * 1.2)
+        one, one.job.cell, lambda v: v.with_columns(linear=v.speed.linear * 1.2)
     )
 
 
@@ -172,7 +172,7 @@ def override_left_out(one: Case, rng: np.random.Generator) -> Claims:
     """All moves go at 80 % though the program says another override."""
 
     def slower(v: Visits) -> Visits:
-        return replace(v, override=np.full(len(v), 0.8))
+        return v.with_columns(override=np.full(len(v), 0.8))
 
     return planned_anew(one, one.job.cell, slower)
 
@@ -181,9 +181,9 @@ def arcs_as_lines(one: Case, rng: np.random.Generator) -> Claims:
     """Arcs are cut short: lines to their VIA point and end."""
 
     def straight(v: Visits) -> Visits:
-        arc = v.motion == Motion.CIRCULAR
-        motion = np.where(arc, int(Motion.LINEAR), v.motion)
-        return replace(v, motion=motion, via=np.zeros(len(v), bool))
+        arc = v.motion.kind == Motion.CIRCULAR
+        motion = np.where(arc, int(Motion.LINEAR), v.motion.kind)
+        return v.with_columns(kind=motion, via=np.zeros(len(v), bool))
 
     return planned_anew(one, one.job.cell, straight)
 
@@ -193,7 +193,9 @@ def lines_as_joint_moves(one: Case, rng: np.random.Generator) -> Claims:
     lines = Motion.LINEAR, Motion.JOINT
 
     def bent(v: Visits) -> Visits:
-        return replace(v, motion=np.where(v.motion == lines[0], lines[1], v.motion))
+        return v.with_columns(
+            kind=np.where(v.motion.kind == lines[0], lines[1], v.motion.kind)
+        )
 
     return planned_anew(one, one.job.cell, bent)
 
@@ -202,9 +204,12 @@ def home_elsewhere(one: Case, rng: np.random.Generator) -> Claims:
     """Joint targets are read with the first two angles swapped."""
 
     def swapped(v: Visits) -> Visits:
-        values, rows = np.array(v.values), np.flatnonzero(v.target == Meaning.JOINTS)
+        values, rows = (
+            np.array(v.target.values),
+            np.flatnonzero(v.target.meaning == Meaning.JOINTS),
+        )
         values[rows[:, None], [0, 1]] = values[rows[:, None], [1, 0]]
-        return replace(v, values=values)
+        return v.with_columns(values=values)
 
     return read_as(one, swapped)
 
@@ -316,19 +321,23 @@ def _arrival(one: Case, rows: np.ndarray, rng: np.random.Generator) -> Claims:
 
 def _stops(one: Case) -> np.ndarray:
     v = one.output.visits
-    return np.asarray(~(v.fly | v.via))
+    return np.asarray(~(v.motion.fly | v.motion.via))
 
 
 def lambda_behind_fly(one: Case, rng: np.random.Generator) -> Claims:
     """A stop behind a fly point is corrected for the other side."""
     v = one.output.visits
-    return _arrival(one, _stops(one) & (v.before >= 0) & v.fly[v.before], rng)
+    return _arrival(
+        one, _stops(one) & (v.graph.before >= 0) & v.motion.fly[v.graph.before], rng
+    )
 
 
 def lambda_behind_stop(one: Case, rng: np.random.Generator) -> Claims:
     """A stop behind a stop is corrected for the other side."""
     v = one.output.visits
-    return _arrival(one, _stops(one) & (v.before >= 0) & ~v.fly[v.before], rng)
+    return _arrival(
+        one, _stops(one) & (v.graph.before >= 0) & ~v.motion.fly[v.graph.before], rng
+    )
 
 
 def lambda_of_first_moves(one: Case, rng: np.random.Generator) -> Claims:
@@ -338,7 +347,7 @@ def lambda_of_first_moves(one: Case, rng: np.random.Generator) -> Claims:
 
 def lambda_of_arcs(one: Case, rng: np.random.Generator) -> Claims:
     """The end of an arc is corrected for the other side."""
-    arc = one.output.visits.motion == Motion.CIRCULAR
+    arc = one.output.visits.motion.kind == Motion.CIRCULAR
     return _arrival(one, _stops(one) & arc, rng)
 
 
@@ -401,13 +410,17 @@ def a_move_left_out(one: Case, rng: np.random.Generator) -> Claims:
     """A stop is skipped: what follows comes from the target before it."""
 
     def skipped(v: Visits) -> Visits:
-        pred, start = np.array(v.pred), v.pred_start[:-1]
-        rows = np.flatnonzero((v.before >= 1) & (v.before[v.before] >= 0))
-        rows = rows[(v.motion[rows] == Motion.JOINT) & (v.before[rows] == rows - 1)]
+        pred, start = np.array(v.graph.pred), v.graph.pred_start[:-1]
+        rows = np.flatnonzero(
+            (v.graph.before >= 1) & (v.graph.before[v.graph.before] >= 0)
+        )
+        rows = rows[
+            (v.motion.kind[rows] == Motion.JOINT) & (v.graph.before[rows] == rows - 1)
+        ]
         if len(rows):
             i = int(rows[len(rows) // 2])
-            pred[start[i]] = v.before[v.before[i]]
-        return replace(v, pred=pred)
+            pred[start[i]] = v.graph.before[v.graph.before[i]]
+        return replace(v, graph=replace(v.graph, pred=pred))
 
     return planned_anew(one, one.job.cell, skipped)
 
@@ -453,7 +466,9 @@ def otherwise(one: Case, wrong: Claims) -> str:
         return NEAR if fewer else MISSED
     if not _same(one, wrong, "direction"):
         changed = (told.direction != right.direction) & (told.direction != 0)
-        passed = (right.visits.fly | right.visits.via)[changed.any(axis=1)].all()
+        passed = (right.visits.motion.fly | right.visits.motion.via)[
+            changed.any(axis=1)
+        ].all()
         found = not passed and compares_directions(one, wrong)
         return MISSED if found else FLY if passed else NEAR
     if _times_differ(right, told):
@@ -468,10 +483,10 @@ def _of_places(right: Claim, told: Claim) -> str:
     if np.isnan(told.q[rows]).any(axis=1).all():
         return LOST
     rows = rows[~np.isnan(told.q[rows]).any(axis=1)]
-    if not np.isin(v.target[rows], PLACED).any():
+    if not np.isin(v.target.meaning[rows], PLACED).any():
         return STEPS
     turned = (np.abs(told.q[rows] - right.q[rows]) > np.pi).any(axis=1)
-    free = turned.all() and (v.motion[rows] == Motion.JOINT).all()
+    free = turned.all() and (v.motion.kind[rows] == Motion.JOINT).all()
     return FREE if free else MISSED
 
 
@@ -492,10 +507,10 @@ def _compared(one: Case, claims: Claims) -> int:
 def _times_differ(right: Claim, told: Claim) -> bool:
     """Tell whether a move between stops takes another time, by more than bounds."""
     v = right.visits
-    passed = v.fly | v.via
-    rows = (v.before >= 0) & ~passed & ~passed[v.before]
-    ours, theirs = (c.time - c.time[v.before] for c in (right, told))
-    joint = v.motion == Motion.JOINT
+    passed = v.motion.fly | v.motion.via
+    rows = (v.graph.before >= 0) & ~passed & ~passed[v.graph.before]
+    ours, theirs = (c.time - c.time[v.graph.before] for c in (right, told))
+    joint = v.motion.kind == Motion.JOINT
     bound = np.where(
         joint, 2 * MOVE_S, 0.02 * LINE_PERCENT * np.maximum(ours, SHORTEST_S)
     )

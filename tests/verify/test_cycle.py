@@ -49,7 +49,8 @@ def test_every_stop_is_compared_once(cases, name, counts) -> None:
     rows = [row(opinion, what) for what in (MOVES, RUNS, ARCS, FLY)]
     v = cases[name].output.visits
     lost = sum(rows[3].skipped.values())
-    assert sum(r.compared for r in rows) + lost == int((~(v.fly | v.via)).sum())
+    stops = ~(v.motion.fly | v.motion.via)
+    assert sum(r.compared for r in rows) + lost == int(stops.sum())
     for found, expected in zip(rows, counts, strict=True):
         assert abs(found.compared - expected) <= 2
     assert rows[0].largest < 1e-8 and rows[1].largest < 1.0  # [s] and [%]
@@ -69,7 +70,7 @@ def test_every_stop_is_compared_once(cases, name, counts) -> None:
 )
 def test_another_time_disagrees(cases, name, motion, what, by) -> None:
     one = cases[name]
-    time = slower(one.output, one.output.visits.motion == motion, by)
+    time = slower(one.output, one.output.visits.motion.kind == motion, by)
     assert row(told(one, time=time), what).beyond > 0
 
 

@@ -71,7 +71,9 @@ def test_the_shipped_programs_agree(name: str, models) -> None:
     assert 0.9 < ends.compared / min(len(job.outcome.visits), MOVES)
     assert ends.largest < 1e-8  # [rad]
     found = row(opinion, "output: approach directions")
-    stops = 6 * int((~job.outcome.visits.fly & ~job.outcome.visits.via).sum())
+    stops = 6 * int(
+        (~job.outcome.visits.motion.fly & ~job.outcome.visits.motion.via).sum()
+    )
     skipped = {why: n for why, n in found.skipped.items() if "blend" not in why}
     assert found.compared + sum(skipped.values()) == stops
     assert found.compared > 0.7 * stops

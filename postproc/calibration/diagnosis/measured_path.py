@@ -162,12 +162,14 @@ def _diagnose_track(
     own = with_measured_play(cell, model)
     cycle = run(own.arm, targets_from_visits(visits, own)[0])
     ways = predict_ways(cycle, own, model, cell.temperature)
-    found = align(read, ways, visits.fly)
+    found = align(read, ways, visits.motion.fly)
     _check(found, track, frame)
     joints = in_motion(measure_steps(ways, found.on_the_way, read.scatter))
     visit = ways.visit[_move(np.arange(len(ways.q)), ways)]
     nominal = own.arm.tcp(ways.q, cycle.targets.tool[visit, :3, 3])
-    lag = servo_lag(ways, nominal, found.on_the_way, visits.fly & ~visits.via)
+    lag = servo_lag(
+        ways, nominal, found.on_the_way, visits.motion.fly & ~visits.motion.via
+    )
     rows = _rows(found, ways, visits, cycle, cell)
     survey = Measurements(
         track, rows.states, rows.position, rows.ids, np.zeros(len(rows.ids), np.int64),
@@ -297,7 +299,7 @@ def _rows(
         heading=np.concatenate([np.full((len(at), 3), np.nan), on.heading]),
     )[order]
     position = np.concatenate([found.standing, on.position])[order]
-    line = visits.line[visit].tolist()
+    line = visits.place.line[visit].tolist()
     ids = [f"line {n} stop" for n in line[: len(at)]]
     ids += [f"line {n} at {t:.2f} s"
             for n, t in zip(line[len(at) :], on.time, strict=True)]  # fmt: skip

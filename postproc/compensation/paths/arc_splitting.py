@@ -77,6 +77,6 @@ def halve_flat_pieces(
 
 def whole_arcs(now: PathPrediction) -> set[int]:
     """Return both visits of arcs that are not cut."""
-    via = now.task.visits.via
+    via = now.task.visits.motion.via
     arcs = np.flatnonzero(via & ~np.isin(np.arange(len(via)), now.cut_arcs))
     return {*arcs.tolist(), *(arcs + 1).tolist()}

@@ -43,11 +43,11 @@ def hindrances_of_arcs(v: Visits, alike: Bools) -> list[tuple[Bools, str]]:
         v: The program.
         alike: Visits that have frames and flags of the ones before them, (n,).
     """
-    via = np.flatnonzero(v.via)
-    own = v.name[via] == 0
-    told = np.array([bool(v.measure_id[k]) for k in via.tolist()], dtype=bool)
+    via = np.flatnonzero(v.motion.via)
+    own = v.target.name[via] == 0
+    told = np.array([bool(v.place.measure_id[k]) for k in via.tolist()], dtype=bool)
     rows = (
-        (~np.isnan(v.arc_angle[via + 1]), "it ends at an angle"),
+        (~np.isnan(v.motion.arc_angle[via + 1]), "it ends at an angle"),
         (~own, "its middle point is a variable: write its numbers in the move"),
         (told, "its middle point is measured"),
         (~(alike[via] & alike[via + 1]), "its frames or configuration flags change"),
@@ -63,8 +63,8 @@ def hindrances_of_arcs(v: Visits, alike: Bools) -> list[tuple[Bools, str]]:
 
 def _uneven(v: Visits, via: Ints) -> Bools:
     """Tell on which arcs (k,) the tool does not turn evenly about one axis."""
-    start = np.maximum(v.before[via], 0)
-    poses = [v.dialect.poses(v.values[rows]) for rows in (start, via, via + 1)]
+    start = np.maximum(v.graph.before[via], 0)
+    poses = [v.dialect.poses(v.target.values[rows]) for rows in (start, via, via + 1)]
     share = shares_before_via(poses[0], poses[1], poses[2])
     base = np.swapaxes(poses[0][:, :3, :3], 1, 2)
     turns = [rotation_vector(base @ pose[:, :3, :3]) for pose in poses[1:]]
@@ -109,13 +109,13 @@ class CutArc:
         joints: Callable[[int, Floats], Floats] | None = None,
     ) -> CutArc:
         """Look at the arc with the point `via` on its way."""
-        rows = [int(visits.before[via]), via, via + 1]
-        poses = visits.dialect.poses(visits.values[rows])
+        rows = [int(visits.graph.before[via]), via, via + 1]
+        poses = visits.dialect.poses(visits.target.values[rows])
         halves = arcs(poses[0:1], poses[1:2], poses[2:3])
         cuts = points.get(via, ()), points.get(via + 1, ())
         still = [np.zeros((len(own), 3)) for own in cuts]
         turned = turns.get(via, still[0]), turns.get(via + 1, still[1])
-        start = visits.values[rows[0]]
+        start = visits.target.values[rows[0]]
         return cls(start, visits, halves, cuts, via, chords, turned, joints)
 
     def pieces(self) -> tuple[list[ArcPiece], Floats]:
@@ -183,8 +183,8 @@ def flat_pieces(visits: Visits, moved: Floats, rows: Ints) -> list[tuple[int, fl
     """
     found = []
     for via in rows.tolist():
-        points = np.array([visits.before[via], via, via + 1])
-        own, place = moved[points], visits.values[points, :3] * MM
+        points = np.array([visits.graph.before[via], via, via + 1])
+        own, place = moved[points], visits.target.values[points, :3] * MM
         differ = float(np.linalg.norm(own[1] - (own[0] + own[2]) / 2))
         chord = place[2] - place[0]
         aside = np.cross(place[1] - place[0], chord / np.linalg.norm(chord))
@@ -320,7 +320,7 @@ NO_ARCS = WantedArcs(
 
 def is_arc(visits: Visits, visit: int) -> bool:
     """Tell whether a visit is the point on the way of an arc, or its end."""
-    return bool(visits.motion[visit] == Motion.CIRCULAR)
+    return bool(visits.motion.kind[visit] == Motion.CIRCULAR)
 
 
 def halves(visits: Visits, visit: int) -> tuple[int, ...]:
@@ -333,4 +333,4 @@ def halves(visits: Visits, visit: int) -> tuple[int, ...]:
 
 def point_on_way(visits: Visits, visit: int) -> int:
     """Return the visit of the point on the way of the arc that a visit is of."""
-    return visit if visits.via[visit] else visit - 1
+    return visit if visits.motion.via[visit] else visit - 1

@@ -131,9 +131,9 @@ def find_drive_turns(
     Returns:
         Rotation vectors in the tool's own frame, (k, 3) [rad].
     """
-    cell, law = setting.cell, visits.orientation_law[v]
+    cell, law = setting.cell, visits.motion.orientation_law[v]
     known = law in (OrientationLaw.UNSET, OrientationLaw.ONE_AXIS)
-    if setting.options.orientation or visits.wrist_joint[v] or not known:
+    if setting.options.orientation or visits.motion.wrist_joint[v] or not known:
         return np.zeros((len(q), 3))
     half = np.where(setting.gap > 0.0, half_widths(setting.model, cell.arm, q), 0.0)
     behind = q + np.linalg.solve(cell.arm.coupling, (crossed * half).T).T

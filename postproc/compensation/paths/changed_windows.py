@@ -8,7 +8,7 @@ an earlier stop, behind which every joint has turned farther than its gap is wid
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,9 +22,9 @@ from postproc.compensation.paths.path_error import PathAccuracy
 from postproc.compensation.pipeline import WindowResult
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.timing_comparison import InTime
-from postproc.compensation.windowing import SHARED, cut_points
+from postproc.compensation.windowing import cut_points
 from postproc.diagnostics import Code
-from postproc.language.visits import Meaning, Visits
+from postproc.language.visits import Graph, Meaning, Visits
 from postproc.model.backlash_width import half_widths
 from postproc.model.flank_hypotheses import FlankOfJoint
 from postproc.motion.cycle_time import ProgramCycle
@@ -77,7 +77,7 @@ class Part:
     @cached_property
     def moves(self) -> Floats:
         """Return what they are corrected by, (k, 3) [m]."""
-        moved = self.decisions.corrected - self.visits.values
+        moved = self.decisions.corrected - self.visits.target.values
         return np.asarray(moved[:, :3] * MM)
 
     def rows_on_way(self, v: int) -> Ints:
@@ -232,35 +232,27 @@ def take_windows(
 
 def _take(visits: Visits, rows: Ints) -> Visits:
     """Take some visits as a program in which one follows the other, (k,)."""
-    values: dict[str, Any] = {}
-    for f in fields(Visits):
-        if f.name in SHARED:
-            continue
-        column = getattr(visits, f.name)
-        if isinstance(column, Sequence):
-            values[f.name] = tuple(column[k] for k in rows.tolist())
-        else:
-            values[f.name] = np.array(column[rows])
-    block = values["block"]
-    values["block"] = np.where(block >= 0, np.searchsorted(rows, block), block)
     before = np.arange(-1, len(rows) - 1)
     if len(rows) and rows[0] == 0:
-        before[0] = visits.predecessors(0)[0]
-    return replace(visits, **values, pred_start=np.arange(len(rows) + 1), pred=before)
+        before[0] = visits.graph.predecessors(0)[0]
+    taken = visits.take(rows, Graph(np.arange(len(rows) + 1), before))
+    block = taken.motion.block
+    return taken.with_columns(
+        block=np.where(block >= 0, np.searchsorted(rows, block), block)
+    )
 
 
 def _begin_at(visits: Visits, rows: Ints, q: Floats) -> Visits:
     """Let the joints go to some visits (s,), where nothing is corrected."""
-    values = np.array(visits.values)
+    values = np.array(visits.target.values)
     values[rows] = np.nan
     values[rows, :6] = np.rad2deg(q)
     fixed = {
-        "motion": int(Motion.JOINT), "target": int(Meaning.JOINTS), "literal": -1,
+        "kind": int(Motion.JOINT), "meaning": int(Meaning.JOINTS), "literal": -1,
         "follows": -1, "shift": -1, "block": -1, "via": False, "curved": False,
         "fly": False,
     }  # fmt: skip
-    columns: dict[str, Any] = {n: np.array(getattr(visits, n)) for n in fixed}
+    columns = {name: np.array(visits.columns[name]) for name in fixed}
     for name, column in columns.items():
-        if len(column):
-            column[rows] = fixed[name]
-    return replace(visits, values=values, **columns)
+        column[rows] = fixed[name]
+    return visits.with_columns(values=values, **columns)

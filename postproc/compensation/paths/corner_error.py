@@ -55,19 +55,19 @@ def predict_corners(
         cycle: It in time.
         paths: How it keeps to its paths.
     """
-    lines = (visits.motion == Motion.LINEAR) & (cycle.ways[1] >= 0)
+    lines = (visits.motion.kind == Motion.LINEAR) & (cycle.ways[1] >= 0)
     behind = np.full(len(visits), -1)
-    on = np.flatnonzero(lines & (visits.before >= 0))
-    behind[visits.before[on]] = on
-    corner = lines & visits.fly & (behind >= 0) & (visits.before >= 0)
+    on = np.flatnonzero(lines & (visits.graph.before >= 0))
+    behind[visits.graph.before[on]] = on
+    corner = lines & visits.motion.fly & (behind >= 0) & (visits.graph.before >= 0)
     p, aside = cycle.targets.tcp[:, :3, 3], cycle.path.aside
     told = np.asarray(~np.isnan(p).any(axis=1))  # steps have no place of their own
-    corner &= told & told[visits.before] & told[behind]
+    corner &= told & told[visits.graph.before] & told[behind]
     path = np.flatnonzero(corner[paths.visit])
     row = paths.visit[path]
     units = [
         step / np.maximum(lengths(step), 1e-12)[:, None]
-        for step in (p[row] - p[visits.before[row]], p[behind[row]] - p[row])
+        for step in (p[row] - p[visits.graph.before[row]], p[behind[row]] - p[row])
     ]
     along = units[0] + units[1]
     along = along / np.maximum(lengths(along), 1e-12)[:, None]

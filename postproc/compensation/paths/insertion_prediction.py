@@ -129,7 +129,7 @@ class InsertionTask:
     def corners(self) -> SourceCorners:
         """Return how the source passes its visits."""
         return SourceCorners.of(
-            self.setting.cell.arm, self.first.before, self.visits.via
+            self.setting.cell.arm, self.first.before, self.visits.motion.via
         )
 
     @cached_property
@@ -142,7 +142,7 @@ class InsertionTask:
 
     def find_hindrance(self, v: int) -> str:
         """Say why nothing can be put on the way to a visit, "" for nothing."""
-        file, line = int(self.visits.file[v]), int(self.lines[v])
+        file, line = int(self.visits.place.file[v]), int(self.lines[v])
         found = self._hindrances.get(v)
         return found or unwritable(self.splitter, self.visits, v, file, line)
 
@@ -247,7 +247,7 @@ class InsertionTask:
         reading, mine, taken = take_windows(reading, rows, inside, seeds, windows.q)
         reading, kept = self._correct(reading)
         values = kept.decisions.corrected
-        again = replace(reading, visits=replace(reading.visits, values=values))
+        again = replace(reading, visits=reading.visits.with_columns(values=values))
         owner = np.searchsorted(rows, taken)
         part = self._run(plan, reading, again, kept, mine, owner)
         if not self._is_where_it_was(part, inside):
@@ -257,7 +257,7 @@ class InsertionTask:
 
     def _is_where_it_was(self, part: Part, inside: Bools) -> bool:
         """Return True if the joints are at the source's targets as they were."""
-        rows = np.flatnonzero(inside & ~self.visits.via)
+        rows = np.flatnonzero(inside & ~self.visits.motion.via)
         q = part.in_time.before.path.q[part.own[rows]]
         off = np.abs(q - self.windows.q[rows])
         return bool(np.nan_to_num(off).max(initial=0.0) < changed_windows.SAME)
@@ -334,7 +334,7 @@ class InsertionTask:
     def list_wanted_arcs(self, plan: InsertionPlan) -> WantedArcs:
         """Return the arcs that a plan cuts."""
         cut = cut_arcs(self.visits, plan)
-        return WantedArcs.of(self.first.before, self.visits.before, cut)
+        return WantedArcs.of(self.first.before, self.visits.graph.before, cut)
 
 
 @dataclass(frozen=True, eq=False)
@@ -428,15 +428,15 @@ class PathPrediction:
             why = decided.reasons[decided.why[left[0]]]
             return f"points inserted into it cannot be corrected: {why}"
         visits = part.visits
-        passed = rows[~visits.via[rows]][v in self.plan.stops :]
-        sized = visits.fly[passed] & (visits.zone_mm[passed] > 0.0)
+        passed = rows[~visits.motion.via[rows]][v in self.plan.stops :]
+        sized = visits.motion.fly[passed] & (visits.zone.size_mm[passed] > 0.0)
         return "" if sized.all() else self.task.splitter.unsized
 
     def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""
         part = self.part_of(v)
-        marked, via = part.steep, part.visits.via
-        begin = int(part.own[self.task.visits.before[v]])
+        marked, via = part.steep, part.visits.motion.via
+        begin = int(part.own[self.task.visits.graph.before[v]])
         pieces = enumerate(pairwise([begin, *self.ends(v)]))
         return [
             k for k, (a, b) in pieces
@@ -457,14 +457,14 @@ class PathPrediction:
                     self.ends(half), (*points.get(half, ()), 1.0), strict=False
                 )
             }
-            arcs = [row - 1 for row in sorted(ends) if visits.via[row - 1]]
+            arcs = [row - 1 for row in sorted(ends) if visits.motion.via[row - 1]]
             flat = flat_pieces(visits, part.moves, np.array(arcs, dtype=np.int64))
             found.update({ends[row]: bent for row, bent in flat})
         return found
 
     def may_be_chord(self, cut: Cut) -> bool:
         """Return True if a piece that is too flat may be a chord, but the last."""
-        last = cut[1] == 1.0 and not self.task.visits.via[cut[0]]
+        last = cut[1] == 1.0 and not self.task.visits.motion.via[cut[0]]
         return self.flat[cut] <= STRAIGHT * self.task.tolerance and not last
 
     def ends(self, v: int) -> list[int]:
@@ -474,13 +474,13 @@ class PathPrediction:
         """
         part = self.part_of(v)
         rows = np.append(part.rows_on_way(v), part.own[v])
-        ends: list[int] = rows[~part.visits.via[rows]].tolist()
+        ends: list[int] = rows[~part.visits.motion.via[rows]].tolist()
         return ends
 
 
 def cut_arcs(visits: Visits, plan: InsertionPlan) -> list[int]:
     """Return the points on the ways of the arcs that a plan cuts."""
-    return sorted(v for v in plan.points if visits.via[v])
+    return sorted(v for v in plan.points if visits.motion.via[v])
 
 
 def _evenly(side: Floats, ways: list[Floats]) -> Floats:

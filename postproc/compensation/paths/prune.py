@@ -210,7 +210,7 @@ def _harmful(
             continue
         if near:
             yield int(cut[last]), Removal("a later move would be worse")
-        if v + 1 in now.plan.points and now.task.visits.fly[v]:
+        if v + 1 in now.plan.points and now.task.visits.motion.fly[v]:
             yield v + 1, Removal("the corner where it begins would move")
 
 
@@ -312,7 +312,7 @@ def _roundings_in(
     planned = zone_sizes(arm, in_time.after, in_time.after.targets)
     for v in moves:
         shares = plan.points[v]
-        rows = [int(part.own[visits.before[v]]), *now.ends(v)]
+        rows = [int(part.own[visits.graph.before[v]]), *now.ends(v)]
         if shares[-1] == 1.0:
             rows.append(now.ends(v + 1)[0])
         rows = rows[: len(shares) + 2]

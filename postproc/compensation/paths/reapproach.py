@@ -29,11 +29,11 @@ def insert_reapproaches(now: PathPrediction) -> PathPrediction:
     """Approach targets anew that a joint reaches from a side that is not sure."""
     task, plan = now.task, now.plan
     visits, room = task.visits, now.room
-    ends = (visits.motion == Motion.LINEAR) & ~visits.fly
-    ends &= ~visits.fly[visits.before]
+    ends = (visits.motion.kind == Motion.LINEAR) & ~visits.motion.fly
+    ends &= ~visits.motion.fly[visits.graph.before]
     places = dict(plan.approaches)
     for v in np.flatnonzero(ends & _find_uncertain(task.source.kept)).tolist():
-        file, line = int(visits.file[v]), int(task.lines[v])
+        file, line = int(visits.place.file[v]), int(task.lines[v])
         may = not task.find_hindrance(v) and task.splitter.stops(file, line)
         if may and len(places) < room:
             place = _place_to_approach(task, v)
@@ -53,7 +53,7 @@ def _worse_paths(now: PathPrediction) -> set[int]:
 
     Only where a path was asked for, and where it is farther off than that.
     """
-    task, before = now.task, now.task.visits.before
+    task, before = now.task, now.task.visits.graph.before
     was, far = sizes_of(task.first.paths), now.sizes
     worse = {
         v
@@ -69,7 +69,7 @@ def _place_to_approach(task: InsertionTask, v: int) -> Floats | None:
     cell, cycle = task.setting.cell, task.first.before
     visits, side = task.visits, task.source.kept.decisions.side
     q = place_to_approach(
-        cell.arm, cycle, v, int(visits.before[v]), np.abs(side[v]) < SURE,
+        cell.arm, cycle, v, int(visits.graph.before[v]), np.abs(side[v]) < SURE,
         cell.limits.reapproach_mm * MM,
     )  # fmt: skip
     if q is None:

@@ -51,30 +51,33 @@ def hindrances(
         speed: Of its moves, see `speeds_of_pieces`, (n,) [m/s].
         keeps_aux: See `Splitter.keeps_aux`.
     """
-    status, before = decisions.status, np.maximum(v.before, 0)
+    status, before = decisions.status, np.maximum(v.graph.before, 0)
     corrected = (status == Status.CORRECTED) | (status == Status.UNCHANGED)
-    ends = (v.literal >= 0) & (v.target == Meaning.POSE) & corrected
-    has = (v.literal >= 0) & (len(v.literals) > 0)
+    ends = (v.target.literal >= 0) & (v.target.meaning == Meaning.POSE) & corrected
+    has = (v.target.literal >= 0) & (len(v.literals) > 0)
     taught = np.zeros(len(v), dtype=bool)
-    taught[has] = v.literals.taught[v.literal[has]]
-    frames = [v.tool, v.base, v.uframe, v.config]
+    taught[has] = v.literals.taught[v.target.literal[has]]
+    frames = [v.frame.tool, v.frame.base, v.frame.uframe, v.target.config]
     alike = np.all([column == column[before] for column in frames], axis=0)
     found: dict[int, str] = {}
     for rows, why in (
-        (v.motion == Motion.JOINT, "it is neither a line nor an arc"),
-        (v.before < 0, "its start is not known, or there are several"),
+        (v.motion.kind == Motion.JOINT, "it is neither a line nor an arc"),
+        (v.graph.before < 0, "its start is not known, or there are several"),
         (_several(v), "it is reached several times"),
         (
             taught | taught[before],
             "one of its ends is taught and contains the arm's error",
         ),
         (~(ends & ends[before]), "its ends are not both corrected poses"),
-        (v.shift >= 0, "its end is shifted from a point"),
-        (v.weaves, "it weaves, or may: the pattern would restart at every point"),
+        (v.target.shift >= 0, "its end is shifted from a point"),
+        (
+            v.motion.weaves,
+            "it weaves, or may: the pattern would restart at every point",
+        ),
         (_carries_otherwise(v, cell), "the program states the payload on it"),
         (~alike, "it starts with other frames or configuration flags"),
         (_aux_moves(v, before, keeps_aux), "auxiliary axes move with it"),
-        (v.tool_remote, "the arm holds the part"),
+        (v.frame.tool_remote, "the arm holds the part"),
         *hindrances_of_arcs(v, alike),
         (_turns_otherwise(v, before), "it is uncertain how the tool turns along it"),
         (np.isnan(speed), "its speed is not known"),
@@ -82,7 +85,7 @@ def hindrances(
     ):
         for row in np.flatnonzero(rows).tolist():
             found.setdefault(row, why)
-    for via in np.flatnonzero(v.via).tolist():  # an arc is cut as a whole
+    for via in np.flatnonzero(v.motion.via).tolist():  # an arc is cut as a whole
         for one, other in ((via, via + 1), (via + 1, via)):
             if one in found:
                 found.setdefault(other, found[one])
@@ -108,20 +111,22 @@ def _carries_otherwise(v: Visits, cell: Cell) -> Bools:
     mass, centre = payload_of(v, cell)
     off = np.column_stack([mass - cell.payload_mass, centre - cell.payload_com])
     same = np.abs(np.nan_to_num(off, nan=np.inf)).max(axis=1) <= SAME_LOAD
-    return np.asarray((v.load > 0) & ~same)
+    return np.asarray((v.motion.load > 0) & ~same)
 
 
 def _aux_moves(v: Visits, before: Ints, kept: bool) -> Bools:
     """Return where external axes move, or points would not keep them still, (n,)."""
     if not kept:
-        return np.asarray(~np.isnan(v.aux).all(axis=1))
-    return np.asarray(~np.isclose(v.aux, v.aux[before], equal_nan=True).all(axis=1))
+        return np.asarray(~np.isnan(v.target.aux).all(axis=1))
+    return np.asarray(
+        ~np.isclose(v.target.aux, v.target.aux[before], equal_nan=True).all(axis=1)
+    )
 
 
 def unwritable(splitter: Splitter, visits: Visits, v: int, file: int, line: int) -> str:
     """Say what in the text of a move hinders points on its way, "" for nothing."""
     widest = np.array([visits.dialect.widest])
-    config = visits.configs[visits.config[v]]
+    config = visits.target.configs[visits.target.config[v]]
     try:
         said = splitter.hinders(file, line)
         if not said and is_arc(visits, v):
@@ -136,18 +141,18 @@ def unwritable(splitter: Splitter, visits: Visits, v: int, file: int, line: int)
 
 def _several(visits: Visits) -> Bools:
     """Tell which moves are reached more than once, (n,)."""
-    rows = np.stack([visits.file, visits.line, visits.via])
+    rows = np.stack([visits.place.file, visits.place.line, visits.motion.via])
     _, at, count = np.unique(rows, axis=1, return_inverse=True, return_counts=True)
     return np.asarray(count[at.ravel()] > 1)
 
 
 def _turns_otherwise(visits: Visits, before: Ints) -> Bools:
     """Tell where the tool may turn otherwise than about one axis, (n,)."""
-    law = visits.orientation_law
+    law = visits.motion.orientation_law
     known = (law == OrientationLaw.UNSET) | (law == OrientationLaw.ONE_AXIS)
-    turn = visits.dialect.poses(visits.values)[:, :3, :3]
+    turn = visits.dialect.poses(visits.target.values)[:, :3, :3]
     same = np.abs(turn - turn[before]).max(axis=(1, 2)) < ALIKE
-    return np.asarray((~known | visits.wrist_joint) & ~same)
+    return np.asarray((~known | visits.motion.wrist_joint) & ~same)
 
 
 def shortest_pieces(
@@ -164,10 +169,14 @@ def shortest_pieces(
         speed: That of the moves, see `speeds_of_pieces`, (n,) [m/s].
     """
     least: Floats = np.maximum(shortest * np.nan_to_num(speed), CLOSEST)
-    size = np.maximum(2 * np.nan_to_num(np.abs(visits.zone_mm) * MM), CLEAR)
-    flown = visits.fly & ~visits.via  # the point on the way of an arc is no corner
+    size = np.maximum(2 * np.nan_to_num(np.abs(visits.zone.size_mm) * MM), CLEAR)
+    flown = (
+        visits.motion.fly & ~visits.motion.via
+    )  # the point on the way of an arc is no corner
     round_ = np.where(flown, np.maximum(size, least), least)
-    clear = np.where(visits.before >= 0, round_[np.maximum(visits.before, 0)], least)
+    clear = np.where(
+        visits.graph.before >= 0, round_[np.maximum(visits.graph.before, 0)], least
+    )
     round_ = np.maximum(round_, _last_pieces(visits, cycle))
     columns = least, np.maximum(clear, least), np.maximum(round_, least)
     return list(zip(*(column.tolist() for column in columns), strict=True))
@@ -178,9 +187,9 @@ def _last_pieces(visits: Visits, cycle: ProgramCycle) -> Floats:
 
     No more than `CLEAR`; 0 where a move is no arc.
     """
-    via, out = np.flatnonzero(visits.via), np.zeros(len(visits))
+    via, out = np.flatnonzero(visits.motion.via), np.zeros(len(visits))
     if len(via):
-        radius = WantedArcs.of(cycle, visits.before, via.tolist()).radius[::2]
+        radius = WantedArcs.of(cycle, visits.graph.before, via.tolist()).radius[::2]
         bends = np.sqrt(8.0 * radius * LAST_FLATS * FLAT)
         out[via + 1] = np.minimum(bends, CLEAR)
     return out

@@ -74,10 +74,10 @@ def _explain_refusal(now: PathPrediction, v: int) -> str:
 def can_stop(task: InsertionTask, v: int) -> bool:
     """Tell whether the arm stands where a move begins, and may stop once more."""
     visits = task.visits
-    before = int(visits.before[v])
-    if visits.fly[before] or visits.via[before]:
+    before = int(visits.graph.before[v])
+    if visits.motion.fly[before] or visits.motion.via[before]:
         return False
-    return task.splitter.stops(int(visits.file[v]), int(task.lines[v]))
+    return task.splitter.stops(int(visits.place.file[v]), int(task.lines[v]))
 
 
 def _is_within_lag(task: InsertionTask, v: int, joints: Sequence[int]) -> bool:

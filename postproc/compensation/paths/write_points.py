@@ -21,12 +21,11 @@ from postproc.compensation.paths.backlash_preload import BacklashPreload, MeantS
 from postproc.compensation.paths.insertion_report import Points
 from postproc.compensation.program import ParsedProgram, read_program
 from postproc.compensation.rewrite import VerificationError
-from postproc.compensation.windowing import SHARED
 from postproc.language.language import Splitter
 from postproc.language.languages import language_of
 from postproc.language.text.source import Edit, Source, apply, compose
 from postproc.language.text.symbol_column import NameColumn
-from postproc.language.visits import Literals, Visits
+from postproc.language.visits import Graph, Literals, Visits
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, lengths, rotation_from_vector, rotation_vector
 from postproc.robot.trajectory import Motion
@@ -73,8 +72,8 @@ def insert(
     edits = _edits(reading, points, stops, splitter, cell, chords, meant, joints)
     lines, visits = lines_in_files(reading, cell), reading.visits
     for visit, numbers in approaches.items():
-        config = visits.configs[visits.config[visit]]
-        file, line = int(visits.file[visit]), int(lines[visit])
+        config = visits.target.configs[visits.target.config[visit]]
+        file, line = int(visits.place.file[visit]), int(lines[visit])
         edits[file].append(splitter.approach(file, line, numbers, config))
     edits = [sorted(own, key=lambda edit: edit.span) for own in edits]
     sources = [
@@ -93,7 +92,7 @@ def insert(
     given = reading.given or reading.sources
     with_points = replace(again, cloned=cloned, given=given, missed=reading.missed)
     own = np.flatnonzero(~new)
-    aims = _aims(visits, again.visits.via, own, points, stops, meant)
+    aims = _aims(visits, again.visits.motion.via, own, points, stops, meant)
     told = replace(with_points, diagnostics=reading.diagnostics, aims=aims)
     return told, own
 
@@ -112,9 +111,9 @@ def _edits(
     visits, found = reading.visits, defaultdict[int, list[Edit]](list)
     lines = lines_in_files(reading, cell)
     for visit in sorted(points):
-        config = visits.configs[visits.config[visit]]
-        file, line = int(visits.file[visit]), int(lines[visit])
-        if visits.via[visit]:
+        config = visits.target.configs[visits.target.config[visit]]
+        file, line = int(visits.place.file[visit]), int(lines[visit])
+        if visits.motion.via[visit]:
             turns = {v: _turns(v, points, stops, meant) for v in (visit, visit + 1)}
             arc = CutArc.of(visits, points, visit, chords, turns, joints)
             pieces, via = arc.pieces()
@@ -151,8 +150,10 @@ def _turns(
 def lines_in_files(reading: ParsedProgram, cell: Cell) -> Ints:
     """Return the lines of visits in the files as they are, clones included, (n,)."""
     if not reading.cloned:
-        return reading.visits.line
-    return read_program({s.name: s.data for s in reading.sources}, cell).visits.line
+        return reading.visits.place.line
+    return read_program(
+        {s.name: s.data for s in reading.sources}, cell
+    ).visits.place.line
 
 
 def between(visits: Visits, visit: int, share: Floats) -> Floats:
@@ -168,7 +169,7 @@ def between(visits: Visits, visit: int, share: Floats) -> Floats:
     Returns:
         Their numbers, (k, w).
     """
-    ends = visits.values[[visits.before[visit], visit]]
+    ends = visits.target.values[[visits.graph.before[visit], visit]]
     turn = visits.dialect.poses(ends)[:, :3, :3]
     axis = rotation_vector((turn[1] @ turn[0].T)[None])[0]
     out = np.tile(ends[0], (len(share), 1))
@@ -193,7 +194,7 @@ def _aims(
         piece = np.cumsum(~via[rows])[via[rows]]
         out[rows[via[rows]]] = sides.between[piece]
     for visit, taken in stops.items():
-        arc = bool(visits.via[visit])
+        arc = bool(visits.motion.via[visit])
         first = own[visit - 1] + 1 if arc else own[visit] - len(points[visit])
         out[first] = taken.side
     return out
@@ -208,7 +209,7 @@ def numbers_at(visits: Visits, visit: int, pose: Floats, q: Floats) -> Floats:
         pose: The pose, (4, 4) [m].
         q: Joint angles there, (6,) [rad].
     """
-    numbers = np.array(visits.values[[visit]])
+    numbers = np.array(visits.target.values[[visit]])
     pose = base_in_uframe(visits, np.array([visit]))[0] @ pose
     turn = pose[:3, :3] @ visits.dialect.poses(numbers)[0, :3, :3].T
     numbers[0, :3] = pose[:3, 3] / MM
@@ -229,8 +230,8 @@ def _find_inserted(
         old = np.array([e.span.end - e.span.start for e in own], dtype=np.int64)
         begin = np.array([e.span.start for e in own], dtype=np.int64)
         begin += np.cumsum(size - old) - (size - old)
-        rows = np.flatnonzero(visits.file == file) if own else begin
-        lines = source.line_starts[visits.line[rows] - 1]
+        rows = np.flatnonzero(visits.place.file == file) if own else begin
+        lines = source.line_starts[visits.place.line[rows] - 1]
         at = np.searchsorted(begin, lines, side="right") - 1
         found[rows] = (at >= 0) & (lines < (begin + size)[at])
     return found
@@ -249,11 +250,11 @@ def points_on_ways(visits: Visits, sources: Sequence[Source], inserted: Bools) -
     """
     new = np.array(inserted)
     language = language_of(sources[0].name)
-    for row in np.flatnonzero(inserted & ~visits.via).tolist():
-        source = sources[visits.file[row]]
-        text = source.line_text(int(visits.line[row])).encode("latin-1")
+    for row in np.flatnonzero(inserted & ~visits.motion.via).tolist():
+        source = sources[visits.place.file[row]]
+        text = source.line_text(int(visits.place.line[row])).encode("latin-1")
         if language.ends_at_via(text):
-            later = np.flatnonzero(visits.via[row:] & ~inserted[row:])
+            later = np.flatnonzero(visits.motion.via[row:] & ~inserted[row:])
             if len(later):
                 new[row], new[row + later[0]] = False, True
     return new
@@ -274,22 +275,23 @@ def _prove(
     Raises:
         VerificationError: It is not.
     """
-    found = inserted & ~after.via
+    found = inserted & ~after.motion.via
     problem = f"{int(found.sum())} of {count} points are found again"
     if int(found.sum()) == count and len(after) - int(new.sum()) == len(before):
         nothing = np.zeros(0, dtype=np.int64)
         ends = inserted & ~new  # of pieces, which were points on ways
-        motion = np.where(ends, Motion.CIRCULAR, after.motion)
-        old = replace(after, via=after.via | ends, motion=motion)
+        motion = np.where(ends, Motion.CIRCULAR, after.motion.kind)
+        old = after.with_columns(via=after.motion.via | ends, kind=motion)
         same = renumber_literals(before, without(old, new))
         cut = np.flatnonzero(ends[~new])  # there the tool may be turned a little
         if are_near(before, same, cut):
-            values = np.array(same.values)
-            values[cut] = before.values[cut]
-            aux = np.array(same.aux)  # what is not written there stays as it is
-            aux[cut] = np.where(np.isnan(aux[cut]), before.aux[cut], aux[cut])
-            same = replace(same, values=values, aux=aux, **_passing(before, same, cut))
-        problem = equivalent(before, same, nothing, before.values)
+            values = np.array(same.target.values)
+            values[cut] = before.target.values[cut]
+            aux = np.array(same.target.aux)  # what is not written there stays as it is
+            aux[cut] = np.where(np.isnan(aux[cut]), before.target.aux[cut], aux[cut])
+            passing = _passing(before, same, cut)
+            same = same.with_columns(values=values, aux=aux, **passing)
+        problem = equivalent(before, same, nothing, before.target.values)
     if problem:
         raise VerificationError(
             f"{before.files[0]}: points on the ways would change what the program "
@@ -303,17 +305,17 @@ def _passing(before: Visits, after: Visits, cut: Ints) -> dict[str, Any]:
     As the end of a piece such a point says how it is blended, and the tool turns as on
     lines where the piece is a chord: arcs are cut where that makes no difference.
     """
-    found = {}
-    for name in ("zone_mm", "zone_rule", "overlap_percent", "blend", "orientation_law"):
-        column = np.array(getattr(after, name))
-        column[cut] = getattr(before, name)[cut]
-        found[name] = column
-    return found
+    found = {name: np.array(column) for name, column in vars(after.zone).items()}
+    for name, column in found.items():
+        column[cut] = getattr(before.zone, name)[cut]
+    law = np.array(after.motion.orientation_law)
+    law[cut] = before.motion.orientation_law[cut]
+    return {**found, "orientation_law": law}
 
 
 def are_near(before: Visits, after: Visits, rows: Ints) -> bool:
     """Tell whether some visits are the same but for how the tool is turned there."""
-    poses = [v.dialect.poses(v.values[rows])[:, :3] for v in (before, after)]
+    poses = [v.dialect.poses(v.target.values[rows])[:, :3] for v in (before, after)]
     off = np.swapaxes(poses[0][:, :, :3], 1, 2) @ poses[1][:, :, :3]
     far = lengths(poses[1][:, :, 3] - poses[0][:, :, 3])
     turned = lengths(rotation_vector(off))
@@ -328,26 +330,23 @@ def without(visits: Visits, rows: Bools) -> Visits:
         rows: Which of them, (m,).
     """
     own, number = np.flatnonzero(~rows), np.cumsum(~rows) - 1
-    values: dict[str, Any] = {
-        f.name: _some(getattr(visits, f.name), own)
-        for f in fields(Visits)
-        if f.name not in SHARED
-    }
-    count = np.diff(visits.pred_start)
-    pred = visits.pred[np.repeat(~rows, count)]
+    count = np.diff(visits.graph.pred_start)
+    pred = visits.graph.pred[np.repeat(~rows, count)]
     while len(at := np.flatnonzero((pred >= 0) & rows[pred])):
-        pred[at] = visits.pred[visits.pred_start[pred[at]]]
+        pred[at] = visits.graph.pred[visits.graph.pred_start[pred[at]]]
     gone = np.zeros(len(visits.literals) + 1, dtype=bool)
-    gone[visits.literal[rows]] = True
+    gone[visits.target.literal[rows]] = True
     gone[-1] = False  # that is no literal
-    for name in ("literal", "follows"):
-        values[name] -= np.cumsum(gone)[values[name]] * (values[name] >= 0)
+    start = np.append(0, np.cumsum(count[own]))
+    graph = Graph(start, np.where(pred >= 0, number[pred], pred))
+    left, fewer = visits.take(own, graph), np.cumsum(gone)
+    columns = {"literal": left.target.literal, "follows": left.target.follows}
+    literals = _take_literals(visits.literals, np.flatnonzero(~gone[:-1]))
     return replace(
-        visits,
-        **values,
-        pred_start=np.append(0, np.cumsum(count[own])),
-        pred=np.where(pred >= 0, number[pred], pred),
-        literals=_take_literals(visits.literals, np.flatnonzero(~gone[:-1])),
+        left.with_columns(
+            **{k: own - fewer[own] * (own >= 0) for k, own in columns.items()}
+        ),
+        literals=literals,
     )
 
 
@@ -357,18 +356,17 @@ def renumber_literals(before: Visits, after: Visits) -> Visits:
     They are numbered as they stand in the files, and the point on the way of an arc
     that is cut stands in front of the arc's end, not behind it.
     """
-    has = (before.literal >= 0) & (after.literal >= 0)
+    has = (before.target.literal >= 0) & (after.target.literal >= 0)
     number = np.arange(len(after.literals))
-    number[after.literal[has]] = before.literal[has]
+    number[after.target.literal[has]] = before.target.literal[has]
     if not np.array_equal(np.sort(number), np.arange(len(number))):
         return after
     number = np.append(number, -1)  # that is no literal
-    return replace(
-        after,
-        literal=number[after.literal],
-        follows=number[after.follows],
-        literals=_take_literals(after.literals, np.argsort(number[:-1])),
+    own = after.with_columns(
+        literal=number[after.target.literal], follows=number[after.target.follows]
     )
+    literals = _take_literals(after.literals, np.argsort(number[:-1]))
+    return replace(own, literals=literals)
 
 
 def _take_literals(literals: Literals, rows: Ints) -> Literals:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -12,14 +11,11 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, slim
 from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.text.statement_table import StatementText
-from postproc.language.visits import Visits
+from postproc.language.visits import Graph, Visits
 
 LEAST = 8  # statements that are worth it
 Runs = dict[int, int]
 """From the first row that is read for all, to the row behind the last such one."""
-
-# What is no column of visits.
-_NO_COLUMNS = ("frames", "frame_taught", "pred_start", "pred", "loads")
 
 
 def find_runs(
@@ -126,36 +122,28 @@ def unfold(
     owner, inside = within(counts)
     begin = np.cumsum(counts) - counts
     literal_begin = np.cumsum(literal_counts) - literal_counts
-    columns: dict[str, Any] = {
-        name: slim(column[owner])
-        for name, column in vars(visits).items()
-        if isinstance(column, np.ndarray) and name not in _NO_COLUMNS
-    }
-    for name in ("literal", "follows"):
-        own = getattr(visits, name)[owner].astype(np.int64)
+    columns: dict[str, Any] = {"values": values, "line": line}
+    for name, each in (("literal", inside), ("follows", 0)):
+        own = visits.columns[name][owner].astype(np.int64)
         moved = np.append(literal_begin, 0)[own]
-        each = inside if name == "literal" else 0
         columns[name] = slim(np.where(own >= 0, moved + each, -1))
-    block = visits.block[owner].astype(np.int64)
+    block = visits.motion.block[owner].astype(np.int64)
     columns["block"] = slim(np.where(block >= 0, begin[block], -1))
-    columns |= {"values": values, "line": line}
-    pred_start, pred = _follow_each_other(visits, counts)
-    return replace(
-        visits, pred_start=pred_start, pred=pred, measure_id=measure_id, **columns
-    )
+    unfolded = visits.take(owner, _follow_each_other(visits, counts))
+    return unfolded.with_columns(measure_id=measure_id, **columns)
 
 
-def _follow_each_other(visits: Visits, counts: Ints) -> tuple[Ints, Ints]:
+def _follow_each_other(visits: Visits, counts: Ints) -> Graph:
     """Return the predecessors of unfolded visits: in a run each follows the last."""
     owner, inside = within(counts)
     behind = np.cumsum(counts)
-    own = np.diff(visits.pred_start)
+    own = np.diff(visits.graph.pred_start)
     number = np.where(inside == 0, own[owner], 1)
     start = np.concatenate([[0], np.cumsum(number)]).astype(np.int64)
     pred = np.repeat(np.arange(len(owner)) - 1, number)
-    old = visits.pred.astype(np.int64)
+    old = visits.graph.pred.astype(np.int64)
     moved = np.where(old >= 0, np.append(behind, 0)[old] - 1, old)
     heads = start[behind - counts]
     at = np.repeat(heads, own) + within(own)[1]
     pred[at] = moved
-    return start, pred
+    return Graph(start, pred)

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Floats, Interned, Ints, slim
+from postproc.arrays import Bools, Floats, Interned, Ints, slim
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis.assigned_points import AssignedPoint, Scope
 from postproc.language.analysis.call_context import in_program_order
@@ -33,12 +33,19 @@ from postproc.language.text.comment_directives import MEASURE, Comments
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import (
     Blend,
+    FrameColumns,
+    Graph,
     Literals,
     Meaning,
+    MotionColumns,
     NumberPlaces,
     OrientationLaw,
+    PlaceColumns,
+    SpeedColumns,
     Switch,
+    TargetColumns,
     Visits,
+    ZoneColumns,
     ZoneRule,
 )
 from postproc.robot.pose import pose_from_record
@@ -346,19 +353,6 @@ class Conditions:
     load: tuple[float, ...] = ()
 
 
-@dataclass
-class _Tables:
-    """What columns point into."""
-
-    frames: Interned[tuple[Pose, bool]]
-    reasons: Interned[Reason]
-    names: Interned[str]
-
-    def frames_of(self, frames: Sequence[tuple[Pose, bool]]) -> Ints:
-        found = [self.frames[frame] if frame[0] else _NO_FRAME for frame in frames]
-        return slim(np.array(found, np.int64))
-
-
 def visits_of(
     machine: TaskMachine,
     dialect: Dialect,
@@ -379,8 +373,7 @@ def visits_of(
     found = [machine.visits[k] for k in order]
     held = [conditions(v) for v in found]
     texts, n = machine.texts, len(found)
-    tables = _Tables(Interned(), Interned([NO_REASON]), Interned([""]))
-    loads = Interned[tuple[float, ...]]([NO_LOAD])
+    numbers = Interned[Reason]([NO_REASON])
     other = [*_goals_beside(machine, moves)]
     literals, literal, follows, copies = _literals(
         found, machine, dialect.width, comments, other
@@ -389,42 +382,25 @@ def visits_of(
     for k in np.flatnonzero(follows == _NO_LITERAL).tolist():
         reasons[k] = reasons[k] or ONLY_SHIFTED
     follows[follows == _NO_LITERAL] = -1
-    pred_start, pred = _predecessors(machine, order)
-    base = tables.frames_of([(c.base, False) for c in held])
     counts = np.array([v.count for v in found], np.int64)
     ids = _read_measure_ids(found, texts, comments, moves)
     visits = Visits(
         files=tuple(text.source.name for text in texts),
-        file=slim(np.array([v.scope.file for v in found], np.int64)),
-        line=np.array([texts[v.scope.file].line(v.row) for v in found], np.int64),
-        values=np.array([v.goal.values for v in found], float).reshape(n, -1)
-        if n else np.empty((0, dialect.width)),
-        aux=_aux(found),
-        literal=literal,
-        follows=slim(follows),
-        name=slim(np.array(tables.names.of([v.goal.name for v in found]), np.int64)),
-        base=base,
-        tool=tables.frames_of([(c.tool, c.taught[0]) for c in held]),
-        uframe=tables.frames_of([(c.uframe, c.taught[1]) for c in held]),
-        reason=slim(np.array(tables.reasons.of(reasons), np.int64)),
-        **_moves(found, held),
-        **_settings(held),
-        names=tuple(tables.names),
-        reasons=tuple(tables.reasons),
-        frames=np.array([f for f, _ in tables.frames], float).reshape(-1, 4, 4),
-        frame_taught=np.array([taught for _, taught in tables.frames], bool),
-        pred_start=pred_start,
-        pred=pred,
-        measure_id=("",) * n if (counts > 1).any() else tuple(ids),
+        place=_place(found, texts, ("",) * n if (counts > 1).any() else tuple(ids)),
+        target=_target(found, held, dialect.width, literal, follows),
+        frame=_frames(held),
+        motion=_motion(found, held),
+        zone=_zone(found, held),
+        speed=_speed(held),
+        graph=_graph(machine, order),
+        reason=slim(np.array(numbers.of(reasons), np.int64)),
+        reasons=tuple(numbers),
         literals=literals,
         dialect=dialect,
-        **_shifts(found),
-        load=slim(np.array(loads.of([c.load or NO_LOAD for c in held]), np.int64)),
-        loads=np.array(list(loads), float).reshape(-1, 4),
-    )  # fmt: skip
+    )
     if (counts <= 1).all():
         return visits
-    values, line = _each(found, counts, visits.values, machine)
+    values, line = _each(found, counts, visits.target.values, machine)
     return unfold(visits, counts, copies, values, line, tuple(ids))
 
 
@@ -484,38 +460,116 @@ def _reason(held: Conditions, exhausted: bool) -> Reason:
     return next((why for why in held.reasons if why), NO_REASON)
 
 
-def _moves(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> dict[str, Any]:
-    """Columns of how the arm moves."""
-    n = len(found)
-    zone = np.array([c.zone_mm for c in held], float)
-    via = np.array([v.via for v in found], bool)
+def _place(
+    found: Sequence[FoundVisit],
+    texts: Sequence[StatementText[Any]],
+    ids: tuple[str, ...],
+) -> PlaceColumns:
+    lines = [texts[v.scope.file].line(v.row) for v in found]
+    return PlaceColumns(
+        file=slim(np.array([v.scope.file for v in found], np.int64)),
+        line=np.array(lines, np.int64),
+        measure_id=ids,
+    )
+
+
+def _target(
+    found: Sequence[FoundVisit],
+    held: Sequence[Conditions],
+    width: int,
+    literal: Ints,
+    follows: Ints,
+) -> TargetColumns:
+    n, names, shifts = len(found), Interned([""]), Interned[Shift]()
+    own = [v.goal.shift if v.goal.target == Meaning.POSE else None for v in found]
+    shift = [-1 if one is None else shifts[one.shift] for one in own]
+    values = np.array([v.goal.values for v in found], float)
+    return TargetColumns(
+        meaning=slim(np.array([v.goal.target for v in found], np.int64)),
+        values=values.reshape(n, -1) if n else np.empty((0, width)),
+        distance_mm=slim(np.full(n, np.nan)),
+        aux=_aux(found),
+        config=slim(np.zeros(n, dtype=np.int64)),
+        configs=("",),
+        config_given=slim(np.array([c.flagged for c in held], bool)),
+        literal=literal,
+        follows=slim(follows),
+        name=slim(np.array(names.of([v.goal.name for v in found]), np.int64)),
+        names=tuple(names),
+        shift=slim(np.array(shift, np.int64)),
+        shifts=tuple(shifts),
+    )
+
+
+def _frames(held: Sequence[Conditions]) -> FrameColumns:
+    poses = Interned[tuple[Pose, bool]]()
+
+    def index(frames: Iterable[tuple[Pose, bool]]) -> Ints:
+        rows = [poses[frame] if frame[0] else _NO_FRAME for frame in frames]
+        return slim(np.array(rows, np.int64))
+
+    return FrameColumns(
+        base=index((c.base, False) for c in held),
+        tool=index((c.tool, c.taught[0]) for c in held),
+        uframe=index((c.uframe, c.taught[1]) for c in held),
+        poses=np.array([pose for pose, _ in poses], float).reshape(-1, 4, 4),
+        taught=np.array([taught for _, taught in poses], bool),
+        tool_remote=slim(np.array([c.remote for c in held], bool)),
+    )
+
+
+def _motion(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> MotionColumns:
+    n, loads = len(held), Interned[tuple[float, ...]]([NO_LOAD])
+    care = np.repeat(np.array([c.flags for c in held], np.int64)[:, None], 3, axis=1)
+    return MotionColumns(
+        kind=slim(np.array([v.motion for v in found], np.int64)),
+        via=slim(np.array([v.via for v in found], bool)),
+        fly=slim(_is_passed(found, held)),
+        nearest_turn=slim(np.zeros(n, dtype=bool)),
+        care=care.reshape(-1, 3),
+        wrist_joint=slim(np.array([c.wrist for c in held], bool)),
+        orientation_law=slim(np.array([c.law for c in held], np.int64)),
+        arc_angle=slim(np.array([v.arc_angle for v in found], float)),
+        block=slim(_blocks(found)),
+        curved=slim(np.array([v.curved for v in found], bool)),
+        weaves=slim(np.zeros(n, dtype=bool)),
+        load=slim(np.array(loads.of([c.load or NO_LOAD for c in held]), np.int64)),
+        loads=np.array(list(loads), float).reshape(-1, 4),
+    )
+
+
+def _is_passed(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> Bools:
+    """Tell which visits the arm passes without stopping, or may, (n,)."""
+    passed = [
+        v.via or c.exact or c.unsized or c.zone_mm >= 0.0 or c.overlap >= 0.0
+        for v, c in zip(found, held, strict=True)
+    ]
+    return np.array(passed, bool)
+
+
+def _zone(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> ZoneColumns:
+    size = np.array([c.zone_mm for c in held], float)
     overlap = np.array([c.overlap for c in held], float)
-    overlaps = overlap >= 0.0
-    exact = np.array([c.exact for c in held], bool)
-    unsized = np.array([c.unsized for c in held], bool)
-    fly = (zone >= 0.0) | via | overlaps | exact | unsized
+    via, fly = np.array([v.via for v in found], bool), _is_passed(found, held)
+    overlaps, unsized = overlap >= 0.0, np.array([c.unsized for c in held], bool)
     rounded = np.where(overlaps, Blend.OVERLAP, Blend.ZONE)
-    rule = np.where(exact, ZoneRule.PASS, ZoneRule.FROM)
+    rule = np.where([c.exact for c in held], ZoneRule.PASS, ZoneRule.FROM)
     rule = np.where(unsized & ~via, ZoneRule.UNKNOWN, rule)
-    return {
-        "motion": slim(np.array([v.motion for v in found], np.int64)),
-        "target": slim(np.array([v.goal.target for v in found], np.int64)),
-        "via": slim(via),
-        "distance_mm": slim(np.full(n, np.nan)),
-        "config": slim(np.zeros(n, dtype=np.int64)),
-        "configs": ("",),
-        "config_given": slim(np.array([c.flagged for c in held], bool)),
-        "fly": slim(fly),
-        "zone_mm": slim(np.where(zone >= 0.0, zone, np.nan)),
-        "overlap_percent": slim(np.where(overlaps, overlap, 100.0)),
-        "blend": slim(np.where(fly, rounded, Blend.UNSET)),
-        "zone_rule": slim(np.where(fly & ~overlaps, rule, ZoneRule.UNSET)),
-        "lin_spd": slim(np.array([c.speed for c in held], float)),
-        "arc_angle": slim(np.array([v.arc_angle for v in found], float)),
-        "block": slim(_blocks(found)),
-        "curved": slim(np.array([v.curved for v in found], bool)),
-        "rot_spd": slim(np.full(n, np.nan)),
-    }
+    return ZoneColumns(
+        size_mm=slim(np.where(size >= 0.0, size, np.nan)),
+        overlap_percent=slim(np.where(overlaps, overlap, 100.0)),
+        blend=slim(np.where(fly, rounded, Blend.UNSET)),
+        rule=slim(np.where(fly & ~overlaps, rule, ZoneRule.UNSET)),
+    )
+
+
+def _speed(held: Sequence[Conditions]) -> SpeedColumns:
+    share = np.array([c.override for c in held], float)
+    return SpeedColumns(
+        linear=slim(np.array([c.speed for c in held], float)),
+        turning=slim(np.full(len(held), np.nan)),
+        override=slim(np.where(share > 0.0, share, 1.0)),
+    )
 
 
 def _blocks(found: Sequence[FoundVisit]) -> Ints:
@@ -524,20 +578,6 @@ def _blocks(found: Sequence[FoundVisit]) -> Ints:
     own = [-1 if v.block is None else first.setdefault(v.block, k)
            for k, v in enumerate(found)]  # fmt: skip
     return np.array(own, np.int64)
-
-
-def _settings(held: Sequence[Conditions]) -> dict[str, Any]:
-    """Columns of what holds at moves."""
-    share = np.array([c.override for c in held], float)
-    care = np.repeat(np.array([c.flags for c in held], np.int64)[:, None], 3, axis=1)
-    return {
-        "nearest_turn": slim(np.zeros(len(held), dtype=bool)),
-        "care": care.reshape(-1, 3),
-        "override": slim(np.where(share > 0.0, share, 1.0)),
-        "wrist_joint": slim(np.array([c.wrist for c in held], bool)),
-        "orientation_law": slim(np.array([c.law for c in held], np.int64)),
-        "tool_remote": slim(np.array([c.remote for c in held], bool)),
-    }
 
 
 def _aux(found: Sequence[FoundVisit]) -> np.ndarray:
@@ -687,14 +727,6 @@ def _hold_for_taught(
             pinned[at] = pinned[at] or TAUGHT_SHIFT
 
 
-def _shifts(found: Sequence[FoundVisit]) -> dict[str, Any]:
-    """Columns of how targets are shifted from points."""
-    own = [v.goal.shift if v.goal.target == Meaning.POSE else None for v in found]
-    shifts = Interned[Shift]()
-    rows = [-1 if one is None else shifts[one.shift] for one in own]
-    return {"shift": slim(np.array(rows, np.int64)), "shifts": tuple(shifts)}
-
-
 def _goals_beside(
     machine: TaskMachine, moves: Mapping[int, Sequence[int]]
 ) -> Iterator[tuple[FoundGoal, str]]:
@@ -838,7 +870,7 @@ def _on_line(
     return found
 
 
-def _predecessors(machine: TaskMachine, order: Sequence[int]) -> tuple[Ints, Ints]:
+def _graph(machine: TaskMachine, order: Sequence[int]) -> Graph:
     """Translate origins to visits in program order, in CSR form."""
     place = {number: k for k, number in enumerate(order)}
     found = [
@@ -846,4 +878,4 @@ def _predecessors(machine: TaskMachine, order: Sequence[int]) -> tuple[Ints, Int
         for k in order
     ]
     start = np.concatenate([[0], np.cumsum([len(f) for f in found])]).astype(np.int64)
-    return start, np.array([p for f in found for p in f], dtype=np.int64)
+    return Graph(start, np.array([p for f in found for p in f], dtype=np.int64))

@@ -113,9 +113,9 @@ class SettingColumns:
             columns["load"] = np.zeros(0, dtype=np.int64)
             columns["weaves"] = np.zeros(0, dtype=bool)
         records = np.array([f for f, _ in frames], float).reshape(-1, 6)
-        columns["frames"] = pose_from_record(records)
+        columns["poses"] = pose_from_record(records)
         columns["loads"] = np.array(list(self._loads), float)
-        columns["frame_taught"] = np.array([taught for _, taught in frames], bool)
+        columns["taught"] = np.array([taught for _, taught in frames], bool)
         return columns
 
 
@@ -133,12 +133,12 @@ def _row(settings: Settings, frame: Any) -> dict[str, Any]:
         "tool_remote": settings.get("tool_rmt") is True,
         "nearest_turn": settings.get("jnt_mturn") is False,
         "care": [_switch(settings.get(name)) for name in _CARE],
-        "zone_mm": _number(settings, "fly_dist"),
+        "size_mm": _number(settings, "fly_dist"),
         "overlap_percent": _number(settings, "fly_per"),
         "blend": _word(settings, "fly_type", _BLENDS),
-        "zone_rule": _word(settings, "fly_traj", _ZONE_RULES),
-        "lin_spd": _number(settings, "lin_spd"),
-        "rot_spd": _number(settings, "rot_spd"),
+        "rule": _word(settings, "fly_traj", _ZONE_RULES),
+        "linear": _number(settings, "lin_spd"),
+        "turning": _number(settings, "rot_spd"),
         "override": _override(settings),
         "wrist_joint": settings.get("ornt_type") == "wrist_jnt",
         "orientation_law": _orientation_law(settings),

@@ -368,8 +368,8 @@ def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
         name = program.lines.source.name
         moves = program.statements.which(_has_target)
         lines = program.lines.line[moves[program.lines.shape]]
-        own = visits.file == visits.files.index(name)
-        missed = lines[~np.isin(lines, visits.line[own])]
+        own = visits.place.file == visits.files.index(name)
+        missed = lines[~np.isin(lines, visits.place.line[own])]
         if len(missed):
             found[name] = missed
     return found

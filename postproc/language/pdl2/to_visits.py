@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import chain
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.arrays import (
     Bools,
@@ -32,13 +33,23 @@ from postproc.language.text.source import NumberSpans, Source
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import (
     ELSEWHERE,
+    FrameColumns,
+    Graph,
     Literals,
     Meaning,
+    MotionColumns,
     NumberPlaces,
+    PlaceColumns,
+    SpeedColumns,
+    TargetColumns,
+    VisitPart,
     Visits,
+    ZoneColumns,
     ZoneRule,
     texts_of,
 )
+
+Part = TypeVar("Part", bound=VisitPart)
 
 # Which numbers of which file belong to which target.
 
@@ -277,14 +288,38 @@ def collect(machine: Machine) -> Visits:
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     _mark_torn(collector, numbering, literal)
     numbers = _number_visits(machine, ordered, offsets)
-    pred_start, pred = _predecessors(machine, ordered, offsets, numbers)
+    settings = collector.settings.columns(c.setting)
+    n = len(c.line)
     visits = Visits(
         files=tuple(world.files),
-        file=slim(c.file),
-        line=slim(c.line),
-        motion=slim(c.motion),
-        target=slim(c.target),
-        via=slim(c.via),
+        place=PlaceColumns(slim(c.file), slim(c.line), texts_of(n, c.measured)),
+        target=_target(collector, literal, follows),
+        frame=_select(FrameColumns, settings),
+        motion=_select(
+            MotionColumns,
+            settings,
+            kind=slim(c.motion),
+            via=slim(c.via),
+            fly=slim(c.fly),
+            arc_angle=slim(np.full(n, np.nan)),
+            block=slim(np.full(n, -1)),
+            curved=slim(np.zeros(n, dtype=bool)),
+        ),
+        zone=_select(ZoneColumns, settings),
+        speed=_select(SpeedColumns, settings),
+        graph=_graph(machine, ordered, offsets, numbers),
+        reason=slim(c.reason),
+        reasons=tuple(collector.reasons),
+        literals=literals,
+        dialect=PDL2_DIALECT,
+    )
+    return _mark_pauses(visits, machine, numbers)
+
+
+def _target(collector: Collector, literal: Indices, follows: Indices) -> TargetColumns:
+    c = collector.columns
+    return TargetColumns(
+        meaning=slim(c.target),
         values=c.values,
         distance_mm=slim(c.distance_mm),
         aux=slim(c.aux),
@@ -295,20 +330,14 @@ def collect(machine: Machine) -> Visits:
         follows=slim(follows),
         name=slim(c.name),
         names=collector.names,
-        fly=slim(c.fly),
-        arc_angle=slim(np.full(len(c.line), np.nan)),
-        block=slim(np.full(len(c.line), -1)),
-        curved=slim(np.zeros(len(c.line), dtype=bool)),
-        reason=slim(c.reason),
-        reasons=tuple(collector.reasons),
-        pred_start=pred_start,
-        pred=pred,
-        measure_id=texts_of(len(c.line), c.measured),
-        literals=literals,
-        dialect=PDL2_DIALECT,
-        **collector.settings.columns(c.setting),
+        shift=slim(np.full(len(c.line), -1)),
     )
-    return _mark_pauses(visits, machine, numbers)
+
+
+def _select(part: type[Part], settings: Mapping[str, Any], **own: NDArray[Any]) -> Part:
+    """Make a part of visits of columns of settings, and of its own."""
+    names = {f.name for f in fields(part)} - {*own}
+    return part(**own, **{name: settings[name] for name in names})
 
 
 def _collect_visits(
@@ -361,16 +390,16 @@ def _mark_pauses(visits: Visits, machine: Machine, visit: Indices) -> Visits:
     """Say of which fly points it is not known whether the arm stops there."""
     paused, lost = ([visit[k] for k in ids if k >= 0]
                     for ids in (machine.paused, machine.lost))  # fmt: skip
-    unsure = {*lost, *np.intersect1d(paused, visits.pred).tolist()}
+    unsure = {*lost, *np.intersect1d(paused, visits.graph.pred).tolist()}
     rows = np.array(sorted(k for k in unsure if k >= 0), dtype=np.int64)
-    rule = visits.zone_rule[rows]
-    exact = (rule == ZoneRule.PASS) | (visits.zone_mm[rows] < 0.0)
-    rows = rows[visits.fly[rows] & ~exact]
+    rule = visits.zone.rule[rows]
+    exact = (rule == ZoneRule.PASS) | (visits.zone.size_mm[rows] < 0.0)
+    rows = rows[visits.motion.fly[rows] & ~exact]
     if len(rows) == 0:
         return visits
-    rules = np.array(visits.zone_rule)
+    rules = np.array(visits.zone.rule)
     rules[rows] = ZoneRule.UNKNOWN
-    return replace(visits, zone_rule=rules)
+    return visits.with_columns(rule=rules)
 
 
 def _number_visits(
@@ -383,12 +412,12 @@ def _number_visits(
     return visit
 
 
-def _predecessors(
+def _graph(
     machine: Machine,
     ordered: list[tuple[Key, MoveRun]],
     offsets: Ints,
     visit: Indices,
-) -> tuple[Indices, Indices]:
+) -> Graph:
     """Translate predecessor ids to visits, in CSR form."""
     n, first = int(offsets[-1]), offsets[:-1]
     origins = []
@@ -402,4 +431,4 @@ def _predecessors(
     start = np.append(np.int32(0), np.cumsum(counts, dtype=np.int32))
     pred = np.repeat(np.arange(-1, n - 1, dtype=np.int32), counts)
     pred[spans(start[first], counts[first])] = [*chain.from_iterable(origins)]
-    return start, pred
+    return Graph(start, pred)

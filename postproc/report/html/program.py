@@ -154,33 +154,33 @@ class ProgramPage:
 def columns_of(outcome: Outcome) -> PageColumns:
     """Take the columns out of an outcome."""
     v, d = outcome.visits, outcome.decisions
-    n, has = len(v), v.literal >= 0
-    literal = np.where(has, v.literal, 0)
+    n, has = len(v), v.target.literal >= 0
+    literal = np.where(has, v.target.literal, 0)
     nowhere = np.full(n, -1)
     empty = len(v.literals) == 0
     place = (nowhere, nowhere) if empty else (v.literals.file, v.literals.line)
     known = len(outcome.position) == n
     position = outcome.position / MM if known else np.full((n, 3), np.nan)
-    blank = np.where(np.arange(v.values.shape[1]) < JOINTS, 0.0, np.nan)
-    blank = np.where((v.target == Meaning.JOINTS)[:, None], blank, 0.0)
+    blank = np.where(np.arange(v.target.values.shape[1]) < JOINTS, 0.0, np.nan)
+    blank = np.where((v.target.meaning == Meaning.JOINTS)[:, None], blank, 0.0)
     blank[~has] = np.nan
     return PageColumns(
         files=v.files,
-        names=v.names,
+        names=v.target.names,
         reasons=tuple(reason.text for reason in d.reasons),
         heads=v.dialect.heads,
         visit=np.arange(1, n + 1),
-        file=v.file,
-        line=v.line,
+        file=v.place.file,
+        line=v.place.line,
         literal_file=nowhere if empty else np.where(has, place[0][literal], -1),
         literal_line=nowhere if empty else np.where(has, place[1][literal], -1),
-        name=v.name,
-        move=np.where(v.via, VIA, v.motion),
+        name=v.target.name,
+        move=np.where(v.motion.via, VIA, v.motion.kind),
         status=d.status,
         why=d.why,
         direction=np.asarray(d.direction, dtype=np.int64),
         q_deg=np.rad2deg(d.q),
-        original=v.values + blank,
+        original=v.target.values + blank,
         corrected=d.corrected + blank,
         position_mm=position,
         correction_mm=d.correction / MM,

@@ -51,7 +51,9 @@ def test_every_language_goes_the_same_way(cell, tests):
         assert found.diagnostics == ()
         plan = plan_visits(found.visits, cell)
         assert {reason.text for reason in plan.reasons} <= {""}
-        planned.append((found.visits.measure_id, plan.plan.q, found.visits.fly))
+        planned.append(
+            (found.visits.place.measure_id, plan.plan.q, found.visits.motion.fly)
+        )
     ids, q, fly = planned[0]
     for other_ids, other_q, other_fly in planned[1:]:
         assert other_ids == ids
@@ -63,13 +65,13 @@ def test_every_language_goes_the_same_way(cell, tests):
 def test_poses_directions_and_cycles(cell, tests):
     place = tests[0]
     visits = read_program({place.name: place.read_bytes()}, cell).visits
-    ids = [name for name in visits.measure_id if name]
+    ids = [name for name in visits.place.measure_id if name]
     assert len(ids) == len(set(ids)) == 30 * (5 + 3 * 3)
     assert ids[:6] == ["P5.1", "P4.1", "P3.1", "P2.1", "P1.1", "P5.2"]
-    at = {name: i for i, name in enumerate(visits.measure_id)}
+    at = {name: i for i, name in enumerate(visits.place.measure_id)}
     for axis, name in enumerate("xyz"):
         row = at[f"P4.{name}.7"]
-        q = np.deg2rad(visits.values[[row - 1, row], :6])
+        q = np.deg2rad(visits.target.values[[row - 1, row], :6])
         came = np.diff(cell.arm.tcp(q, np.tile(cell.probes[0], (2, 1))), axis=0)[0]
         np.testing.assert_allclose(came, 0.05 * np.eye(3)[axis], atol=1e-6)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -117,11 +116,13 @@ def test_a_program_with_cut_arcs_is_the_same_without_points(
     found, own = insert(reading, points, {}, splitter, CELL)
     v, w = reading.visits, found.visits
     assert len(own) == len(v)
-    np.testing.assert_array_equal(w.values[own], v.values)  # its numbers stay
-    assert not w.via[own].any() and w.via[own[END] - 1]
-    ends = np.setdiff1d(np.flatnonzero(~w.via), own)
+    np.testing.assert_array_equal(
+        w.target.values[own], v.target.values
+    )  # its numbers stay
+    assert not w.motion.via[own].any() and w.motion.via[own[END] - 1]
+    ends = np.setdiff1d(np.flatnonzero(~w.motion.via), own)
     assert len(ends) == len(first) + len(second) - 1
-    assert off_the_circle(w.values[own[0] + 1 : own[END], :3]).max() < 2e-3
+    assert off_the_circle(w.target.values[own[0] + 1 : own[END], :3]).max() < 2e-3
 
 
 def test_the_tool_is_turned_at_the_point_on_the_way_as_well() -> None:
@@ -136,18 +137,20 @@ def test_the_tool_is_turned_at_the_point_on_the_way_as_well() -> None:
     }
     found, own = insert(reading, points, {}, splitter, CELL, meant=meant)
     v, w = reading.visits, found.visits
-    poses = w.dialect.poses(w.values[own[0] + 1 : own[END] + 1])
+    poses = w.dialect.poses(w.target.values[own[0] + 1 : own[END] + 1])
     turn = rotation_vector(poses[0, :3, :3].T @ poses[:, :3, :3])
     base = rotation_vector(
-        v.dialect.poses(v.values[[0]])[0, :3, :3].T @ poses[:1, :3, :3]
+        v.dialect.poses(v.target.values[[0]])[0, :3, :3].T @ poses[:1, :3, :3]
     )
     np.testing.assert_allclose(
         (base + turn)[:, 2],
         [0.5e-4, 1e-4, 2e-4, 3e-4, 2.5e-4, 2e-4, 1e-4, 0.0],
         atol=4e-6,
     )
-    np.testing.assert_allclose(w.values[own][:, :3], v.values[:, :3], atol=6e-4)
-    np.testing.assert_array_equal(w.values[own[END]], v.values[END])
+    np.testing.assert_allclose(
+        w.target.values[own][:, :3], v.target.values[:, :3], atol=6e-4
+    )
+    np.testing.assert_array_equal(w.target.values[own[END]], v.target.values[END])
 
 
 def test_the_last_piece_of_an_arc_is_long_enough_to_bend() -> None:
@@ -178,7 +181,7 @@ def test_half_way_between_points_of_an_arc_joints_are_meant_to_lie_between() -> 
     found, own = insert(reading, points, {}, splitter, CELL, chords, meant=meant)
     assert found.aims is not None
     rows = slice(int(own[0]) + 1, int(own[END]) + 1)
-    assert found.visits.via[rows].tolist() == [1, 0, 0, 1, 0, 1, 0]
+    assert found.visits.motion.via[rows].tolist() == [1, 0, 0, 1, 0, 1, 0]
     np.testing.assert_array_equal(
         found.aims[rows, 0], [-0.9, 1.0, 1.0, 0.6, -1.0, 0.5, np.nan]
     )
@@ -192,9 +195,12 @@ def test_what_is_turned_too_far_or_moved_is_another_program() -> None:
         (5, 0.1, True),
         (5, 0.2, False),
     ):
-        values = np.array(visits.values)
+        values = np.array(visits.target.values)
         values[VIA, column] += off
-        assert are_near(visits, replace(visits, values=values), np.array([VIA])) is near
+        assert (
+            are_near(visits, visits.with_columns(values=values), np.array([VIA]))
+            is near
+        )
 
 
 def test_arcs_that_are_cut_lead_where_they_led() -> None:
@@ -207,7 +213,7 @@ def test_arcs_that_are_cut_lead_where_they_led() -> None:
               for r in (reading, found)]  # fmt: skip
     before, after = cycles
     owner = np.searchsorted(own, np.arange(len(found.visits)))
-    arcs = WantedArcs.of(before, reading.visits.before, [VIA])
+    arcs = WantedArcs.of(before, reading.visits.graph.before, [VIA])
     edges = after.path.edges
     to = np.repeat(np.arange(len(owner)), np.diff(edges.start))
     tools = after.targets.tool[to, :3, 3]

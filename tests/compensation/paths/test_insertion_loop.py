@@ -362,7 +362,7 @@ def test_both_halves_of_an_arc_are_open_where_one_is(
     monkeypatch.setattr(split_selection, "_list_far", one_half_of_every_arc)
     compensated(shop, "job.pdl", "halves", "--path-tolerance", TOLERANCE)
     (now,) = judged
-    via = np.flatnonzero(now.task.visits.via)
+    via = np.flatnonzero(now.task.visits.motion.via)
     assert len(via) > 1 and {*via, *(via + 1)} == set(now.plan.open)
     assert now.plan.beside == set(via.tolist())
     sizes = now.sizes
@@ -372,7 +372,7 @@ def test_both_halves_of_an_arc_are_open_where_one_is(
 
 
 def one_half_of_every_arc(now: PathPrediction) -> set[int]:
-    return {*(np.flatnonzero(now.task.visits.via) + 1).tolist()}
+    return {*(np.flatnonzero(now.task.visits.motion.via) + 1).tolist()}
 
 
 def test_pieces_of_unknown_speed_are_as_long_as_the_fastest_needs(shop: Path) -> None:
@@ -746,7 +746,7 @@ def test_points_behind_which_a_move_would_be_worse_are_taken_back() -> None:
         return dict(zip([3, 4, 9], np.array(mm) * MM, strict=True))
 
     now = Mock(plan=InsertionPlan(points={3: (0.5,)}), cut_arcs=[])
-    now.task.visits.motion = [Motion.LINEAR] * 10
+    now.task.visits.motion.kind = [Motion.LINEAR] * 10
     without = sizes(0.3, 0.01, 0.01)
     now.sizes = sizes(0.02, 0.07, 0.09)
     ((v, (why, *_)),) = prune._harmful(now, without)  # 9 is too far behind

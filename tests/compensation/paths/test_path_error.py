@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tempfile
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -178,7 +177,7 @@ def real_corners(folder: Path, name: str) -> dict[int, float]:
 
 def with_stops(visits: Visits) -> Visits:
     """Let the arm stop at all targets, so that it goes to them."""
-    return replace(visits, fly=np.zeros(len(visits), dtype=bool))
+    return visits.with_columns(fly=np.zeros(len(visits), dtype=bool))
 
 
 def test_rounded_corners_are_passed_as_the_virtual_arm_does(shop: Path) -> None:

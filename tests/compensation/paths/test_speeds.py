@@ -30,10 +30,10 @@ def test_the_speed_of_the_cell_holds_until_a_program_sets_one(
     place.write_text(MOTION + CELL.read_text())
     text = program(FIRST, *lines, POSE, declared="fast : REAL")
     visits = read_program({"job.pdl": text}, load_cell(place)).visits
-    np.testing.assert_allclose(visits.lin_spd[-1], speed)
-    np.testing.assert_allclose(visits.override[-1], share)
+    np.testing.assert_allclose(visits.speed.linear[-1], speed)
+    np.testing.assert_allclose(visits.speed.override[-1], share)
 
 
 def test_without_one_it_is_not_known() -> None:
     visits = read_program({"job.pdl": program(FIRST, POSE)}, load_cell(CELL)).visits
-    assert np.isnan(visits.lin_spd[-1])
+    assert np.isnan(visits.speed.linear[-1])

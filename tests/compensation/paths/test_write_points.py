@@ -58,7 +58,9 @@ def read() -> ParsedProgram:
 
 
 def last(reading: ParsedProgram) -> int:
-    return int(np.flatnonzero(reading.visits.line == reading.visits.line.max())[0])
+    return int(
+        np.flatnonzero(reading.visits.place.line == reading.visits.place.line.max())[0]
+    )
 
 
 def test_points_lie_on_the_line_and_turn_about_one_axis() -> None:
@@ -86,16 +88,18 @@ def test_a_program_with_points_is_the_same_without_them() -> None:
     assert len(w) == len(v) + 3 == len(own) + 3
     new = np.setdiff1d(np.arange(len(w)), own)
     assert (
-        equivalent(v, without(w, np.isin(np.arange(len(w)), new)), NOTHING, v.values)
+        equivalent(
+            v, without(w, np.isin(np.arange(len(w)), new)), NOTHING, v.target.values
+        )
         == ""
     )
-    assert w.fly[new].tolist() == [True, False, True]
+    assert w.motion.fly[new].tolist() == [True, False, True]
     rounded: Floats = np.abs(
-        w.values[new[1:]] - between(v, visit, np.array([0.1, 0.5]))
+        w.target.values[new[1:]] - between(v, visit, np.array([0.1, 0.5]))
     )
     assert rounded[:, :3].max() < 1e-3 and rounded[1].max() < 1e-3
     turn = w.dialect.poses(
-        np.vstack([between(v, visit, np.array([0.1])), w.values[new[1]]])
+        np.vstack([between(v, visit, np.array([0.1])), w.target.values[new[1]]])
     )
     turned = Rotation.from_matrix(turn[0, :3, :3].T @ turn[1, :3, :3]).as_rotvec()
     np.testing.assert_allclose(turned, TURNED.turn, atol=2e-6)
@@ -120,7 +124,7 @@ def test_what_else_changes_is_found() -> None:
     reading = read()
     programs = [parse(source) for source in reading.sources]
     for text, keeps, said in (
-        (b"  $LIN_SPD := 0.01\r\n", True, "another lin_spd"),
+        (b"  $LIN_SPD := 0.01\r\n", True, "another speed: linear"),
         (b"-- none\r\n", False, "0 of 1"),
         (b"  MOVE JOINT TO {1.0, 2.0, -80.0, 4.0, 5.0, 6.0}\r\n", True, "2 of 1"),
     ):

@@ -29,7 +29,7 @@ def follow(
         AssertionError: A step is no visit, or none that may come then.
     """
     by_line: dict[tuple[str, int], list[int]] = {}
-    files, lines = visits.file.tolist(), visits.line.tolist()
+    files, lines = visits.place.file.tolist(), visits.place.line.tolist()
     for visit, (file, line) in enumerate(zip(files, lines, strict=True)):
         by_line.setdefault((visits.files[file], line), []).append(visit)
     before, found = {START}, []
@@ -43,7 +43,7 @@ def follow(
         alike = [v for v in here if not misfit(visits, v, step, rapid)]
         now = {
             v for v in alike
-            if not (before | {ELSEWHERE}).isdisjoint(visits.predecessors(v).tolist())
+            if {ELSEWHERE, *before} & {*visits.graph.predecessors(v).tolist()}
         }  # fmt: skip
         if not now:
             why = {misfit(visits, v, step, rapid) or "its predecessors" for v in here}
@@ -58,17 +58,17 @@ def follow(
 
 def misfit(visits: Visits, visit: int, step: Step, rapid: bool) -> str:
     """Say in what a visit differs from a step of a run, "" in nothing."""
-    if bool(visits.via[visit]) != step.via:
+    if bool(visits.motion.via[visit]) != step.via:
         return "another point of an arc"
     if ANYTHING.search(visits.reasons[visits.reason[visit]].text):
         return ""
-    tool, uframe = int(visits.tool[visit]), int(visits.uframe[visit])
-    if tool >= 0 and not same(visits.frames[tool], step.tool):
+    tool, uframe = int(visits.frame.tool[visit]), int(visits.frame.uframe[visit])
+    if tool >= 0 and not same(visits.frame.poses[tool], step.tool):
         return "the tool"
-    if visits.target[visit] == Meaning.UNKNOWN:
+    if visits.target.meaning[visit] == Meaning.UNKNOWN:
         return ""
     if not step.in_joints and uframe >= 0:
-        if not same(visits.frames[uframe], step.base):
+        if not same(visits.frame.poses[uframe], step.base):
             return "the base"
     known = visits.reason[visit] == 0 and tool >= 0
     if known and not same_load(visits, visit, step):
@@ -78,7 +78,7 @@ def misfit(visits: Visits, visit: int, step: Step, rapid: bool) -> str:
 
 def same_load(visits: Visits, visit: int, step: Step) -> bool:
     """Compare what the arm carries: NaN is what the cell says."""
-    stated = visits.loads[visits.load[visit]]
+    stated = visits.motion.loads[visits.motion.load[visit]]
     mass, centre = step.load
     if np.isnan(stated[0]) or np.isnan(mass):
         return bool(np.isnan(stated[0]) and np.isnan(mass))
@@ -88,7 +88,10 @@ def same_load(visits: Visits, visit: int, step: Step) -> bool:
 
 def same_goal(visits: Visits, visit: int, step: Step, rapid: bool) -> bool:
     """Compare the kind of a target, and its numbers."""
-    numbers, meaning = visits.values[visit].tolist(), Meaning(visits.target[visit])
+    numbers, meaning = (
+        visits.target.values[visit].tolist(),
+        Meaning(visits.target.meaning[visit]),
+    )
     if meaning == Meaning.RELATIVE_UFRAME:
         by = step.move.to.by if isinstance(step.move.to, Shifted) else ()
         return step.move.kind == "step" and np.allclose(numbers[:3], by)

@@ -169,13 +169,13 @@ def count(
                 why = {d.reasons[d.why[row]].text for row in mine}
                 text = f"went to new numbers, though: {' / '.join(why)}"
                 found.wrong.append((seed, line, text))
-        elif (visits.tool[mine] < 0).any() or (
-            not old.in_joints and (visits.uframe[mine] < 0).any()
+        elif (visits.frame.tool[mine] < 0).any() or (
+            not old.in_joints and (visits.frame.uframe[mine] < 0).any()
         ):
             found.wrong.append(
                 (seed, line, "is corrected in frames that are not known")
             )
-        elif (visits.fly & ~visits.via)[mine].any() or old.fly:
+        elif (visits.motion.fly & ~visits.motion.via)[mine].any() or old.fly:
             found.error_mm[ROUNDED].append(pair)
         elif is_averaged(d, mine):
             found.error_mm[AVERAGED].append(pair)
@@ -246,16 +246,16 @@ def straight(steps: Sequence[Step]) -> Visits:
     meanings = [Meaning.JOINTS if s.in_joints else Meaning.POSE for s in steps]
     return made_visits(
         [int(m) for m in meanings], numbers,
-        motion=np.array([KINDS[s.move.kind] for s in steps]),
+        kind=np.array([KINDS[s.move.kind] for s in steps]),
         via=np.array([s.via for s in steps]),
         fly=np.array([s.fly for s in steps]),
-        zone_mm=np.array([s.zone or np.nan for s in steps]),
+        size_mm=np.array([s.zone or np.nan for s in steps]),
         blend=np.array([Blend.OVERLAP if s.by_joints else Blend.ZONE for s in steps]),
-        overlap_percent=zeros + OVERLAP, zone_rule=zeros + ZoneRule.FROM,
-        lin_spd=np.array([s.speed * MM for s in steps]),
+        overlap_percent=zeros + OVERLAP, rule=zeros + ZoneRule.FROM,
+        linear=np.array([s.speed * MM for s in steps]),
         config_given=np.zeros(n, dtype=bool), configs=("",),
-        tool=np.array(tools), base=zeros, uframe=zeros, frames=np.array(poses),
-        frame_taught=np.zeros(len(poses), dtype=bool),
+        tool=np.array(tools), base=zeros, uframe=zeros, poses=np.array(poses),
+        taught=np.zeros(len(poses), dtype=bool),
     )  # fmt: skip
 
 

@@ -60,8 +60,8 @@ def test_as_many_points_as_a_program_assigns_are_known():
     lines = ["FOR i FROM 1 TO 8000 DO", "big{i}:=Offs(p1,0,0,i);", "ENDFOR"]
     moves = [L.format(f"big{{{k}}}") for k in (1, 4000, 8000)]
     found = task(*lines, *moves, more="VAR robtarget big{8000};")
-    assert found.visits.target.tolist() == [Meaning.POSE] * 3
-    assert np.diff(found.visits.values[:, 2]).tolist() == [3999, 4000]
+    assert found.visits.target.meaning.tolist() == [Meaning.POSE] * 3
+    assert np.diff(found.visits.target.values[:, 2]).tolist() == [3999, 4000]
 
 
 @pytest.mark.parametrize("rounds", [3, 3000])
@@ -69,13 +69,13 @@ def test_copies_of_copies_are_as_deep_as_a_loop_is_long(rounds):
     lines = [f"FOR i FROM 1 TO {rounds} DO", "b:=a;", "a:=b;", "a.trans.z:=i;"]
     more = "VAR robtarget a;\nVAR robtarget b;"
     found = task("a:=p1;", *lines, "ENDFOR", L.format("a"), more=more)
-    assert found.visits.target.tolist() == [Meaning.POSE]
-    assert found.visits.values[0, 2] == rounds
+    assert found.visits.target.meaning.tolist() == [Meaning.POSE]
+    assert found.visits.target.values[0, 2] == rounds
 
 
 def test_a_point_may_be_shifted_as_often_as_a_loop_runs():
     lines = ["FOR I=1 TO 2000", "Q={X 0,Y 0,Z 0.5,A 0,B 0,C 0}:Q", "ENDFOR", "LIN Q"]
     found = job("Q=XP1", *lines, data=f"{DATA}DECL E6POS Q\nDECL INT I\n")
-    assert found.visits.target.tolist() == [Meaning.POSE]
-    start = job("LIN XP1").visits.values[0]
-    np.testing.assert_allclose(found.visits.values[0, 2], start[2] + 1000.0)
+    assert found.visits.target.meaning.tolist() == [Meaning.POSE]
+    start = job("LIN XP1").visits.target.values[0]
+    np.testing.assert_allclose(found.visits.target.values[0, 2], start[2] + 1000.0)

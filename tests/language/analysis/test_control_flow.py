@@ -73,7 +73,7 @@ def test_what_fits_nowhere_is_told_and_closes_nothing(words: str, lost: set[int]
 
 def rapid(*lines: str) -> list[list[int]]:
     found = Rapid().read([Source("job.mod", module(*lines))], Start()).visits
-    return [found.predecessors(k).tolist() for k in range(len(found))]
+    return [found.graph.predecessors(k).tolist() for k in range(len(found))]
 
 
 def test_what_stands_behind_an_endless_loop_leads_nowhere():

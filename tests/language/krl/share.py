@@ -37,13 +37,13 @@ def outcomes(path: Path, cell: Path, model: Path) -> Counter[str]:
     found: Counter[str] = Counter()
     done = compensate(path, cell, model, options=Options(timing=False))
     v, status = done.visits, done.decisions.status
-    for file in np.unique(v.file).tolist():
-        for line in np.unique(v.line[v.file == file]).tolist():
-            rows = np.flatnonzero((v.file == file) & (v.line == line))
+    for file in np.unique(v.place.file).tolist():
+        for line in np.unique(v.place.line[v.place.file == file]).tolist():
+            rows = np.flatnonzero((v.place.file == file) & (v.place.line == line))
             why = next((v.reasons[k].text for k in v.reason[rows].tolist() if k), "")
             if (
                 any(word in why for word in NO_TARGET)
-                or v.target[rows[0]] in NO_TARGETS
+                or v.target.meaning[rows[0]] in NO_TARGETS
             ):
                 found["no target"] += 1
             elif (status[rows] == Status.CORRECTED).all():

@@ -34,8 +34,8 @@ def lin(point, blend=""):
 
 
 def left(found):
-    home = {k for k, name in enumerate(found.visits.names) if name in ("xhome",)}
-    names = found.visits.name.tolist()
+    home = {k for k, name in enumerate(found.visits.target.names) if name in ("xhome",)}
+    names = found.visits.target.name.tolist()
     why = reasons(found)
     return [w for w, name in zip(why, names, strict=True) if w and name not in home]
 
@@ -65,4 +65,8 @@ def test_a_load_that_changes_with_the_part():
     found = job(*INI, *ptp("XP1"), "$LOAD=LOAD_DATA[1]", "LIN XP2",
                 "$LOAD={M 55,CM {X 0,Y 0,Z 9,A 0,B 0,C 0}}", "LIN XP1")  # fmt: skip
     assert left(found) == []
-    assert found.visits.loads[found.visits.load][:, 0].tolist() == [40.0, 40.0, 55.0]
+    assert found.visits.motion.loads[found.visits.motion.load][:, 0].tolist() == [
+        40.0,
+        40.0,
+        55.0,
+    ]

@@ -78,18 +78,18 @@ def test_a_row_of_the_page(lines, result):
             job(*program, more=MORE)
         return
     found = job(*program, more=MORE)
-    names = [found.visits.names[k] for k in found.visits.name.tolist()]
+    names = [found.visits.target.names[k] for k in found.visits.target.name.tolist()]
     first, last = 0, len(names) - 1 - names[::-1].index("xp2")
     if "moves( )" in lines:
         last = len(names) - 1
-    why, fly = reasons(found), found.visits.fly.tolist()
+    why, fly = reasons(found), found.visits.motion.fly.tolist()
     lost = origins(found)[last] == [ELSEWHERE]
     assert bool(why[last]) == (result in ("not corrected", "lost"))
     assert lost == (result == "lost")
     if result in ("nothing", "stops"):
         assert why[first] == "" and fly[first] == (result == "nothing")
     if result == "may stop":
-        rule = found.visits.zone_rule[first]
+        rule = found.visits.zone.rule[first]
         assert why[first] == "" and fly[first] and rule == ZoneRule.UNKNOWN
 
 

@@ -63,7 +63,7 @@ def test_the_arm_lands_where_it_is_to(bench_cell, bench_model, seed):
         for text in (files, {**files, **found.outputs})
     )
     landing, rows = land(body, setup, given, made), found.decisions
-    safe = (rows.why == 0) & ~found.visits.fly & ~found.visits.via
+    safe = (rows.why == 0) & ~found.visits.motion.fly & ~found.visits.motion.via
     sure = (safe & (rows.direction != 0).all(axis=1))[landing.visit]
     miss = 1e3 * np.linalg.norm(landing.error, axis=1)[sure & (landing.visit > 0)]
     assert len(miss) > 10 and miss.max() <= 0.1
@@ -213,7 +213,7 @@ def test_a_point_that_other_programs_know_stays_and_its_move_gets_another(
         point in found.outputs["more.dat"] and b"PTP XP9__2" in found.outputs["job.src"]
     )
     again = read_program({**files, **found.outputs}, bench_cell).visits
-    assert again.names[again.name[1]] == "xp9__2"
+    assert again.target.names[again.target.name[1]] == "xp9__2"
 
 
 def test_of_an_inline_form_such_a_point_is_left(bench_cell, bench_model):

@@ -112,7 +112,7 @@ def test_initial_moves_switch_corrections_off():
 def test_initial_moves_take_the_first_tool_and_no_base():
     lines = ["BAS(#TOOL,2)", "$BASE=BASE_DATA[2]", "$IPO_MODE=#TCP", INIT, "LIN XP1"]
     found = job(*lines)
-    assert reasons(found) == [""] and not found.visits.tool_remote.any()
+    assert reasons(found) == [""] and not found.visits.frame.tool_remote.any()
     np.testing.assert_allclose(places(found), ([10, 20, 300], [0, 0, 0]))
     on = CONFIG.replace("ENDDAT", "BOOL M_BAS_COR_ON=TRUE\nENDDAT")
     np.testing.assert_allclose(places(job(*lines, config=on))[1], 0.0)
@@ -151,12 +151,12 @@ def test_initial_moves_take_speeds_and_distances_of_the_controller():
     config = CONFIG.replace("ENDDAT", f"{given}ENDDAT")
     lines = [INIT, "PTP XP1 C_PTP", "LIN XP2 C_DIS", "LIN XP1"]
     found = job(*lines, config=config).visits
-    assert found.override[0] == 0.8 and found.overlap_percent[0] == 40.0
-    assert found.zone_mm[1] == 7.0
+    assert found.speed.override[0] == 0.8 and found.zone.overlap_percent[0] == 40.0
+    assert found.zone.size_mm[1] == 7.0
     rules = [ZoneRule.UNKNOWN] * 2
-    assert job("$APO.CDIS=5", *lines).visits.zone_rule.tolist()[:2] == rules
+    assert job("$APO.CDIS=5", *lines).visits.zone.rule.tolist()[:2] == rules
     still = config.replace("ENDDAT", "INT DEF_ADVANCE=0\nENDDAT")
-    assert not job(*lines, config=still).visits.fly.any()
+    assert not job(*lines, config=still).visits.motion.fly.any()
 
 
 def test_a_switch_of_the_program_itself_is_not_that_of_the_controller():
@@ -203,7 +203,9 @@ def test_components_of_frames_are_set_one_by_one(lines):
     found = job(*lines, "LIN XP1")
     whole = job("$BASE={X 100,Y 0,Z 7,A 90,B 0,C 0}", "LIN XP1")
     assert reasons(found) == [""]
-    poses = [one.visits.frames[one.visits.uframe[0]] for one in (found, whole)]
+    poses = [
+        one.visits.frame.poses[one.visits.frame.uframe[0]] for one in (found, whole)
+    ]
     np.testing.assert_allclose(*poses, atol=1e-12)
 
 
@@ -264,7 +266,7 @@ def test_an_interrupt_that_sets_an_entry_leaves_everything():
 
 def loads(found):
     v = found.visits
-    return v.loads[v.load]
+    return v.motion.loads[v.motion.load]
 
 
 LOAD = "{M 90,CM {X 10,Y 20,Z 30,A 0,B 0,C 0},J {X 1,Y 1,Z 1}}"
@@ -350,11 +352,11 @@ def test_a_base_on_a_conveyor_leaves_the_tool_and_the_load(name):
     v = found.visits
     assert "another axis or arm" in reasons(found)[0] and reasons(found)[1] == ""
     assert frame(found, "tool", 1)[:3].tolist() == [10, 20, 300]
-    assert v.loads[v.load[1]][0] == 40.0
-    assert v.predecessors(0).tolist() == [ELSEWHERE]
+    assert v.motion.loads[v.motion.load[1]][0] == 40.0
+    assert v.graph.predecessors(0).tolist() == [ELSEWHERE]
 
 
 def test_the_arm_may_be_taken_along_before_another_base_is_set():
     found = job(INIT, "BAS(#TOOL,1)", "PTP XA", f"$BASE=EB({BELT})", "BAS(#BASE,2)",
                 "LIN XP1")  # fmt: skip
-    assert found.visits.predecessors(1).tolist() == [ELSEWHERE]
+    assert found.visits.graph.predecessors(1).tolist() == [ELSEWHERE]

@@ -221,7 +221,10 @@ def test_inline_forms_blend_across_the_collision_monitor():
     form = ["FDAT_ACT=FP1", "LDAT_ACT=LCPDAT1", "BAS(#CP_PARAMS, 2.0)",
             "SET_CD_PARAMS (0)"]  # fmt: skip
     found = job(*form, "LIN XP1 C_DIS", *form, "LIN XP2")
-    assert reasons(found) == ["", ""] and found.visits.fly.tolist() == [True, False]
+    assert reasons(found) == ["", ""] and found.visits.motion.fly.tolist() == [
+        True,
+        False,
+    ]
 
 
 def test_a_routine_of_the_files_comes_before_one_of_a_package():

@@ -76,9 +76,13 @@ def corrected(lines, cell, model, points=()):
     pages = {"job.dat": page.encode()} if points else {}
     done = compensate(text.encode(), cell, model, name="job.src", pages=pages)
     v, d = done.visits, done.decisions
-    rows = v.config_given & (v.target == Meaning.POSE) & (d.status == Status.CORRECTED)
-    signs = np.where(v.values[rows, 7].astype(int) & BIT, -1, 1)
-    return done, v.values[rows], d.corrected[rows], signs
+    rows = (
+        v.target.config_given
+        & (v.target.meaning == Meaning.POSE)
+        & (d.status == Status.CORRECTED)
+    )
+    signs = np.where(v.target.values[rows, 7].astype(int) & BIT, -1, 1)
+    return done, v.target.values[rows], d.corrected[rows], signs
 
 
 def axis_4(values, arm=KR):

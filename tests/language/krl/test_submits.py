@@ -106,7 +106,7 @@ def test_what_runs_beside_may_leave_the_track_elsewhere(submit):
 def test_how_points_are_passed_may_change_beside_the_program():
     lines = [*KNOWN, "$APO.CDIS=5", "LIN XP1 C_DIS", "LIN XP2"]
     rules = [
-        job(*lines, submit=submit).visits.zone_rule[0]
+        job(*lines, submit=submit).visits.zone.rule[0]
         for submit in ("own=TRUE", "$APO.CDIS=50", "$ADVANCE=0")
     ]
     assert rules == [ZoneRule.FROM, ZoneRule.UNKNOWN, ZoneRule.UNKNOWN]

@@ -235,7 +235,10 @@ def test_bas_takes_the_settings_of_the_controller(declared):
 @pytest.mark.parametrize("word", ["#CONSTANT", "#IGNORE", "N2"])
 def test_where_the_tool_need_not_turn_to_a_point_nothing_follows_from_it(word):
     found = job(f"$ORI_TYPE={word}", "LIN XP1", "PTP XP2")
-    assert "$ORI_TYPE" in reasons(found)[0] and np.isnan(found.visits.values[0]).all()
+    assert (
+        "$ORI_TYPE" in reasons(found)[0]
+        and np.isnan(found.visits.target.values[0]).all()
+    )
 
 
 @pytest.mark.parametrize("lines", [
@@ -247,7 +250,7 @@ def test_where_the_tool_need_not_turn_to_a_point_nothing_follows_from_it(word):
 def test_a_point_that_a_move_need_not_reach_keeps_its_numbers(lines):
     found = job(*FRAMES, *lines, "LIN XP1")
     assert reasons(found)[-1] == ""
-    last = int(found.visits.literal[-1])
+    last = int(found.visits.target.literal[-1])
     assert any(last in rows.tolist() for rows in found.visits.literals.pins.values())
 
 
@@ -280,7 +283,7 @@ def test_a_home_position_that_is_a_pose_is_where_it_says():
     home = "DECL E6POS HOME={X 1,Y 2,Z 3,A 0,B 0,C 180,S 2,T 35}\n"
     found = job("PTP HOME", data=DATA + home)
     assert "home position" in reasons(found)[0]
-    assert found.visits.values[0].tolist()[:3] == [1, 2, 3]
+    assert found.visits.target.values[0].tolist()[:3] == [1, 2, 3]
 
 
 # Interrupts that come in moves before they are switched on: the program is ahead.

@@ -51,7 +51,7 @@ COLUMNS = {"base": "uframe", "frames": "uframe", "load": "load"}
 def test_what_it_sets_holds_behind_it(kind):
     sources = [("userspot", written(ACTING[kind]))]
     found = job(*FRAMES, "USERSPOT(1)", "LIN XP2", others=sources)
-    first, last = getattr(found.visits, COLUMNS[kind]).tolist()
+    first, last = found.visits.columns[COLUMNS[kind]].tolist()
     assert reasons(found) == ["", ""] and first != last
 
 

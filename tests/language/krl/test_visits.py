@@ -74,12 +74,12 @@ def job(*lines, more="", data=DATA, start=None, config=CONFIG, others=()):
 
 def names(found):
     v = found.visits
-    return [v.names[k] for k in v.name.tolist()]
+    return [v.target.names[k] for k in v.target.name.tolist()]
 
 
 def origins(found):
     v = found.visits
-    return [v.predecessors(k).tolist() for k in range(len(v))]
+    return [v.graph.predecessors(k).tolist() for k in range(len(v))]
 
 
 def reasons(found):
@@ -92,7 +92,7 @@ def codes(found):
 
 
 def frame(found, column, k=0):
-    pose = found.visits.frames[getattr(found.visits, column)[k]]
+    pose = found.visits.frame.poses[found.visits.columns[column][k]]
     return record_from_pose(pose[None])[0]
 
 
@@ -100,12 +100,12 @@ def test_points_by_name():
     found = job("PTP XP1", "LIN XP2", "PTP XA", "PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}")
     v = found.visits
     assert reasons(found) == [""] * 4 and names(found) == ["xp1", "xp2", "xa", ""]
-    assert v.target.tolist() == [Meaning.POSE] * 2 + [Meaning.JOINTS] * 2
-    assert v.values[0].tolist() == [1, 2, 3, 0, 0, 180, 2, 35]
-    assert v.values[1].tolist() == [4.5, -5, 6, 10, 20, 30, 2, 35]
-    assert v.values[2].tolist() == [1, 2, 3, 4, 5, 6, 0, 0]
+    assert v.target.meaning.tolist() == [Meaning.POSE] * 2 + [Meaning.JOINTS] * 2
+    assert v.target.values[0].tolist() == [1, 2, 3, 0, 0, 180, 2, 35]
+    assert v.target.values[1].tolist() == [4.5, -5, 6, 10, 20, 30, 2, 35]
+    assert v.target.values[2].tolist() == [1, 2, 3, 4, 5, 6, 0, 0]
     assert origins(found) == [[START], [0], [1], [2]]
-    assert np.isnan(v.aux).all() and v.config_given.tolist() == [
+    assert np.isnan(v.target.aux).all() and v.target.config_given.tolist() == [
         True,
         False,
         False,
@@ -127,9 +127,9 @@ def test_inline_forms_old_and_modern(line):
     np.testing.assert_allclose(frame(found, "tool")[:3], [10, 20, 300])
     np.testing.assert_allclose(frame(found, "uframe"), [1000, 100, 500, 0, 0, 0])
     v = found.visits
-    assert v.zone_mm[0] == 12.5 and v.fly.tolist() == [True, True, False]
-    np.testing.assert_allclose(v.lin_spd, 2.0)
-    assert v.orientation_law.tolist() == [OrientationLaw.ONE_AXIS] * 3
+    assert v.zone.size_mm[0] == 12.5 and v.motion.fly.tolist() == [True, True, False]
+    np.testing.assert_allclose(v.speed.linear, 2.0)
+    assert v.motion.orientation_law.tolist() == [OrientationLaw.ONE_AXIS] * 3
 
 
 def test_inline_settings_hold_for_one_move():
@@ -200,7 +200,7 @@ def test_what_is_not_known_is_left(lines, why):
     found = job(*lines)
     given = [*reasons(found), *found.visits.literals.pinned]
     if not why:
-        remote = found.visits.tool_remote.tolist()
+        remote = found.visits.frame.tool_remote.tolist()
         assert True in remote or "all programs share" in given[-1]
     else:
         assert any(why in one for one in given)
@@ -232,11 +232,13 @@ def test_speeds_and_blending():
         "PTP XP1 C_PTP", "PTP XP2 C_PTP C_DIS", "LIN XP1 C_DIS", "LIN XP2",
     )  # fmt: skip
     v = found.visits
-    assert reasons(found) == [""] * 4 and v.fly.tolist() == [True, True, True, False]
-    assert v.blend.tolist() == [Blend.OVERLAP, Blend.ZONE, Blend.ZONE, Blend.UNSET]
-    assert v.overlap_percent[0] == 40.0 and v.zone_mm[1:3].tolist() == [5.0, 5.0]
-    assert v.override.tolist() == [0.5, 0.5, 1.0, 1.0]
-    np.testing.assert_allclose(v.lin_spd, 0.3)
+    assert reasons(found) == [""] * 4
+    assert v.motion.fly.tolist() == [True, True, True, False]
+    assert v.zone.blend.tolist() == [Blend.OVERLAP, Blend.ZONE, Blend.ZONE, Blend.UNSET]
+    assert v.zone.overlap_percent[0] == 40.0
+    assert v.zone.size_mm[1:3].tolist() == [5.0, 5.0]
+    assert v.speed.override.tolist() == [0.5, 0.5, 1.0, 1.0]
+    np.testing.assert_allclose(v.speed.linear, 0.3)
 
 
 def test_blending_of_inline_settings():
@@ -245,10 +247,10 @@ def test_blending_of_inline_settings():
     found = job(
         f"SLIN XP1 WITH {line} C_SPL", f"SPTP XP2 WITH {joint} C_SPL", "SLIN XP1"
     )
-    assert found.visits.zone_mm[:2].tolist() == [12.5, 50.0]
+    assert found.visits.zone.size_mm[:2].tolist() == [12.5, 50.0]
     assert reasons(found) == [""] * 3
     lost = job(f"SPTP XP2 WITH {joint} C_SPL", "SLIN XP1", "PPDAT1.APO_DIST=3")
-    assert reasons(lost) == ["", ""] and lost.visits.zone_rule[0] == ZoneRule.UNKNOWN
+    assert reasons(lost) == ["", ""] and lost.visits.zone.rule[0] == ZoneRule.UNKNOWN
 
 
 @pytest.mark.parametrize(
@@ -270,25 +272,31 @@ def test_what_stops_the_advance_run_ends_blending(between, fly):
     found = job("$APO.CDIS=5", "LIN XP1 C_DIS", between, "LIN XP2")
     if fly is None:
         assert reasons(found) == ["", ""]
-        assert found.visits.zone_rule.tolist() == [ZoneRule.UNKNOWN, ZoneRule.UNSET]
+        assert found.visits.zone.rule.tolist() == [ZoneRule.UNKNOWN, ZoneRule.UNSET]
     else:
-        assert reasons(found) == ["", ""] and found.visits.fly.tolist() == [fly, False]
+        assert reasons(found) == ["", ""] and found.visits.motion.fly.tolist() == [
+            fly,
+            False,
+        ]
 
 
 @pytest.mark.parametrize("word", ["LIN XP1 C_DIS", "PTP XP1 C_PTP", "SLIN XP1 C_SPL"])
 def test_a_distance_of_blending_that_is_not_known(word):
     found = job(word, "SLIN XP2" if "S" in word[0] else "LIN XP2")
-    assert reasons(found) == ["", ""] and found.visits.fly.tolist() == [True, False]
-    assert found.visits.zone_rule[0] == ZoneRule.UNKNOWN
+    assert reasons(found) == ["", ""] and found.visits.motion.fly.tolist() == [
+        True,
+        False,
+    ]
+    assert found.visits.zone.rule[0] == ZoneRule.UNKNOWN
 
 
 def test_planners_do_not_blend_into_each_other():
     found = job("$APO.CDIS=5", "LIN XP1 C_DIS", "SLIN XP2 C_DIS", "SLIN XP1")
-    assert found.visits.fly.tolist() == [False, True, False]
+    assert found.visits.motion.fly.tolist() == [False, True, False]
     found = job("$APO.CDIS=5", "LIN XP1 C_DIS")  # nothing stands behind it
-    assert found.visits.fly.tolist() == [False]
+    assert found.visits.motion.fly.tolist() == [False]
     found = job("$ADVANCE=0", "$APO.CDIS=5", "LIN XP1 C_DIS", "LIN XP2")
-    assert found.visits.fly.tolist() == [False, False]
+    assert found.visits.motion.fly.tolist() == [False, False]
 
 
 def test_arcs():
@@ -297,9 +305,9 @@ def test_arcs():
         "CIRC XP1,XP2", "SCIRC XP1,XP2", through, "SCIRC XP1,XP2", "CIRC XP1,XP2"
     )
     v, law = found.visits, OrientationLaw
-    assert v.via.tolist() == [True, False] * 4
+    assert v.motion.via.tolist() == [True, False] * 4
     known = [law.ALONG_PATH] * 4 + [law.ONE_AXIS] * 2 + [law.ALONG_PATH] * 2
-    assert v.orientation_law.tolist() == known
+    assert v.motion.orientation_law.tolist() == known
 
 
 CIRCLES = {
@@ -324,7 +332,7 @@ DECL LDAT LNONE={VEL 2,ACC 100,APO_DIST 5,ORI_TYP #VAR}
 @pytest.mark.parametrize(("lines", "law"), CIRCLES.values(), ids=CIRCLES)
 def test_how_the_tool_turns_on_arcs(lines, law):
     found = job(*lines, "CIRC XP1,XP2", data=DATA + LDATS)
-    assert found.visits.orientation_law.tolist() == [OrientationLaw[law]] * 2
+    assert found.visits.motion.orientation_law.tolist() == [OrientationLaw[law]] * 2
 
 
 @pytest.mark.parametrize("first", ["LDAT_ACT=LNONE\nBAS(#CP_DAT)", "BAS(#INITMOV,0)"])
@@ -332,7 +340,7 @@ def test_the_default_of_the_controller_for_arcs(first):
     config = CONFIG.replace("ENDDAT", "DECL CIRC_TYPE DEF_CIRC_TYP=#BASE\nENDDAT")
     found = job(first, "CIRC XP1,XP2", data=DATA + LDATS, config=config)
     law = OrientationLaw
-    assert found.visits.orientation_law.tolist() == [law.START_TO_END] * 2
+    assert found.visits.motion.orientation_law.tolist() == [law.START_TO_END] * 2
 
 
 def test_arcs_of_the_spline_planner_along_the_path():
@@ -342,7 +350,7 @@ def test_arcs_of_the_spline_planner_along_the_path():
                 data=DATA + LDATS)  # fmt: skip
     law = OrientationLaw
     known = [law.ALONG_PATH] * 2 + [law.ONE_AXIS] * 2 + [law.ALONG_PATH] * 2
-    assert found.visits.orientation_law.tolist() == known
+    assert found.visits.motion.orientation_law.tolist() == known
 
 
 def test_a_submit_program_may_set_how_the_tool_turns_on_arcs():
@@ -351,13 +359,15 @@ def test_a_submit_program_may_set_how_the_tool_turns_on_arcs():
                Source("m.dat", f"DEFDAT m\n{DATA}\nENDDAT\n".encode()),
                Source("sps.sub", b"DEF sps( )\n$CIRC_TYPE=#PATH\nEND\n")]  # fmt: skip
     found = Krl().read(sources, Start())
-    assert found.visits.orientation_law.tolist() == [OrientationLaw.ALONG_PATH] * 2
+    assert (
+        found.visits.motion.orientation_law.tolist() == [OrientationLaw.ALONG_PATH] * 2
+    )
 
 
 def test_orientation_joint_by_joint():
     found = job("LDAT_ACT=LJOINT", "FDAT_ACT=FP1", "BAS(#CP_PARAMS,1)", "LIN XP1")
-    assert found.visits.orientation_law.tolist() == [OrientationLaw.WRIST_JOINTS]
-    assert found.visits.wrist_joint.tolist() == [True]
+    assert found.visits.motion.orientation_law.tolist() == [OrientationLaw.WRIST_JOINTS]
+    assert found.visits.motion.wrist_joint.tolist() == [True]
 
 
 def test_steps_hold_no_target():
@@ -365,13 +375,13 @@ def test_steps_hold_no_target():
         "LIN_REL {X 5,Z -1}", "LIN_REL {X 5} #TOOL", "PTP_REL {A1 10}",
         "SLIN_REL {Y 1}", "PTP_REL {X 5}", "LIN_REL {A 10}", "PTP $AXIS_INT",
     )  # fmt: skip
-    assert found.visits.target.tolist() == [
+    assert found.visits.target.meaning.tolist() == [
         Meaning.RELATIVE_UFRAME, Meaning.RELATIVE_TOOL, Meaning.BY,
         Meaning.RELATIVE_UFRAME, *[Meaning.UNKNOWN] * 3,
     ]  # fmt: skip
     assert all("holds no target" in why for why in reasons(found))
-    assert found.visits.values[0, :3].tolist() == [5, 0, -1]
-    assert found.visits.values[2, :6].tolist() == [10, 0, 0, 0, 0, 0]
+    assert found.visits.target.values[0, :3].tolist() == [5, 0, -1]
+    assert found.visits.target.values[2, :6].tolist() == [10, 0, 0, 0, 0, 0]
 
 
 def test_missing_numbers_stay_what_they_were():
@@ -380,12 +390,12 @@ def test_missing_numbers_stay_what_they_were():
     )  # fmt: skip
     v, nan = found.visits, np.nan
     pose, joints = Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS
-    assert v.literal.tolist() == [-1] * 4
+    assert v.target.literal.tolist() == [-1] * 4
     assert all("does not state all of its numbers" in why for why in reasons(found))
-    assert v.target.tolist() == [joints, pose, pose, joints]
+    assert v.target.meaning.tolist() == [joints, pose, pose, joints]
     numbers = [[5, *[nan] * 5], [nan, nan, 500, *[nan] * 3], [1, 2, 3, *[nan] * 3],
                [nan, -90, *[nan] * 3, 1]]  # fmt: skip
-    assert np.array_equal(v.values[:, :6], numbers, equal_nan=True)
+    assert np.array_equal(v.target.values[:, :6], numbers, equal_nan=True)
 
 
 @pytest.mark.parametrize(
@@ -408,7 +418,7 @@ def test_missing_numbers_stay_what_they_were():
 def test_where_missing_numbers_lead_is_not_always_known(lines):
     data = DATA + "DECL POS XPART={X 1,Y 2}\nDECL E6AXIS XAPART={A1 1}\n"
     found = job("FDAT_ACT=FP1", "BAS(#FRAMES)", "LIN XP1", *lines, data=data)
-    goals = found.visits.target.tolist()
+    goals = found.visits.target.meaning.tolist()
     assert {Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS}.isdisjoint(goals)
     assert Meaning.UNKNOWN in goals
 
@@ -417,32 +427,35 @@ def test_where_the_arm_is_holds_no_target():
     """It stays there, and reading that stops what is planned ahead."""
     found = job("$APO.CDIS=5", "LIN XP1 C_DIS", "LIN $POS_ACT", "PTP $AXIS_ACT")
     v = found.visits
-    assert v.target.tolist() == [Meaning.POSE, Meaning.RELATIVE_UFRAME, Meaning.BY]
-    assert v.fly.tolist() == [False] * 3 and not v.values[1:].any()
+    meanings = [Meaning.POSE, Meaning.RELATIVE_UFRAME, Meaning.BY]
+    assert v.target.meaning.tolist() == meanings
+    assert v.motion.fly.tolist() == [False] * 3 and not v.target.values[1:].any()
     assert all("stays where it is" in why for why in reasons(found)[1:])
     lines = ["CIRC XP1,$POS_ACT", "SPLINE", "SPL XP2", "SLIN $POS_ACT", "ENDSPLINE"]
-    goals = job("LIN XP1", *lines).visits.target.tolist()  # where arc or block began
+    # where arc or block began
+    goals = job("LIN XP1", *lines).visits.target.meaning.tolist()
     known, lost = Meaning.POSE, Meaning.UNKNOWN
     assert goals == [known, known, lost, known, lost]
 
 
 def test_home_holds_no_target():
     v = job("PTP XHOME", "PTP HOME").visits
-    assert v.target.tolist() == [Meaning.HOME] * 2 and v.literal.tolist() == [-1, -1]
-    assert v.values[0, :6].tolist() == [0, -90, 90, 0, 0, 0]
-    assert np.isnan(v.values[1]).all()
+    assert v.target.meaning.tolist() == [Meaning.HOME] * 2
+    assert v.target.literal.tolist() == [-1, -1]
+    assert v.target.values[0, :6].tolist() == [0, -90, 90, 0, 0, 0]
+    assert np.isnan(v.target.values[1]).all()
 
 
 def test_a_remote_tool():
     found = job("FDAT_ACT=FOUT", "BAS(#FRAMES)", "LIN XP1")
-    assert found.visits.tool_remote.tolist() == [True]
+    assert found.visits.frame.tool_remote.tolist() == [True]
 
 
 def test_external_axes_count_where_they_are_not_0_or_the_arm_has_some():
     point = "LIN {X 1,Y 2,Z 3,A 0,B 0,C 0,E1 0,E2 12.5}"
-    aux = job(point).visits.aux
+    aux = job(point).visits.target.aux
     assert np.isnan(aux[0, 0]) and aux[0, 1] == 12.5 and aux.shape == (1, 2)
-    aux = job(point, start=Start(aux={1: "track"})).visits.aux
+    aux = job(point, start=Start(aux={1: "track"})).visits.target.aux
     assert aux[0].tolist() == [0.0, 12.5]
 
 
@@ -453,11 +466,13 @@ def test_products_follow_their_point():
     )  # fmt: skip
     v = found.visits
     assert reasons(found) == [""] * 4
-    assert v.literal.tolist() == [0, 1, 2, 3] and v.follows.tolist() == [-1, 0, -1, 2]
-    np.testing.assert_allclose(v.values[1, :3], [1, 2, -47])  # XP1 looks down
-    np.testing.assert_allclose(v.values[3, :3], [4.5, -5, 56])
+    assert v.target.literal.tolist() == [0, 1, 2, 3]
+    assert v.target.follows.tolist() == [-1, 0, -1, 2]
+    np.testing.assert_allclose(v.target.values[1, :3], [1, 2, -47])  # XP1 looks down
+    np.testing.assert_allclose(v.target.values[3, :3], [4.5, -5, 56])
     assert set(v.literals.pinned) == {""}
-    assert v.values[1, 6:].tolist() == [-1, -1] and v.values[3, 6:].tolist() == [2, 35]
+    assert v.target.values[1, 6:].tolist() == [-1, -1]
+    assert v.target.values[3, 6:].tolist() == [2, 35]
     turned = job("LIN XP1", "LIN XP1:{X 0,Y 0,Z 5,A 4+5,B 0,C 0}").visits
     assert "turned" in turned.literals.pinned[0]
 
@@ -496,7 +511,7 @@ def test_loops_and_jumps():
 def test_rounds_of_a_loop_are_told_apart():
     found = job("FOR I=3 TO 1 STEP -1", "LIN XS[I]", "ENDFOR")
     assert names(found) == ["xs[3]", "xs[2]", "xs[1]"]
-    assert found.visits.values[:, 0].tolist() == [3.0, 2.0, 1.0]
+    assert found.visits.target.values[:, 0].tolist() == [3.0, 2.0, 1.0]
     assert origins(found) == [[START], [0], [1]]
     assert len(job("FOR I=3 TO 1", "LIN XS[I]", "ENDFOR").visits) == 0
     found = job("FOR I=1 TO 3", "LIN XS[I]", "IF N2 THEN", "EXIT", "ENDIF", "ENDFOR",
@@ -565,22 +580,23 @@ def test_a_spline_block_is_a_curve_of_its_points():
     )  # fmt: skip
     v = found.visits
     assert not any(reasons(found))
-    assert v.block.tolist() == [-1, 1, 1, 1, 1, 1, -1, 7]
-    assert v.curved.tolist() == [False, True, True, *[False] * 4, True]
+    assert v.motion.block.tolist() == [-1, 1, 1, 1, 1, 1, -1, 7]
+    assert v.motion.curved.tolist() == [False, True, True, *[False] * 4, True]
     passed = ZoneRule.PASS
-    assert v.zone_rule[1:4].tolist() == [passed] * 3
-    assert v.fly.tolist() == [False, *[True] * 5, False, False]
-    assert v.zone_mm[5] == 5.0 and v.zone_rule[5] == ZoneRule.FROM
-    assert v.lin_spd[1:6].tolist() == [0.4, 0.2, 0.4, 0.4, 0.4]
+    assert v.zone.rule[1:4].tolist() == [passed] * 3
+    assert v.motion.fly.tolist() == [False, *[True] * 5, False, False]
+    assert v.zone.size_mm[5] == 5.0 and v.zone.rule[5] == ZoneRule.FROM
+    assert v.speed.linear[1:6].tolist() == [0.4, 0.2, 0.4, 0.4, 0.4]
 
 
 def test_where_a_spline_of_joint_moves_ends_is_known():
     """Its points are left; how the joints come to them is not known."""
     found = job("PTP_SPLINE", "SPTP XP1", "SPTP XP2", "ENDSPLINE", "SLIN XP1")
     v = found.visits
-    assert v.target.tolist() == [Meaning.POSE] * 3 and origins(found)[2] == [1]
+    assert v.target.meaning.tolist() == [Meaning.POSE] * 3 and origins(found)[2] == [1]
     assert ["spline of joint" in why for why in reasons(found)] == [True, True, False]
-    assert v.block.tolist() == [0, 0, -1] and v.curved.tolist() == [True, True, False]
+    assert v.motion.block.tolist() == [0, 0, -1]
+    assert v.motion.curved.tolist() == [True, True, False]
 
 
 @pytest.mark.parametrize(
@@ -652,7 +668,7 @@ def test_sides_of_axis_5_that_s_and_t_tell_otherwise():
 
 
 def test_flags_are_checked_on_joint_moves_alone():
-    care = job("PTP XP1", "LIN XP1").visits.care
+    care = job("PTP XP1", "LIN XP1").visits.motion.care
     assert care[:, 0].tolist() == [Switch.ON, Switch.OFF]
 
 

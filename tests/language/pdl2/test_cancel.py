@@ -24,7 +24,7 @@ ENDING = (
 def unknown(*body, **more):
     """Return for every visit whether the arm may come from anywhere."""
     visits = followed(*body, **more).visits
-    return [ELSEWHERE in visits.predecessors(k) for k in range(len(visits))]
+    return [ELSEWHERE in visits.graph.predecessors(k) for k in range(len(visits))]
 
 
 @pytest.mark.parametrize("line", ENDING)
@@ -63,7 +63,7 @@ def test_a_cycle_that_is_left_ends_a_move():
     head = routine("leave_it", "EXIT CYCLE")
     body = ("CYCLE", FIRST, AHEAD, "leave_it")
     found = followed(*body, head=head).visits
-    assert ELSEWHERE in found.predecessors(0)
+    assert ELSEWHERE in found.graph.predecessors(0)
 
 
 def test_a_handler_may_leave_any_statement_of_the_cycle():
@@ -72,7 +72,7 @@ def test_a_handler_may_leave_any_statement_of_the_cycle():
     body = (kind.format("JOINT"), "CYCLE", *cycle)
     found = followed(*handler("EXIT CYCLE"), *body)
     assert "trajectory" in reasons(found)[0] and not reasons(found)[1]
-    assert ELSEWHERE in found.visits.predecessors(0)
+    assert ELSEWHERE in found.visits.graph.predecessors(0)
     assert not any(reasons(followed(*body)))
 
 

@@ -22,8 +22,8 @@ def test_case(path: Path, newline: bytes) -> None:
     source = source_from_bytes(path.name, given)
     visits = resolve(parse(source)).visits
     rows = np.arange(len(visits.literals))
-    first = [int(np.flatnonzero(visits.literal == row)[0]) for row in rows]
-    new = visits.values[first] + [1.25, 1.25, 1.25, 0, 0, 0]
+    first = [int(np.flatnonzero(visits.target.literal == row)[0]) for row in rows]
+    new = visits.target.values[first] + [1.25, 1.25, 1.25, 0, 0, 0]
     (mine,) = edits(visits.literals, (source,), rows, new, PDL2_DIALECT)
     out = apply(given, mine)
     assert out == wanted

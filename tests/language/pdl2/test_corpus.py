@@ -44,25 +44,30 @@ def described(resolved: Resolved, *texts: str) -> str:
     out = []
     for i in range(len(v)):
         origins = {START: "start", ELSEWHERE: "?"}
-        before = [origins.get(p) or str(v.line[p]) for p in v.predecessors(i).tolist()]
-        word = Motion(v.motion[i]).name + (" VIA" if v.via[i] else "")
+        before = [
+            origins.get(p) or str(v.place.line[p])
+            for p in v.graph.predecessors(i).tolist()
+        ]
+        word = Motion(v.motion.kind[i]).name + (" VIA" if v.motion.via[i] else "")
         literal = "-"
-        if v.literal[i] >= 0:
-            row = v.literal[i]
+        if v.target.literal[i] >= 0:
+            row = v.target.literal[i]
             places = zip(
                 v.literals.places.start[row], v.literals.places.end[row], strict=True
             )
             text = texts[v.literals.file[row]]
             literal = ",".join(text[a:b] for a, b in places)
             literal += " taught" * bool(v.literals.taught[row])
-        name = v.names[v.name[i]] or "-"
+        name = v.target.names[v.target.name[i]] or "-"
         parts = [
-            f"{v.line[i]} {word} {Meaning(v.target[i]).name} {name}",
+            f"{v.place.line[i]} {word} {Meaning(v.target.meaning[i]).name} {name}",
             f"from {'|'.join(before)}",
             f"numbers {literal}",
         ]
-        parts += [f"measure {v.measure_id[i]}"] * bool(v.measure_id[i])
-        kept = v.literals.pinned[v.literal[i]] if v.literal[i] >= 0 else ""
+        parts += [f"measure {v.place.measure_id[i]}"] * bool(v.place.measure_id[i])
+        kept = (
+            v.literals.pinned[v.target.literal[i]] if v.target.literal[i] >= 0 else ""
+        )
         parts += [f"stays, for {kept}"] * bool(kept)
         parts += [f"because {v.reasons[v.reason[i]].text}"] * bool(v.reason[i])
         out.append("; ".join(parts))

@@ -33,8 +33,11 @@ def followed(*body: str, head: list[str], values: str = "", **said: object) -> R
 def places(found: Resolved) -> list[float]:
     """Return x of every target that is known, 0 of others."""
     v = found.visits
-    known = (v.target == Meaning.POSE) & (v.literal >= 0)
-    return [x if k else 0 for x, k in zip(v.values[:, 0].tolist(), known, strict=True)]
+    known = (v.target.meaning == Meaning.POSE) & (v.target.literal >= 0)
+    return [
+        x if k else 0
+        for x, k in zip(v.target.values[:, 0].tolist(), known, strict=True)
+    ]
 
 
 def indexed(*between: str, **said: object) -> list[float]:

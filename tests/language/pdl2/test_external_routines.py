@@ -49,7 +49,7 @@ def test_targets_after_an_unknown_routine_are_left(call: str, target: str) -> No
     before, after = reasons(found)
     assert before == ""
     assert "not known here" in after and "$TOOL" in after and "[routines]" in after
-    assert found.visits.predecessors(1).tolist() == [ELSEWHERE]
+    assert found.visits.graph.predecessors(1).tolist() == [ELSEWHERE]
     assert codes(found) == ["unknown-routine"]
 
 
@@ -68,7 +68,7 @@ def test_frames_that_are_set_again_are_known() -> None:
               ("TOOL", "BASE", "UFRAME")]  # fmt: skip
     found = followed(FIRST, "tt_tool(1)", *frames, THEN)
     assert reasons(found) == ["", ""]
-    assert found.visits.predecessors(1).tolist() == [ELSEWHERE]
+    assert found.visits.graph.predecessors(1).tolist() == [ELSEWHERE]
 
 
 def test_settings_that_the_program_has_made_are_forgotten() -> None:
@@ -105,7 +105,7 @@ def test_a_pattern_means_the_one_program_that_is_imported() -> None:
 def test_what_the_cell_says_by_name_holds_against_its_patterns() -> None:
     found = followed(FIRST, "tt_tool(1)", THEN, motionless=("*",),
                      routines={"TT_lib.tt_tool": "moves"})  # fmt: skip
-    assert found.visits.predecessors(1).tolist() == [ELSEWHERE]
+    assert found.visits.graph.predecessors(1).tolist() == [ELSEWHERE]
     assert reasons(found)[1] == ""
 
 
@@ -154,8 +154,8 @@ def test_a_function_that_calls_one_leaves_the_same_unknown() -> None:
 def test_a_handler_that_calls_one_may_change_all_at_any_time() -> None:
     found = followed(*handler("tt_tool(1)"), FIRST)
     assert "a condition handler" in reasons(found)[0]
-    assert ELSEWHERE in found.visits.predecessors(0).tolist()
+    assert ELSEWHERE in found.visits.graph.predecessors(0).tolist()
     assert "unknown-routine" in codes(found)
     still = followed(*handler("tt_tool(1)"), FIRST, motionless=("tt_tool",))
     assert reasons(still) == [""]
-    assert still.visits.predecessors(0).tolist() == [START]
+    assert still.visits.graph.predecessors(0).tolist() == [START]

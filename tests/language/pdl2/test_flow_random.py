@@ -34,18 +34,18 @@ def generate(seed: int, exact: bool) -> tuple[Generated, Visits]:
 
 
 def fits(visits: Visits, visit: int, executed: Executed) -> bool:
-    if visits.via[visit] != (executed.how == "VIA"):
+    if visits.motion.via[visit] != (executed.how == "VIA"):
         return False
     frames = (
-        (visits.tool[visit], executed.tool),
-        (visits.uframe[visit], executed.uframe),
+        (visits.frame.tool[visit], executed.tool),
+        (visits.frame.uframe[visit], executed.uframe),
     )
     for index, actual in frames:
         pose = matrix(actual)
         pose[:3, 3] /= 1000.0
-        if index >= 0 and not np.allclose(visits.frames[index], pose):
+        if index >= 0 and not np.allclose(visits.frame.poses[index], pose):
             return False
-    if visits.target[visit] == Meaning.UNKNOWN or recursive(visits, visit):
+    if visits.target.meaning[visit] == Meaning.UNKNOWN or recursive(visits, visit):
         return True
     return executed.values is not None and same_goal(visits, visit, executed)
 
@@ -57,17 +57,19 @@ def recursive(visits: Visits, visit: int) -> bool:
 
 def same_goal(visits: Visits, visit: int, executed: Executed) -> bool:
     """Compare the kind of a move, and its numbers: angles by the rotation they say."""
-    target, held = Meaning(visits.target[visit]), executed.values or ()
+    target, held = Meaning(visits.target.meaning[visit]), executed.values or ()
     how = executed.how
     if target == Meaning.ABOUT:
-        frame = Meaning(int(visits.values[visit][4])).name.removeprefix("RELATIVE")
+        frame = Meaning(int(visits.target.values[visit][4])).name.removeprefix(
+            "RELATIVE"
+        )
         if how != f"ABOUT{frame}":
             return False
     elif target.name != how and how not in ("TO", "VIA"):
         return False
-    if how in ("NEAR", "FOR") and visits.distance_mm[visit] != executed.short_mm:
+    if how in ("NEAR", "FOR") and visits.target.distance_mm[visit] != executed.short_mm:
         return False
-    numbers = visits.values[visit][: len(held)]
+    numbers = visits.target.values[visit][: len(held)]
     if target in POSES:
         return np.allclose(matrix(numbers), matrix(held))
     return np.allclose(numbers, held)
@@ -76,7 +78,7 @@ def same_goal(visits: Visits, visit: int, executed: Executed) -> bool:
 def follow(visits: Visits, trace: list[Executed], made: Generated) -> list[set[int]]:
     """Return the visits that each executed move may be, along predecessors."""
     by_line: dict[int, list[int]] = {}
-    lines = visits.file * PAGE + visits.line
+    lines = visits.place.file * PAGE + visits.place.line
     for visit, line in enumerate(lines.tolist()):
         by_line.setdefault(line, []).append(visit)
     before, found = {START}, []
@@ -86,7 +88,7 @@ def follow(visits: Visits, trace: list[Executed], made: Generated) -> list[set[i
             for visit in by_line.get(executed.line, [])
             if fits(visits, visit, executed)
             and not (before | {ELSEWHERE}).isdisjoint(
-                visits.predecessors(visit).tolist()
+                visits.graph.predecessors(visit).tolist()
             )
         }
         assert now, f"line {executed.line} is run, but is no visit\n{made.whole}"
@@ -110,8 +112,8 @@ def test_constant_programs_are_followed_exactly(seed: int) -> None:
     followed = follow(visits, trace, made)
     assert all(len(now) == 1 for now in followed)
     for (visit,), executed in zip(followed, trace, strict=True):
-        known = visits.target[visit] != Meaning.UNKNOWN
+        known = visits.target.meaning[visit] != Meaning.UNKNOWN
         assert known or executed.values is None, f"line {executed.line}\n{made.whole}"
     if conditions_known:
         assert len(visits) == len(trace)
-        assert np.diff(visits.pred_start).tolist() == [1] * len(visits)
+        assert np.diff(visits.graph.pred_start).tolist() == [1] * len(visits)

@@ -62,7 +62,7 @@ def test_twice_the_routines_take_twice_the_memory(write, job_cell):
 def test_calls_however_deep_are_followed_to_the_last(job_cell):
     visits = read_program(chain(3000), job_cell).visits
     assert len(visits) == 3000
-    assert visits.pred.tolist() == list(range(-1, 2999))
+    assert visits.graph.pred.tolist() == list(range(-1, 2999))
     assert len(read_program(tree(1 << 10), job_cell).visits) == (1 << 10) - 1
 
 
@@ -87,6 +87,6 @@ def test_a_program_beyond_the_limit_is_listed_once_and_left(job_cell, monkeypatc
     visits = found.visits
     lines = [k + 1 for k, line in enumerate(tree(1 << 14)["job.pdl"].splitlines())
              if b"MOVE" in line]  # fmt: skip
-    assert visits.line.tolist() == lines and len(lines) == 14
+    assert visits.place.line.tolist() == lines and len(lines) == 14
     assert all("too complex" in visits.reasons[k].text for k in visits.reason)
-    assert (visits.pred == ELSEWHERE).all()
+    assert (visits.graph.pred == ELSEWHERE).all()

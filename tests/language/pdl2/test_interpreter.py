@@ -49,15 +49,15 @@ def test_pages_of_one_job_are_one_flow() -> None:
     }
     found = resolve(main, others=others)
     visits = found.visits
-    assert visits.values[:, 0].tolist() == [1, 2, 3, 4]
-    assert visits.pred.tolist() == [START, 0, 1, 2]
-    assert [visits.files[i] for i in visits.file] == [
+    assert visits.target.values[:, 0].tolist() == [1, 2, 3, 4]
+    assert visits.graph.pred.tolist() == [START, 0, 1, 2]
+    assert [visits.files[i] for i in visits.place.file] == [
         "job.pdl",
         "page1.pdl",
         "page2.pdl",
         "page3.pdl",
     ]
-    assert visits.literals.file.tolist() == visits.file.tolist()
+    assert visits.literals.file.tolist() == visits.place.file.tolist()
     assert found.diagnostics == ()
     assert main.imports == ("page1", "Page2.pdl")
 
@@ -74,7 +74,7 @@ def test_a_shared_frame_of_another_program_reaches_its_routines() -> None:
     )
     visits = resolve(main, others={"lib": lib}).visits
     wanted = pose_from_record(np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]))
-    assert (visits.frames[visits.tool[0]] == wanted).all()
+    assert (visits.frame.poses[visits.frame.tool[0]] == wanted).all()
 
 
 def test_frames_that_the_cell_does_not_know() -> None:
@@ -83,9 +83,9 @@ def test_frames_that_the_cell_does_not_know() -> None:
         Start(uframe=None),
     )
     assert "$UFRAME" in reasons(found)[0]
-    assert found.visits.literal.tolist() == [0, 1]
+    assert found.visits.target.literal.tolist() == [0, 1]
     assert reasons(found)[1] == ""
-    assert found.visits.uframe.tolist() == [-1, -1]
+    assert found.visits.frame.uframe.tolist() == [-1, -1]
 
 
 def test_settings_become_columns() -> None:
@@ -100,17 +100,17 @@ def test_settings_become_columns() -> None:
         "MOVE LINEAR TO POS(1,2,3,4,5,6)"
     )
     v = found.visits
-    assert v.lin_spd.tolist() == [0.25, 0.1, 0.25]
-    assert v.override.tolist() == [0.25] * 3
-    assert v.fly.tolist() == [True, False, False]
-    assert v.zone_mm.tolist() == [5, -1, -1]
-    assert v.overlap_percent.tolist() == [80] * 3
-    assert (v.blend == Blend.ZONE).all()
-    assert (v.zone_rule == ZoneRule.WITHIN).all()
-    assert v.nearest_turn.all() and v.wrist_joint.all()
-    assert v.tool_remote.tolist() == [True, False, False]
-    assert v.config_given.tolist() == [True, False, False]
-    assert [v.configs[i] for i in v.config] == ["W", "", ""]
+    assert v.speed.linear.tolist() == [0.25, 0.1, 0.25]
+    assert v.speed.override.tolist() == [0.25] * 3
+    assert v.motion.fly.tolist() == [True, False, False]
+    assert v.zone.size_mm.tolist() == [5, -1, -1]
+    assert v.zone.overlap_percent.tolist() == [80] * 3
+    assert (v.zone.blend == Blend.ZONE).all()
+    assert (v.zone.rule == ZoneRule.WITHIN).all()
+    assert v.motion.nearest_turn.all() and v.motion.wrist_joint.all()
+    assert v.frame.tool_remote.tolist() == [True, False, False]
+    assert v.target.config_given.tolist() == [True, False, False]
+    assert [v.target.configs[i] for i in v.target.config] == ["W", "", ""]
 
 
 def test_switches_and_orientation_types_are_told_from_what_is_not_known() -> None:
@@ -122,11 +122,11 @@ def test_switches_and_orientation_types_are_told_from_what_is_not_known() -> Non
         f"IF $DIN[2] THEN\n$TURN_CARE := TRUE\n$ORNT_TYPE := RS_WORLD\nENDIF\n{move}"
     )
     off, on, unset, unknown = Switch.OFF, Switch.ON, Switch.UNSET, Switch.UNKNOWN
-    assert found.visits.care.tolist() == [
+    assert found.visits.motion.care.tolist() == [
         [unset] * 3, [on, off, unknown], [off, off, unknown], [on, unknown, unknown],
     ]  # fmt: skip
     euler, either = OrientationLaw.EULER_ANGLES, OrientationLaw.UNKNOWN
-    assert found.visits.orientation_law.tolist() == [
+    assert found.visits.motion.orientation_law.tolist() == [
         OrientationLaw.UNSET,
         euler,
         euler,
@@ -139,7 +139,7 @@ def test_a_variable_used_twice_is_one_literal() -> None:
         "p := POS(1,2,3,4,5,6,'')\nMOVE LINEAR TO p\nMOVE JOINT TO {1,2,3,4,5,6}\n"
         "MOVE LINEAR TO p"
     )
-    assert found.visits.literal.tolist() == [0, 1, 0]
+    assert found.visits.target.literal.tolist() == [0, 1, 0]
     assert found.visits.literals.name == ("p", "")
 
 
@@ -163,8 +163,8 @@ def test_a_taught_frame_is_marked() -> None:
         "$UFRAME := POS(1,2,3,4,5,6,'') -- TAUGHT\nMOVE LINEAR TO POS(1,2,3,4,5,6,'')"
     )
     v = found.visits
-    assert v.frame_taught[v.uframe[0]]
-    assert not v.frame_taught[v.tool[0]]
+    assert v.frame.taught[v.frame.uframe[0]]
+    assert not v.frame.taught[v.frame.tool[0]]
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_a_taught_frame_is_marked() -> None:
 def test_what_the_cell_says_of_outside_routines(said: str, origin: int) -> None:
     text = "MOVE LINEAR TO POS(1,2,3,4,5,6,'')\next\nMOVE LINEAR TO POS(2,2,3,4,5,6,'')"
     found = body(text, Start(routines={"Ext": said}))
-    assert found.visits.predecessors(1).tolist() == [origin]
+    assert found.visits.graph.predecessors(1).tolist() == [origin]
     assert ("[frames.routines.ext]" in reasons(found)[1]) == (said == "sets-frames")
     assert found.diagnostics == ()
 
@@ -191,7 +191,7 @@ def test_each_routine_that_is_not_at_hand_is_listed_once() -> None:
 def test_a_loop_too_long_to_unroll_is_reported() -> None:
     found = body("FOR i := 1 TO 1000000 DO\nMOVE LINEAR TO POS(1,2,3,4,5,6,'')\nENDFOR")
     assert len(found.visits) == 1
-    assert sorted(found.visits.predecessors(0).tolist()) == [START, 0]
+    assert sorted(found.visits.graph.predecessors(0).tolist()) == [START, 0]
     assert "loop-not-unrolled" in {d.code for d in found.diagnostics}
 
 
@@ -201,7 +201,7 @@ def test_a_move_in_a_call_inside_of_an_expression_is_reported() -> None:
         "RETURN (1)\nEND f\nBEGIN\nn := f()\nMOVE JOINT TO {1,2,3,4,5,6}\nEND a"
     )
     found = resolve(program(text))
-    assert found.visits.predecessors(0).tolist() == [-2]
+    assert found.visits.graph.predecessors(0).tolist() == [-2]
     assert {d.code for d in found.diagnostics} == {"call-not-followed"}
 
 
@@ -216,7 +216,7 @@ def test_a_condition_handler_makes_what_it_changes_unknown() -> None:
 def test_an_empty_program_has_no_visits() -> None:
     found = body("-- nothing")
     assert len(found.visits) == len(found.visits.literals) == 0
-    assert found.visits.frames.shape == (0, 4, 4)
+    assert found.visits.frame.poses.shape == (0, 4, 4)
 
 
 def test_long_lines_and_many_variables() -> None:
@@ -226,7 +226,7 @@ def test_long_lines_and_many_variables() -> None:
     text += [f"MOVE LINEAR TO {n}{' ' * 430}-- note" for n in names]
     found = body("\n".join(text), declared=declared)
     assert len(found.visits.literals) == 3000
-    assert found.visits.values[:, 0].tolist() == list(range(3000))
+    assert found.visits.target.values[:, 0].tolist() == list(range(3000))
 
 
 @pytest.mark.parametrize(
@@ -236,7 +236,7 @@ def test_loops_without_a_number_of_rounds_are_followed_over_and_over(
     bounds: str,
 ) -> None:
     found = body(f"FOR i := {bounds} DO\nMOVE JOINT TO {{1,2,3,4,5,6}}\nENDFOR")
-    assert found.visits.predecessors(0).tolist() == [START, 0]
+    assert found.visits.graph.predecessors(0).tolist() == [START, 0]
 
 
 PLAIN = Start()
@@ -247,8 +247,8 @@ def frames_after(*lines: str, start: Start = PLAIN) -> list[list[float]]:
     text = "\n".join(["PROGRAM a", "VAR p : POSITION", "BEGIN", *lines, "END a", ""])
     source = source_from_bytes("a.pdl", text.encode())
     visits = resolve(parse(source), start).visits
-    table = [*np.round(record_from_pose(visits.frames), 9).tolist(), []]
-    return [table[k] for k in visits.uframe.tolist()]
+    table = [*np.round(record_from_pose(visits.frame.poses), 9).tolist(), []]
+    return [table[k] for k in visits.frame.uframe.tolist()]
 
 
 MOVE = "MOVE LINEAR TO POS(1, 2, 3, 4, 5, 6, '')"
@@ -293,7 +293,7 @@ def test_a_handler_calls_a_routine_where_there_is_no_main_body() -> None:
         "ENABLE CONDITION[1]\nEND arm\n"
     )
     found = resolve(library)
-    assert found.visits.line.tolist() == [4]
+    assert found.visits.place.line.tolist() == [4]
     assert {d.code for d in found.diagnostics} == {"handler-moves"}
 
 
@@ -321,4 +321,4 @@ def test_calls_are_looked_for_in_statements_of_the_program_alone(
         "ENDSELECT\nMOVE LINEAR TO POS(2,2,3,4,5,6,'')\nEND a"
     ))  # fmt: skip
     assert len(asked) > 5
-    assert sorted(found.visits.predecessors(2).tolist()) == [ELSEWHERE, 1]
+    assert sorted(found.visits.graph.predecessors(2).tolist()) == [ELSEWHERE, 1]

@@ -47,7 +47,7 @@ def visits(*lines: str) -> Visits:
 
 def known(found: Visits) -> list[bool]:
     """Tell which targets are known, and may be edited."""
-    own = found.literal.tolist()
+    own = found.target.literal.tolist()
     free = [k >= 0 and not found.literals.pinned[k] for k in own]
     return [f and t == Meaning.POSE for f, t in zip(free, found.target, strict=True)]
 
@@ -85,7 +85,7 @@ def test_the_reason_says_so() -> None:
 
 def test_a_number_set_before_it_is_used_is_known() -> None:
     found = visits("p.Z := 80", "MOVE TO p", "MOVE TO q")
-    assert found.values[0].tolist() == [1.5, 2.5, 80, 4.5, 5.5, 6.5]
+    assert found.target.values[0].tolist() == [1.5, 2.5, 80, 4.5, 5.5, 6.5]
     assert known(found) == [False, True]  # its numbers stand in two files
 
 

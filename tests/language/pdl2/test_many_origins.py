@@ -30,10 +30,10 @@ def written(count: int) -> str:
 def test_origins_are_told_apart_up_to_a_number_of_them(text: str) -> None:
     visits = body(text).visits
     for n in range(len(visits)):
-        found = visits.predecessors(n).tolist()
+        found = visits.graph.predecessors(n).tolist()
         every = [START, *range(n)]
         assert found == (every if len(every) <= MOST_ORIGINS else [ELSEWHERE])
-    assert len(visits.pred) < MOST_ORIGINS**2 / 2 + MOST_ORIGINS + len(visits)
+    assert len(visits.graph.pred) < MOST_ORIGINS**2 / 2 + MOST_ORIGINS + len(visits)
 
 
 def test_it_is_said_where_the_side_is_lost() -> None:
@@ -47,8 +47,8 @@ def test_it_is_said_where_the_side_is_lost() -> None:
 def test_a_move_that_is_always_run_tells_the_side_again() -> None:
     end = "MOVE LINEAR TO POS(7,2,3,4,5,6,'')\n"
     visits = body(written(600) + end + end).visits
-    assert visits.predecessors(600).tolist() == [ELSEWHERE]
-    assert visits.predecessors(601).tolist() == [600]
+    assert visits.graph.predecessors(600).tolist() == [ELSEWHERE]
+    assert visits.graph.predecessors(601).tolist() == [600]
 
 
 @pytest.mark.parametrize("count", [300, 700])
@@ -62,4 +62,4 @@ def test_a_cycle_of_them_settles(count: int, monkeypatch: pytest.MonkeyPatch) ->
     assert len(taken) < 10 * count  # a row is run anew a few times, not once an origin
     every = [START, *range(count)]
     wanted = every if len(every) <= MOST_ORIGINS else [ELSEWHERE]
-    assert all(visits.predecessors(n).tolist() == wanted for n in range(count))
+    assert all(visits.graph.predecessors(n).tolist() == wanted for n in range(count))

@@ -114,17 +114,25 @@ class Writer:
 def told(visits: Visits) -> list[object]:
     """List what is said of every visit, the tables' texts instead of their indices."""
     v = visits
-    texts = ((v.config, v.configs), (v.name, v.names), (v.reason, v.reasons))
-    frames = np.concatenate([v.frames, np.full((1, 4, 4), np.nan)])
+    texts = (
+        (v.target.config, v.target.configs),
+        (v.target.name, v.target.names),
+        (v.reason, v.reasons),
+    )
+    frames = np.concatenate([v.frame.poses, np.full((1, 4, 4), np.nan)])
     return [
         *([table[k] for k in column.tolist()] for column, table in texts),
-        *(repr(frames[k].tolist()) for k in (v.tool, v.base, v.uframe)),
         *(
-            repr(getattr(v, name).tolist())
-            for name in "line motion target via values distance_mm aux config_given "
-            "literal follows fly zone_mm lin_spd pred_start pred".split()
+            repr(frames[k].tolist())
+            for k in (v.frame.tool, v.frame.base, v.frame.uframe)
         ),
-        v.measure_id,
+        *(
+            repr(v.columns[name].tolist())
+            for name in "line kind meaning via values distance_mm aux config_given "
+            "literal follows fly size_mm linear".split()
+        ),
+        repr((v.graph.pred_start.tolist(), v.graph.pred.tolist())),
+        v.place.measure_id,
         *(repr(getattr(v.literals, n)) for n in ("line", "places", "name", "pinned")),
         *(v.literals.taught.tolist(), v.literals.shared.tolist()),
     ]
@@ -173,7 +181,7 @@ def test_moves_that_are_looked_at_twice_are_listed_once() -> None:
         "$MOVE_TYPE := n\nUNTIL $DIN[1]\nEND a"
     )
     visits = resolve(parse(source_from_bytes("a.pdl", text.encode()))).visits
-    assert visits.line.tolist() == [6, 7]
+    assert visits.place.line.tolist() == [6, 7]
     assert all(
         "known only at run time" in visits.reasons[k].text for k in visits.reason
     )

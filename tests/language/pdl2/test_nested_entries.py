@@ -54,8 +54,8 @@ def followed(values: str, *lines: str) -> Resolved:
 def known(found: Resolved) -> list[float | int]:
     """Return x of every target that may be edited, UNKNOWN for all others."""
     v = found.visits
-    free = [k >= 0 and not v.literals.pinned[k] for k in v.literal.tolist()]
-    x = v.values[:, 0].tolist()
+    free = [k >= 0 and not v.literals.pinned[k] for k in v.target.literal.tolist()]
+    x = v.target.values[:, 0].tolist()
     return [x[i] if free[i] and not v.reasons[v.reason[i]].text else UNKNOWN
             for i in range(len(v))]  # fmt: skip
 
@@ -223,7 +223,7 @@ def test_what_may_use_or_change_any_node_keeps_them_all(use):
 @pytest.mark.parametrize("builtin", ["node_app", "node_del", "node_ins"])
 def test_built_ins_leave_no_node_known(builtin):
     found = followed(path("[1]:"), f"{builtin}(pth, 1)", "MOVE LINEAR TO pth.NODE[1]")
-    assert found.visits.literal.tolist() == [UNKNOWN]
+    assert found.visits.target.literal.tolist() == [UNKNOWN]
 
 
 def test_assignments_replace_what_the_file_says():
@@ -238,7 +238,7 @@ def test_assignments_replace_what_the_file_says():
     )
     assert known(found) == [9.0, 3.0, 3.0]
     v = found.visits
-    assert [v.names[k] for k in v.name] == [
+    assert [v.target.names[k] for k in v.target.name] == [
         "pth.NODE[1].$MAIN_POS", "pth.NODE[3].$MAIN_POS", "pth.NODE[3].$MAIN_POS",
     ]  # fmt: skip
 
@@ -247,8 +247,8 @@ def test_a_joint_of_a_field_that_is_assigned_counts():
     joints = " 1: 1 2: 0 3: -90 4: 0 5: 60 6: 0\n"
     values = f"r REC rt Priv\n j JNTP Arm: 1 Ax: 6\n{joints}"
     found = followed(values, "r.j[1] := 7", "MOVE JOINT TO r.j").visits
-    assert found.values[0].tolist() == [7, 0, -90, 0, 60, 0]
-    assert found.literal.tolist() == [UNKNOWN]
+    assert found.target.values[0].tolist() == [7, 0, -90, 0, 60, 0]
+    assert found.target.literal.tolist() == [UNKNOWN]
 
 
 def test_what_a_head_says_holds_for_all_parts():
@@ -257,7 +257,7 @@ def test_what_a_head_says_holds_for_all_parts():
     assert found.literals.shared.tolist() == [True]
     values = path("NODE[1]", head="pth PATH nd Arm: 2 Priv")
     found = followed(values, "MOVE LINEAR TO pth.NODE[1]").visits
-    assert found.literal.tolist() == [UNKNOWN]
+    assert found.target.literal.tolist() == [UNKNOWN]
     assert "arm 2" in found.reasons[found.reason[0]].text
 
 
@@ -266,8 +266,8 @@ def test_edits_hit_their_node_and_nothing_else():
     found = followed(values, "MOVE LINEAR TO pth.NODE[2]").visits
     files = (source_from_bytes("job.pdl", HEAD.encode()),
              source_from_bytes("job.lsv", values.encode()))  # fmt: skip
-    new = found.values + np.array([0.5, 0, 0, 0, 0, 0])
-    _, own = edits(found.literals, files, found.literal, new, PDL2_DIALECT)
+    new = found.target.values + np.array([0.5, 0, 0, 0, 0, 0])
+    _, own = edits(found.literals, files, found.target.literal, new, PDL2_DIALECT)
     assert apply(values.encode(), own) == values.replace("X: 2.00", "X: 2.500").encode()
 
 

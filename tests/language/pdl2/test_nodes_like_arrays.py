@@ -109,7 +109,7 @@ def followed(program: str, values: str):
 def edited(visits) -> list[tuple[bool, bool]]:
     """Tell of every visit whether it has a literal, and whether that may change."""
     pinned = visits.literals.pinned
-    return [(k >= 0, k >= 0 and not pinned[k]) for k in visits.literal.tolist()]
+    return [(k >= 0, k >= 0 and not pinned[k]) for k in visits.target.literal.tolist()]
 
 
 @pytest.mark.parametrize("seed", range(60))
@@ -117,7 +117,7 @@ def test_nodes_are_followed_like_elements(seed):
     program = HEAD + "\n".join([*body(random.Random(seed)), "END job"])
     arrays, paths = followed(program, ARRAYS), followed(as_path(program), PATHS)
     assert len(arrays) == len(paths)
-    np.testing.assert_array_equal(arrays.values, paths.values)
+    np.testing.assert_array_equal(arrays.target.values, paths.target.values)
     np.testing.assert_array_equal(arrays.pred, paths.pred)
     assert edited(arrays) == edited(paths)
     assert [bool(arrays.reasons[k]) for k in arrays.reason] == [

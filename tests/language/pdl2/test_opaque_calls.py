@@ -37,9 +37,9 @@ def codes(found: Resolved) -> set[str]:
 def last(found: Resolved, file: int = 0) -> tuple[Meaning, list[int], str]:
     """Return target, origins and reason of the last visit in a file."""
     v = found.visits
-    row = max(n for n in range(len(v)) if v.file[n] == file)
+    row = max(n for n in range(len(v)) if v.place.file[n] == file)
     reason = v.reasons[v.reason[row]].text
-    return Meaning(v.target[row]), v.predecessors(row).tolist(), reason
+    return Meaning(v.target.meaning[row]), v.graph.predecessors(row).tolist(), reason
 
 
 def test_a_handler_changes_what_a_parameter_stands_for():
@@ -111,11 +111,11 @@ def test_moves_that_a_function_may_make_are_listed_with_their_points():
     head = [*moving, "ROUTINE f : INTEGER", "BEGIN", "r", "RETURN(1)", "END f"]
     found = resolved(program("job", ["VAR n : INTEGER", *head], ["r", "n := f"]))
     v = found.visits
-    origins = [v.predecessors(n).tolist() for n in range(len(v))]
+    origins = [v.graph.predecessors(n).tolist() for n in range(len(v))]
     assert sorted(origins) == [[ELSEWHERE], [-1]]
     unknown = origins.index([ELSEWHERE])
     assert "f, which is not followed" in v.reasons[v.reason[unknown]].text
-    assert len(set(v.literal.tolist())) == 1  # so that its numbers stay
+    assert len(set(v.target.literal.tolist())) == 1  # so that its numbers stay
 
 
 def test_a_point_given_to_a_function_keeps_its_numbers():

@@ -27,7 +27,7 @@ VARS = ["VAR n : INTEGER", "VAR p : POSITION EXPORTED FROM other"]
 def anywhere(*body, **more):
     """Return True if the last move may begin anywhere."""
     visits = followed(*body, **more).visits
-    return ELSEWHERE in visits.predecessors(len(visits) - 1)
+    return ELSEWHERE in visits.graph.predecessors(len(visits) - 1)
 
 
 def left(*body, **more):
@@ -37,7 +37,7 @@ def left(*body, **more):
 
 def mass(*body):
     visits = followed(*body).visits
-    return visits.loads[visits.load[-1]][0]
+    return visits.motion.loads[visits.motion.load[-1]][0]
 
 
 CHECKS = {
@@ -46,12 +46,12 @@ CHECKS = {
         for line in (LAST, LAST.replace("MOVE", "MOVEFLY"))),
     "`WAIT`, `DELAY`, `PAUSE`, `READ` behind a fly point": lambda: all(
         ZoneRule.UNKNOWN in
-        followed(FIRST, LAST.replace("MOVE", "MOVEFLY"), line, FIRST).visits.zone_rule
+        followed(FIRST, LAST.replace("MOVE", "MOVEFLY"), line, FIRST).visits.zone.rule
         for line in ("WAIT FOR $DIN[1]", "DELAY 10", "PAUSE", "READ (n)")),
     "what may move the arm (a routine in no file, a statement that is not understood) "
     "behind a fly point": lambda: all(
         ZoneRule.UNKNOWN in
-        followed(FIRST, LAST.replace("MOVE", "MOVEFLY"), line, FIRST).visits.zone_rule
+        followed(FIRST, LAST.replace("MOVE", "MOVEFLY"), line, FIRST).visits.zone.rule
         for line in ("dock", "CALL other", "FROBNICATE it WITH 3")),
     "a value that the program changes": lambda: (
         left(RAISED, "n := n + 1", LAST, head=SAVED)
@@ -63,7 +63,7 @@ CHECKS = {
         and not anywhere(FIRST, AHEAD, "CANCEL ALL FOR ARM[2]", LAST)),
     "`EXIT CYCLE`": lambda: ELSEWHERE in followed(
         "CYCLE", FIRST, AHEAD, "IF $DIN[1] THEN", "EXIT CYCLE", "ENDIF",
-        LAST).visits.predecessors(0),
+        LAST).visits.graph.predecessors(0),
     "`CANCEL`, `EXIT CYCLE` in a condition handler": lambda: (
         anywhere(*handler("CANCEL ALL"), FIRST, LAST)
         and anywhere(*handler("EXIT CYCLE"), "CYCLE", FIRST, LAST)),
@@ -86,9 +86,10 @@ CHECKS = {
         mass("$TOOL_MASS := 41", LAST) == 41.0
         and left("READ (n)", "$TOOL_MASS := n", LAST, head=["VAR n : INTEGER"])),
     "`$WEAVE_NUM`, `$WEAVE_TYPE`": lambda: (
-        followed("$WEAVE_NUM := 1", LAST).visits.weaves[0]
+        followed("$WEAVE_NUM := 1", LAST).visits.motion.weaves[0]
         and not left("$WEAVE_NUM := 1", LAST)),
-    "`$TOOL_RMT`": lambda: followed("$TOOL_RMT := TRUE", LAST).visits.tool_remote[0],
+    "`$TOOL_RMT`": lambda: (
+        followed("$TOOL_RMT := TRUE", LAST).visits.frame.tool_remote[0]),
     "`READ`, `DECODE`": lambda: left("READ (n)", "MOVE LINEAR TO POS(n, 2, 3, 0, 180, "
                                      "0, '')", head=["VAR n : INTEGER"]),
     "exported variables": lambda: left("MOVE LINEAR TO p", head=VARS),

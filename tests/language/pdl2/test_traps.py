@@ -25,7 +25,7 @@ def read(head, body):
 ])  # fmt: skip
 def test_a_parameter_is_the_variable_that_is_given_for_it(head):
     v, _ = read(["VAR p : POSITION", *head.split("\n")], [f"p := {AT}", "r(p)"])
-    assert v.values[0, :3].tolist() == [9.0, 2.0, 3.0]
+    assert v.target.values[0, :3].tolist() == [9.0, 2.0, 3.0]
 
 
 @pytest.mark.parametrize("line", ["i := i + 1", "inc(i)", "also"])
@@ -61,7 +61,7 @@ def test_a_function_that_sets_frames_does_so_in_any_expression(line):
 
 def test_a_cycle_begins_where_and_with_what_it_ends():
     v, why = read([], ["CYCLE", MOVE, MOVE, SHIFT])
-    assert v.predecessors(0).tolist() == [START, 1] and all(why)
+    assert v.graph.predecessors(0).tolist() == [START, 1] and all(why)
 
 
 def test_a_routine_that_calls_itself_is_left():

@@ -26,15 +26,15 @@ def job(assigned: str) -> Resolved:
 @pytest.mark.parametrize("component", "XYZAER")
 def test_a_component_set_by_the_program_leaves_the_target_alone(component: str) -> None:
     visits = job(f"p.{component} := 9.25").visits
-    assert visits.literal.tolist() == [-1, 0]
+    assert visits.target.literal.tolist() == [-1, 0]
     assert "others in another file" in visits.reasons[visits.reason[0]].text
     assert visits.reason[1] == 0
-    assert visits.values[0, "XYZAER".index(component)] == 9.25
+    assert visits.target.values[0, "XYZAER".index(component)] == 9.25
 
 
 def test_numbers_of_one_file_are_edited_where_they_stand() -> None:
-    assert job("-- nothing").visits.literal.tolist() == [0, 1]
+    assert job("-- nothing").visits.target.literal.tolist() == [0, 1]
     own = ", ".join(f"{n}.25" for n in range(6))
     visits = job(f"p := POS({own}, '')\np.X := 9.25").visits
-    assert (visits.literal >= 0).all()
+    assert (visits.target.literal >= 0).all()
     assert visits.reason.tolist() == [0, 0]

@@ -19,9 +19,11 @@ from tests.language.pdl2.test_external_routines import (
 
 def test_a_stated_payload_is_used() -> None:
     visits = followed("$TOOL_MASS := 41", FIRST).visits
-    assert visits.loads[visits.load[0]][0] == 41.0 and not visits.reason[0]
+    assert (
+        visits.motion.loads[visits.motion.load[0]][0] == 41.0 and not visits.reason[0]
+    )
     none = followed(FIRST).visits
-    assert math.isnan(none.loads[none.load[0]][0])
+    assert math.isnan(none.motion.loads[none.motion.load[0]][0])
 
 
 def test_a_payload_that_is_not_known_is_left() -> None:
@@ -48,5 +50,5 @@ def test_what_a_function_switches_on_counts(inner: str) -> None:
 
 def test_what_is_set_for_one_move_counts_for_it() -> None:
     visits = followed(f"{FIRST} WITH $TOOL_MASS = 9", FIRST).visits
-    masses = visits.loads[visits.load, 0].tolist()
+    masses = visits.motion.loads[visits.motion.load, 0].tolist()
     assert masses[0] == 9.0 and math.isnan(masses[1])

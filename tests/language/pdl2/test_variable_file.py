@@ -60,17 +60,18 @@ def test_values_and_their_places() -> None:
     found, variables = resolved()
     v = found.visits
     assert v.files == ("job.pdl", "job.lsv")
-    assert (v.literal >= 0).tolist() == [True, True, True, False, True] + [False] * 3
-    assert v.values[0].tolist() == [1093.44, 636.79, 345.13, -135, 56, 38]
-    assert v.values[4].tolist() == [0, -20, -110, 0, 60, 0]
-    assert v.aux[0, 0] == v.aux[4, 0] == 90
-    assert v.configs[v.config[1]] == "W T1:1"
+    own = [True, True, True, False, True] + [False] * 3
+    assert (v.target.literal >= 0).tolist() == own
+    assert v.target.values[0].tolist() == [1093.44, 636.79, 345.13, -135, 56, 38]
+    assert v.target.values[4].tolist() == [0, -20, -110, 0, 60, 0]
+    assert v.target.aux[0, 0] == v.target.aux[4, 0] == 90
+    assert v.target.configs[v.target.config[1]] == "W T1:1"
     assert v.literals.file.tolist() == [1] * 4
     assert v.literals.shared.tolist() == [False, True, False, False]
     start, end = v.literals.places.start, v.literals.places.end
     text = variables.source.text
     spans = zip(start[0], end[0], strict=True)
-    assert [float(text[a:b]) for a, b in spans] == v.values[0].tolist()
+    assert [float(text[a:b]) for a, b in spans] == v.target.values[0].tolist()
 
 
 def test_what_is_wrong_is_said() -> None:
@@ -95,9 +96,9 @@ def test_edits_fall_into_the_variable_file() -> None:
     found, variables = resolved()
     v = found.visits
     program = source_from_bytes("job.pdl", PDL)
-    new = v.values[:1] + np.array([0.5, 0, 0, 0, 0, 0])
+    new = v.target.values[:1] + np.array([0.5, 0, 0, 0, 0, 0])
     pdl, lsv = edits(
-        v.literals, (program, variables.source), v.literal[:1], new, PDL2_DIALECT
+        v.literals, (program, variables.source), v.target.literal[:1], new, PDL2_DIALECT
     )
     assert not pdl
     assert apply(LSV, lsv) == LSV.replace(b"1093.44", b"1093.940")
@@ -114,4 +115,4 @@ def test_an_auxiliary_axis_must_be_declared() -> None:
     for aux, word in (({}, "not declared"), ({1: "track"}, "track")):
         v = resolve(program, Start(aux=aux), variables).visits
         assert word in v.reasons[v.reason[0]].text
-        assert v.literal[0] >= 0
+        assert v.target.literal[0] >= 0

@@ -60,7 +60,7 @@ def test_the_arm_lands_where_it_is_to(bench_cell, bench_model, seed):
         read_program({"job.mod": text}, bench_cell).visits for text in (source, output)
     )
     landing, rows = land(body, setup, given, made), found.decisions
-    safe = (rows.why == 0) & ~found.visits.fly & ~found.visits.via
+    safe = (rows.why == 0) & ~found.visits.motion.fly & ~found.visits.motion.via
     sure = (safe & (rows.direction != 0).all(axis=1))[landing.visit]
     miss = 1e3 * np.linalg.norm(landing.error, axis=1)[sure & (landing.visit > 0)]
     assert len(miss) > 10 and miss.max() <= 0.1

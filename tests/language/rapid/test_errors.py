@@ -26,7 +26,7 @@ def behind(handler, body, *routines, head="ERROR", call="sub;"):
 
 def at_end(found):
     """Say whether the last move of main begins anywhere, and why it stays."""
-    names = [found.visits.names[k] for k in found.visits.name.tolist()]
+    names = [found.visits.target.names[k] for k in found.visits.target.name.tolist()]
     last = len(names) - 1 - names[::-1].index("p2")
     return ELSEWHERE in origins(found)[last], reasons(found)[last]
 

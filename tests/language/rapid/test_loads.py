@@ -23,7 +23,7 @@ HEAVY, LIGHT = (f"MoveL p1,v200,fine,{name}\\WObj:=w;" for name in ("heavy", "li
 def loads(*lines, more=""):
     """Return the loads that the moves of a task state."""
     visits = task(*lines, data=DATA, more=more).visits
-    return visits.loads[visits.load]
+    return visits.motion.loads[visits.motion.load]
 
 
 def why(*lines):

@@ -17,7 +17,7 @@ def free(found, name):
     """Return True if a visit of a point may be corrected, in the point's numbers."""
     v, why = found.visits, reasons(found)
     rows = [k for k, own in enumerate(names(found)) if own == name]
-    literals = {int(max(v.literal[k], v.follows[k])) for k in rows}
+    literals = {int(max(v.target.literal[k], v.target.follows[k])) for k in rows}
     return bool(rows) and all(
         k >= 0 and not v.literals.pinned[k] for k in literals
     ) and not any(why[k] for k in rows)  # fmt: skip
@@ -26,7 +26,7 @@ def free(found, name):
 def test_a_point_is_a_target_where_its_routine_moves_to_it():
     found = once("go p1;", "go p2;", more=GO)
     assert names(found) == ["p1", "p2"] and free(found, "p1") and free(found, "p2")
-    np.testing.assert_allclose(found.visits.values[:, 0], [1.0, 4.0])
+    np.testing.assert_allclose(found.visits.target.values[:, 0], [1.0, 4.0])
 
 
 def test_through_more_than_one_routine():
@@ -42,23 +42,23 @@ def test_shifts_and_numbers():
         given="(robtarget p,num dx\\num n)",
     )  # fmt: skip
     found = once("place p1,5\\n:=3;", more=more)
-    np.testing.assert_allclose(found.visits.values[0, :3], [6.0, -3.0, 9.0])
-    assert found.visits.follows.tolist() == [0, -1] and free(found, "p1")
+    np.testing.assert_allclose(found.visits.target.values[0, :3], [6.0, -3.0, 9.0])
+    assert found.visits.target.follows.tolist() == [0, -1] and free(found, "p1")
     lost = once("place p1,5;", more=more)
-    assert lost.visits.target[0] == Meaning.UNKNOWN and not free(lost, "p1")
+    assert lost.visits.target.meaning[0] == Meaning.UNKNOWN and not free(lost, "p1")
 
 
 def test_a_shift_of_a_shift():
     line = "MoveL RelTool(Offs(p2,1,0,0),0,0,-9),v200,fine,t\\WObj:=w;"
     found = once(line, L.format("p2"))
-    np.testing.assert_allclose(found.visits.values[0, :3], [5.0, 5.0, 15.0])
-    assert found.visits.follows.tolist() == [1, -1] and free(found, "p2")
+    np.testing.assert_allclose(found.visits.target.values[0, :3], [5.0, 5.0, 15.0])
+    assert found.visits.target.follows.tolist() == [1, -1] and free(found, "p2")
 
 
 def test_a_loop_that_counts_what_it_calls_with():
     more = routine("at", "MoveL Offs(p1,x,0,0),v9,fine,t\\WObj:=w;", given="(num x)")
     found = once("FOR i FROM 1 TO 3 DO", "at 2*i;", "ENDFOR", L.format("p1"), more=more)
-    np.testing.assert_allclose(found.visits.values[:, 0], [3.0, 5.0, 7.0, 1.0])
+    np.testing.assert_allclose(found.visits.target.values[:, 0], [3.0, 5.0, 7.0, 1.0])
 
 
 def test_tools_zones_and_speeds():
@@ -68,10 +68,10 @@ def test_tools_zones_and_speeds():
     )  # fmt: skip
     found = once("go t,w,v300,z10;", "go tool0,wobj0,v100,fine;", more=more)
     v = found.visits
-    assert reasons(found) == ["", ""] and v.fly.tolist() == [True, False]
-    np.testing.assert_allclose(v.lin_spd, [0.3, 0.1])
-    np.testing.assert_allclose(v.frames[v.tool][:, 2, 3], [0.3, 0.0])
-    np.testing.assert_allclose(v.frames[v.uframe][:, 0, 3], [1.0, 0.0])
+    assert reasons(found) == ["", ""] and v.motion.fly.tolist() == [True, False]
+    np.testing.assert_allclose(v.speed.linear, [0.3, 0.1])
+    np.testing.assert_allclose(v.frame.poses[v.frame.tool][:, 2, 3], [0.3, 0.0])
+    np.testing.assert_allclose(v.frame.poses[v.frame.uframe][:, 0, 3], [1.0, 0.0])
 
 
 # What may change it, or move there unseen.
@@ -166,13 +166,13 @@ def test_a_number_that_its_routine_counts_up():
     more = routine("at", "n:=n+1;", "MoveL Offs(p1,n,0,0),v9,fine,t\\WObj:=w;",
                    given="(num n)")  # fmt: skip
     found = once("at 5;", more=more)
-    assert found.visits.target.tolist() == [Meaning.UNKNOWN]
+    assert found.visits.target.meaning.tolist() == [Meaning.UNKNOWN]
 
 
 def test_a_modal_instruction_takes_a_number_of_the_call():
     more = routine("slow", "VelSet x,500;", given="(num x)")
     found = once("slow 50;", L.format("p1"), more=more)
-    assert found.visits.override.tolist() == [0.5]
+    assert found.visits.speed.override.tolist() == [0.5]
 
 
 # What is handed over whole.

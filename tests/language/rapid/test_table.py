@@ -39,9 +39,14 @@ def after(*lines, handler=(), more=""):
     """Tell how the move behind some lines begins, and why it is not corrected."""
     ends = ("ERROR", *handler) if handler else ()
     found = task(P1, *lines, P2, *ends, more=MORE + more)
-    names = [found.visits.names[k] for k in found.visits.name.tolist()]
+    names = [found.visits.target.names[k] for k in found.visits.target.name.tolist()]
     last = len(names) - 1 - names[::-1].index("p2")
     return ELSEWHERE in origins(found)[last], reasons(found)[last], found.visits, last
+
+
+def mass(visits, visit):
+    """Return the mass that the program states to be carried at a visit [kg]."""
+    return visits.motion.loads[visits.motion.load[visit]][0]
 
 
 def anywhere(*lines, **more):
@@ -92,11 +97,11 @@ CHECKS = {
         "TRAP", "CONNECT i WITH x;", "TriggInt g,5,i;",
         more="TRAP x\nPDispSet d;\nENDTRAP"),
     "`WaitDI`, `WaitTime`, `Stop`, `TPReadNum` and the like behind a zone": lambda: all(
-        task(P1.replace("fine", "z10"), f"{line};", P2).visits.zone_rule[0]
+        task(P1.replace("fine", "z10"), f"{line};", P2).visits.zone.rule[0]
         == ZoneRule.UNKNOWN
         for line in ("WaitDI di1,1", "WaitTime 1", "Stop", 'TPReadNum n,"?"')),
     "`StopMove`, `StorePath`, a statement that may move the arm, behind a zone": lambda:
-        all(task(P1.replace("fine", "z10"), line, P2, more=MORE).visits.zone_rule[0]
+        all(task(P1.replace("fine", "z10"), line, P2, more=MORE).visits.zone.rule[0]
             == ZoneRule.UNKNOWN
             for line in ("StopMove;", "StorePath;", "weld 3;", "?? n;")),
     "`MoveLSync`, `MoveJSync`, `MoveCSync`": lambda: left(
@@ -122,14 +127,14 @@ CHECKS = {
                                                "SoftAct", "SyncMoveOn", "WaitWObj"))
         and known("SoftAct 1,20;", "SoftDeact;")),
     "`GripLoad`, `\\TLoad`, the mass of a tooldata": lambda: (
-        (lambda v, k: v.loads[v.load[k]][0] == 4.0)(*after("GripLoad part;")[2:])),
+        mass(*after("GripLoad part;")[2:]) == 4.0),
     "`ConfL`, `ConfJ`": lambda: (
-        (lambda v, k: v.care[k][0] == Switch.OFF)(*after("ConfL \\Off;")[2:])),
+        (lambda v, k: v.motion.care[k][0] == Switch.OFF)(*after("ConfL \\Off;")[2:])),
     "`SingArea`, `CirPathMode`": lambda: (
-        (lambda v, k: v.orientation_law[k] == OrientationLaw.WRIST_JOINTS)(
+        (lambda v, k: v.motion.orientation_law[k] == OrientationLaw.WRIST_JOINTS)(
             *after("SingArea \\Wrist;")[2:])),
     "`VelSet`, `SpeedLimAxis`": lambda: (
-        (lambda v, k: v.override[k] == 0.5)(*after("VelSet 50,500;")[2:])),
+        (lambda v, k: v.speed.override[k] == 0.5)(*after("VelSet 50,500;")[2:])),
     "`Load`, `UnLoad`, `StartLoad`": lambda: left(SHIFT, 'Load "x.mod";'),
     "`SetDataVal`, `SetAllDataVal`": lambda: (
         "run" in reasons(task(L.format("list{1}"), 'SetDataVal "list",n;',

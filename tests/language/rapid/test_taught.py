@@ -92,15 +92,15 @@ def test_a_computed_target_that_is_taught_holds_its_point(move, pinned):
      (",0,0,0]];", ",0,0,0]\n]; ! TAUGHT")],
 )  # fmt: skip
 def test_a_tool_that_is_taught_is_so_by_its_statement(swap):
-    assert not read(go("p1")).frame_taught.any()
-    assert read(go("p1"), swap=[swap]).frame_taught.any()
+    assert not read(go("p1")).frame.taught.any()
+    assert read(go("p1"), swap=[swap]).frame.taught.any()
 
 
 def test_a_written_shift_is_taught_by_its_statement():
     move = "MoveL Offs(p1,0,0,100),v200,\nfine,t\\WObj:=w; ! TAUGHT"
     visits = read(go("p1"), move)
-    assert visits.literals.taught[visits.literal[2]]
-    assert not visits.literals.taught[visits.literal[1]]
+    assert visits.literals.taught[visits.target.literal[2]]
+    assert not visits.literals.taught[visits.target.literal[1]]
 
 
 def test_a_shift_of_a_point_that_is_computed_keeps_its_numbers():

@@ -76,7 +76,7 @@ def test_a_search_leaves_its_tool_and_its_other_points(search):
     found = once(SEARCHES[search].format("found"), P2, more=MORE + FOUND)
     (before,) = origins(found)[-1]
     assert reasons(found)[-1] == ""
-    assert found.visits.target[before] == Meaning.UNKNOWN  # it ends anywhere
+    assert found.visits.target.meaning[before] == Meaning.UNKNOWN  # it ends anywhere
 
 
 def test_a_routine_that_is_named_like_a_search_may_write_all():
@@ -107,7 +107,7 @@ def test_a_routine_of_the_task_may_change_what_it_gets(kind):
 def test_a_function_of_the_task_that_is_called_offs():
     more = f"FUNC robtarget Offs(robtarget p,num x)\nRETURN p2;\nENDFUNC\n{MORE}"
     found = once(P1, "MoveL Offs(p1,0,0,9),v200,fine,t\\WObj:=w;", more=more)
-    assert reasons(found)[1] and found.visits.follows.tolist() == [-1, -1]
+    assert reasons(found)[1] and found.visits.target.follows.tolist() == [-1, -1]
 
 
 # Functions that set modes.
@@ -168,7 +168,7 @@ BESIDE = {
 def test_a_target_of_moves_that_run_beside_keeps_its_numbers(kind):
     lines, more = BESIDE[kind]
     found = once(*lines, more=MORE + more + SUB)
-    first = int(found.visits.literal[0])
+    first = int(found.visits.target.literal[0])
     assert any("goes there too" in why and first in rows.tolist()
                for why, rows in found.visits.literals.pins.items())  # fmt: skip
 
@@ -284,8 +284,8 @@ def test_all_modes_go_on_into_the_next_cycle():
         P1, arc, "ConfL\\Off;", "SingArea\\Wrist;", "CirPathMode\\CirPointOri;"
     )
     v = found.visits
-    assert v.orientation_law.tolist() == [OrientationLaw.UNKNOWN] * 3
-    assert (v.care == Switch.UNKNOWN).all()
+    assert v.motion.orientation_law.tolist() == [OrientationLaw.UNKNOWN] * 3
+    assert (v.motion.care == Switch.UNKNOWN).all()
 
 
 SOMETIMES = {
@@ -308,8 +308,8 @@ def test_what_an_unknown_call_may_set_does_not_go_on():
 def test_a_main_that_sets_its_modes_first_knows_them():
     found = task("ConfL\\Off;", "SingArea\\Off;", P1, "ConfL\\On;", "SingArea\\Wrist;")
     v = found.visits
-    assert v.orientation_law.tolist() == [OrientationLaw.ONE_AXIS]
-    assert (v.care == Switch.OFF).all()
+    assert v.motion.orientation_law.tolist() == [OrientationLaw.ONE_AXIS]
+    assert (v.motion.care == Switch.OFF).all()
 
 
 # Statements that are not understood.

@@ -50,12 +50,12 @@ def once(*lines, **given):
 
 def names(found):
     v = found.visits
-    return [v.names[k] for k in v.name.tolist()]
+    return [v.target.names[k] for k in v.target.name.tolist()]
 
 
 def origins(found):
     v = found.visits
-    return [v.predecessors(k).tolist() for k in range(len(v))]
+    return [v.graph.predecessors(k).tolist() for k in range(len(v))]
 
 
 def reasons(found):
@@ -73,13 +73,13 @@ def test_frames_zone_and_speed_of_a_move():
     )
     v = found.visits
     assert reasons(found) == [""] * 3 and names(found) == ["p1", "p2", "j"]
-    assert v.target.tolist() == [Meaning.POSE, Meaning.POSE, Meaning.JOINTS]
-    tool, uframe = v.frames[v.tool[0]], v.frames[v.uframe[0]]
+    assert v.target.meaning.tolist() == [Meaning.POSE, Meaning.POSE, Meaning.JOINTS]
+    tool, uframe = v.frame.poses[v.frame.tool[0]], v.frame.poses[v.frame.uframe[0]]
     np.testing.assert_allclose(tool[:3, :3], np.eye(3))
     np.testing.assert_allclose(tool[:3, 3], [0.01, 0.02, 0.3])
     np.testing.assert_allclose(uframe[:3, 3], [1, 0.1, 0.5])
-    assert v.fly.tolist() == [True, False, False] and v.zone_mm[0] == 10.0
-    np.testing.assert_allclose(v.lin_spd, [0.2, 0.2, 0.005])
+    assert v.motion.fly.tolist() == [True, False, False] and v.zone.size_mm[0] == 10.0
+    np.testing.assert_allclose(v.speed.linear, [0.2, 0.2, 0.005])
     assert origins(found) == [[START], [0], [1]]
 
 
@@ -135,8 +135,11 @@ def test_data_that_are_declared_twice_are_not_known(name):
 @pytest.mark.parametrize("zone", ["odd", "fine\\Z:=5", "z10\\Z:=n"])
 def test_a_zone_that_is_not_known(zone):
     found = once(f"MoveL p1,v200,{zone},t\\WObj:=w;", L.format("p2"))
-    assert reasons(found) == ["", ""] and found.visits.fly.tolist() == [True, False]
-    assert found.visits.zone_rule[0] == ZoneRule.UNKNOWN
+    assert reasons(found) == ["", ""] and found.visits.motion.fly.tolist() == [
+        True,
+        False,
+    ]
+    assert found.visits.zone.rule[0] == ZoneRule.UNKNOWN
 
 
 @pytest.mark.parametrize("name", ["z10", "tool0"])
@@ -146,7 +149,7 @@ def test_a_parameter_hides_what_the_controller_knows(name):
     more = f"PROC go({type_} {name}) MoveL p1,v200,{zone},{tool}; ENDPROC"
     found = task("go fine;", more=more)
     if name == "z10":
-        assert found.visits.zone_mm.tolist() != [10.0]
+        assert found.visits.zone.size_mm.tolist() != [10.0]
     else:
         assert reasons(found) != [""]
 
@@ -194,7 +197,7 @@ def test_own_routines_hide_those_of_the_controller():
 
 
 def test_stop_point_data_stop():
-    assert not task("MoveL p1,v200,z10\\Inpos:=inpos50,t;").visits.fly[0]
+    assert not task("MoveL p1,v200,z10\\Inpos:=inpos50,t;").visits.motion.fly[0]
 
 
 @pytest.mark.parametrize(
@@ -214,7 +217,9 @@ def test_what_is_known_again_is_not(lines):
 def test_a_known_displacement_is_part_of_the_frame():
     found = task("PDispSet [[0,0,7],[1,0,0,0]];", L.format("p1"))
     assert reasons(found) == [""]
-    assert found.visits.frames[found.visits.uframe[0], 2, 3] == pytest.approx(0.507)
+    assert found.visits.frame.poses[
+        found.visits.frame.uframe[0], 2, 3
+    ] == pytest.approx(0.507)
 
 
 def test_lines_at_singularities_and_arcs():
@@ -224,11 +229,19 @@ def test_lines_at_singularities_and_arcs():
         L.format("p1"), "SingArea\\LockAxis4;", L.format("p1"),
     )  # fmt: skip
     law = OrientationLaw
-    assert found.visits.orientation_law.tolist() == [
+    assert found.visits.motion.orientation_law.tolist() == [
         law.ONE_AXIS, law.ALONG_PATH, law.ALONG_PATH, law.ONE_AXIS, law.ONE_AXIS,
         law.WRIST_JOINTS, law.UNKNOWN,
     ]  # fmt: skip
-    assert found.visits.via.tolist() == [False, True, False, True, False, False, False]
+    assert found.visits.motion.via.tolist() == [
+        False,
+        True,
+        False,
+        True,
+        False,
+        False,
+        False,
+    ]
 
 
 def test_branches_meet():
@@ -256,9 +269,9 @@ def test_loops_and_jumps():
 def test_rounds_of_a_loop_are_told_apart():
     found = once("FOR i FROM 3 TO 1 STEP -1 DO", L.format("list{i}"), "ENDFOR")
     assert names(found) == ["list{3}", "list{2}", "list{1}"]
-    assert found.visits.values[:, 0].tolist() == [3.0, 2.0, 1.0]
+    assert found.visits.target.values[:, 0].tolist() == [3.0, 2.0, 1.0]
     assert origins(found) == [[START], [0], [1]]
-    assert len(np.unique(found.visits.literal)) == 3
+    assert len(np.unique(found.visits.target.literal)) == 3
 
 
 def test_calls_are_followed_across_modules():
@@ -266,7 +279,7 @@ def test_calls_are_followed_across_modules():
     found = once("weld;", L.format("p1"), "weld;", others=[other])
     assert names(found) == ["p2", "p1", "p2"] and origins(found) == [[START], [0], [1]]
     assert reasons(found) == [""] * 3
-    assert found.visits.literal.tolist() == [0, 1, 0]
+    assert found.visits.target.literal.tolist() == [0, 1, 0]
 
 
 def test_a_routine_of_another_module_does_not_see_local_data():
@@ -298,9 +311,10 @@ def test_shifted_points_follow_theirs():
         L.format("p2"), "MoveL RelTool(p2,0,0,50),v200,fine,t\\WObj:=w;",
     )  # fmt: skip
     v = found.visits
-    assert v.literal.tolist() == [0, 1, 2, 3] and v.follows.tolist() == [-1, 0, -1, 2]
-    assert v.values[1, :3].tolist() == [1, 2, 53]
-    np.testing.assert_allclose(v.values[3, :3], [4, 5, -44])  # p2 looks down
+    assert v.target.literal.tolist() == [0, 1, 2, 3]
+    assert v.target.follows.tolist() == [-1, 0, -1, 2]
+    assert v.target.values[1, :3].tolist() == [1, 2, 53]
+    np.testing.assert_allclose(v.target.values[3, :3], [4, 5, -44])  # p2 looks down
     assert set(v.literals.pinned) == {""}
 
 
@@ -330,12 +344,12 @@ def test_points_that_must_keep_their_numbers(lines, more, why):
 def test_points_built_from_other_data_keep_their_numbers(goal, more):
     found = task(L.format(goal), more=more)
     assert "other data" in reasons(found)[0] or "run" in reasons(found)[0]
-    assert found.visits.literal.tolist() == [-1]
+    assert found.visits.target.literal.tolist() == [-1]
 
 
 def test_external_axes_are_told():
     p = "[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,12.5,9E9,9E9,9E9,9E9]]"
-    aux = task(L.format(p)).visits.aux
+    aux = task(L.format(p)).visits.target.aux
     assert np.isnan(aux[0, 0]) and aux[0, 1] == 12.5 and aux.shape == (1, 2)
 
 
@@ -429,13 +443,13 @@ ENDPROC
 ENDMODULE
 """
     visits = read_program({"m.mod": text.encode()}, bench_cell).visits
-    assert visits.line.tolist() == [8] and visits.literal.tolist() == [-1]
+    assert visits.place.line.tolist() == [8] and visits.target.literal.tolist() == [-1]
     assert "known only when the program runs" in visits.reasons[visits.reason[0]].text
 
 
 def taught(found):
     v = found.visits
-    return [bool(v.literals.taught[k]) for k in v.literal.tolist()]
+    return [bool(v.literals.taught[k]) for k in v.target.literal.tolist()]
 
 
 LINES = L.format("p1"), L.format("p2"), L.format("list{2}")
@@ -454,7 +468,8 @@ def test_what_was_taught_is_known_by_the_cell_or_a_comment():
 def test_frames_that_were_taught():
     def frames(found):
         v = found.visits
-        return bool(v.frame_taught[v.tool[0]]), bool(v.frame_taught[v.uframe[0]])
+        own = (v.frame.tool[0], v.frame.uframe[0])
+        return tuple(bool(v.frame.taught[k]) for k in own)
 
     assert frames(task(L.format("p1"))) == (False, False)
     named = Start(taught=frozenset({"w"}))
@@ -470,7 +485,7 @@ def test_measured_moves_carry_their_ids():
         "! MEASURE h1", L.format("p1"), L.format("p2"),
         L.format("p1") + " ! MEASURE h2", "! MEASURE h3", "x:=1;", arc, "! MEASURE h4",
     )  # fmt: skip
-    assert found.visits.measure_id == ("h1", "", "h2", "", "h3")
+    assert found.visits.place.measure_id == ("h1", "", "h2", "", "h3")
 
 
 SET = "PDispSet [[0,0,7],[1,0,0,0]];"
@@ -498,7 +513,7 @@ def test_a_move_of_external_axes_says_where_they_go():
     unused = "9E9,9E9,9E9,9E9,9E9"
     more = f"CONST jointtarget far:=[[9E9,{unused}],[500,{unused}]];\n"
     found = once("MoveExtJ far,vrot10,fine;", L.format("p1"), more=more)
-    assert found.visits.aux[:, 0].tolist()[0] == 500.0
+    assert found.visits.target.aux[:, 0].tolist()[0] == 500.0
 
 
 WOBJ = 'VAR wobjdata wv:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
@@ -511,7 +526,7 @@ def in_wobj(name):
 
 def heights(found):
     v = found.visits
-    return [v.frames[k][2, 3] if k >= 0 else None for k in v.uframe]
+    return [v.frame.poses[k][2, 3] if k >= 0 else None for k in v.frame.uframe]
 
 
 def test_work_objects_and_tools_that_the_program_assigns_are_known():
@@ -524,7 +539,9 @@ def test_work_objects_and_tools_that_the_program_assigns_are_known():
     move = L.format("p1").replace(",t\\", ",tv\\")
     found = task("tv:=t;", "tv.tframe.trans.z:=77;", move, more=tool)
     assert reasons(found) == [""]
-    assert found.visits.frames[found.visits.tool[0]][2, 3] == pytest.approx(0.077)
+    assert found.visits.frame.poses[found.visits.frame.tool[0]][2, 3] == pytest.approx(
+        0.077
+    )
 
 
 @pytest.mark.parametrize(
@@ -554,5 +571,5 @@ def test_a_frame_that_differs_in_later_rounds_is_not_that_of_the_first():
     move = L.format("p1").replace(",t\\", ",tv\\")
     other = "tv:=[TRUE,[[0,0,9],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];"
     found = task("tv:=t;", "WHILE di1=1 DO", move, other, "ENDWHILE", more=tool)
-    assert found.visits.tool.tolist() == [-1]
+    assert found.visits.frame.tool.tolist() == [-1]
     assert "different values" in reasons(found)[0]

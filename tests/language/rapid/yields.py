@@ -41,7 +41,7 @@ def reasons_of(task: list[Path]) -> list[str]:
     found = Rapid().read(sources, Start())
     visits, lines = found.visits, dict[tuple[int, int], str]()
     for k in range(len(visits)):
-        place = int(visits.file[k]), int(visits.line[k])
+        place = int(visits.place.file[k]), int(visits.place.line[k])
         why = visits.reasons[int(visits.reason[k])].text
         lines[place] = lines.get(place, "") or why
     counted = [why for why in lines.values() if not any(b in why for b in BESIDE)]

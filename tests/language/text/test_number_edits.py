@@ -87,11 +87,11 @@ def test_a_plus_belongs_to_its_number_and_stays_while_it_is_not_below_zero() -> 
     text = b"PROGRAM a\nBEGIN\n" + move + b"\nEND a\n"
     source = source_from_bytes("a.pdl", text)
     visits = resolve(parse(source)).visits
-    assert visits.values[0].tolist() == [1500.0, 2.0, 0.01, 90.0, -45.0, 15.0]
+    assert visits.target.values[0].tolist() == [1500.0, 2.0, 0.01, 90.0, -45.0, 15.0]
     wanted = np.array([[1501.25, 3.5, -0.02, 91.0, 44.0, 16.0]])
     (mine,) = edits(visits.literals, (source,), np.array([0]), wanted, PDL2_DIALECT)
     out = apply(source.data, mine)
     assert b"POS(+1501.250, +3.500, -0.020, +91.0000, 44.0000, +16.0000, '')" in out
     again = resolve(parse(source_from_bytes("a.pdl", out))).visits
-    np.testing.assert_array_equal(again.values, wanted)
+    np.testing.assert_array_equal(again.target.values, wanted)
     assert difference(source, Source("a.pdl", out), mine) == ""

@@ -12,6 +12,7 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.visits import Diagnostic, Literals, NumberPlaces, Visits
 from postproc.model.statistics import ErrorStatistics
+from tests.made_visits import assemble
 
 REASONS = (
     NO_REASON,
@@ -65,12 +66,12 @@ def visits_of(n: int, name: str, names: tuple[str, ...]) -> Visits:
         no,
         ("",) * n,
     )
-    return Visits(
+    return assemble(
         files=(name,),
         file=index * 0,
         line=line,
-        motion=index * 0 + 1,
-        target=index * 0,
+        kind=index * 0 + 1,
+        meaning=index * 0,
         via=no,
         values=np.column_stack([path(n), angles]),
         distance_mm=nan,
@@ -85,18 +86,18 @@ def visits_of(n: int, name: str, names: tuple[str, ...]) -> Visits:
         tool=index * 0,
         base=index * 0,
         uframe=index * 0,
-        frames=np.eye(4)[None],
-        frame_taught=np.zeros(1, dtype=bool),
+        poses=np.eye(4)[None],
+        taught=np.zeros(1, dtype=bool),
         tool_remote=no,
         nearest_turn=no,
         care=np.zeros((n, 3), dtype=np.int64),
         fly=~no,
-        zone_mm=nan,
+        size_mm=nan,
         overlap_percent=nan,
         blend=index * 0,
-        zone_rule=index * 0,
-        lin_spd=nan,
-        rot_spd=nan,
+        rule=index * 0,
+        linear=nan,
+        turning=nan,
         override=np.ones(n),
         wrist_joint=no,
         orientation_law=index * 0,
@@ -129,7 +130,7 @@ def decisions_of(visits: Visits, seed: int) -> Decisions:
         [0.6 * np.cos(turn), 0.5 + 0.2 * side[:, 0], 0.4 * np.sin(turn)]
     ) + rng.normal(0.0, 2e-5, (n, 3))
     correction[status != Status.CORRECTED] = 0.0
-    corrected = np.array(visits.values)
+    corrected = np.array(visits.target.values)
     corrected[:, :3] += correction * 1e3
     q = rng.uniform(-1.5, 1.5, (n, 6))
     std = np.full((n, 3), 1.2e-5)

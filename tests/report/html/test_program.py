@@ -279,7 +279,7 @@ def test_all_numbers_of_a_rapid_target_have_a_head(bench_cell, bench_model) -> N
         numbers = packed["numbers"]["original"]
         assert numbers["width"] == len(heads)
         rows = np.array(numbers["values"], dtype=float).reshape(-1, len(heads))
-        joints = outcome.visits.target == Meaning.JOINTS
+        joints = outcome.visits.target.meaning == Meaning.JOINTS
         assert joints.any() and not joints.all()
         assert np.isnan(rows[joints, 6:]).all() and np.isfinite(rows[~joints]).all()
 
