@@ -100,7 +100,7 @@ def test_the_load_of_the_cell_is_stated(tmp_path, suffix):
     for more in ("", LOAD):
         place.write_text(robot + more)
         own = load_cell(place)
-        loads.append(read(written(tmp_path, own, suffix, 20), own).loads)
+        loads.append(read(written(tmp_path, own, suffix, 20), own).motion.loads)
     assert not np.isfinite(loads[0][:, 0]).any() or (loads[0][:, 0] < 0.01).all()
     np.testing.assert_allclose(loads[1][-1][:4], [45.5, 0.01, -0.02, 0.15])
 
