@@ -26,9 +26,9 @@ def visits_of(moves: list[Executed], cell) -> Visits:
     return visits(
         [int(Meaning.JOINTS if m.joints else Meaning.POSE) for m in moves],
         [list(m.numbers) for m in moves],
-        motion=np.array([int(Motion[m.motion]) for m in moves]),
+        kind=np.array([int(Motion[m.motion]) for m in moves]),
         configs=("",),
-        frames=frames,
+        poses=frames,
     )
 
 

@@ -30,9 +30,9 @@ NORM, CART = Blend.OVERLAP, Blend.ZONE
 )
 def test_settings(type_, trajectory, distance, percent, expected) -> None:
     one = visits(
-        [0], [[0.0] * 6], fly=np.array([True]), zone_mm=np.array([distance]),
+        [0], [[0.0] * 6], fly=np.array([True]), size_mm=np.array([distance]),
         overlap_percent=np.array([percent]), blend=np.array([int(type_)]),
-        zone_rule=np.array([int(trajectory)]),
+        rule=np.array([int(trajectory)]),
     )  # fmt: skip
     rounding, metres, overlap = rounding_of(one)
     assert (rounding[0], metres[0], overlap[0]) == pytest.approx(expected)

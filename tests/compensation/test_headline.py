@@ -13,6 +13,8 @@ from postproc.compensation.headline import ProgramErrors, headline, list_excepti
 from postproc.compensation.tolerance import check_tolerance
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.text.stamp import read_stamp
+from postproc.language.visits import Meaning
+from tests.made_visits import visits as made_visits
 from tests.written import FIRST, NEXT, POSE, cli, program
 
 N = 40
@@ -33,8 +35,8 @@ def errors_of(kept=(), unknown=(), tolerance=None, side=()):
         check = check_tolerance(expected, np.full(N, tolerance * 1e-3))
     resting = np.ones((N, 6))
     resting[list(side), 4] = 0.2
-    visits = SimpleNamespace(
-        files=("job.pdl",), file=np.zeros(N, dtype=int), line=np.arange(N) + 10,
+    visits = made_visits(
+        [Meaning.POSE] * N, [[0.0] * 6] * N, line=np.arange(N) + 10,
         names=("", "p_3"), name=left.astype(int),
     )  # fmt: skip
     return ProgramErrors(

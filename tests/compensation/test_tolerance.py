@@ -16,6 +16,8 @@ from postproc.compensation.expected_error import (
 )
 from postproc.compensation.tolerance import JobTolerance, Verdict, check_tolerance
 from postproc.exceptions import PostprocError
+from postproc.language.visits import Meaning
+from tests.made_visits import visits as made_visits
 from tests.written import FIRST, NEXT, POSE, cli, program
 
 STD = 0.02e-3
@@ -73,15 +75,12 @@ def test_an_error_that_does_not_scatter_has_its_own_length():
 
 
 def test_the_last_pattern_that_fits_a_name_counts():
-    class Visits:
-        names, name = ("", "P_drill1", "q"), np.array([0, 1, 2])
-        files, file = ("a.pdl", "b.pdl"), np.array([0, 0, 1])
-
-        def __len__(self):
-            return 3
-
+    visits = made_visits(
+        [Meaning.POSE] * 3, [[0.0] * 6] * 3, files=("a.pdl", "b.pdl"),
+        file=np.array([0, 0, 1]), names=("", "P_drill1", "q"), name=np.arange(3),
+    )  # fmt: skip
     job = JobTolerance(0.3, {"b.*": 0.5, "p_*": 0.1})
-    assert job.of_visits(Visits()) == pytest.approx([0.3e-3, 0.1e-3, 0.5e-3])
+    assert job.of_visits(visits) == pytest.approx([0.3e-3, 0.1e-3, 0.5e-3])
     with pytest.raises(PostprocError, match="above 0"):
         JobTolerance(0.3, {"p": -1.0})
 

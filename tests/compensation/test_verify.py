@@ -90,7 +90,7 @@ def test_a_target_that_was_to_be_kept_is_refused(job_cell: Cell) -> None:
         check_output(reading, after, output, rows, values)
     frames = after.visits.frame.poses + 1e-3
     moved = replace(after, visits=after.visits.with_columns(poses=frames))
-    with pytest.raises(VerificationError, match="another frames"):
+    with pytest.raises(VerificationError, match="another frame: poses"):
         check(reading, moved, output, rows)
     fewer = replace(
         after, visits=read_program({"job.pdl": program(FIRST)}, job_cell).visits

@@ -118,7 +118,7 @@ def test_confdata_is_that_of_the_rounded_numbers(bench_cell, bench_model):
         run = run_program(virtual_arm(SEED, tool=setup.tool), setup, made)
         rows = run.visit
         stops = (found.decisions.status[rows] == Status.CORRECTED) & (
-            made.target[rows] == Meaning.POSE
+            made.target.meaning[rows] == Meaning.POSE
         )
         stops &= ~made.motion.fly[rows]
         assert stops.sum() > 5
@@ -144,7 +144,7 @@ def test_t_is_that_of_the_rounded_numbers(bench_cell, bench_model):
         made = read_program(output, bench_cell).visits
         run = run_program(virtual_arm(SEED, tool=setup.tool), setup, made)
         rows = run.visit
-        ends = made.target.config_given[rows] & (made.motion[rows] == Motion.JOINT)
+        ends = made.target.config_given[rows] & (made.motion.kind[rows] == Motion.JOINT)
         safe = ends & (found.decisions.status[rows] == Status.CORRECTED)
         q = np.rad2deg(run.arrivals.q)
         bits = (made.target.values[rows, 7].astype(int)[:, None] >> np.arange(6)) & 1

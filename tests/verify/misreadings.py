@@ -83,7 +83,7 @@ def _frames(
 ) -> Visits:
     """Change the frames that visits use as tool, base or uframe."""
     frames = np.array(v.frame.poses).reshape(-1, 4, 4)
-    rows = np.unique(getattr(v, which))
+    rows = np.unique(v.columns[which])
     for k in rows[rows >= 0]:
         frames[k] = change(frames[k])
     return v.with_columns(poses=frames)

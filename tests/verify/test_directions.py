@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from postproc.compensation.options import Options
+from postproc.language.visits import Meaning
 from postproc.verify import directions
 from postproc.verify.cycle import NOT_DRAWN
 from postproc.verify.directions import MOVES, draw
 from postproc.verify.ruckig_move import move_in_time
 from postproc.verify.toppra_run import run_in_time
+from tests.made_visits import visits as made_visits
 from tests.verify.judged import SHIPPED, row, shipped
 
 LIMITS = np.array([[2.0] * 6, [5.0] * 6, [50.0] * 6])
@@ -102,8 +104,8 @@ def test_stops_that_are_not_drawn_are_counted_as_such(models, monkeypatch) -> No
 def test_the_same_program_is_drawn_from_alike(models) -> None:
     class Long:
         def __init__(self, seed: int) -> None:
-            self.visits = self
-            self.values = np.random.default_rng(seed).random((20_000, 6))
+            values = np.random.default_rng(seed).random((20_000, 6))
+            self.visits = made_visits([Meaning.POSE] * 20_000, values.tolist())
 
         def __len__(self) -> int:
             return 20_000

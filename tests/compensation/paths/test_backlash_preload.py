@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -62,7 +60,7 @@ def setting(bench_cell: Cell, bench_model: Model) -> Job:
 
 def visits(cell: Cell, law: OrientationLaw) -> Visits:
     found = read_program({"job.pdl": JOB}, cell).visits
-    return replace(found, orientation_law=np.full(len(found), law))
+    return found.with_columns(orientation_law=np.full(len(found), law))
 
 
 def test_the_tool_turns_as_far_as_the_drives_turn_it(setting: Job) -> None:

@@ -49,7 +49,8 @@ def known(found: Visits) -> list[bool]:
     """Tell which targets are known, and may be edited."""
     own = found.target.literal.tolist()
     free = [k >= 0 and not found.literals.pinned[k] for k in own]
-    return [f and t == Meaning.POSE for f, t in zip(free, found.target, strict=True)]
+    poses = found.target.meaning == Meaning.POSE
+    return [f and bool(p) for f, p in zip(free, poses, strict=True)]
 
 
 @pytest.mark.parametrize(

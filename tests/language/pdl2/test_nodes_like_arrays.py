@@ -118,7 +118,7 @@ def test_nodes_are_followed_like_elements(seed):
     arrays, paths = followed(program, ARRAYS), followed(as_path(program), PATHS)
     assert len(arrays) == len(paths)
     np.testing.assert_array_equal(arrays.target.values, paths.target.values)
-    np.testing.assert_array_equal(arrays.pred, paths.pred)
+    np.testing.assert_array_equal(arrays.graph.pred, paths.graph.pred)
     assert edited(arrays) == edited(paths)
     assert [bool(arrays.reasons[k]) for k in arrays.reason] == [
         bool(paths.reasons[k]) for k in paths.reason

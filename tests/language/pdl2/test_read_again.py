@@ -27,9 +27,13 @@ def same_reading(program: bytes, values: bytes) -> bool:
     again = Pdl2().read(sources(program, values), Start(), first.programs)
     alone = Pdl2().read(sources(program, values), Start())
     assert again.diagnostics == alone.diagnostics
-    a, b = vars(again.visits), vars(alone.visits)
-    for name in set(a) - {"literals", "dialect"}:
-        np.testing.assert_equal(a[name], b[name], err_msg=name)
+    for part in (*again.visits.parts, "graph"):
+        a, b = vars(getattr(again.visits, part)), vars(getattr(alone.visits, part))
+        for name in a:
+            np.testing.assert_equal(a[name], b[name], err_msg=name)
+    for name in ("files", "reason", "reasons"):
+        a, b = getattr(again.visits, name), getattr(alone.visits, name)
+        np.testing.assert_equal(a, b, err_msg=name)
     for name, column in vars(again.visits.literals).items():
         other = getattr(alone.visits.literals, name)
         if name == "places":
