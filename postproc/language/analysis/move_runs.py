@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, slim
+from postproc.arrays import Bools, Floats, Ints
 from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.text.statement_table import StatementText
-from postproc.language.visits import Graph, Visits
 
 LEAST = 8  # statements that are worth it
 Runs = dict[int, int]
@@ -99,51 +98,3 @@ def within(counts: Ints) -> tuple[Ints, Ints]:
     """
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]
-
-
-def unfold(
-    visits: Visits,
-    counts: Ints,
-    literal_counts: Ints,
-    values: Floats,
-    line: Ints,
-    measure_id: tuple[str, ...],
-) -> Visits:
-    """Put a visit for each move in the place of the one that was read for several.
-
-    Args:
-        visits: As they were read; their literals are unfolded already.
-        counts: Of the moves that each stands for, (n,).
-        literal_counts: Likewise of literals.
-        values: Of the unfolded visits, and so on.
-        line: ..
-        measure_id: ..
-    """
-    owner, inside = within(counts)
-    begin = np.cumsum(counts) - counts
-    literal_begin = np.cumsum(literal_counts) - literal_counts
-    columns: dict[str, Any] = {"values": values, "line": line}
-    for name, each in (("literal", inside), ("follows", 0)):
-        own = visits.columns[name][owner].astype(np.int64)
-        moved = np.append(literal_begin, 0)[own]
-        columns[name] = slim(np.where(own >= 0, moved + each, -1))
-    block = visits.motion.block[owner].astype(np.int64)
-    columns["block"] = slim(np.where(block >= 0, begin[block], -1))
-    unfolded = visits.take(owner, _follow_each_other(visits, counts))
-    return unfolded.with_columns(measure_id=measure_id, **columns)
-
-
-def _follow_each_other(visits: Visits, counts: Ints) -> Graph:
-    """Return the predecessors of unfolded visits: in a run each follows the last."""
-    owner, inside = within(counts)
-    behind = np.cumsum(counts)
-    own = np.diff(visits.graph.pred_start)
-    number = np.where(inside == 0, own[owner], 1)
-    start = np.concatenate([[0], np.cumsum(number)]).astype(np.int64)
-    pred = np.repeat(np.arange(len(owner)) - 1, number)
-    old = visits.graph.pred.astype(np.int64)
-    moved = np.where(old >= 0, np.append(behind, 0)[old] - 1, old)
-    heads = start[behind - counts]
-    at = np.repeat(heads, own) + within(own)[1]
-    pred[at] = moved
-    return Graph(start, pred)

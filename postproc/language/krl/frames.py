@@ -11,7 +11,7 @@ import numpy as np
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
-from postproc.language.analysis.to_visits import IDENTITY, Pose, compose_poses, flat
+from postproc.language.analysis.conditions import IDENTITY, Pose, compose_poses, flat
 from postproc.language.krl.abstract_state import (
     CORRECTIONS,
     NOTHING_SET,

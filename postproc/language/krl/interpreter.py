@@ -12,13 +12,14 @@ from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import Context
 from postproc.language.analysis.call_graph import reach
+from postproc.language.analysis.conditions import cell_pose
 from postproc.language.analysis.control_flow import HeadedRows
+from postproc.language.analysis.found_visits import FoundGoal
 from postproc.language.analysis.task_machine import (
     NOWHERE,
     Arrived,
     TaskMachine,
 )
-from postproc.language.analysis.to_visits import FoundGoal, cell_pose
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import HELD
 from postproc.language.krl.external_routines import AHEAD, ASSUMED, package_routines

@@ -158,7 +158,7 @@ _SWITCHED_OFF: Sequence[tuple[str, object]] = (
 _KEPT_ON = "tool_corr_on"  # old controllers take the frame back, but not the switch
 BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
 """Commands of BAS that change neither frames nor blending nor speed."""
-NO_LOAD = Reason(
+UNKNOWN_LOAD = Reason(
     Code.LOAD_UNKNOWN,
     "which $LOAD holds here is not known: set it again on every way here",
 )

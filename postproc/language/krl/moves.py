@@ -17,7 +17,7 @@ from postproc.language.analysis.assigned_points import (
     Points,
     Scope,
 )
-from postproc.language.analysis.to_visits import (
+from postproc.language.analysis.found_visits import (
     FoundGoal,
     FoundShift,
     FoundVisit,

@@ -5,23 +5,24 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis import to_visits
-from postproc.language.analysis.to_visits import (
+from postproc.language.analysis.conditions import (
+    NO_LOAD,
     Conditions,
-    FoundGoal,
     Pose,
+    Zone,
     cell_pose,
-    not_reached,
 )
+from postproc.language.analysis.found_visits import FoundGoal, not_reached
+from postproc.language.analysis.to_visits import Arrival, zone_at
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.modal_state import (
     LOST_LOAD,
-    NO_LOAD,
     OF_TRACK,
     UNKNOWN,
+    UNKNOWN_LOAD,
     KrlModes,
     ModeReader,
 )
@@ -70,13 +71,13 @@ def visits_of(machine: KrlMachine) -> Visits:
     base = cell_pose(machine.start.base)
     number = {id(v): k for k, v in enumerate(found)}
 
-    def conditions(v: KrlVisit) -> Conditions:
+    def arrive(v: KrlVisit) -> Arrival:
         at = number[id(v)]
         early = machine.early.get(at, frozenset())
-        return _conditions(machine, v, base, ends[at], at in odd, early)
+        return _arrive(machine, v, base, ends[at], at in odd, early)
 
     moves = {k: file.moves for k, file in enumerate(machine.task.files)}
-    return to_visits.visits_of(machine, KRL_DIALECT, conditions, COMMENTS, moves)
+    return to_visits.visits_of(machine, KRL_DIALECT, arrive, COMMENTS, moves)
 
 
 def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, Reason]:
@@ -97,31 +98,17 @@ def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, Reason]:
     return modes, NO_REASON
 
 
-@dataclass(frozen=True)
-class _Blending:
-    """How a point is passed: see `Conditions`."""
-
-    zone_mm: float = math.nan
-    overlap: float = math.nan
-    exact: bool = False
-    unsized: bool = False
-
-
-_UNSIZED = _Blending(unsized=True)
-
-
-def _conditions(
+def _arrive(
     machine: KrlMachine,
     v: KrlVisit,
     base: Pose,
     end: str,
     odd: bool,
     early: frozenset[Reason],
-) -> Conditions:
+) -> Arrival:
     """Say what an arrival is carried out with."""
     modes, unset = _effective(machine, v)
     joint = v.motion == Motion.JOINT
-    blending = _blending(v, modes, end)
     active = {why for _, why in modes.active}
     blocked = modes.blocked | active | machine.everywhere | early
     if "track" not in machine.start.aux.values():
@@ -134,32 +121,28 @@ def _conditions(
         swapped = remote and modes.interpolation != "#tcp"
         given += (_SWAPPED if swapped else NO_REASON,)
     given += (_STATUS if odd else NO_REASON,)
-    given += (NO_LOAD if modes.load == LOST_LOAD else NO_REASON,)
-    return Conditions(
+    given += (UNKNOWN_LOAD if modes.load == LOST_LOAD else NO_REASON,)
+    conditions = Conditions(
         tool=modes.tool.pose,
         base=base,
         uframe=modes.base.pose,
-        taught=(modes.tool.taught, modes.base.taught),
+        taught=(modes.tool.taught, False, modes.base.taught),
         remote=modes.interpolation == "#tcp",
-        reasons=given,
-        flags=Switch.ON if joint else Switch.OFF,
-        flagged=joint and v.goal.target == Meaning.POSE,
+        care=(Switch.ON if joint else Switch.OFF,) * 3,
         law=_law(v, modes),
-        zone_mm=blending.zone_mm,
+        zone=_zone(v, modes, end),
         speed=modes.speed if modes.speed > 0 else math.nan,
         wrist=modes.law == OrientationLaw.WRIST_JOINTS and not joint,
-        override=modes.share if joint else 1.0,
-        overlap=blending.overlap,
-        exact=blending.exact,
-        unsized=blending.unsized,
+        override=modes.share if joint and modes.share > 0.0 else 1.0,
         load=_load(modes),
     )
+    return Arrival(conditions, given, joint and v.goal.target == Meaning.POSE)
 
 
 def _load(modes: KrlModes) -> tuple[float, ...]:
     """Return what the program states that the arm carries, see `Conditions.load`."""
     unknown = not modes.load or modes.load == LOST_LOAD
-    return () if unknown else (*modes.load, *(math.nan,) * 3)[:4]
+    return NO_LOAD if unknown else (*modes.load, *(math.nan,) * 3)[:4]
 
 
 def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
@@ -175,24 +158,23 @@ def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
     return OrientationLaw.START_TO_END if known else OrientationLaw.ALONG_PATH
 
 
-def _blending(v: KrlVisit, modes: KrlModes, end: str) -> _Blending:
+def _zone(v: KrlVisit, modes: KrlModes, end: str) -> Zone:
     """Tell how a point is passed."""
     if v.inner and not v.via:
-        return _Blending(exact=True)
+        return zone_at(v.via, exact=True)
     if v.via or not v.blends or end == STOP or modes.ahead is False:
-        return _Blending()
+        return zone_at(v.via)
+    unsized = zone_at(v.via, unsized=True)
     if end == MAYBE or modes.ahead is None:
-        return _UNSIZED
+        return unsized
     words = v.move.words
-    by_share = "c_ptp" in words and "c_dis" not in words
-    if by_share:
-        if modes.overlap == UNKNOWN:
-            return _UNSIZED
-        return _Blending(overlap=modes.overlap)
+    if "c_ptp" in words and "c_dis" not in words:
+        known = modes.overlap != UNKNOWN
+        return zone_at(v.via, overlap=modes.overlap) if known else unsized
     by_distance = "c_dis" in words or "c_spl" in words
     if not by_distance or modes.distance == UNKNOWN:
-        return _UNSIZED
-    return _Blending(zone_mm=modes.distance)
+        return unsized
+    return zone_at(v.via, modes.distance)
 
 
 # What stands behind a point decides whether it is passed.

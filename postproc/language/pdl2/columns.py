@@ -1,215 +1,28 @@
-"""Columns of `Visits` from what the analysis recorded: settings, targets, reasons."""
+"""Columns of visits: those of all moves of a program in a few array passes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from postproc.arrays import Indices, Interned, Ints, chunks, is_one_value, slim, spans
+from postproc.arrays import Indices, Interned, Ints, chunks, spans
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language.analysis.visit_columns import VisitColumns
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.abstract_state import Settings
+from postproc.language.pdl2.conditions import SettingTable
 from postproc.language.pdl2.job import base_variable
 from postproc.language.pdl2.machine import WRITTEN, Goal, Machine, MoveForm, MoveRun
 from postproc.language.pdl2.pose_encoding import COMMENTS
 from postproc.language.pdl2.program import Program
-from postproc.language.pdl2.untracked_settings import (
-    disturbance,
-    load_of_settings,
-    weaves,
-)
-from postproc.language.pdl2.values import Nothing, Position, Value
+from postproc.language.pdl2.values import Nothing, Position
 from postproc.language.text.comment_directives import MEASURE
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import number_in_order
 from postproc.language.visits import (
-    Blend,
     Meaning,
-    OrientationLaw,
-    Switch,
-    ZoneRule,
 )
-from postproc.robot.pose import pose_from_record
-
-# Frames and motion variables of visits as columns.
-
-_FRAMES = ("tool", "base", "uframe")
-_CARE = ("cnfg_care", "turn_care", "jnt_mturn")
-_OVERRIDES = ("arm_spd_ovr", "prog_spd_ovr", "gen_ovr")
-_BLENDS = {"FLY_NORM": Blend.OVERLAP, "FLY_CART": Blend.ZONE}
-_ZONE_RULES = {
-    "FLY_AUTO": ZoneRule.AUTO,
-    "FLY_PASS": ZoneRule.PASS,
-    "FLY_TOL": ZoneRule.WITHIN,
-    "FLY_FROM": ZoneRule.FROM,
-}
-_LAWS = {
-    "RS_WORLD": OrientationLaw.ONE_AXIS,
-    "RS_TRAJ": OrientationLaw.ALONG_PATH,
-    "EUL_WORLD": OrientationLaw.EULER_ANGLES,
-    "RPY_WORLD": OrientationLaw.ROLL_PITCH_YAW,
-    "WRIST_JNT": OrientationLaw.WRIST_JOINTS,
-}
-_WITHOUT_UFRAME = (Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY)
-
-
-class SettingColumns:
-    """Each distinct state of the settings becomes one row, read off once."""
-
-    def __init__(self) -> None:
-        self._kept: list[Settings] = []
-        self._rows = Interned[int]()
-        self._problems: list[tuple[Reason, Reason]] = []
-        self._frames = Interned[tuple[tuple[float, ...], bool]]()
-        self._loads = Interned([load_of_settings({})])
-        self._table: dict[str, list[Any]] = {}
-
-    def index(self, settings: Settings) -> int:
-        """Return the row of a state of the settings."""
-        row = self._rows[id(settings)]
-        if row == len(self._kept):
-            self._kept.append(settings)  # keeps its id from being used again
-            for name, value in _row(settings, self._frame).items():
-                self._table.setdefault(name, []).append(value)
-            load = self._loads[load_of_settings(settings)]
-            self._table.setdefault("load", []).append(load)
-            self._table.setdefault("weaves", []).append(weaves(settings))
-            found = disturbance(settings)
-            tool = ("tool", "tool_rmt")
-            pose = found or _unknown(settings, ("uframe", "base", *tool))
-            self._problems.append((pose, found or _unknown(settings, tool)))
-        return row
-
-    def get_settings(self, row: int) -> Settings:
-        """Return the state of the settings of a row."""
-        return self._kept[row]
-
-    def problem(self, row: int, target: Meaning) -> Reason:
-        """Return why a visit cannot be compensated under these settings."""
-        pose, joints = self._problems[row]
-        return joints if target in _WITHOUT_UFRAME else pose
-
-    def _frame(self, value: object) -> int:
-        if not isinstance(value, Position) or value.joints or not value.complete:
-            return -1
-        numbers = tuple(float(n) for n in value.numbers if n is not None)
-        return self._frames[numbers, value.taught]
-
-    def columns(self, rows: Indices) -> dict[str, Any]:
-        """Return the columns of `Visits` that come from settings."""
-        frames = list(self._frames)
-        used = np.flatnonzero(np.bincount(rows, minlength=len(self._kept)))
-        columns: dict[str, Any] = {
-            name: _spread(np.array(values), rows, used)
-            for name, values in self._table.items()
-        }
-        if not columns:
-            empty = _row({}, lambda value: -1)
-            columns = {name: np.array([value])[:0] for name, value in empty.items()}
-            columns["load"] = np.zeros(0, dtype=np.int64)
-            columns["weaves"] = np.zeros(0, dtype=bool)
-        records = np.array([f for f, _ in frames], float).reshape(-1, 6)
-        columns["poses"] = pose_from_record(records)
-        columns["loads"] = np.array(list(self._loads), float)
-        columns["taught"] = np.array([taught for _, taught in frames], bool)
-        return columns
-
-
-def _spread(values: NDArray[Any], rows: Indices, used: Ints) -> NDArray[Any]:
-    """Return a column of settings; those that are used often say one value."""
-    own = slim(values[used])
-    if len(used) == 1 or (len(used) and is_one_value(own)):
-        return np.broadcast_to(own[0], (len(rows), *values.shape[1:]))
-    return values[rows]
-
-
-def _row(settings: Settings, frame: Any) -> dict[str, Any]:
-    return {
-        **{name: frame(settings.get(name)) for name in _FRAMES},
-        "tool_remote": settings.get("tool_rmt") is True,
-        "nearest_turn": settings.get("jnt_mturn") is False,
-        "care": [_switch(settings.get(name)) for name in _CARE],
-        "size_mm": _number(settings, "fly_dist"),
-        "overlap_percent": _number(settings, "fly_per"),
-        "blend": _word(settings, "fly_type", _BLENDS),
-        "rule": _word(settings, "fly_traj", _ZONE_RULES),
-        "linear": _number(settings, "lin_spd"),
-        "turning": _number(settings, "rot_spd"),
-        "override": _override(settings),
-        "wrist_joint": settings.get("ornt_type") == "wrist_jnt",
-        "orientation_law": _orientation_law(settings),
-    }
-
-
-def _number(settings: Settings, name: str) -> float:
-    value = settings.get(name)
-    return value if isinstance(value, float) else np.nan
-
-
-def _word(settings: Settings, name: str, words: Mapping[str, int]) -> int:
-    """Return what a predefined word means, 0 where it is not set or not known."""
-    return words.get(str(settings.get(name)).upper(), 0)
-
-
-def _orientation_law(settings: Settings) -> OrientationLaw:
-    if "ornt_type" not in settings:
-        return OrientationLaw.UNSET
-    said = _word(settings, "ornt_type", _LAWS)
-    return OrientationLaw(said or OrientationLaw.UNKNOWN)
-
-
-def _switch(value: Value | None) -> Switch:
-    if value is None:
-        return Switch.UNSET
-    if isinstance(value, bool):
-        return Switch.ON if value else Switch.OFF
-    return Switch.UNKNOWN
-
-
-def _override(settings: Settings) -> float:
-    product = 1.0
-    for name in _OVERRIDES:
-        value = _number(settings, name)
-        if value > 0:
-            product *= min(value, 100.0) / 100.0
-    return product
-
-
-def _unknown(settings: Settings, names: tuple[str, ...]) -> Reason:
-    """Say which of some settings are not known, and why."""
-    alike: dict[str, list[str]] = {}
-    missing = False
-    for name in names:
-        if unknown := _why_not_known(settings, name):
-            alike.setdefault(unknown.why, []).append(f"${name.upper()}")
-            missing |= unknown.code is Code.NO_VALUE
-    if not alike:
-        return NO_REASON
-    text = "; ".join(
-        f"{', '.join(some)} {'is' if len(some) == 1 else 'are'} not known here: {why}"
-        for why, some in alike.items()
-    )
-    return Reason(Code.NO_VALUE if missing else Code.FRAME_UNKNOWN, text)
-
-
-def _why_not_known(settings: Settings, name: str) -> Nothing | None:
-    """Say why a setting is not known, None where it is."""
-    value = settings.get(name)
-    if isinstance(value, Nothing):
-        return value
-    if name not in _FRAMES or (
-        isinstance(value, Position) and value.complete and not value.joints
-    ):
-        return None
-    partly = isinstance(value, Position) and not value.joints
-    return Nothing("a part of it is not known" if partly else "it is no known position")
-
-
-# Columns of visits: those of all moves of a program in a few array passes.
 
 _COMPUTED = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)  # may move along with a literal
 MOST_CODES = 2**62  # combinations of columns that an integer tells apart
@@ -222,39 +35,6 @@ _RECURSIVE = Reason(
 _AXES_UNKNOWN = Reason(
     Code.EXTERNAL_AXES, "its auxiliary axes are not known before the program runs"
 )
-
-
-class VisitColumns:
-    """Columns of n visits."""
-
-    def __init__(self, n: int, axes: int, slots: int) -> None:
-        """Make room.
-
-        Args:
-            n: Visits.
-            axes: The last auxiliary axis.
-            slots: Numbers in all files: theirs are the longest columns.
-        """
-        short = np.int32 if slots < 2**31 else np.int64
-        self.file = np.zeros(n, dtype=np.int32)
-        self.line = np.zeros(n, dtype=np.int32)
-        self.motion = np.zeros(n, dtype=np.int8)
-        self.target = np.zeros(n, dtype=np.int8)
-        self.via = np.zeros(n, dtype=bool)
-        self.fly = np.zeros(n, dtype=bool)
-        self.values = np.full((n, 6), np.nan)
-        self.distance_mm = np.broadcast_to(np.nan, n)
-        self.aux = np.full((n, axes), np.nan)
-        self.config = np.zeros(n, dtype=np.int32)
-        self.config_given = np.zeros(n, dtype=bool)
-        self.name = np.zeros(n, dtype=np.int32)
-        self.reason = np.zeros(n, dtype=np.int32)
-        self.setting = np.zeros(n, dtype=np.int32)
-        self.slots = np.full((n, 6), -1, dtype=short)
-        self.bases: dict[int, tuple[int, ...]] = {}
-        self.taught = np.zeros(n, dtype=bool)
-        self.shared = np.zeros(n, dtype=bool)
-        self.measured: dict[int, str] = {}
 
 
 @dataclass
@@ -322,14 +102,21 @@ def _number_forms(run: MoveRun, numbers: Interned[MoveForm]) -> Indices:
 
 @dataclass
 class Collector:
-    """Fills the columns; holds the tables that they index."""
+    """Fills the columns.
+
+    Attributes:
+        machine: Has followed the program.
+        columns: Its visits.
+        bases: The six numbers that computed targets are made of, by visit.
+    """
 
     machine: Machine
     columns: VisitColumns
-    settings: SettingColumns
-    configs: Interned[str] = field(default_factory=lambda: Interned([""]))
-    names: NameColumn = field(default_factory=lambda: NameColumn([""]))
-    reasons: Interned[Reason] = field(default_factory=lambda: Interned([NO_REASON]))
+    bases: dict[int, tuple[int, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.settings = SettingTable(self.columns.conditions)
+        self._setting = np.zeros(len(self.columns), dtype=np.int32)
 
     def fill(self, runs: Iterable[tuple[int, MoveRun]]) -> None:
         """Fill the visits of all runs; each is given with the first of its visits."""
@@ -364,7 +151,8 @@ class Collector:
             if form.overrides:
                 mine = np.flatnonzero(moves.form == number)
                 setting[mine] = self._override_settings(moves, mine, setting[mine])
-        self.columns.setting[moves.visit] = setting
+        self._setting[moves.visit] = setting
+        self.columns.condition[moves.visit] = self.settings.conditions(setting)
 
     def _override_settings(
         self, moves: ProgramMoves, mine: Ints, setting: Ints
@@ -403,7 +191,7 @@ class Collector:
                 c.slots[mine[k]] = numbers + base
             c.target[mine] = Meaning.JOINTS if form.joints else Meaning.POSE
             if form.config is not None:
-                c.config[mine] = self.configs[form.config]
+                c.config[mine] = self.columns.configs[form.config]
                 c.config_given[mine] = True
         mine = moves.visit[here]
         wrong = np.zeros(len(mine), dtype=bool)
@@ -412,7 +200,7 @@ class Collector:
         bad = mine[wrong]
         c.target[bad], c.slots[bad], c.values[bad] = Meaning.UNKNOWN, -1, np.nan
         if len(bad):
-            moves.first[np.flatnonzero(here)[wrong]] = self.reasons[_UNREAD]
+            moves.first[np.flatnonzero(here)[wrong]] = self.columns.reasons[_UNREAD]
         taught = self.machine.world.taught_lines[lines.source.name]
         if taught:
             c.taught[mine] = np.isin(c.line[mine], np.array(sorted(taught)))
@@ -430,7 +218,7 @@ class Collector:
         }
         if told:
             at, names = _between(at, names, told)
-        self.columns.name[moves.visit[at]] = self.names.of(names)
+        self.columns.name[moves.visit[at]] = self.columns.names.of(names)
 
     def _points(self, moves: ProgramMoves) -> None:
         """Fill moves to points that the variable file tells, layout by layout."""
@@ -449,14 +237,14 @@ class Collector:
             c.taught[visit] |= [self.is_listed(name) for name in names]
         for number in _in_order(entries.layout[rows]):
             layout, mine = entries.layouts[number], entries.layout[rows] == number
-            c.config[visit[mine]] = self.configs[layout.config or ""]
+            c.config[visit[mine]] = self.columns.configs[layout.config or ""]
             c.config_given[visit[mine]] = layout.config is not None
             joints = layout.kind == "JNTP"
             c.target[visit[mine]] = Meaning.JOINTS if joints else Meaning.POSE
             for column, axis in enumerate(layout.axes):
                 if 1 <= axis <= c.aux.shape[1]:
                     c.aux[visit[mine], axis - 1] = entries.aux[rows[mine], column]
-            moves.last[some[mine]] = self.reasons[self.aux_problem(layout.axes)]
+            moves.last[some[mine]] = self.columns.reasons[self.aux_problem(layout.axes)]
 
     def _fill_evaluated(self, moves: ProgramMoves) -> None:
         c, found = self.columns, [*moves.list_evaluated()]
@@ -471,20 +259,20 @@ class Collector:
         if np.isfinite(distances).any():
             c.distance_mm = np.array(c.distance_mm)
             c.distance_mm[visit] = distances
-        moves.first[index] = self.reasons.of([goal.reason for goal in goals])
+        moves.first[index] = self.columns.reasons.of([goal.reason for goal in goals])
         for at, k, goal in zip(visit.tolist(), index.tolist(), goals, strict=True):
             if goal.position is not None:
                 self._position(at, moves.program, goal.target, goal.position)
                 aux = goal.position.aux
                 axes = None if aux is None else tuple(axis for axis, _ in aux)
-                moves.last[k] = self.reasons[self.aux_problem(axes)]
+                moves.last[k] = self.columns.reasons[self.aux_problem(axes)]
 
     def _position(
         self, at: int, program: Program, target: Meaning, position: Position
     ) -> None:
         """Fill what is known of the position value that a visit goes to."""
         c, world = self.columns, self.machine.world
-        c.config[at] = self.configs[position.config or ""]
+        c.config[at] = self.columns.configs[position.config or ""]
         c.config_given[at] = position.config is not None
         for axis, value in position.aux or ():
             if 1 <= axis <= c.aux.shape[1] and value is not None:
@@ -492,7 +280,7 @@ class Collector:
         if position.editable and target in (Meaning.POSE, Meaning.JOINTS):
             c.slots[at] = position.slots
         elif -1 not in position.slots and target in _COMPUTED:
-            c.bases[at] = position.slots
+            self.bases[at] = position.slots
         else:
             world.pin(position, "a target is computed from a part of it")
         lines = world.taught_lines[program.lines.source.name]
@@ -507,9 +295,14 @@ class Collector:
         whole = Interned[Reason]()
         kinds: list[Indices]
         kinds = [moves.first, whole.of([self._reason(run) for run in runs])[moves.run]]
-        kinds += [moves.form, c.setting[moves.visit], c.target[moves.visit], moves.last]
+        kinds += [
+            moves.form,
+            self._setting[moves.visit],
+            c.target[moves.visit],
+            moves.last,
+        ]
         which, example = _alike(kinds)
-        firsts, of_runs = [*self.reasons], [*whole]
+        firsts, of_runs = [*self.columns.reasons], [*whole]
         reasons = []
         for first, run, form, setting, target, last in zip(
             *(kind[example].tolist() for kind in kinds), strict=True
@@ -517,7 +310,7 @@ class Collector:
             reason = firsts[first] or of_runs[run] or moves.forms[form].reason
             problem = self.settings.problem(setting, Meaning(target))
             why = reason or problem or firsts[last] or self.machine.handler
-            reasons.append(self.reasons[why])
+            reasons.append(self.columns.reasons[why])
         c.reason[moves.visit] = np.array(reasons, dtype=np.int64)[which]
 
     def _reason(self, run: MoveRun) -> Reason:

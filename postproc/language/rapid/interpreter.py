@@ -15,12 +15,12 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import HeadedRows
+from postproc.language.analysis.found_visits import FoundGoal
 from postproc.language.analysis.task_machine import (
     NOWHERE,
     Arrived,
     TaskMachine,
 )
-from postproc.language.analysis.to_visits import FoundGoal
 from postproc.language.language import Start
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.error_paths import ErrorExit, ErrorHandlers, exits_of

@@ -18,16 +18,13 @@ from postproc.language.analysis.assigned_points import (
     Points,
     Scope,
 )
-from postproc.language.analysis.to_visits import (
-    IDENTITY,
+from postproc.language.analysis.conditions import IDENTITY, Pose, compose_poses, flat
+from postproc.language.analysis.found_visits import (
     FoundGoal,
     FoundShift,
     FoundVisit,
-    Pose,
-    compose_poses,
     explain_components,
     explain_disagreement,
-    flat,
     hold_numbers,
     not_reached,
     spell_element,

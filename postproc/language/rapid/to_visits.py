@@ -6,12 +6,14 @@ import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis import to_visits
-from postproc.language.analysis.to_visits import (
+from postproc.language.analysis.conditions import (
+    NO_LOAD,
     Conditions,
     Pose,
     cell_pose,
     compose_poses,
 )
+from postproc.language.analysis.to_visits import Arrival, zone_at
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.modal_state import NO_SHIFT, UNKNOWN_SHIFT
 from postproc.language.rapid.moves import (
@@ -49,37 +51,36 @@ def visits_of(machine: RapidMachine) -> Visits:
     stops = machine.find_unsure_stops()
     paused = {id(machine.visits[k]) for k in stops if k >= 0}
 
-    def conditions(v: RapidVisit) -> Conditions:
+    def arrive(v: RapidVisit) -> Arrival:
         key = v.wobj, v.modes.shift
         if key not in placed:
             placed[key] = pose = v.wobj.pose if v.modes.shift != UNKNOWN_SHIFT else ()
             if pose and v.modes.shift != NO_SHIFT:
                 placed[key] = compose_poses(pose, pose_of_numbers(v.modes.shift))
-        return _conditions(v, base, placed[key], id(v) in paused)
+        conditions = _conditions(v, base, placed[key], id(v) in paused)
+        return Arrival(conditions, _reasons(v), v.goal.target == Meaning.POSE)
 
     files = enumerate(machine.task.files)
     moves = {k: [move.row for move in file.moves] for k, file in files}
-    return to_visits.visits_of(machine, RAPID_DIALECT, conditions, COMMENTS, moves)
+    return to_visits.visits_of(machine, RAPID_DIALECT, arrive, COMMENTS, moves)
 
 
 def _conditions(v: RapidVisit, base: Pose, uframe: Pose, paused: bool) -> Conditions:
     """Say what an arrival is carried out with."""
     joint = v.motion == Motion.JOINT
+    unsized = v.zone_mm == UNKNOWN_ZONE or (paused and v.zone_mm >= 0.0)
     return Conditions(
         tool=v.tool.pose,
         base=base,
         uframe=uframe,
-        taught=(v.tool.taught, v.wobj.taught),
+        taught=(v.tool.taught, False, v.wobj.taught),
         remote=not v.tool.held or v.wobj.held,
-        reasons=_reasons(v),
-        flags=v.modes.confj if joint else v.modes.confl,
-        flagged=v.goal.target == Meaning.POSE,
+        care=(v.modes.confj if joint else v.modes.confl,) * 3,
         law=v.modes.arc_law if v.motion == Motion.CIRCULAR else v.modes.law,
-        zone_mm=v.zone_mm,
-        unsized=v.zone_mm == UNKNOWN_ZONE or (paused and v.zone_mm >= 0.0),
+        zone=zone_at(v.via, v.zone_mm, unsized=unsized),
         speed=v.speed,
         wrist=bool(v.modes.wrist) and not joint,
-        override=v.modes.override,
+        override=v.modes.override if v.modes.override > 0.0 else 1.0,
         load=_load(v),
     )
 
@@ -90,7 +91,7 @@ def _load(v: RapidVisit) -> tuple[float, ...]:
         mass, *centre = v.total
         return mass, *(x * MM for x in centre)
     if not v.tool.load or not v.modes.grip or not v.tool.pose:
-        return ()
+        return NO_LOAD
     mass, *own = v.tool.load
     carried, *part = v.modes.grip
     at = np.array(v.tool.pose).reshape(4, 4) @ np.array([*(x * MM for x in part), 1.0])

@@ -1,6 +1,6 @@
 """Moves that are read at once are read as one by one."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 
 import numpy as np
@@ -9,9 +9,10 @@ import pytest
 from postproc.compensation.program import read_program
 from postproc.language.analysis import move_runs
 from postproc.language.analysis.move_runs import rows_of_lines, within
+from postproc.language.analysis.visit_columns import chain_visits
 from postproc.language.rapid.statements import read_statements
 from postproc.language.text.source import Source
-from postproc.language.visits import Visits
+from postproc.language.visits import Graph, Visits
 from postproc.robot.cell import Cell, load_cell
 from tests.any_controller import any_controller, told
 from tests.bench.languages import milled, written
@@ -72,14 +73,13 @@ def folded(
 ) -> list[int]:
     """List how many moves each run that is read at once holds."""
     found = list[int]()
-    plain = move_runs.unfold
 
-    def unfold(visits: Visits, counts: np.ndarray, *rest: object) -> Visits:
+    def chained(counts: np.ndarray, origins: Sequence[Sequence[int]]) -> Graph:
         found.extend(counts[counts > 1].tolist())
-        return plain(visits, counts, *rest)  # type: ignore[arg-type]
+        return chain_visits(counts, origins)
 
     with patch.context() as one:
-        one.setattr("postproc.language.analysis.to_visits.unfold", unfold)
+        one.setattr("postproc.language.analysis.to_visits.chain_visits", chained)
         read(files, cell, 3, patch)
     return found
 

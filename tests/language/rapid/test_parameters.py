@@ -52,7 +52,8 @@ def test_a_shift_of_a_shift():
     line = "MoveL RelTool(Offs(p2,1,0,0),0,0,-9),v200,fine,t\\WObj:=w;"
     found = once(line, L.format("p2"))
     np.testing.assert_allclose(found.visits.target.values[0, :3], [5.0, 5.0, 15.0])
-    assert found.visits.target.follows.tolist() == [1, -1] and free(found, "p2")
+    target = found.visits.target
+    assert target.follows.tolist() == [target.literal[1], -1] and free(found, "p2")
 
 
 def test_a_loop_that_counts_what_it_calls_with():

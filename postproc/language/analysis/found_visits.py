@@ -1,0 +1,268 @@
+"""What an analysis finds of an arrival, before it becomes columns."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import defaultdict
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language.analysis.assigned_points import AssignedPoint, Scope
+from postproc.language.shifts import Shift
+from postproc.language.visits import Meaning
+from postproc.robot.trajectory import Motion
+
+MOST_NAMED, MOST_PARTS = 3, 6  # lines or data, components, in a reason
+
+
+@dataclass(frozen=True)
+class FoundShift:
+    """How a move shifts the point that it names, and where that is written.
+
+    Attributes:
+        shift: The shift.
+        file: Index of the file that holds its numbers.
+        slots: Which numbers of that file they are, w as of a target, -1 where nothing
+            is written; the first one is -1 where the shift keeps its numbers.
+        pins: Why they must stay, "" where they need not.
+    """
+
+    shift: Shift
+    file: int = -1
+    slots: tuple[int, ...] = (-1,)
+    pins: str = ""
+
+
+@dataclass(frozen=True)
+class FoundGoal:
+    """Where a move goes.
+
+    Attributes:
+        target: What the numbers mean.
+        values: w numbers, NaN where not known.
+        file: Index of the file that holds them.
+        slots: Which numbers of that file they are, -1 for those that are computed;
+            the first one tells literals apart.
+        follows: Likewise of the point that it is shifted from.
+        name: Of the point, "" where it is written in the move.
+        aux: External axes, NaN where there is none.
+        why: Why it cannot be compensated.
+        pins: Why the numbers must stay, "" where they need not.
+        shared: Other programs may read it too.
+        shift: How it is shifted from a point, None where it is not, or not known.
+        stays: The point that it is made from keeps its numbers for this move.
+        holds: Files and first numbers of shifts that keep their numbers for this move.
+        given: What assignments gave to the data that the move names.
+        doubtful: Names of data of which only the run tells what they hold.
+    """
+
+    target: Meaning
+    values: tuple[float, ...]
+    file: int = -1
+    slots: tuple[int, ...] = (-1,)
+    follows: tuple[int, ...] = (-1,)
+    name: str = ""
+    aux: tuple[float, ...] = (math.nan,) * 6
+    why: Reason = NO_REASON
+    pins: str = ""
+    shared: bool = False
+    shift: FoundShift | None = None
+    stays: bool = False
+    holds: frozenset[tuple[int, int]] = frozenset()
+    given: frozenset[AssignedPoint] = frozenset()
+    doubtful: frozenset[str] = frozenset()
+
+    @property
+    def lost(self) -> FoundGoal:
+        """The goal where data that it names hold different values on the ways here."""
+        names = sorted({point.name for point in self.given})
+        why = explain_disagreement(Code.RUNTIME_VALUE, self.given)
+        goal = hold_numbers(self, self.name, why, self.pins, aux=self.aux)
+        return replace(goal, doubtful=frozenset({*names, array_of(self.name)} - {""}))
+
+    @property
+    def writes(self) -> tuple[int, tuple[int, ...]]:
+        """The file and the numbers in it that may be written anew for this move."""
+        if self.is_rewritten_by_shift:
+            assert self.shift is not None
+            return self.shift.file, self.shift.slots
+        return self.file, self.slots
+
+    @property
+    def is_rewritten_by_shift(self) -> bool:
+        """Whether it is the numbers of the shift that may be written anew."""
+        return self.shift is not None and self.shift.slots[0] >= 0
+
+    @property
+    def origin(self) -> tuple[int, ...]:
+        """The numbers that it holds, or that it moves along with."""
+        return self.follows if self.slots[0] < 0 <= self.follows[0] else self.slots
+
+    @property
+    def point(self) -> tuple[int, int]:
+        """The file of its point, or the point that it is shifted from, and its place.
+
+        The place is that of the first number, -1 where it is not written.
+        """
+        return self.file, max(self.slots[0], self.follows[0])
+
+
+def explain_disagreement(code: Code, given: Iterable[AssignedPoint]) -> Reason:
+    """Say that assigned data hold different values on the ways to a move."""
+    names = sorted({point.name for point in given})
+    text = f"{', '.join(names[:MOST_NAMED])} is given different values on the ways "
+    return Reason(code, f"{text}here, or beside them")
+
+
+def hold_numbers(
+    base: FoundGoal,
+    name: str,
+    why: Reason,
+    pins: str,
+    meaning: Meaning = Meaning.UNKNOWN,
+    values: tuple[float, ...] = (),
+    aux: tuple[float, ...] = (math.nan,) * 6,
+) -> FoundGoal:
+    """Return a goal that is computed from what a point was given: that stays.
+
+    Args:
+        base: What the point was given.
+        name: Of the point.
+        why: Why the goal cannot be compensated.
+        pins: Why the numbers of the base stay.
+        meaning: What the values mean.
+        values: Numbers of the goal, none where they are not known.
+        aux: External axes.
+    """
+    own = set[tuple[int, int]]()
+    if base.is_rewritten_by_shift:
+        file, slots = base.writes
+        own = {(file, slots[0])}
+    unknown = meaning == Meaning.UNKNOWN and base.origin[0] < 0
+    return FoundGoal(
+        meaning, values or tuple(math.nan for _ in base.values), base.file,
+        tuple(-1 for _ in base.values), base.origin,
+        whole_name(name) if unknown else name, aux, why, pins or why.text, stays=True,
+        holds=base.holds | own,
+    )  # fmt: skip
+
+
+def spell_element(held: AssignedPoint, brackets: str) -> str:
+    """Spell a point, or an element of an array.
+
+    Args:
+        held: The point.
+        brackets: Those around an index.
+    """
+    index = ",".join(map(str, held.index))
+    return held.name + (index and f"{brackets[0]}{index}{brackets[1]}")
+
+
+def explain_components(
+    held: AssignedPoint, name: str, files: Sequence[Any], known: bool
+) -> Reason:
+    """Say which components of a point are set by themselves, and where.
+
+    Args:
+        held: The point.
+        name: As it is spelt.
+        files: Of the task.
+        known: All of its numbers are known.
+    """
+    late = [one for one in held.components if one.value is None]
+    meant = late or held.components
+    lines = defaultdict[int, set[int]](set)
+    for one in meant:
+        lines[one.file].add(files[one.file].text.line(one.row))
+    places = [
+        f"line{'s' * (len(own) > 1)} {', '.join(map(str, sorted(own)[:MOST_NAMED]))} "
+        f"of {files[at].text.source.name}"
+        for at, own in sorted(lines.items())
+    ]
+    parts = ", ".join(one.name for one in meant[:MOST_PARTS])
+    more = len(meant) - MOST_PARTS
+    parts += f" and {more} more" if more > 0 else ""
+    text = f"{name}: {parts} set in {', '.join(places)}"
+    if late:
+        text = f"{text} to what is known only when the program runs"
+    elif not known:
+        text = f"{text}; its other numbers are known only when the program runs"
+    return Reason(Code.COMPUTED_TARGET if known else Code.RUNTIME_VALUE, text)
+
+
+def not_reached(goal: FoundGoal, why: Reason) -> FoundGoal:
+    """Return the goal of a move that need not reach it: its numbers stay.
+
+    Args:
+        goal: What the move names.
+        why: Why it need not reach it.
+    """
+    numbers = (max(goal.slots[0], goal.follows[0]),)
+    return FoundGoal(
+        Meaning.UNKNOWN, tuple(math.nan for _ in goal.values), goal.file,
+        follows=numbers, name=goal.name, aux=goal.aux, why=why,
+        pins=goal.pins or why.text,
+    )  # fmt: skip
+
+
+@dataclass
+class FoundVisit:
+    """One arrival, as it is found.
+
+    Attributes:
+        scope, row: The move.
+        motion, via: `Motion`, and whether it is the point of an arc.
+        goal: Where it goes.
+        modes: What holds there.
+        origins: Where it may come from.
+        why: Why it cannot be compensated.
+        arc_angle: As in `Visits` [rad].
+        block: Tells the curves apart that visits are points of, None for none.
+        curved: As in `Visits`.
+        count: How many moves it stands for that follow each other and differ only in
+            where they go: this one is the first.
+        agreed: The points that it names hold the same on every way here.
+        taken: What assignments gave to the frames and other data that it names.
+        kept: These hold the same on every way here.
+    """
+
+    scope: Scope
+    row: int
+    motion: Motion
+    via: bool
+    goal: FoundGoal
+    modes: Any
+    origins: frozenset[int] = frozenset()
+    why: Reason = NO_REASON
+    arc_angle: float = math.nan
+    block: Hashable = None
+    curved: bool = False
+    count: int = 1
+    agreed: bool = True
+    taken: frozenset[AssignedPoint] = frozenset()
+    kept: bool = True
+
+    def forget_conditions(self) -> None:
+        """Forget what it is carried out with, where that differs on the ways here."""
+
+
+def whole_name(name: str) -> str:
+    """Return the name of data without an index.
+
+    >>> whole_name("xs[1]"), whole_name("p1")
+    ('xs', 'p1')
+    """
+    return re.split(r"[{\[]", name, maxsplit=1)[0]
+
+
+def array_of(name: str) -> str:
+    """Return the array of an element, "" for other data.
+
+    >>> array_of("xs[1]"), array_of("list{1,2}"), array_of("p1")
+    ('xs', 'list', '')
+    """
+    array, *index = re.split(r"[{\[]", name, maxsplit=1)
+    return array if index else ""

@@ -1,0 +1,324 @@
+"""Columns of visits as a language fills them, and what follows from them alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+
+from postproc.arrays import (
+    Bools,
+    Indices,
+    Interned,
+    Ints,
+    any_in_rows,
+    chunks,
+    map_chunks,
+    slim,
+    spans,
+)
+from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language.analysis.conditions import (
+    ConditionColumns,
+    Conditions,
+    Placed,
+)
+from postproc.language.pose_encoding import Dialect
+from postproc.language.shifts import Shift
+from postproc.language.text.source import NumberSpans, Source
+from postproc.language.text.symbol_column import NameColumn
+from postproc.language.visits import (
+    Graph,
+    Literals,
+    Meaning,
+    NumberPlaces,
+    PlaceColumns,
+    TargetColumns,
+    Visits,
+    texts_of,
+)
+
+TOO_COMPLEX = Reason(Code.TOO_COMPLEX, "the program is too complex to be followed")
+TORN = Reason(
+    Code.NUMBERS_NOT_OWN, "a number of the target belongs to another target too"
+)
+APART = Reason(
+    Code.NUMBERS_NOT_OWN,
+    "some of its numbers stand in the program, others in another file: write them in "
+    "one",
+)
+
+
+class VisitColumns:
+    """Columns of n visits that a language fills; see the parts of `Visits`.
+
+    Attributes:
+        condition: Index into `conditions`, (n,).
+        slots: Which numbers of all files are those of a target that may be edited,
+            (n, w), -1 for what is not written; none where the first is -1.
+        taught, shared: See `Literals`, (n,).
+        measured: Ids of measured visits.
+    """
+
+    def __init__(self, n: int, width: int, axes: int, numbers: int) -> None:
+        """Make room.
+
+        Args:
+            n: Visits.
+            width: Numbers of a target.
+            axes: The last auxiliary axis.
+            numbers: Those in all files: where they stand are the longest columns.
+        """
+        short = np.int32 if numbers < 2**31 else np.int64
+        self.file = np.zeros(n, dtype=np.int32)
+        self.line = np.zeros(n, dtype=np.int32)
+        self.motion = np.zeros(n, dtype=np.int8)
+        self.target = np.zeros(n, dtype=np.int8)
+        self.via = np.zeros(n, dtype=bool)
+        self.fly = np.zeros(n, dtype=bool)
+        self.arc_angle = np.broadcast_to(np.nan, n)
+        self.block = np.broadcast_to(-1, n)
+        self.curved = np.broadcast_to(False, n)
+        self.values = np.full((n, width), np.nan)
+        self.distance_mm = np.broadcast_to(np.nan, n)
+        self.aux = np.full((n, axes), np.nan)
+        self.config = np.zeros(n, dtype=np.int32)
+        self.config_given = np.zeros(n, dtype=bool)
+        self.name = np.zeros(n, dtype=np.int32)
+        self.shift = np.broadcast_to(-1, n)
+        self.reason = np.zeros(n, dtype=np.int32)
+        self.condition = np.zeros(n, dtype=np.int32)
+        self.slots = np.full((n, width), -1, dtype=short)
+        self.taught = np.zeros(n, dtype=bool)
+        self.shared = np.zeros(n, dtype=bool)
+        self.measured: dict[int, str] = {}
+        self.configs = Interned([""])
+        self.names = NameColumn([""])
+        self.shifts = Interned[Shift]()
+        self.reasons = Interned[Reason]([NO_REASON])
+        self.conditions = Interned[Conditions]()
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return len(self.line)
+
+
+def to_visits(
+    columns: VisitColumns,
+    files: Sequence[str],
+    graph: Graph,
+    literals: Literals,
+    literal: Indices,
+    follows: Indices,
+    dialect: Dialect,
+) -> Visits:
+    """Make visits of columns.
+
+    Args:
+        columns: n visits.
+        files: Names of the files.
+        graph: Where arms come from.
+        literals: The places of targets in the texts.
+        literal: Literal of every visit, (n,), -1 where it has none.
+        follows: Literal that it moves along with, (n,), likewise.
+        dialect: What the numbers mean.
+    """
+    c = columns
+    conditions = ConditionColumns(c.conditions, c.condition)
+    own = Placed(c.motion, c.via, c.fly, c.arc_angle, c.block, c.curved)
+    return Visits(
+        files=tuple(files),
+        place=PlaceColumns(slim(c.file), slim(c.line), texts_of(len(c), c.measured)),
+        target=TargetColumns(
+            meaning=slim(c.target),
+            values=c.values,
+            distance_mm=slim(c.distance_mm),
+            aux=slim(c.aux),
+            config=slim(c.config),
+            configs=tuple(c.configs),
+            config_given=slim(c.config_given),
+            literal=literal,
+            follows=slim(follows),
+            name=slim(c.name),
+            names=c.names,
+            shift=slim(c.shift),
+            shifts=tuple(c.shifts),
+        ),
+        frame=conditions.frame(),
+        motion=conditions.motion(own),
+        zone=conditions.zone(),
+        speed=conditions.speed(),
+        graph=graph,
+        reason=slim(c.reason),
+        reasons=tuple(c.reasons),
+        literals=literals,
+        dialect=dialect,
+    )
+
+
+def chain_visits(counts: Ints, origins: Sequence[Sequence[int]]) -> Graph:
+    """Say where the arm comes from: in a run of visits each follows the one before.
+
+    Args:
+        counts: Visits of every run, (r,), none of them 0.
+        origins: What the first visit of each run may come from, ascending.
+
+    >>> chain_visits(np.array([2, 1]), [[-1], [0, 1]]).pred.tolist()
+    [-1, 0, 0, 1]
+    """
+    n, first = int(counts.sum()), np.cumsum(counts) - counts
+    own = np.ones(n, dtype=np.int32)
+    own[first] = [len(some) for some in origins]
+    start = np.append(np.int32(0), np.cumsum(own, dtype=np.int32))
+    pred = np.repeat(np.arange(-1, n - 1, dtype=np.int32), own)
+    if n:
+        pred[spans(start[first], own[first])] = [*chain.from_iterable(origins)]
+    return Graph(start, pred)
+
+
+# Which numbers of which file belong to which target.
+
+
+@dataclass(frozen=True)
+class Numbering:
+    """All numbers of all files of a job.
+
+    Attributes:
+        sources: The files.
+        first: Index of each file's first number, and how many there are, (f + 1,).
+        numbers: Where every file's numbers stand.
+    """
+
+    sources: tuple[Source, ...]
+    first: Indices
+    numbers: tuple[NumberSpans, ...]
+
+    @staticmethod
+    def of(texts: Sequence[tuple[Source, NumberSpans]]) -> Numbering:
+        """Number the numbers of files in their order."""
+        sources, numbers = zip(*texts, strict=True)
+        first = np.cumsum([0, *map(len, numbers)]).astype(np.int64)
+        return Numbering(sources, first, numbers)
+
+    def __len__(self) -> int:
+        """Return how many numbers there are."""
+        return int(self.first[-1])
+
+    def file(self, slots: Indices) -> Indices:
+        """Return the file of every number."""
+        found: Ints = np.searchsorted(self.first[1:], slots, side="right")
+        return found.astype(np.int32)
+
+    def places(self, slots: Indices, file: Indices) -> NumberPlaces:
+        """Tell where the numbers of targets stand.
+
+        Args:
+            slots: Numbers of each target, (m, w), -1 for what is not written.
+            file: The file of each, (m,).
+        """
+        rows = max(len(slots), 1)
+        return NumberPlaces.join(
+            map_chunks(lambda k: self._of(slots[k], file[k]), rows)
+        )
+
+    def _of(self, slots: Indices, file: Indices) -> NumberPlaces:
+        start, end = np.full((2, *slots.shape), -1, dtype=np.int32)
+        for number in np.unique(file).tolist():
+            mine = slots >= 0
+            mine[file != number] = False
+            own = slots[mine] - self.first[number]
+            numbers = self.numbers[number]
+            start[mine], end[mine] = numbers.starts(own), numbers.ends(own)
+        return NumberPlaces.of(start, end)
+
+    def apart(self, slots: Indices) -> Bools:
+        """Tell which targets have their numbers in more than one file, (k,).
+
+        Args:
+            slots: Numbers of each target, (k, w), -1 for what is not written.
+        """
+        found = np.zeros(len(slots), dtype=bool)
+        for k in chunks(len(slots) if len(self.sources) > 1 else 0):
+            file = self.file(slots[k])
+            found[k] = any_in_rows((file != file[:, :1]) & (slots[k] >= 0))
+        return found
+
+
+def find_literals(
+    columns: VisitColumns, numbering: Numbering
+) -> tuple[Literals, Indices]:
+    """Find the distinct literals; also return the literal of every visit.
+
+    Visits whose numbers partly belong to another target, or to another file, get none
+    (-1), and a reason where they have none yet.
+    """
+    literal = np.full(len(columns), -1, dtype=np.int32)
+    rows = np.flatnonzero(columns.slots[:, 0] >= 0)
+    span = len(rows) > 0 and rows[-1] - rows[0] == len(rows) - 1  # a view, no copy
+    slots = columns.slots[rows[0] : rows[-1] + 1] if span else columns.slots[rows]
+    numbers = slots.ravel()
+    if bool((numbers[1:] > numbers[:-1]).all()) and not numbering.apart(slots).any():
+        literal[rows] = np.arange(len(rows), dtype=np.int32)
+        return _literals(columns, numbering, slots, rows, literal), literal
+    _, example, inverse = np.unique(slots[:, 0], return_index=True, return_inverse=True)
+    distinct = slots[example]
+    mixed = np.zeros(len(distinct), dtype=bool)
+    mixed[inverse[(slots != distinct[inverse]).any(axis=1)]] = True
+    used = np.bincount(distinct[distinct >= 0])
+    mixed |= any_in_rows((used[distinct] > 1) & (distinct >= 0))
+    mixed |= numbering.apart(distinct)
+    kept = np.flatnonzero(~mixed)
+    index = np.full(len(distinct), -1, dtype=np.int32)
+    index[kept] = np.arange(len(kept))
+    literal[rows] = index[inverse]
+    first = rows[example[kept]]
+    _mark_torn(columns, numbering, literal)
+    return _literals(columns, numbering, distinct[kept], first, literal), literal
+
+
+def _mark_torn(columns: VisitColumns, numbering: Numbering, literal: Indices) -> None:
+    """Give a reason to targets whose numbers are no literal of their own."""
+    c = columns
+    torn = (literal < 0) & (c.slots[:, 0] >= 0) & (c.reason == 0)
+    if not torn.any():
+        return
+    apart = torn & numbering.apart(c.slots)
+    c.reason[torn] = c.reasons[TORN]
+    if apart.any():
+        c.reason[apart] = c.reasons[APART]
+
+
+def _literals(
+    columns: VisitColumns,
+    numbering: Numbering,
+    slots: Indices,
+    visit: Indices,
+    literal: Indices,
+) -> Literals:
+    file = numbering.file(slots[:, 0])
+    places = numbering.places(slots, file)
+    line = np.zeros(len(slots), dtype=np.int32)
+    for i, source in enumerate(numbering.sources):
+        mine = file == i
+        first = places.first[mine]
+        line[mine] = source.lines_of(first)
+    own, unnamed = columns.name[visit].astype(np.int64), texts_of(len(slots), {})
+    return Literals(
+        file=slim(file),
+        line=line,
+        places=places,
+        joints=columns.target[visit] == Meaning.JOINTS,
+        name=columns.names.take(own) if own.any() else unnamed,
+        shared=slim(_any(columns.shared, literal, len(slots))),
+        taught=slim(_any(columns.taught, literal, len(slots))),
+        pinned=unnamed,
+    )
+
+
+def _any(flags: Bools, literal: Indices, m: int) -> Bools:
+    """Tell for each literal whether any of its visits is flagged."""
+    found = np.zeros(m, dtype=bool)
+    found[literal[flags & (literal >= 0)]] = True
+    return found
