@@ -1,0 +1,137 @@
+"""Write real-bounds.md: how many real readings the bound of a true error holds.
+
+PYTHONPATH=. python docs/studies/real_bounds.py [--seeds 5] [--shared ../shared]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from intervals import Series, blocks, loaded, predict_rows, random_rows
+
+from postproc.calibration.cross_validation import regions_of
+from postproc.compensation.expected_error import LengthLaw
+from postproc.exceptions import PostprocError
+
+OUT = Path(__file__).parent / "real-bounds.md"
+TEXT = """# Bounds of real readings
+
+Written by `PYTHONPATH=. python docs/studies/real_bounds.py --seeds {n}`, from
+measurements of two real arms: a UR10 (series A, B and D) and a UR5 (`grid`).
+
+`compensate --tolerance` states a 95 % bound for the length of every true error. This
+study holds the bound against readings of a tracker. A fit of some rows predicts the
+other rows. The bound of a reading has the scatter of the tracker besides. All rows of
+one pose are on one side of a split.
+
+- *random*: 30 % of the poses, drawn {n} times (series A: once);
+- *blocks*: 9 of 30 blocks of consecutive rows, likewise;
+- *regions*: each of six regions of joint space, predicted from the five others.
+
+*At least, at most* are the lowest and the highest single split. *Quarters* are the
+shares by quarter of the bound, the lowest bounds first.
+
+"""
+HEAD = [
+    "| rows | split | readings | within the bound | at least, at most | quarters "
+    "| mean error mm | mean bound mm |",
+    "|---|---|---|---|---|---|---|---|",
+]
+
+
+@dataclass(frozen=True)
+class Held:
+    """Lengths of errors of readings that no fit has seen, and their bounds [m]."""
+
+    size: np.ndarray
+    bound: np.ndarray
+
+    @property
+    def share(self) -> float:
+        """Share of the readings within their bounds [%]."""
+        return 100.0 * float((self.size <= self.bound).mean())
+
+    def quarters(self) -> str:
+        """Write the shares by quarter of the bound."""
+        cuts = np.quantile(self.bound, [0.25, 0.5, 0.75])
+        own = np.searchsorted(cuts, self.bound)
+        shares = (
+            Held(self.size[own == k], self.bound[own == k]).share for k in range(4)
+        )
+        return ", ".join(f"{share:.1f}" for share in shares)
+
+
+def judge(series: Series, test: np.ndarray) -> Held:
+    """Predict some rows by a fit of all others."""
+    left, read = predict_rows(series, test, "tracker")
+    law = LengthLaw.of_normal(np.zeros_like(left), read.covariance)
+    return Held(np.linalg.norm(left, axis=1), law.bound)
+
+
+def by_pose(series: Series, test: np.ndarray) -> np.ndarray:
+    """Keep whole poses: all rows of those that the drawn rows begin with."""
+    pose = np.unique(np.round(series.rows.states.q, 4), axis=0, return_inverse=True)[1]
+    pose = pose.reshape(-1)
+    return np.flatnonzero(np.isin(pose, pose[test]))
+
+
+def splits(series: Series, seeds: int) -> Iterator[tuple[str, list[np.ndarray]]]:
+    """List the rows that are held out, split by split."""
+    draws: dict[str, Callable[[int, int], np.ndarray]] = {
+        "random": random_rows,
+        "blocks": blocks,
+    }
+    for name, draw in draws.items():
+        drawn = (draw(len(series.rows), seed) for seed in range(seeds))
+        yield name, [by_pose(series, rows) for rows in drawn]
+    region = regions_of(series.rows.states)
+    yield "regions", [np.flatnonzero(region == k) for k in np.unique(region)]
+
+
+def report(series: Series, seeds: int) -> Iterator[str]:
+    """Judge a series by every split."""
+    for name, tests in splits(series, seeds):
+        found = [judge(series, test) for test in tests]
+        sizes, bounds = (
+            np.concatenate([getattr(one, key) for one in found])
+            for key in ("size", "bound")
+        )
+        every, shares = Held(sizes, bounds), [one.share for one in found]
+        yield (
+            f"| {series.name} | {name} | {len(sizes)} | {every.share:.1f} % "
+            f"| {min(shares):.1f} to {max(shares):.1f} % | {every.quarters()} "
+            f"| {sizes.mean() * 1e3:.3f} | {bounds.mean() * 1e3:.3f} |"
+        )
+
+
+def main() -> None:
+    """Run the study and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=5)
+    default = os.environ.get("POSTPROC_SHARED", "../shared")
+    parser.add_argument("--shared", type=Path, default=Path(default))
+    parser.add_argument("--only", nargs="*", help="series, such as B and grid")
+    given = parser.parse_args()
+    lines = [*TEXT.format(n=given.seeds).splitlines(), *HEAD]
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            data = loaded(given.shared, Path(folder))
+        except PostprocError as exc:  # the data are not there
+            raise SystemExit(f"not run: {exc}") from None
+        for name in given.only or ("B", "D", "grid", "A"):
+            # Every fit of A's 8,300 rows takes half a minute.
+            for line in report(data[name], 1 if name == "A" else given.seeds):
+                print(line, flush=True)
+                lines.append(line)
+    if not given.only:
+        OUT.write_text("\n".join([*lines, ""]))
+
+
+if __name__ == "__main__":
+    main()
