@@ -115,14 +115,18 @@ class Outcome:
 
 def held_out(series: Series, test: np.ndarray, frame: str) -> Outcome:
     """Fit the other rows, and judge these."""
-    left, read = predict_rows(series, test, frame)
+    left, read, _ = predict_rows(series, test, frame)
     return Outcome(left, read.std)
 
 
 def predict_rows(
     series: Series, test: np.ndarray, frame: str
-) -> tuple[np.ndarray, PredictedReading]:
-    """Fit the other rows, and return what is left of these, (n, 3) [m].
+) -> tuple[np.ndarray, PredictedReading, np.ndarray]:
+    """Fit the other rows, and predict these.
+
+    Returns:
+        What is left of the readings, (n, 3) [m]; the prediction; and which states the
+        model calls outside of what was surveyed, (n,).
 
     In the base frame the rows are as a user registers them: by the fitted rows and the
     nominal arm, before and without the fit.
@@ -139,7 +143,8 @@ def predict_rows(
     states = placed.on_probes(rows.states)
     read = model.reading(arm, states)
     tcp = ArmStates(arm, states).walk.tcp
-    return placed.to_base(rows.position) - tcp - read.error, read
+    outside = model.predict(arm, states).any_outside
+    return placed.to_base(rows.position) - tcp - read.error, read, outside
 
 
 def random_rows(n: int, seed: int) -> np.ndarray:
