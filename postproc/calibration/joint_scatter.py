@@ -20,7 +20,7 @@ from postproc.calibration.noise_estimate import (
     ReadingCost,
     minimise_costs,
 )
-from postproc.calibration.regression import Fit, expected_products
+from postproc.calibration.regression import Fit, products_of_rows
 from postproc.model.whitening import PoseBlock
 
 SPREAD = float(np.log(2.0)) / 1.96  # of the log: joints are alike within a factor of 2
@@ -29,7 +29,8 @@ WIDEST = 3.0  # of the log: bounds of all sizes
 JOINTS = 6
 KINDS = ("tracker", *(f"joint {j}" for j in range(1, JOINTS + 1)))
 PRECISION = np.linalg.inv(
-    block_diag(LEVEL**2, SPREAD**2 * np.eye(JOINTS) + LEVEL**2)
+    np.diag(np.append(0.0, np.full(JOINTS, SPREAD**2)))
+    + LEVEL**2 * block_diag(np.eye(1), np.ones((JOINTS, JOINTS)))
 )  # of the prior of the logarithms, (7, 7)
 
 
@@ -48,7 +49,7 @@ def split_by_joint(fit: Fit) -> Fit:
     """
     costs: list[Cost] = [
         _cost_of_poses(fit, block, products)
-        for block, products in zip(*_expected_products(fit), strict=True)
+        for block, products in zip(*_products_of_poses(fit), strict=True)
     ]
     noise = fit.noise
     begin = np.append(np.log(noise.tracker), np.zeros(JOINTS))
@@ -77,13 +78,13 @@ def _list_poses(fit: Fit) -> list[PoseBlock]:
     return [b for b in (single, *fit.whitener.blocks) if len(b.rows)]
 
 
-def _expected_products(fit: Fit) -> tuple[list[PoseBlock], list[Floats]]:
+def _products_of_poses(fit: Fit) -> tuple[list[PoseBlock], list[Floats]]:
     """Return poses, and the products of what the fit leaves of their rows."""
     design = fit.design.rotate(fit.whitener.turn)
     turned, spread = fit.whitener.rotate(fit.residual), design.variance(fit.covariance)
     blocks = _list_poses(fit)
     return blocks, [
-        expected_products(design, turned, block.rows, spread, fit.shared)
+        products_of_rows(design, turned, block.rows, spread, fit.shared)
         for block in blocks
     ]
 

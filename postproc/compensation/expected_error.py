@@ -72,7 +72,7 @@ class LengthLaw:
     @property
     def bound(self) -> Floats:
         """The lengths that 95 % of the errors are within, (n,) [m]."""
-        return self._root(2.0 * gammaincinv(self.half, BOUND))
+        return self._root(np.asarray(2.0 * gammaincinv(self.half, BOUND)))
 
     def beyond(self, length: Floats | float) -> Floats:
         """Return the probability that a length is larger, (n,), within 0.01."""

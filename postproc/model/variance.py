@@ -24,7 +24,8 @@ def covariance_of(parts: Floats) -> Floats:
     >>> covariance_of(np.array([[[1.0], [2.0], [0.0]]]))
     array([[1., 4., 0., 2., 0., 0.]])
     """
-    return np.einsum("nik,nik->ni", parts[:, ROWS], parts[:, COLUMNS])
+    out: Floats = np.einsum("nik,nik->ni", parts[:, ROWS], parts[:, COLUMNS])
+    return out
 
 
 def spread_covariance(columns: Floats, covariance: Floats) -> Floats:
@@ -36,7 +37,8 @@ def spread_covariance(columns: Floats, covariance: Floats) -> Floats:
     """
     rows = columns.T.reshape(columns.shape[2], -1)  # one large product
     weighed = (covariance @ rows).reshape(columns.T.shape).T
-    return np.einsum("nip,nip->ni", weighed[:, ROWS], columns[:, COLUMNS])
+    out: Floats = np.einsum("nip,nip->ni", weighed[:, ROWS], columns[:, COLUMNS])
+    return out
 
 
 def parameter_covariance(

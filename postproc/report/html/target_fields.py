@@ -70,7 +70,7 @@ def _texts(texts: Sequence[str], index: Any) -> list[Cell]:
 
 
 def _places(c: PageColumns) -> list[Cell]:
-    lines = c.line.tolist()
+    lines: list[Cell] = c.line.tolist()
     if len(set(c.file.tolist())) < 2:
         return lines
     return [f"{c.files[f]}:{n}" for f, n in zip(c.file.tolist(), lines, strict=True)]
