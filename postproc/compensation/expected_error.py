@@ -25,6 +25,7 @@ SIDED = float(ndtri(BOUND))  # standard deviations that hold it on one side
 NODES, WEIGHTS = (  # of a probability from 0 to 1
     (np.polynomial.legendre.leggauss(6) + np.array([[1.0], [0.0]])) / 2.0
 )
+WIDE = 3.0  # times its mean is beyond the bound of any length
 LEAST = 1e-9  # standard deviation [m]
 FLAT = 1e-3  # .. and part of the mean: below it the error does not scatter
 
@@ -174,21 +175,20 @@ def expect_errors(
     before[rows], after[rows], high[rows] = first.mean, last.mean, last.bound
     return ExpectedErrors(
         judged, mean, covariance, np.asarray(found[:, 3, 0] > 0.0), before, after, high,
-        below=pool_bound(last, high[rows]),
-        below_before=pool_bound(first, first.bound),
+        below=pool_bound(last, np.max(high[rows], initial=0.0)),
+        below_before=pool_bound(first, WIDE * np.max(before[rows], initial=0.0)),
     )  # fmt: skip
 
 
-def pool_bound(law: LengthLaw, bound: Floats) -> float:
+def pool_bound(law: LengthLaw, widest: float) -> float:
     """Return the length that 95 % of all errors of n visits are within; NaN for none.
 
     Args:
         law: Of every visit.
-        bound: The 95 % bound of every visit, (n,) [m]: none is wider for all.
+        widest: A length that it is not beyond, such as the largest bound [m].
     """
-    if not len(bound):
+    if not len(law.half):
         return np.nan
-    widest = float(bound.max())
 
     def more(length: float) -> float:
         return float(law.beyond(length).mean()) - (1.0 - BOUND)
