@@ -1,6 +1,11 @@
-"""Write real-bounds.md: how many real readings the bound of a true error holds.
+"""How many readings of real arms are within the bound of a true error.
 
-PYTHONPATH=. python docs/studies/real_bounds.py [--seeds 5] [--shared ../shared]
+    PYTHONPATH=. python docs/studies/real_bounds.py [--seeds 5] [--shared ../shared]
+
+A fit of some rows predicts the others: 30 % of the poses, 9 of 30 blocks of consecutive
+rows, or each of six regions of joint space. All rows of a pose are on one side. The
+first columns count readings whose states the model calls surveyed; others never get the
+verdict *pass*. real-bounds.md has the results.
 """
 
 from __future__ import annotations
@@ -19,27 +24,6 @@ from postproc.calibration.cross_validation import regions_of
 from postproc.compensation.expected_error import LengthLaw
 from postproc.exceptions import PostprocError
 
-OUT = Path(__file__).parent / "real-bounds.md"
-TEXT = """# Bounds of real readings
-
-Written by `PYTHONPATH=. python docs/studies/real_bounds.py --seeds {n}`, from
-measurements of two real arms: a UR10 (series B and D) and a UR5 (`grid`).
-
-`compensate --tolerance` states a 95 % bound for the length of every true error. This
-study holds the bound against readings of a tracker. A fit of some rows predicts the
-other rows. The bound of a reading has the scatter of the tracker besides. All rows of
-one pose are on one side of a split.
-
-- *random*: 30 % of the poses, drawn {n} times;
-- *blocks*: 9 of 30 blocks of consecutive rows, drawn {n} times;
-- *regions*: each of six regions of joint space, predicted from the five others.
-
-The first columns count the readings whose states the model calls surveyed. Other
-states never get the verdict *pass*, and have a column of their own. *Quarters* are the
-shares by quarter of the bound, the lowest bounds first. *At least, at most* are the
-lowest and the highest single split, all states together.
-
-"""
 HEAD = [
     "| rows | split | readings | within the bound | quarters | outside of the survey "
     "| at least, at most | mean error mm | mean bound mm |",
@@ -123,14 +107,14 @@ def report(series: Series, seeds: int) -> Iterator[str]:
 
 
 def main() -> None:
-    """Run the study and write the page."""
+    """Run the study and print its rows."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=5)
     default = os.environ.get("POSTPROC_SHARED", "../shared")
     parser.add_argument("--shared", type=Path, default=Path(default))
     parser.add_argument("--only", nargs="*", help="series: A, B, D, grid")
     given = parser.parse_args()
-    lines = [*TEXT.format(n=given.seeds).splitlines(), *HEAD]
+    print(*HEAD, sep="\n")
     with tempfile.TemporaryDirectory() as folder:
         try:
             data = loaded(given.shared, Path(folder))
@@ -139,9 +123,6 @@ def main() -> None:
         for name in given.only or ("D", "grid", "B"):
             for line in report(data[name], given.seeds):
                 print(line, flush=True)
-                lines.append(line)
-    if not given.only:
-        OUT.write_text("\n".join([*lines, ""]))
 
 
 if __name__ == "__main__":
