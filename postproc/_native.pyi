@@ -174,14 +174,14 @@ def profile(
     range: tuple[Sequence[float], Sequence[float]],
 ) -> Floats: ...
 
-# variance.rs: uncertain parameters of geometry and joints (`postproc.model.model`)
-def variance(
+# variance.rs: uncertain parameters of geometry and joints (`postproc.model.variance`)
+def covariance(
     parameters: Floats,
     base: Floats,
     states: tuple[Floats, Floats],
     geometry: tuple[bool, Sequence[tuple[int, int]], bool],
     basis: tuple[Floats, Sequence[int]],
-    covariance: Floats,
+    of_parameters: Floats,
 ) -> Floats: ...
 
 # design.rs: sums over the rows of a fit (`postproc.calibration.design_matrix`)

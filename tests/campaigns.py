@@ -45,7 +45,9 @@ from tests.campaign_rows import (
 
 PLAIN = ("geometry", "backlash")
 GROUP = 0.9  # of what an effect does that others can do as well
-ASKED = "the rows say that weight pulls"  # begins the question about the mounting
+ASKED = (
+    "the rows are strong evidence that weight"  # begins the question about the mounting
+)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from postproc.model.effects.backlash_profile import BacklashProfile
 from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.geometry import Geometry
 from postproc.model.kinematics import ArmStates
-from postproc.model.variance import parameter_variance
+from postproc.model.variance import COLUMNS, ROWS, parameter_covariance
 from postproc.motion import blending
 from postproc.motion import path as cartesian
 from postproc.motion.branches import OTHER_TURN, on_other_turns, on_written_turns
@@ -367,9 +367,10 @@ def test_uncertain_parameters(base, more, bench_cell, random):
         effects.at(ArmStates(bench_cell.arm, states), values),
         root @ root.T,
     )
-    found, columns = parameter_variance(effects, at, covariance), effects.columns(at)
-    meant = np.einsum("nkp,pq,nkq->nk", columns, covariance, columns)
-    assert np.allclose(found, meant, rtol=1e-9, atol=0, equal_nan=True)
+    found, columns = parameter_covariance(effects, at, covariance), effects.columns(at)
+    meant = np.einsum("nip,pq,njq->nij", columns, covariance, columns)[:, ROWS, COLUMNS]
+    size = np.sqrt(meant[:, ROWS] * meant[:, COLUMNS])
+    assert np.allclose(found / size, meant / size, rtol=0, atol=1e-9, equal_nan=True)
     assert np.isnan(meant).any(axis=1).tolist() == np.isnan(q).any(axis=1).tolist()
 
 

@@ -20,8 +20,7 @@ from postproc.calibration.registration import predict_registered
 from postproc.calibration.tables import TableFormat
 from postproc.exceptions import PostprocError
 from postproc.model.kinematics import ArmStates
-from postproc.model.model import Model
-from postproc.robot.arm import Arm
+from postproc.model.model import PredictedReading
 from postproc.robot.cell import Cell, load_cell
 
 Splits = tuple[tuple[str, Callable[[int, int], np.ndarray]], ...]
@@ -114,33 +113,38 @@ class Outcome:
         return float(np.linalg.norm(self.left, axis=1).mean())
 
 
-def judged(model: Model, arm: Arm, rows: Measurements) -> Outcome:
-    """Compare readings of the set-up that the model knows, base frame."""
-    read = model.reading(arm, rows.states)
-    left = rows.position - ArmStates(arm, rows.states).walk.tcp - read.error
+def held_out(series: Series, test: np.ndarray, frame: str) -> Outcome:
+    """Fit the other rows, and judge these."""
+    left, read, _ = predict_rows(series, test, frame)
     return Outcome(left, read.std)
 
 
-def held_out(series: Series, test: np.ndarray, frame: str) -> Outcome:
-    """Fit the other rows, and judge these.
+def predict_rows(
+    series: Series, test: np.ndarray, frame: str
+) -> tuple[np.ndarray, PredictedReading, np.ndarray]:
+    """Fit the other rows, and predict these.
+
+    Returns:
+        What is left of the readings, (n, 3) [m]; the prediction; and which states the
+        model calls outside of what was surveyed, (n,).
 
     In the base frame the rows are as a user registers them: by the fitted rows and the
     nominal arm, before and without the fit.
     """
     train = series.rows[np.setdiff1d(np.arange(len(series.rows)), test)]
-    rows = series.rows[test]
+    rows, arm = series.rows[test], series.cell.arm
     if frame == "base":
-        train, placed = into_base_frame(train, series.cell.arm)
+        train, placed = into_base_frame(train, arm)
         model = fit_measurements(train, series.cell).model
     else:
         model = fit_measurements(train, series.cell, frame="tracker").model
         assert model.registration is not None
         placed = model.registration
-    at = placed.to_base(rows.position)
-    rows = Measurements(**{**vars(rows), "position": at}).with_states(
-        placed.on_probes(rows.states)
-    )
-    return judged(model, series.cell.arm, rows)
+    states = placed.on_probes(rows.states)
+    read = model.reading(arm, states)
+    tcp = ArmStates(arm, states).walk.tcp
+    outside = model.predict(arm, states).any_outside
+    return placed.to_base(rows.position) - tcp - read.error, read, outside
 
 
 def random_rows(n: int, seed: int) -> np.ndarray:

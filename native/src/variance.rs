@@ -1,4 +1,4 @@
-//! What uncertain parameters of geometry and joints give: `postproc.model.model`.
+//! What uncertain parameters of geometry and joints give: `postproc.model.variance`.
 //!
 //! The columns of all parameters that turn one joint are its column of the Jacobian, by
 //! a number each: their part of the covariance shrinks to one row per joint.
@@ -15,6 +15,10 @@ use crate::walk::{Base, Walk};
 
 /// Three components of each.
 type Column = [Lanes; 3];
+/// The covariance of three components of each: the diagonal, then xy, xz and yz.
+type Products = [Lanes; 6];
+/// Which components are off the diagonal, in that order.
+const OFF: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
 const NOTHING: Column = [[0.0; SIDE]; 3];
 
@@ -27,6 +31,18 @@ fn add(sum: &mut Lanes, factor: f64, of: &Lanes) {
 fn add_product(sum: &mut Lanes, a: &Lanes, b: &Lanes) {
     for k in 0..SIDE {
         sum[k] += a[k] * b[k];
+    }
+}
+
+/// Add what a column gives, with half the form's sums over it and those before.
+fn add_column(total: &mut Products, sums: &Column, column: &Column) {
+    for k in 0..3 {
+        add_product(&mut total[k], &sums[k], &column[k]);
+        let (i, j) = OFF[k];
+        for lane in 0..SIDE {
+            total[3 + k][lane] +=
+                0.5 * (sums[i][lane] * column[j][lane] + sums[j][lane] * column[i][lane]);
+        }
     }
 }
 
@@ -95,16 +111,16 @@ impl Form {
         &self.lower[k * self.size..(k + 1) * self.size]
     }
 
-    fn value(&self, block: &Block) -> Column {
-        let mut total = NOTHING;
+    fn value(&self, block: &Block) -> Products {
+        let mut total = [[0.0; SIDE]; 6];
         for (u, column) in block.fixed.iter().enumerate() {
-            for k in 0..3 {
-                let mut sum = [0.0; SIDE];
+            let mut sums = NOTHING;
+            for (k, sum) in sums.iter_mut().enumerate() {
                 for (c, before) in self.row(u).iter().zip(&block.fixed[..=u]) {
-                    add(&mut sum, *c, &before[k]);
+                    add(sum, *c, &before[k]);
                 }
-                add_product(&mut total[k], &sum, &column[k]);
             }
+            add_column(&mut total, &sums, column);
         }
         let mut with = vec![[0.0; SIDE]; self.fixed];
         for (a, own) in self.joints.iter().enumerate() {
@@ -125,36 +141,36 @@ impl Form {
                     add_product(&mut among[b], &inner, phi);
                 }
             }
-            for k in 0..3 {
-                let (mut sum, own) = ([0.0; SIDE], &block.jacobian[a][k]);
+            let mut sums = NOTHING;
+            for (k, sum) in sums.iter_mut().enumerate() {
                 for (with, column) in with.iter().zip(&block.fixed) {
-                    add_product(&mut sum, with, &column[k]);
+                    add_product(sum, with, &column[k]);
                 }
                 for (with, column) in among[..=a].iter().zip(&block.jacobian) {
-                    add_product(&mut sum, with, &column[k]);
+                    add_product(sum, with, &column[k]);
                 }
-                add_product(&mut total[k], &sum, own);
             }
+            add_column(&mut total, &sums, &block.jacobian[a]);
         }
         total
     }
 }
 
-/// Variance of the TCP per axis, (n, 3) [m^2].
+/// Covariance of the TCP, (n, 6) [m^2]: its diagonal, then xy, xz and yz.
 ///
 /// Base: its axes, those of its rotations, its point, (7, 3). States: joint angles [rad]
 /// and tools [m], both with the deviations. Geometry: whether it has the base, its links
 /// and whether it has the tool. Basis: of the joints' parameters, (n, k), joint by joint,
-/// with the number of each. Covariance: (p, p), the geometry's parameters first.
+/// with the number of each. Of parameters: (p, p), the geometry's parameters first.
 #[pyfunction]
-pub fn variance<'py>(
+pub fn covariance<'py>(
     py: Python<'py>,
     parameters: Parameters<'py>,
     base: PyReadonlyArray2<'py, f64>,
     states: (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>),
     geometry: (bool, Vec<(usize, usize)>, bool),
     basis: (PyReadonlyArray2<'py, f64>, [usize; 6]),
-    covariance: PyReadonlyArray2<'py, f64>,
+    of_parameters: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (chain, base) = (Chain::new(&parameters)?, base_of(rows::<3>(&base)?)?);
     let (q, tool) = (rows::<6>(&states.0)?, rows::<3>(&states.1)?);
@@ -164,16 +180,16 @@ pub fn variance<'py>(
     same_length(&[q.len(), tool.len(), shape[0]])?;
     let size = fixed + own;
     let odd = geometry.links.iter().any(|(j, kind)| *j >= 6 || *kind >= 5);
-    if odd || shape[1] != own || covariance.shape() != [size, size] {
+    if odd || shape[1] != own || of_parameters.shape() != [size, size] {
         return Err(PyValueError::new_err("a covariance of other parameters"));
     }
-    let (basis, covariance) = (flat(&basis)?, flat(&covariance)?);
+    let (basis, of_parameters) = (flat(&basis)?, flat(&of_parameters)?);
     let mut end = 0;
     let joints = count.map(|n| {
         end += n;
         end - n..end
     });
-    let lower = (covariance.iter().enumerate())
+    let lower = (of_parameters.iter().enumerate())
         .map(|(at, c)| if at / size == at % size { *c } else { 2.0 * c })
         .collect();
     let form = Form { lower, size, fixed, joints };

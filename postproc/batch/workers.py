@@ -325,12 +325,11 @@ def _error_facts(outcome: Outcome) -> dict[str, Any]:
     if outcome.errors is None:
         return {}
     found = headline(outcome.errors)
-    worst = None if found.worst is None else found.worst.expected_mm
     figures = {
         "before": found.before_mm,
         "after": found.after_mm,
         "below_95": found.below_mm,
-        "largest": np.nan if worst is None else worst,
+        "worst_95": found.bound_mm,
     }
     check = outcome.tolerance
     facts: dict[str, Any] = {} if check is None else {"tolerance": check.to_record()}

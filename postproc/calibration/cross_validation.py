@@ -15,6 +15,7 @@ from scipy.stats import t as student
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.diagnosis.held_out import Folds, regions, whole_poses
+from postproc.calibration.joint_scatter import split_by_joint
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
 from postproc.model.kinematics import ArmStates
@@ -179,7 +180,7 @@ def predict_held_out_linearly(fit: Fit, part: Ints) -> HeldOutRows:
         fit: A fit of all rows, linearised where it ended.
         part: Part of every row, whole poses, (n,).
     """
-    folds = Folds.of_fit(fit, part)
+    folds, fit = Folds.of_fit(fit, part), split_by_joint(fit)
     jacobian, n = fit.design.jacobian, len(fit.batch)
     noise = fit.noise.arrival_variance(jacobian) + fit.noise.pose_variance(jacobian)
     tracker = fit.noise.tracker_std(fit.position) ** 2 / fit.batch.states.readings

@@ -15,6 +15,7 @@ from postproc.calibration.diagnosis.search import with_effects
 from postproc.calibration.direction_labels import mend_directions
 from postproc.calibration.expected_noise import expect_noise
 from postproc.calibration.extrapolation import widening
+from postproc.calibration.joint_scatter import split_by_joint
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.monuments import TrackerMotion, exclude_effects
 from postproc.calibration.nest_check import find_groups
@@ -400,6 +401,7 @@ def model_of(
         wide: Factor on all standard deviations off the tracker, by held-out rows.
         doubt: What may be there besides.
     """
+    fitted = split_by_joint(fitted)
     used = fitted.rows.weight > 0
     left = np.linalg.norm(fitted.residual[used], axis=1) / MM
     covariance = fitted.stated * max(widening(fitted), wide**2)

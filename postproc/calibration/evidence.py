@@ -27,6 +27,16 @@ FAR = 1000.0  # nats that it may bring besides: it climbs out of saddles, step b
 ROUNDED = 16.0  # units in the last place by which sums over many rows are off
 FEWEST = 4.0  # degrees of freedom that a prior scale is credited with at least
 LOG_SPREAD = 3.0  # hyperprior of log s_g: an order of magnitude is no surprise
+WEAK, LIKELY = 3.0, 6.0  # nats: odds of 20 to 1, and of 400 to 1
+
+
+def name_evidence(nats: float) -> str:
+    """Return evidence in a word: it is relative to what was tried, and never certain.
+
+    >>> [name_evidence(nats) for nats in (2.9, 3.0, 6.1)]
+    ['weak', 'likely', 'strong']
+    """
+    return "weak" if nats < WEAK else "likely" if nats <= LIKELY else "strong"
 
 
 @dataclass(frozen=True)

@@ -37,14 +37,14 @@ def estimate_noise(
     with_others = len(products) == len(whitener.blocks)
     kinds = whitener.estimated if with_others else KINDS[:2]
     alone = np.ones(len(weight), dtype=bool)
-    costs: list[_Cost] = []
+    costs: list[Cost] = []
     if with_others:
         for block, S in zip(whitener.blocks, products, strict=True):
             alone[block.rows] = False
-            costs.append(_BlockCost.of(whitener, block, S, weight, kinds))
+            costs.append(BlockCost.of(whitener, block, S, weight, kinds))
     costs.append(_RowCost.of(whitener, squares, weight * alone, kinds))
-    costs.append(_ReadingCost(whitener.readings, kinds))
-    best = _score(costs, *_begin(whitener, start, kinds))
+    costs.append(ReadingCost(whitener.readings, kinds))
+    best = minimise_costs(costs, *_begin(whitener, start, kinds))
     found = dict(zip(kinds, np.exp(best).tolist(), strict=True))
     return replace(Noise(0.0, 0.0, whitener.origin), **found)
 
@@ -78,7 +78,7 @@ ENOUGH = 1e-3  # nats that a further step must bring
 
 
 @dataclass(frozen=True)
-class _Point:
+class CostPoint:
     """What some sizes of the components cost.
 
     Attributes:
@@ -90,10 +90,10 @@ class _Point:
     slopes: Callable[[], tuple[Floats, Floats]]
 
 
-class _Cost(Protocol):
+class Cost(Protocol):
     """Minus the log likelihood of some rows, by the squared sizes of the components."""
 
-    def at(self, sizes: Floats) -> _Point:
+    def at(self, sizes: Floats) -> CostPoint:
         """Evaluate it."""
 
 
@@ -126,11 +126,11 @@ class _RowCost:
         known = (whitener.extra + whitener.unseen)[used]
         return cls(parts, known, square[used], weight[used, None])
 
-    def at(self, sizes: Floats) -> _Point:
+    def at(self, sizes: Floats) -> CostPoint:
         """Evaluate it."""
         v = np.tensordot(sizes, self.parts, axes=1) + self.known
         value = 0.5 * float((self.weight * (np.log(v) + self.square / v)).sum())
-        return _Point(value, lambda: self._slopes(v))
+        return CostPoint(value, lambda: self._slopes(v))
 
     def _slopes(self, v: Floats) -> tuple[Floats, Floats]:
         slope = 0.5 * self.weight * (1.0 / v - self.square / v**2)
@@ -139,7 +139,7 @@ class _RowCost:
 
 
 @dataclass(frozen=True, eq=False)
-class _BlockCost:
+class BlockCost:
     """Of rows that share a pose.
 
     Attributes:
@@ -161,27 +161,36 @@ class _BlockCost:
         products: Floats,
         weight: Floats,
         kinds: Sequence[str],
-    ) -> _BlockCost:
+    ) -> BlockCost:
         """Take the poses of which any row is used."""
-        rows = block.rows
-        used = np.repeat(weight[rows] > 0, 3, axis=1).astype(float)
-        mask, k = used[:, :, None] * used[:, None], np.arange(used.shape[1])
-        parts = []
+        rows, parts = block.rows, []
+        k = np.arange(3 * rows.shape[1])
         for kind in kinds:
             if kind == "tracker":
-                part = np.zeros_like(mask)
+                part = np.zeros((len(rows), len(k), len(k)))
                 part[:, k, k] = whitener.tracker[rows].reshape(len(rows), -1)
             else:
                 part = block.parts(kind)
-            parts.append(part * mask)
-        known = np.zeros_like(mask)
-        extra = (whitener.extra + whitener.unseen)[rows].reshape(len(rows), -1)
-        known[:, k, k] = extra * used + (1.0 - used)
-        heaviness = np.where(weight[rows] > 0, weight[rows], np.inf).min(axis=1)
-        heaviness = np.where(np.isfinite(heaviness), heaviness, 0.0)
-        return cls(np.stack(parts, axis=1), known, products * mask, heaviness)
+            parts.append(part)
+        known = np.zeros((len(rows), len(k), len(k)))
+        extra = whitener.extra + whitener.unseen
+        known[:, k, k] = extra[rows].reshape(len(rows), -1)
+        return cls.of_used(np.stack(parts, axis=1), known, products, weight[rows])
 
-    def at(self, sizes: Floats) -> _Point:
+    @classmethod
+    def of_used(
+        cls, parts: Floats, known: Floats, products: Floats, weight: Floats
+    ) -> BlockCost:
+        """Take the rows of weights (groups, m) above 0, each pose of its least."""
+        used = np.repeat(weight > 0, 3, axis=1).astype(float)
+        mask, k = used[:, :, None] * used[:, None], np.arange(used.shape[1])
+        known = known * mask
+        known[:, k, k] += 1.0 - used
+        heaviness = np.where(weight > 0, weight, np.inf).min(axis=1)
+        heaviness = np.where(np.isfinite(heaviness), heaviness, 0.0)
+        return cls(parts * mask[:, None], known, products * mask, heaviness)
+
+    def at(self, sizes: Floats) -> CostPoint:
         """Evaluate it."""
         V = self.known + np.einsum("k,gkij->gij", sizes, self.parts)
         root = np.linalg.cholesky(V)
@@ -189,7 +198,7 @@ class _BlockCost:
         P = np.linalg.inv(V)
         square = np.einsum("gij,gij->g", P, self.square)
         value = 0.5 * float((self.weight * (log_det + square)).sum())
-        return _Point(value, lambda: self._slopes(P))
+        return CostPoint(value, lambda: self._slopes(P))
 
     def _slopes(self, P: Floats) -> tuple[Floats, Floats]:
         """Take the inverse of the covariance, (groups, 3 m, 3 m)."""
@@ -203,17 +212,17 @@ class _BlockCost:
 
 
 @dataclass(frozen=True, eq=False)
-class _ReadingCost:
+class ReadingCost:
     """Of repeated readings."""
 
     readings: ReadingScatter
     kinds: Sequence[str]
 
-    def at(self, sizes: Floats) -> _Point:
+    def at(self, sizes: Floats) -> CostPoint:
         """Evaluate it."""
         t2 = float(sizes[0])
         value = 0.5 * self.readings.log_noise(float(np.sqrt(t2)))
-        return _Point(value, lambda: self._slopes(t2))
+        return CostPoint(value, lambda: self._slopes(t2))
 
     def _slopes(self, t2: float) -> tuple[Floats, Floats]:
         slope = np.zeros(len(self.kinds))
@@ -223,7 +232,9 @@ class _ReadingCost:
         return slope, information
 
 
-def _score(costs: Sequence[_Cost], begin: Floats, low: Floats, high: Floats) -> Floats:
+def minimise_costs(
+    costs: Sequence[Cost], begin: Floats, low: Floats, high: Floats
+) -> Floats:
     """Minimise costs by logarithms of standard deviations: Fisher's scoring.
 
     Args:
@@ -233,7 +244,7 @@ def _score(costs: Sequence[_Cost], begin: Floats, low: Floats, high: Floats) -> 
         high: Upper bounds, (kinds,).
     """
 
-    def at(u: Floats) -> tuple[float, list[_Point]]:
+    def at(u: Floats) -> tuple[float, list[CostPoint]]:
         points = [cost.at(np.exp(2.0 * u)) for cost in costs]
         return sum(point.value for point in points), points
 

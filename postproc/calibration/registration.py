@@ -14,6 +14,7 @@ from postproc.model.effects.placement import POINT, Placement, unseen_axes
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, PredictedReading
 from postproc.model.registration import Registration, rigid_fit
+from postproc.model.variance import spread_covariance
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -228,13 +229,12 @@ def predict_registered(
     own = Placement.propose(arm, states).columns(at)
     A = own.reshape(3 * len(batch), -1)
     inverse = np.linalg.pinv(A)
-    left = model.unmodelled_variance(effects, at, values)
+    known = model.unmodelled_covariance(effects, at, values)
     if len(covariance):
         X = effects.columns(at).reshape(len(A), -1)
         X = X - A @ (inverse @ X)
-        left = left + np.einsum("rp,rp->r", X @ covariance, X).reshape(-1, 3)
-    scatter = float((model.reading_std(at, np.zeros((len(batch), 3))) ** 2).mean())
-    told = scatter * np.einsum("rp,pr->r", A, inverse).reshape(-1, 3)
-    known = left + told
+        known += spread_covariance(X.reshape(len(batch), 3, -1), covariance)
+    scatter = model.reading_covariance(at, np.zeros((len(batch), 6)))[:, :3].mean()
+    known[:, :3] += scatter * np.einsum("rp,pr->r", A, inverse).reshape(-1, 3)
     error = effects.error_at(at, batch, values)
-    return placed, PredictedReading(error, model.reading_std(at, known))
+    return placed, PredictedReading(error, model.reading_covariance(at, known))

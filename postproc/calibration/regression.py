@@ -336,7 +336,7 @@ def _weigh_rows(state: Fit, heavy: bool) -> Fit:
         rows = judge(distance, residual, batch.states.q, batch.jacobian, state.pose)
     spread = design.variance(state.covariance)
     noise = estimate_noise(state.whitener, turned**2 + spread, rows.weight, state.noise,
-        [_products(design, turned, block.rows, spread, state.shared)
+        [products_of_rows(design, turned, block.rows, spread, state.shared)
          for block in state.whitener.blocks],
     )  # fmt: skip
     turns = state.turns
@@ -347,14 +347,14 @@ def _weigh_rows(state: Fit, heavy: bool) -> Fit:
     return replace(state, noise=noise, rows=rows, turns=turns, whitener=whitener)
 
 
-def _products(
+def products_of_rows(
     design: DesignMatrix,
     rotated: Floats,
     rows: Ints,
     spread_of_rows: Floats,
     covariance: Floats | None,
 ) -> Floats:
-    """Expected products of the residuals of poses, (groups, 3 m, 3 m) [m^2].
+    """Return expected products of the residuals of poses, (groups, 3 m, 3 m) [m^2].
 
     Args:
         design: Rotated columns.

@@ -53,14 +53,14 @@ def direction_warning(fitted: Fit) -> tuple[str, ...]:
     if laws != effects:
         gains = np.minimum(gains, _gains(fitted, effects))
     best = int(np.argmax(gains))
-    gain, (name, along) = float(gains[best]), unit_directions()[best]
-    if gain < CLEARLY:
+    name, along = unit_directions()[best]
+    if gains[best] < CLEARLY:
         return ()
     return (
-        f"the rows say that weight pulls along {_format(along)} in the base frame of "
-        f"the arm, as on {name}, by {gain:.0f} nats more than along "
-        f"{_format(arm.weight)}, as the cell has it. Check how the arm is mounted, "
-        "and state it: mounting under [robot], or [base]",
+        f"the rows are strong evidence that weight pulls along {_format(along)} in the "
+        f"base frame of the arm, as on {name}, and not along {_format(arm.weight)}, as "
+        "the cell has it. Check how the arm is mounted, and state it: mounting under "
+        "[robot], or [base]",
     )
 
 

@@ -1,13 +1,13 @@
-"""Sheets of Excel workbooks as lines of text, which the reader of tables takes."""
+"""Excel workbooks: their sheets as lines of text, and tables as a workbook."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from postproc.exceptions import MeasurementError
+from postproc.exceptions import MeasurementError, OutputError
 
 ZIP, OLD = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"  # first bytes of .xlsx and of .xls
 INSTALL = 'pip install "postproc[xlsx]"'
@@ -105,3 +105,27 @@ def _cell(value: Any, comma: bool) -> str:
 def _join(words: Iterable[str]) -> str:
     """Join words by blanks, without quotation marks."""
     return " ".join(words).replace('"', "")
+
+
+def write_workbook(path: Path, sheets: Mapping[str, Sequence[Sequence[Any]]]) -> bytes:
+    """Write tables as a workbook, a sheet each.
+
+    Args:
+        path: The file, for messages.
+        sheets: Rows of cells by the names of the sheets.
+
+    Raises:
+        OutputError: openpyxl is not installed.
+    """
+    try:
+        from openpyxl import Workbook
+    except ImportError:
+        cure = f"Install it with {INSTALL}, or write FILE.csv"
+        raise OutputError(path, "needs openpyxl to be written", cure) from None
+    book, out = Workbook(write_only=True), io.BytesIO()
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(list(row))
+    book.save(out)
+    return out.getvalue()

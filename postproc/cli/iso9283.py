@@ -15,7 +15,7 @@ from postproc.cli.common import (
     report_errors,
 )
 from postproc.cli.project import cell_file
-from postproc.cli.reports import PAGE, PageOption, Reports
+from postproc.cli.reports import PAGE, PageOption, Reports, TableOption
 from postproc.exceptions import PostprocError
 from postproc.files import check_places
 
@@ -50,6 +50,7 @@ def iso9283(
     ] = "",
     changes: SetMeasured = None,
     report: PageOption = None,
+    table: TableOption = None,
 ) -> None:
     """Compute accuracy and repeatability after ISO 9283 from readings of a test."""
     from postproc.calibration.iso9283.figures import iso_figures
@@ -57,7 +58,7 @@ def iso9283(
     from postproc.robot.cell import load_cell
 
     with report_errors():
-        reports = Reports.of(report, PAGE)
+        reports = Reports.of(report, PAGE, tables=table)
         check_places(reports.files, [readings, before, program, cell])
         known = None
         if program is not None or cell is not None:

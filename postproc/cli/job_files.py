@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,6 +73,8 @@ class Destination:
             from postproc.report.html import program_report
 
             files[place] = program_report(outcome).encode()
+        if reports.tables:
+            files |= _table_files(outcome, reports.tables)
         own = self.given.path
         target = output or (None if own is None else default_output(own))
         files |= self._results(outcome, target, values)
@@ -133,6 +136,21 @@ class Destination:
         if target is not None and not is_stream(target):
             own[self.given.name] = target
         return own
+
+
+def _table_files(outcome: Outcome, places: Iterable[Path]) -> dict[Path, Content]:
+    """Write the tables of the page, all targets first."""
+    from postproc.report.html import program_report
+    from postproc.report.html.program import columns_of
+    from postproc.report.html.target_fields import target_sheet
+    from postproc.report.sheets import sheets_of_page, table_files
+
+    targets = target_sheet(columns_of(outcome))
+    sheets = [targets, *sheets_of_page(program_report(outcome))]
+    files: dict[Path, Content] = {}
+    for place in places:
+        files |= table_files(place, sheets)
+    return files
 
 
 def _file_of(target: Path | None, part: Path) -> Path:

@@ -17,7 +17,14 @@ from postproc.cli.common import (
     say,
 )
 from postproc.cli.project import cell_file, model_file
-from postproc.cli.reports import PAGE, PLOTS, PlotOption, ReportOption, Reports
+from postproc.cli.reports import (
+    PAGE,
+    PLOTS,
+    PlotOption,
+    ReportOption,
+    Reports,
+    TableOption,
+)
 from postproc.exceptions import PostprocError
 from postproc.files import check_places, schema
 
@@ -38,6 +45,7 @@ def diagnose(
         typer.Option("-o", "--output", help="Default: MODEL.extended.json beside it."),
     ] = None,
     report: PlotOption = None,
+    table: TableOption = None,
     program: Annotated[
         Path | None,
         typer.Option(
@@ -65,7 +73,7 @@ def diagnose(
         beside = program or path or next(iter(files), None)
         cell, model = cell_file(cell, beside), model_file(model, beside)
         inputs = [*files, cell, model, program, path]
-        reports = Reports.of(report, PAGE, *PLOTS)
+        reports = Reports.of(report, PAGE, *PLOTS, tables=table)
         check_places([output, *reports.files], inputs)
         how = {"program": program}
         loaded = load_cell(cell, changes=changes_of(changes))
@@ -78,7 +86,7 @@ def diagnose(
         evidence = evidence_of(found) if reports.files else {}
         measured = {} if on_the_way is None else {"path": on_the_way.to_dict()}
         reports.write_json(lambda: dump_json(schema("diagnosis") | evidence | measured))
-        if reports.pages:
+        if reports.pages or reports.tables:
             from postproc.report.html import diagnosis_report
 
             reports.write_pages(lambda: diagnosis_report(evidence))

@@ -32,6 +32,7 @@ from postproc.cli.reports import (
     PlotOption,
     ReportOption,
     Reports,
+    TableOption,
 )
 from postproc.exceptions import PostprocError
 from postproc.files import check_places
@@ -244,6 +245,7 @@ def fit(
     ] = None,
     changes: SetMeasured = None,
     report: PageOption = None,
+    table: TableOption = None,
     force: Annotated[
         bool, typer.Option("--force", help="Overwrite the model of the project.")
     ] = False,
@@ -257,7 +259,7 @@ def fit(
     with report_errors():
         asked, cell = cell, cell_file(cell, data[0])
         named, output = output, model_to_write(output, force, data[0])
-        reports = Reports.of(report, PAGE)
+        reports = Reports.of(report, PAGE, tables=table)
         check_places([output, *reports.files], [*data, cell, program])
         loaded = load_cell(cell, changes=changes_of(changes))
         with stages(log=True) as progress:
@@ -312,6 +314,7 @@ def compare(
     data: Annotated[list[Path], typer.Argument(help="Measurement files (CSV).")],
     cell: CellOption = None,
     report: PlotOption = None,
+    table: TableOption = None,
     test: Annotated[
         list[Path] | None,
         typer.Option("--test", help="Files to test on; default: a third of the rows."),
@@ -329,7 +332,7 @@ def compare(
     with report_errors():
         cell = cell_file(cell, data[0])
         others = test or []
-        reports = Reports.of(report, PAGE, *PLOTS)
+        reports = Reports.of(report, PAGE, *PLOTS, tables=table)
         check_places(reports.files, [*data, *others, cell])
         loaded = load_cell(cell, changes=changes_of(changes))
         held = Held(others, blocks)

@@ -17,7 +17,7 @@ from postproc.cli.common import (
     say,
 )
 from postproc.cli.project import MAKE, cell_file, find_project, model_file
-from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
+from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports, TableOption
 from postproc.cli.robot import record_file, release
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.exceptions import PostprocError
@@ -80,6 +80,7 @@ def batch(
         bool, typer.Option("--stale", help="Make only stale programs of robots again.")
     ] = False,
     report: PageOption = None,
+    table: TableOption = None,
     changes: SetOption = None,
 ) -> None:
     """Compensate a tree of programs; programs that fail are not written to DST.
@@ -101,7 +102,7 @@ def batch(
 
         asked = changes_of(changes)
         made = make_plan(plan, cell, model, DEFAULT_OPTIONS, asked)
-        reports = Reports.of(report, PAGE)
+        reports = Reports.of(report, PAGE, tables=table)
         check_places(reports.files, [cell, model, plan])
         for line in _archive_lines(source, made):
             say(line)

@@ -28,7 +28,7 @@ from postproc.cli.common import (
     write_text,
 )
 from postproc.cli.project import cell_file, find_project, model_file
-from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports
+from postproc.cli.reports import PAGE, PageOption, ReportOption, Reports, TableOption
 from postproc.cli.robot import release
 from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places, is_stream
@@ -97,6 +97,7 @@ def compensate(
         ),
     ] = None,
     report: PageOption = None,
+    table: TableOption = None,
     strict: Annotated[
         bool,
         typer.Option(
@@ -137,7 +138,7 @@ def compensate(
     given = None if is_stream(program) else Path(program)
     with report_errors(given, variables):
         cell, model = cell_file(cell, program), model_file(model, program)
-        reports = Reports.of(report, PAGE)
+        reports = Reports.of(report, PAGE, tables=table)
         if reports.on_stdout and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         outputs = [output, *reports.files, variables_out]

@@ -12,9 +12,10 @@ import typer
 
 from postproc.cli.common import say, write_text
 from postproc.exceptions import PostprocError
-from postproc.files import STREAM, is_stream
+from postproc.files import STREAM, is_stream, write_all
 
 JSON, PAGE, PLOTS = ".json", ".html", (".svg", ".png")
+TABLES = (".csv", ".xlsx")
 Text = Callable[[], str | Iterable[str]]
 
 
@@ -26,6 +27,14 @@ def _option(endings: str) -> Any:
 
 ReportOption = Annotated[list[Path] | None, _option(".json")]
 PageOption = Annotated[list[Path] | None, _option(".html or .json")]
+TableOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--table",
+        metavar="FILE",
+        help="Write every table of the page: FILE.csv or FILE.xlsx.",
+    ),
+]
 PlotOption = Annotated[list[Path] | None, _option(".html, .json, .svg or .png")]
 
 
@@ -37,14 +46,21 @@ class Reports:
         json: Files of JSON, ``-`` for standard output.
         pages: Pages for a browser.
         plots: Pictures.
+        tables: Tables of the page, as CSV or as workbooks.
     """
 
     json: tuple[Path, ...] = ()
     pages: tuple[Path, ...] = ()
     plots: tuple[Path, ...] = ()
+    tables: tuple[Path, ...] = ()
 
     @classmethod
-    def of(cls, given: Sequence[Path] | None, *kinds: str) -> Reports:
+    def of(
+        cls,
+        given: Sequence[Path] | None,
+        *kinds: str,
+        tables: Sequence[Path] | None = None,
+    ) -> Reports:
         """Sort files by their endings; what has no name that lasts is JSON.
 
         Raises:
@@ -67,12 +83,18 @@ class Reports:
                 f"--report {plots[0]}: pictures need matplotlib. Install it with "
                 "pip install 'postproc[plots]', or write a page (FILE.html)"
             )
-        return cls(tuple(sorted_[JSON]), tuple(sorted_.get(PAGE, ())), tuple(plots))
+        for place in tables or ():
+            if place.suffix.lower() not in TABLES:
+                raise PostprocError(
+                    f"--table {place}: write {' or '.join(f'FILE{e}' for e in TABLES)}"
+                )
+        pages = tuple(sorted_.get(PAGE, ()))
+        return cls(tuple(sorted_[JSON]), pages, tuple(plots), tuple(tables or ()))
 
     @property
     def files(self) -> tuple[Path, ...]:
         """Return all places."""
-        return (*self.json, *self.pages, *self.plots)
+        return (*self.json, *self.pages, *self.plots, *self.tables)
 
     @property
     def on_stdout(self) -> bool:
@@ -89,13 +111,21 @@ class Reports:
             write_text(str(place), text())
 
     def write_pages(self, text: Text) -> None:
-        """Write the pages, likewise.
+        """Write the pages, likewise, and the tables that stand on them.
 
         Raises:
-            OutputError: A file cannot be written.
+            OutputError: A file cannot be written, or a library for it is missing.
         """
         for place in self.pages:
             write_text(str(place), text())
+        if self.tables:
+            from postproc.report.sheets import sheets_of_page, table_files
+
+            sheets = sheets_of_page("".join(text()))
+            for place in self.tables:
+                write_all(files := table_files(place, sheets))
+                for path in files:
+                    say(f"written {path}")
 
     def write_plots(self, plot: Callable[[Path], Iterable[Path]]) -> None:
         """Draw the plots, and name each that is written."""

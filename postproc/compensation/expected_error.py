@@ -1,11 +1,11 @@
 """The expected true error of every target, before and after its correction.
 
 The error of an arrival is e = m + c + d: m is what the model predicts, c the
-correction that was applied, and d is normal with the standard error of the model, what
-is left of the model, and repeatability. Errors of the part and of the frames are not in
-it. The square of the length of e is approximated by a scaled and shifted chi-square
-variable of the same mean, variance and skewness (Pearson; Imhof 1961): its 95 % bound
-is within 1.5 % of the exact one.
+correction that was applied, and d is normal with the covariance of what the model does
+not know, and of repeatability. Errors of the part and of the frames are not in it. The
+square of the length of e is approximated by a scaled and shifted chi-square variable
+of the same mean, variance and skewness (Pearson; Imhof 1961): its 95 % bound is within
+1.5 % of the exact one.
 """
 
 from __future__ import annotations
@@ -14,15 +14,18 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import gammaincc, gammaincinv
+from scipy.optimize import brentq
+from scipy.special import gammaincinv, ndtr, ndtri
 
 from postproc.arrays import Bools, Floats
 from postproc.compensation.arrivals import ArrivalStates
 
 BOUND = 0.95  # of the length of an error
+SIDED = float(ndtri(BOUND))  # standard deviations that hold it on one side
 NODES, WEIGHTS = (  # of a probability from 0 to 1
     (np.polynomial.legendre.leggauss(6) + np.array([[1.0], [0.0]])) / 2.0
 )
+WIDE = 3.0  # times its mean is beyond the bound of any length
 LEAST = 1e-9  # standard deviation [m]
 FLAT = 1e-3  # .. and part of the mean: below it the error does not scatter
 
@@ -34,36 +37,77 @@ class LengthLaw:
     Attributes:
         scale, shift: Of the chi-square variable, (n,) [m^2].
         half: Half of its degrees of freedom, (n,).
+        least: What at least 95 % of the lengths are beyond, (n,) [m].
     """
 
     scale: Floats
     shift: Floats
     half: Floats
+    least: Floats
 
     @classmethod
-    def of_normal(cls, mean: Floats, std: Floats) -> LengthLaw:
-        """Match the first three cumulants: mean and std per axis, (n, 3) [m]."""
-        size = np.sqrt(np.square(mean).sum(axis=1, keepdims=True))
-        m, s = mean**2, np.maximum(std, np.maximum(FLAT * size, LEAST)) ** 2
-        first, second = (m + s).sum(axis=1), 2.0 * (s * (s + 2.0 * m)).sum(axis=1)
-        third = 8.0 * (s * s * (s + 3.0 * m)).sum(axis=1)
-        scale = third / (4.0 * second)
-        half = second / (4.0 * scale**2)
-        return cls(scale, first - 2.0 * half * scale, half)
+    def of_normal(cls, mean: Floats, covariance: Floats) -> LengthLaw:
+        """Match the first three cumulants.
 
-    def quantile(self, share: float) -> Floats:
-        """Return the lengths that errors are within with a probability, (n,) [m]."""
-        square = self.shift + 2.0 * self.scale * gammaincinv(self.half, share)
-        return np.sqrt(np.maximum(square, 0.0))
+        Args:
+            mean: (n, 3) [m].
+            covariance: (n, 6) [m^2]: xx, yy, zz, then xy, xz, yz.
+        """
+        square = np.square(mean).sum(axis=1)
+        x, y, z = mean.T
+        a, b, c, d, e, f = _floor(covariance, square).T
+        turned = (a * x + d * y + e * z, d * x + b * y + f * z, e * x + f * y + c * z)
+        along = np.maximum(x * turned[0] + y * turned[1] + z * turned[2], 0.0)
+        first = a + b + c + square
+        second = a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f + along)
+        third = a**3 + b**3 + c**3 + 6.0 * d * e * f
+        third += 3.0 * (a * (d * d + e * e) + b * (d * d + f * f) + c * (e * e + f * f))
+        third += 3.0 * sum(part * part for part in turned)
+        scale = third / second
+        half = second / (2.0 * scale**2)
+        # A length is no less than its component along the mean.
+        size = np.sqrt(np.maximum(square, LEAST**2))
+        least = np.maximum(size - SIDED * np.sqrt(along) / size, 0.0)
+        return cls(scale, first - 2.0 * half * scale, half, least)
+
+    @property
+    def bound(self) -> Floats:
+        """The lengths that 95 % of the errors are within, (n,) [m]."""
+        return self._root(np.asarray(2.0 * gammaincinv(self.half, BOUND)))
 
     def beyond(self, length: Floats | float) -> Floats:
-        """Return the probability that a length is larger, (n,)."""
-        chi = (np.square(length) - self.shift) / (2.0 * self.scale)
-        return np.asarray(gammaincc(self.half, np.maximum(chi, 0.0)))
+        """Return the probability that a length is larger, (n,), within 0.01."""
+        chi = (np.square(length) - self.shift) / self.scale
+        root = np.cbrt(np.maximum(chi, 0.0) / (2.0 * self.half))
+        return np.asarray(ndtr((1.0 - self._part - root) / np.sqrt(self._part)))
 
-    def at_nodes(self) -> Floats:
-        """Return the lengths at `NODES`, (n, 6) [m]."""
-        return np.stack([self.quantile(p) for p in NODES], axis=1)
+    @property
+    def mean(self) -> Floats:
+        """The expected lengths, (n,) [m], within 2 %."""
+        normal, part = ndtri(NODES), self._part[:, None]
+        root = np.maximum(1.0 - part + normal * np.sqrt(part), 0.0)
+        chi = 2.0 * self.half[:, None] * root * root * root
+        return np.asarray(self._root(chi.T).T @ WEIGHTS)
+
+    @cached_property
+    def _part(self) -> Floats:
+        """Variance of the cube root of chi^2 over its mean, taken as normal, (n,).
+
+        After Wilson and Hilferty (1931).
+        """
+        return np.asarray(1.0 / (9.0 * self.half))
+
+    def _root(self, chi: Floats) -> Floats:
+        """Return lengths of values of the chi-square variable, (n,) or (k, n)."""
+        return np.asarray(np.sqrt(np.maximum(self.shift + self.scale * chi, 0.0)))
+
+
+def _floor(covariance: Floats, square: Floats) -> Floats:
+    """Keep every standard deviation above what counts as none, (n, 6)."""
+    least = np.maximum(FLAT**2 * square, LEAST**2)[:, None]
+    return np.concatenate(
+        [np.maximum(covariance[:, :3], least), covariance[:, 3:]], axis=1
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +117,7 @@ class ExpectedErrors:
     Attributes:
         judged: Whether a visit has a target that it can miss, (n,).
         mean: Its error with the correction that was made, (n, 3).
-        std: Standard deviation of the error of an arrival per axis, (n, 3).
+        covariance: Of the error of an arrival, (n, 6): xx, yy, zz, then xy, xz, yz.
         outside: Whether the state is outside of what was surveyed, (n,).
         before: Expected length of the error without any correction, (n,).
         after: .. with the correction, (n,).
@@ -84,7 +128,7 @@ class ExpectedErrors:
 
     judged: Bools
     mean: Floats
-    std: Floats
+    covariance: Floats
     outside: Bools
     before: Floats
     after: Floats
@@ -95,7 +139,7 @@ class ExpectedErrors:
     @cached_property
     def law(self) -> LengthLaw:
         """Return the distributions of the lengths with the correction."""
-        return LengthLaw.of_normal(self.mean, self.std)
+        return LengthLaw.of_normal(self.mean, self.covariance)
 
     @property
     def known(self) -> Bools:
@@ -120,32 +164,33 @@ def expect_errors(
         judged: Whether visits have a target that they can miss, (n,).
     """
     n = len(arrivals.visits)
-    error, std, outside = np.moveaxis(arrivals.predict(np.arange(n)), 1, 0)
-    known = judged & ~np.isnan(error + std + correction).any(axis=1)
+    found = arrivals.predict(np.arange(n))
+    error, covariance = found[:, 0], found[:, 1:3].reshape(n, 6)
+    known = judged & ~np.isnan(found[:, 0] + found[:, 1] + correction).any(axis=1)
     mean = np.where(known[:, None], error + correction, np.nan)
     rows = np.flatnonzero(known)
-    first = LengthLaw.of_normal(error[rows], std[rows]).at_nodes()
-    law = LengthLaw.of_normal(mean[rows], std[rows])
-    last = law.at_nodes()
+    first = LengthLaw.of_normal(error[rows], covariance[rows])
+    last = LengthLaw.of_normal(mean[rows], covariance[rows])
     before, after, high = np.full((3, n), np.nan)
-    before[rows], after[rows] = first @ WEIGHTS, last @ WEIGHTS
-    high[rows] = law.quantile(BOUND)
+    before[rows], after[rows], high[rows] = first.mean, last.mean, last.bound
     return ExpectedErrors(
-        judged, mean, std, np.asarray(outside[:, 0] > 0.0), before, after, high,
-        below=pool_quantile(last), below_before=pool_quantile(first),
+        judged, mean, covariance, np.asarray(found[:, 3, 0] > 0.0), before, after, high,
+        below=pool_bound(last, np.max(high[rows], initial=0.0)),
+        below_before=pool_bound(first, WIDE * np.max(before[rows], initial=0.0)),
     )  # fmt: skip
 
 
-def pool_quantile(lengths: Floats, share: float = BOUND) -> float:
-    """Return the length that a share of the errors of n visits is within; NaN for none.
+def pool_bound(law: LengthLaw, widest: float) -> float:
+    """Return the length that 95 % of all errors of n visits are within; NaN for none.
 
     Args:
-        lengths: Of every visit at `NODES`, (n, 6).
-        share: Which share.
+        law: Of every visit.
+        widest: A length that it is not beyond, such as the largest bound [m].
     """
-    if not len(lengths):
+    if not len(law.half):
         return np.nan
-    order = np.argsort(lengths, axis=None)
-    weight = np.broadcast_to(WEIGHTS, lengths.shape).ravel()[order]
-    at = (np.cumsum(weight) - weight / 2.0) / weight.sum()
-    return float(np.interp(share, at, lengths.ravel()[order]))
+
+    def more(length: float) -> float:
+        return float(law.beyond(length).mean()) - (1.0 - BOUND)
+
+    return widest if more(widest) >= 0.0 else float(brentq(more, 0.0, widest))

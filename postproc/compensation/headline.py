@@ -104,7 +104,7 @@ class TargetException:
         """Write the expected error."""
         if np.isnan(self.bound_mm):
             return "error not known"
-        return f"{self.expected_mm:.3f} mm, 95 % below {self.bound_mm:.3f} mm"
+        return f"{self.expected_mm:.3f} mm expected, 95 % bound {self.bound_mm:.3f} mm"
 
     def why(self) -> str:
         """Write why it is an exception, nothing where only its size says so."""
@@ -140,9 +140,10 @@ class Headline:
         unknown: How many have no known error.
         before_mm, after_mm: Mean expected error without and with the corrections.
         median_mm: The median of the latter.
-        below_before_mm, below_mm: What 95 % of the true errors are below.
+        below_before_mm, below_mm: What 95 % of all true errors are below.
+        largest_mm: The largest expected error of a target.
         bound_mm: The largest 95 % bound of a target.
-        worst: The target with the largest expected error, None where none is known.
+        worst: The target with that bound, None where none is known.
     """
 
     targets: int
@@ -153,6 +154,7 @@ class Headline:
     median_mm: float
     below_before_mm: float
     below_mm: float
+    largest_mm: float
     bound_mm: float
     worst: TargetException | None
 
@@ -162,14 +164,14 @@ class Headline:
             text = "expected true error not known" if self.targets else ""
         elif not self.corrected:
             text = (
-                f"expected true error mean {self.before_mm:.3f} mm, 95 % below "
-                f"{self.below_before_mm:.3f} mm"
+                f"expected true error mean {self.before_mm:.3f} mm, 95 % of arrivals "
+                f"within {self.below_before_mm:.3f} mm"
             )
         else:
             text = (
                 f"expected true error mean {self.before_mm:.3f} -> "
-                f"{self.after_mm:.3f} mm, 95 % below {self.below_mm:.3f} mm, largest "
-                f"{self.worst.expected_mm:.3f} mm"
+                f"{self.after_mm:.3f} mm, 95 % of arrivals within {self.below_mm:.3f} "
+                f"mm, worst target within {self.bound_mm:.3f} mm (its 95 % bound)"
             )
         if self.worst is not None and self.unknown:
             text += f", not known at {self.unknown} visits"
@@ -195,13 +197,14 @@ class Headline:
         elif self.corrected:
             said.append(
                 f"The mean expected true error falls from {self.before_mm:.3f} mm to "
-                f"{self.after_mm:.3f} mm; 95 % of the targets stay below "
-                f"{self.below_mm:.3f} mm."
+                f"{self.after_mm:.3f} mm. 95 % of arrivals stay within "
+                f"{self.below_mm:.3f} mm, and the worst target stays within "
+                f"{self.bound_mm:.3f} mm (its 95 % bound)."
             )
         else:
             said.append(
-                f"The mean expected true error is {self.before_mm:.3f} mm; 95 % of the "
-                f"targets stay below {self.below_before_mm:.3f} mm."
+                f"The mean expected true error is {self.before_mm:.3f} mm. 95 % of "
+                f"arrivals stay within {self.below_before_mm:.3f} mm."
             )
         if self.worst is not None and self.unknown:
             said.append(f"The error of {self.unknown} targets is not known.")
@@ -215,7 +218,7 @@ class Headline:
         usual = self.below_mm if self.worst.corrected else self.median_mm
         if self.worst.expected_mm <= FAR * usual:
             return ""
-        return f"largest expected error at {self.worst}"
+        return f"worst target {self.worst}"
 
 
 def _against(check: ToleranceCheck, targets: int) -> str:
@@ -234,12 +237,13 @@ def headline(program: ProgramErrors) -> Headline:
     """Put the verdict into figures."""
     errors = program.expected
     known = np.flatnonzero(errors.known)
-    sizes, worst = np.full(4, np.nan), None
+    sizes, worst = np.full(5, np.nan), None
     if len(known):
         before, after = errors.before[known], errors.after[known]
-        most = errors.high[known].max()
-        sizes = np.array([before.mean(), after.mean(), np.median(after), most]) / MM
-        worst = program.describe(int(known[np.argmax(after)]))
+        last = int(known[np.argmax(errors.high[known])])
+        means = before.mean(), after.mean(), np.median(after), after.max()
+        sizes = np.array([*means, errors.high[last]]) / MM
+        worst = program.describe(last)
     return Headline(
         targets=int(errors.judged.sum()),
         corrected=int((program.corrected & errors.judged).sum()),
@@ -249,6 +253,7 @@ def headline(program: ProgramErrors) -> Headline:
         median_mm=float(sizes[2]),
         below_before_mm=errors.below_before / MM,
         below_mm=errors.below / MM,
-        bound_mm=float(sizes[3]),
+        largest_mm=float(sizes[3]),
+        bound_mm=float(sizes[4]),
         worst=worst,
     )

@@ -6,23 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from fnmatch import fnmatchcase
-from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
-from postproc.arrays import Floats, Signs, chunks
+from postproc.arrays import Floats, Signs
 from postproc.compensation.expected_error import ExpectedErrors
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Visits
 from postproc.robot.cell import Cell
-from postproc.robot.pose import MM, lengths
-
-LOW = 5.0  # the other bound of the length of the error [%]
-DRAWS = 1024  # of a normal error, the same for every target
-AT_ONCE = 1_000  # visits
-GOLDEN = 1.2207440846057596  # x^4 = x + 1: its powers fill a cube evenly
+from postproc.robot.pose import MM
 
 
 @dataclass(frozen=True)
@@ -93,7 +86,7 @@ class ToleranceCheck:
         errors: The expected errors.
         tolerance: What each is held against, (n,).
         verdict: `Verdict` of every visit, (n,).
-        low: The 5 % bound of the error's length, (n,), NaN where not known.
+        low: What 95 % of the lengths of its error are beyond, (n,), NaN where unknown.
         risk: Probability that it is beyond the tolerance, (n,), likewise.
     """
 
@@ -140,28 +133,12 @@ def check_tolerance(errors: ExpectedErrors, tolerance: Floats) -> ToleranceCheck
         errors: The expected errors of n visits.
         tolerance: Largest length of each true error, (n,) [m].
     """
-    known = errors.known
-    low = np.full(len(known), np.nan)
-    rows = np.flatnonzero(known)
-    for some in chunks(len(rows), AT_ONCE):
-        own = rows[some]
-        low[own] = np.percentile(_sizes(errors.mean[own], errors.std[own]), LOW, axis=1)
-    risk = np.where(known, errors.law.beyond(tolerance), np.nan)
+    known, law = errors.known, errors.law
+    low = np.where(known, law.least, np.nan)
+    risk = np.where(known, law.beyond(tolerance), np.nan)
     # Outside of what was surveyed nothing says how wide the bounds are.
     verdict = np.full(len(known), Verdict.UNKNOWN, dtype=np.int8)
     verdict[(errors.high <= tolerance) & ~errors.outside] = Verdict.PASS
     verdict[low > tolerance] = Verdict.FAIL
     verdict[~errors.judged] = Verdict.NONE
     return ToleranceCheck(errors, tolerance, verdict, low, risk)
-
-
-def _sizes(mean: Floats, std: Floats) -> Floats:
-    """Draw lengths of normal errors: (k, 3), (k, 3) -> (k, DRAWS)."""
-    return lengths(mean[:, None] + std[:, None] * _normal())
-
-
-@cache
-def _normal() -> Floats:
-    """Return points that fill the normal distribution evenly, (DRAWS, 3)."""
-    steps = np.arange(1, DRAWS + 1)[:, None] * GOLDEN ** -np.arange(1.0, 4.0)
-    return np.asarray(ndtri((0.5 + steps) % 1.0))

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats
 from postproc.model.effect_sum import Combination
 from postproc.model.kinematics import ArmStates
-from postproc.model.variance import parameter_variance
+from postproc.model.variance import parameter_covariance
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +45,16 @@ class Doubt:
         """Multiply the covariance by a factor."""
         return Doubt(self.effects, factor * self.covariance)
 
-    def variance(self, own: Combination, at: ArmStates) -> Floats:
-        """Variance of the error, (n, 3) [m^2].
+    def error_covariance(self, own: Combination, at: ArmStates) -> Floats:
+        """Return the covariance of the error, (n, 6) [m^2].
 
         Args:
             own: The model's effects, of p parameters.
             at: n states, with the kinematics taken at the parameters.
         """
         both = Combination((*own.effects, *self.effects.effects))
-        return parameter_variance(both, at, self.covariance)
+        return parameter_covariance(both, at, self.covariance)
+
+    def variance(self, own: Combination, at: ArmStates) -> Floats:
+        """Return the variance of the error, (n, 3) [m^2], see above."""
+        return self.error_covariance(own, at)[:, :3]

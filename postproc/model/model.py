@@ -37,8 +37,11 @@ from postproc.model.registration import Registration
 from postproc.model.validity import Ranges
 from postproc.model.variance import (
     beyond_variance,
+    covariance_of,
     moment_variance,
+    parameter_covariance,
     parameter_variance,
+    side_covariance,
     side_variance,
     unknown_variance,
 )
@@ -57,15 +60,21 @@ class Prediction:
         error: (n, 3) [m].
         std_model: Standard error of `error` per axis, (n, 3) [m]: how well the error is
             known on average over arrivals.
-        std_arrival: Standard deviation of one arrival, (n, 3) [m]: with repeatability.
+        covariance: Of the error of one arrival, (n, 6) [m^2]: with repeatability; xx,
+            yy, zz, then xy, xz, yz.
         outside: Reasons why states lie outside what was surveyed, with the states,
             (n,) each. No reason: all inside.
     """
 
     error: Floats
     std_model: Floats
-    std_arrival: Floats
+    covariance: Floats
     outside: dict[str, NDArray[np.bool_]]
+
+    @property
+    def std_arrival(self) -> Floats:
+        """Standard deviation of one arrival per axis, (n, 3) [m]."""
+        return np.asarray(np.sqrt(np.maximum(self.covariance[:, :3], 0.0)))
 
     @property
     def any_outside(self) -> NDArray[np.bool_]:
@@ -101,11 +110,16 @@ class PredictedReading:
 
     Attributes:
         error: Reading minus nominal TCP position, base frame, (n, 3) [m].
-        std: Of one reading, (n, 3) [m]: 1.96 of it hold 95 % of the readings.
+        covariance: Of one reading, (n, 6) [m^2]: xx, yy, zz, then xy, xz, yz.
     """
 
     error: Floats
-    std: Floats
+    covariance: Floats
+
+    @property
+    def std(self) -> Floats:
+        """Standard deviation of one reading, (n, 3) [m]: 1.96 of it hold 95 %."""
+        return np.asarray(np.sqrt(self.covariance[:, :3]))
 
 
 # A fitted model: what the arm does wrong, and how well that is known.
@@ -302,11 +316,12 @@ class Model:
         Where a direction is not known (0), the error is that of the middle of the gap,
         and half the gap enters both standard deviations.
         """
-        model, arrival = np.empty((len(states), 3)), np.empty((len(states), 3))
+        known, arrival = np.empty((2, len(states), 6))
         for rows in chunks(len(states), CHUNK):
-            model[rows], at = self._variance(arm, states[rows])
-            arrival[rows] = model[rows] + self.noise.arrival_variance(at.jacobian)
-        model, arrival = (np.sqrt(np.maximum(v, 0.0)) for v in (model, arrival))
+            known[rows], at = self._covariance(arm, states[rows])
+            scatter = covariance_of(self.noise.scatter_columns(at.jacobian))
+            arrival[rows] = known[rows] + scatter
+        model = np.sqrt(np.maximum(known[:, :3], 0.0))
         outside = self.ranges.outside(states, self.needs, self.bent)
         unsure = _on_flanks(states) & any_in_rows(model > self._certain_up_to)
         if unsure.any():
@@ -316,9 +331,9 @@ class Model:
     def std_error(self, arm: Arm, states: States) -> Floats:
         """Standard error of the predicted error, (n, 3) [m], as `predict` gives it."""
         parts = map_chunks(
-            lambda rows: self._variance(arm, states[rows])[0], len(states), CHUNK
+            lambda rows: self._covariance(arm, states[rows])[0], len(states), CHUNK
         )
-        variance = np.concatenate([np.zeros((0, 3)), *parts])
+        variance = np.concatenate([np.zeros((0, 6)), *parts])[:, :3]
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def std_on_flanks(self, arm: Arm, states: States) -> Floats:
@@ -348,19 +363,19 @@ class Model:
         """Standard error per axis up to which the survey vouches for it [m]."""
         return 3 * (self.statistics.get(WORST_STD, np.inf) * MM)
 
-    def _variance(self, arm: Arm, states: States) -> tuple[Floats, ArmStates]:
-        """Variance of the error, (n, 3) [m^2], and the kinematics that it is of."""
+    def _covariance(self, arm: Arm, states: States) -> tuple[Floats, ArmStates]:
+        """Return that of the error, (n, 6) [m^2], and the kinematics it is of."""
         effects, values, covariance = self.compensable()
         at = effects.at(ArmStates(arm, states), values)
-        variance = self.unmodelled_variance(effects, at, values)
+        known = self.unmodelled_covariance(effects, at, values)
         if len(covariance):
-            variance += parameter_variance(effects, at, covariance)
-        return variance, at
+            known += parameter_covariance(effects, at, covariance)
+        return known, at
 
-    def unmodelled_variance(
+    def unmodelled_covariance(
         self, effects: Combination, at: ArmStates, values: Floats
     ) -> Floats:
-        """Variance that the parameters' covariance does not hold, (n, 3) [m^2].
+        """Return what the parameters' covariance does not hold, (n, 6) [m^2].
 
         Unknown directions, free forms beyond their range, what no effect describes of a
         pose that was not measured, and what no row shows of the set-up.
@@ -373,15 +388,17 @@ class Model:
         prior_std = self.prior_std
         if effects is not self.effects and len(prior_std):
             prior_std = prior_std[self.effects.where(*COMPENSATED)]
-        beyond = beyond_variance(effects, at, prior_std)
+        out = side_covariance(effects, at, values)
+        out[:, :3] += beyond_variance(effects, at, prior_std) + np.square(self.spread)
+        out[:, :3] += moment_variance(effects, at, values)
+        out[:, :3] += unknown_variance(effects, at)
         if self.noise.pose_joint or self.noise.pose:
-            beyond = beyond + self.noise.pose_variance(at.jacobian)
-        beyond += moment_variance(effects, at, values) + unknown_variance(effects, at)
+            out += covariance_of(self.noise.pose_columns(at.jacobian))
         if (doubt := self.doubt) is not None:
             if effects is not self.effects:
                 doubt = doubt.get_settings(self.effects.where(*COMPENSATED))
-            beyond += doubt.variance(effects, at)
-        return side_variance(effects, at, values) + np.square(self.spread) + beyond
+            out += doubt.error_covariance(effects, at)
+        return out
 
     def without_clock(self, known: Collection[str]) -> Model:
         """Return it for rows of an unknown moment: what passes with time at its mean.
@@ -401,31 +418,32 @@ class Model:
         parts = map_chunks(
             lambda rows: self._read(arm, states[rows]), len(states), CHUNK
         )
-        nothing = PredictedReading(np.zeros((0, 3)), np.zeros((0, 3)))
-        error, std = zip(*((p.error, p.std) for p in (nothing, *parts)), strict=True)
-        return PredictedReading(np.concatenate(error), np.concatenate(std))
+        nothing = PredictedReading(np.zeros((0, 3)), np.zeros((0, 6)))
+        all_parts = ((p.error, p.covariance) for p in (nothing, *parts))
+        error, covariance = zip(*all_parts, strict=True)
+        return PredictedReading(np.concatenate(error), np.concatenate(covariance))
 
     def _read(self, arm: Arm, states: States) -> PredictedReading:
         batch = ArmStates(arm, states)
         at = self.effects.at(batch, self.values)
-        known = self.unmodelled_variance(self.effects, at, self.values)
+        known = self.unmodelled_covariance(self.effects, at, self.values)
         if len(self.covariance):
-            known = known + parameter_variance(self.effects, at, self.covariance)
+            known += parameter_covariance(self.effects, at, self.covariance)
         error = self.effects.error_at(at, batch, self.values)
-        return PredictedReading(error, self.reading_std(at, known))
+        return PredictedReading(error, self.reading_covariance(at, known))
 
-    def reading_std(self, at: ArmStates, known: Floats) -> Floats:
-        """Standard deviation of one row, the mean of its readings, (n, 3) [m].
+    def reading_covariance(self, at: ArmStates, known: Floats) -> Floats:
+        """Return the covariance of one row, the mean of its readings, (n, 6) [m^2].
 
         Args:
             at: n states, with the kinematics taken at the parameters.
-            known: Variance of the mean of many arrivals, (n, 3) [m^2].
+            known: That of the mean of many arrivals, (n, 6) [m^2].
         """
         read = self.noise.tracker_std(at.tcp) ** 2 / at.states.readings
-        scatter = self.noise.arrival_variance(at.jacobian) + read[:, None]
-        scatter = scatter + self.noise.rounding_variance(at.states.q, at.jacobian)
-        std = np.sqrt(np.maximum(known, 0.0) + scatter)
-        return np.asarray(self.reading_spread * std)
+        out = known + covariance_of(self.noise.scatter_columns(at.jacobian))
+        out[:, :3] += self.noise.rounding_variance(at.states.q, at.jacobian)
+        out[:, :3] += read[:, None]
+        return np.asarray(self.reading_spread**2 * out)
 
     def check_arm(self, arm: Arm, path: str | Path = "model") -> None:
         """Check that the model was made for an arm, mounted as it is.

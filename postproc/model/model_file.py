@@ -19,6 +19,7 @@ from pydantic import (
 
 from postproc.arrays import Floats
 from postproc.exceptions import ModelError
+from postproc.model.noise import ALIKE
 from postproc.model.registration import Registration
 from postproc.robot.arm import FLOOR
 
@@ -70,6 +71,7 @@ class NoiseSection(ModelSection):
     pose_joint: NonNegativeFloat = 0.0
     pose: NonNegativeFloat = 0.0
     rounding: NonNegativeFloat = 0.0
+    by_joint: tuple[NonNegativeFloat, ...] = Field(ALIKE, min_length=6, max_length=6)
 
 
 class RangesSection(ModelSection):

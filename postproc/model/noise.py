@@ -10,6 +10,7 @@ from postproc.arrays import Floats, Ints
 from postproc.robot.state import States
 
 TRACKER_FIXED, TRACKER_RANGE = 1e-5, 5e-6  # [m], [m/m] a laser tracker's data sheet
+ALIKE = (1.0,) * 6  # joints
 SAME_POSE = 6e-5  # [rad] joint angles that are one pose, read back to 0.001 deg
 
 
@@ -28,6 +29,7 @@ class Noise:
         pose: Standard deviation S of a pose per axis [m].
         rounding: Part of R that rounded joint angles of the file explain [rad]: other
             rounded rows have it, commands have not.
+        by_joint: Scatter of every joint over r and R, (6,).
     """
 
     tracker: float
@@ -37,6 +39,12 @@ class Noise:
     pose_joint: float = 0.0
     pose: float = 0.0
     rounding: float = 0.0
+    by_joint: tuple[float, ...] = ALIKE
+
+    @property
+    def joint_std(self) -> Floats:
+        """Standard deviation of every joint angle from stop to stop, (6,) [rad]."""
+        return self.joint * np.array(self.by_joint)
 
     def tracker_std(self, position: Floats) -> Floats:
         """Standard deviation per axis of the tracker at positions (n, 3), (n,) [m]."""
@@ -45,16 +53,27 @@ class Noise:
 
     def arrival_variance(self, jacobian: Floats) -> Floats:
         """Variance per axis of one arrival, (n, 3) [m^2]."""
-        return _propagate_angle(jacobian, self.joint, self.stop)
+        return _propagate_angle(jacobian, self.joint_std, self.stop)
+
+    def scatter_columns(self, jacobian: Floats) -> Floats:
+        """Return independent parts of the scatter of one arrival, (n, 3, 9) [m]."""
+        shift = np.broadcast_to(self.stop * np.eye(3), (len(jacobian), 3, 3))
+        return np.concatenate([jacobian * self.joint_std, shift], axis=2)
+
+    def pose_columns(self, jacobian: Floats) -> Floats:
+        """Return the same of a pose that was not measured, (n, 3, 9) [m]."""
+        of_pose = replace(self, joint=self.pose_joint, stop=self.pose)
+        return of_pose.scatter_columns(jacobian)
 
     def pose_variance(self, jacobian: Floats) -> Floats:
         """Variance per axis of a pose that was not measured, (n, 3) [m^2]."""
-        return _propagate_angle(jacobian, self.pose_joint, self.pose)
+        own = self.pose_joint * np.array(self.by_joint)
+        return _propagate_angle(jacobian, own, self.pose)
 
     def rounding_variance(self, q: Floats, jacobian: Floats) -> Floats:
         """Variance per axis of rows with joint angles q (n, 6) [rad], (n, 3) [m^2]."""
         rounding = self.rounding if self.rounding and angle_step(q) else 0.0
-        return _propagate_angle(jacobian, rounding, 0.0)
+        return _propagate_angle(jacobian, np.full(6, rounding), 0.0)
 
     def rescale(self, factor: float) -> Noise:
         """Multiply the scatter of stops and poses, rounding aside, by a factor."""
@@ -81,10 +100,9 @@ def angle_step(q: Floats) -> float:
     return 0.0
 
 
-def _propagate_angle(jacobian: Floats, joint: float, shift: float) -> Floats:
-    """Variance per axis of joint angles and of a shift, (n, 3) [m^2]."""
-    square: Floats = np.einsum("nij,nij->ni", jacobian, jacobian)
-    return joint**2 * square + shift**2
+def _propagate_angle(jacobian: Floats, joint: Floats, shift: float) -> Floats:
+    """Variance per axis of joint angles (6,) and of a shift, (n, 3) [m^2]."""
+    return np.asarray(np.square(jacobian) @ joint**2 + shift**2)
 
 
 def tracker_shape(

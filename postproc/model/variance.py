@@ -1,4 +1,7 @@
-"""How far off errors may be: parameters are not known exactly, nor are all sides."""
+"""How far off errors may be: parameters are not known exactly, nor are all sides.
+
+A covariance of n errors is kept as (n, 6): xx, yy, zz, then xy, xz, yz.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,36 @@ from postproc.model.effects.geometry import Geometry
 from postproc.model.kinematics import ArmStates, base_of, deviate
 
 NONE = np.empty(0, dtype=np.int64)
+ROWS, COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)  # of a covariance
 
 
-def parameter_variance(
+def covariance_of(parts: Floats) -> Floats:
+    """Sum the covariances of independent parts of unit variance, (n, 3, k) -> (n, 6).
+
+    >>> covariance_of(np.array([[[1.0], [2.0], [0.0]]]))
+    array([[1., 4., 0., 2., 0., 0.]])
+    """
+    out: Floats = np.einsum("nik,nik->ni", parts[:, ROWS], parts[:, COLUMNS])
+    return out
+
+
+def spread_covariance(columns: Floats, covariance: Floats) -> Floats:
+    """Return the covariance of columns times uncertain factors, (n, 6).
+
+    Args:
+        columns: (n, 3, p).
+        covariance: Of the factors, (p, p).
+    """
+    rows = columns.T.reshape(columns.shape[2], -1)  # one large product
+    weighed = (covariance @ rows).reshape(columns.T.shape).T
+    out: Floats = np.einsum("nip,nip->ni", weighed[:, ROWS], columns[:, COLUMNS])
+    return out
+
+
+def parameter_covariance(
     effects: Combination, at: ArmStates, covariance: Floats
 ) -> Floats:
-    """Variance that uncertain parameters give, (n, 3) [m^2].
+    """Return the covariance that uncertain parameters give, (n, 6) [m^2].
 
     Args:
         effects: The effects.
@@ -27,14 +54,18 @@ def parameter_variance(
     placing = sum(isinstance(e, Geometry) for e in effects.effects)
     turning = sum(isinstance(e, JointEffect) for e in effects.effects)
     if placing == 1 and 1 + turning == len(effects.effects):
-        return _variance_by_joints(effects, at, covariance)
-    columns = effects.columns(at)
-    rows = columns.T.reshape(columns.shape[2], -1)  # one large product
-    summed = np.einsum("pr,pr->r", covariance @ rows, rows)
-    return np.asarray(summed.reshape(3, -1).T)
+        return _covariance_by_joints(effects, at, covariance)
+    return spread_covariance(effects.columns(at), covariance)
 
 
-def _variance_by_joints(
+def parameter_variance(
+    effects: Combination, at: ArmStates, covariance: Floats
+) -> Floats:
+    """Return the variance that uncertain parameters give, (n, 3) [m^2]."""
+    return parameter_covariance(effects, at, covariance)[:, :3]
+
+
+def _covariance_by_joints(
     effects: Combination, at: ArmStates, covariance: Floats
 ) -> Floats:
     """Do it for one geometry and joint effects, whose columns are the Jacobian's."""
@@ -49,7 +80,7 @@ def _variance_by_joints(
     given = [np.empty((len(at), 0)), *(e.basis(at) for e, _ in turning)]
     basis = np.ascontiguousarray(np.concatenate(given, axis=1)[:, by_joint])
     tool = at.states.tool + at.deviation.tool
-    return _native.variance(
+    return _native.covariance(
         deviate(at.arm.dh, at.deviation).pack(at.deviation.link[:, 4]),
         base_of(at.deviation),
         (np.ascontiguousarray(at.angles), np.ascontiguousarray(tool)),
@@ -59,15 +90,20 @@ def _variance_by_joints(
     )
 
 
-def side_variance(effects: Combination, at: ArmStates, values: Floats) -> Floats:
-    """Variance that unknown directions give, (n, 3) [m^2]."""
+def side_covariance(effects: Combination, at: ArmStates, values: Floats) -> Floats:
+    """Return the covariance that unknown directions give, (n, 6) [m^2]."""
     unknown = 1.0 - np.clip(at.states.direction, -1.0, 1.0) ** 2
-    out = np.zeros((len(at), 3))
+    out = np.zeros((len(at), 6))
     rows = np.flatnonzero(any_in_rows(unknown > 0.0))
     if len(rows):
         slopes = effects.direction_slopes(at[rows], values)
-        out[rows] = np.einsum("nij,nj->ni", slopes**2, unknown[rows])
+        out[rows] = covariance_of(slopes * np.sqrt(unknown[rows])[:, None])
     return out
+
+
+def side_variance(effects: Combination, at: ArmStates, values: Floats) -> Floats:
+    """Return the variance that unknown directions give, (n, 3) [m^2]."""
+    return side_covariance(effects, at, values)[:, :3]
 
 
 def beyond_variance(effects: Combination, at: ArmStates, prior_std: Floats) -> Floats:

@@ -136,11 +136,11 @@ def _pose_variance(model: Model, at: ArmStates) -> Floats:
     is taken to be as large as that, and what checks have in common tells.
     """
     noise = model.noise
-    all_of_it = model.unmodelled_variance(model.effects, at, model.values)
+    all_of_it = model.unmodelled_covariance(model.effects, at, model.values)[:, :3]
     of_joints = noise.pose_variance(at.jacobian) - noise.pose**2
     shift = np.maximum(all_of_it - of_joints, noise.stop**2)
-    angle = max(noise.pose_joint, noise.joint)
-    joints = np.full((len(at), 6), angle**2)
+    angle = max(noise.pose_joint, noise.joint) * np.array(noise.by_joint)
+    joints = np.tile(angle**2, (len(at), 1))
     return np.concatenate([joints, np.maximum(shift, LEAST**2)], axis=1)
 
 
@@ -154,8 +154,8 @@ def _noise(
     noise, n, spread = model.noise, len(rows), model.reading_spread
     stop = stops_of(rows.states, rows.visit)
     same = stop[:, None] == stop
-    turned = np.einsum("nij,mkj->nmik", at.jacobian, at.jacobian)
-    shared = noise.joint**2 * turned + noise.stop**2 * np.eye(3)
+    turned = at.jacobian * noise.joint_std
+    shared = np.einsum("nij,mkj->nmik", turned, turned) + noise.stop**2 * np.eye(3)
     shared = np.where(same[:, :, None, None], shared, 0.0)
     read = noise.tracker_std(position) ** 2 / rows.states.readings
     shared[range(n), range(n)] += read[:, None, None] * np.eye(3)

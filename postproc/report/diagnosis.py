@@ -12,6 +12,7 @@ import numpy as np
 
 from postproc.calibration.diagnosis.investigate import REMAINS
 from postproc.calibration.diagnosis.result import Diagnosis
+from postproc.calibration.evidence import name_evidence
 from postproc.calibration.report import DirectionReport
 from postproc.files import schema
 from postproc.model.effects.effect import PART_MOTION
@@ -163,7 +164,7 @@ def _describe_unexplained(found: Diagnosis) -> list[str]:
     if not shown:
         return lines
     return lines + [
-        f"closest: {p.direction} by {p.driver} ({p.evidence:.1f} nats, "
+        f"closest: {p.direction} by {p.driver} (evidence {name_evidence(p.evidence)}, "
         f"p = {p.p_value:.2g})"
         for p in found.places[:2]
     ]

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.calibration.baselines import VOLUME_DEG, Comparison
+from postproc.calibration.evidence import WEAK, name_evidence
 from postproc.calibration.fit import Calibration
 from postproc.calibration.report import FitReport, Found
 from postproc.files import schema
@@ -23,12 +24,11 @@ FOUND = (
     Column("joint"),
     Column("rms mm"),
     Column("max mm"),
-    Column("evidence nats"),
+    Column("evidence", "left"),
     Column("", "left"),
 )
 MOST, FEW = 20, 8  # findings, and rows, that a short report lists
 SHOWN_MM = 0.0005  # of poses: less is not listed
-ENOUGH = 3.0  # nats from which a finding is listed: 20 to 1
 COMPARED = (
     Column("method", "left"),
     Column("range mm"),
@@ -101,7 +101,7 @@ def _tell_found(found: Sequence[Found]) -> str:
     cells = (
         (
             f.effect, str(f.joint or ""), f"{f.size_mm:.3f}", f"{f.max_mm:.3f}",
-            str(round(f.evidence)), _remark(f),
+            name_evidence(f.evidence), _remark(f),
         )
         for f in found
     )  # fmt: skip
@@ -121,7 +121,7 @@ def _remark(found: Found) -> str:
 
 def _large(found: Sequence[Found]) -> list[Found]:
     """Take the largest findings for which there is evidence, and impossible ones."""
-    shown = [f for f in found if f.evidence > ENOUGH]
+    shown = [f for f in found if f.evidence > WEAK]
     few = shown[:MOST]
     return few + [f for f in found if f.impossible and f not in few]
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from postproc.calibration.evidence import name_evidence
 from postproc.files import schema
 from postproc.record.causes import BASE, TOOL, ZERO, Power
 from postproc.record.control import CheckVerdict
@@ -23,7 +24,6 @@ LISTED = (
     Column("state", "left"), Column("checks"), Column("last check", "left"),
     Column("stale"),
 )  # fmt: skip
-WEAK, LIKELY = 3.0, 6.0  # nats: below, hardly more than a guess; above, sure enough
 ROOT = float(np.sqrt(2.0))
 
 
@@ -106,19 +106,8 @@ def _headline(serial: str, verdict: CheckVerdict) -> str:
         return f"{serial}: moved, and no cause explains it alone"
     text = f"{serial}: moved: {best.describe()}"
     if others:
-        less = best.nats - others[0].nats
-        text += f" (or {others[0].cause.name}, {less:.0f} nats less)"
-    return f"{text}; evidence {_words(best.nats)}"
-
-
-def _words(nats: float) -> str:
-    """Say how much evidence is worth.
-
-    >>> _words(4.2)
-    'likely (4 nats)'
-    """
-    word = "weak" if nats < WEAK else "likely" if nats < LIKELY else "strong"
-    return f"{word} ({nats:.0f} nats)"
+        text += f" (or just as well {others[0].cause.name})"
+    return f"{text}; evidence {name_evidence(best.nats)}"
 
 
 def tell_foreseen(foreseen: Power) -> str:

@@ -79,7 +79,7 @@ def describe_errors(outcome: Outcome) -> dict[str, Any]:
         "after_mm": found.after_mm,
         "below_95_before_mm": found.below_before_mm,
         "below_95_mm": found.below_mm,
-        "largest_mm": np.nan if found.worst is None else found.worst.expected_mm,
+        "largest_mm": found.largest_mm,
         "largest_bound_95_mm": found.bound_mm,
     }
     return {

@@ -26,7 +26,8 @@ def errors_of(kept=(), unknown=(), tolerance=None, side=()):
     error = np.tile([1.7e-3, 0.0, 0.0], (N, 1))
     error[list(unknown)] = np.nan
     left = np.isin(np.arange(N), kept)
-    found = np.stack([error, np.full((N, 3), 1e-5), np.zeros((N, 3))], axis=1)
+    none = np.zeros((N, 3))
+    found = np.stack([error, np.full((N, 3), 1e-10), none, none], axis=1)
     arrivals = SimpleNamespace(visits=[None] * N, predict=lambda rows: found)
     correction = np.where(left[:, None], 0.0, -np.nan_to_num(error))
     expected = expect_errors(arrivals, correction, np.ones(N, dtype=bool))
@@ -49,15 +50,21 @@ def test_the_headline_is_the_expected_true_error():
     found = headline(errors_of())
     assert found.before_mm == pytest.approx(1.7, rel=0.01) and found.first == ""
     assert 0.005 < found.after_mm < 0.03 < 0.05 > found.below_mm > found.after_mm
-    assert str(found).startswith("expected true error mean 1.700 -> 0.0")
+    # Mean, 95 % of all arrivals, 95 % bound of the worst target: each is larger.
+    assert found.below_mm <= found.bound_mm and found.largest_mm < found.bound_mm
+    assert str(found) == (
+        f"expected true error mean 1.700 -> {found.after_mm:.3f} mm, 95 % of arrivals "
+        f"within {found.below_mm:.3f} mm, worst target within {found.bound_mm:.3f} mm "
+        "(its 95 % bound)"
+    )
 
 
 def test_a_target_that_was_not_corrected_comes_first_with_line_and_reason():
     program_errors = errors_of(kept=[7])
     found = headline(program_errors)
-    assert found.first.startswith("largest expected error at job.pdl:17 p_3: 1.700 mm")
+    assert found.first.startswith("worst target job.pdl:17 p_3: 1.700 mm expected")
     assert found.first.endswith(f"not corrected, {LIMIT}")
-    assert found.verdict().startswith("Largest expected error at job.pdl:17")
+    assert found.verdict().startswith("Worst target job.pdl:17")
     assert [one.row for one in list_exceptions(program_errors)] == [7]
 
 

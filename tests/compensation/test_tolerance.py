@@ -12,11 +12,12 @@ from scipy.stats import chi, ncx2
 from postproc.compensation.expected_error import (
     LengthLaw,
     expect_errors,
-    pool_quantile,
+    pool_bound,
 )
 from postproc.compensation.tolerance import JobTolerance, Verdict, check_tolerance
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Meaning
+from postproc.model.variance import covariance_of
 from tests.made_visits import visits as made_visits
 from tests.written import FIRST, NEXT, POSE, cli, program
 
@@ -26,8 +27,8 @@ STD = 0.02e-3
 def arrivals(error, std=STD, outside=0.0):
     """Arrivals whose model predicts these errors (n, 3) [m]."""
     error = np.asarray(error, dtype=float)
-    columns = (error, np.full_like(error, std), np.full_like(error, outside))
-    found = np.stack(columns, axis=1)
+    whole = np.full_like(error, outside)
+    found = np.stack([error, whole * 0.0 + std**2, whole * 0.0, whole], axis=1)
     return SimpleNamespace(visits=[None] * len(error), predict=lambda rows: found)
 
 
@@ -39,38 +40,42 @@ def check(error, correction, tolerance, **given):
 
 
 def test_bounds_are_those_of_the_length_of_a_normal_error():
-    error = np.array([[1e-3, 0, 0], [0.05e-3, 0, 0]])
-    found = check(error, [-error[0], [0, 0, 0]], 0.1)
+    error = np.array([[1e-3, 0, 0], [0.05e-3, 0, 0], [0.3e-3, 0, 0]])
+    found = check(error, [-error[0], [0, 0, 0], [0, 0, 0]], 0.1)
     assert found.errors.high[0] == pytest.approx(STD * chi(3).ppf(0.95), rel=0.01)
     assert found.errors.after[0] == pytest.approx(STD * chi(3).mean(), rel=0.01)
-    length = ncx2(3, (error[1, 0] / STD) ** 2)
-    for bound, share in ((found.low[1], 0.05), (found.errors.high[1], 0.95)):
-        assert bound == pytest.approx(STD * np.sqrt(length.ppf(share)), rel=0.02)
+    length = ncx2(3, (error[1:, 0] / STD) ** 2)
+    low, high = (STD * np.sqrt(length.ppf(share)) for share in (0.05, 0.95))
+    assert found.errors.high[1:] == pytest.approx(high, rel=0.02)
+    assert (found.low[1:] <= low).all()  # at least 95 % are beyond
+    assert found.low[2] == pytest.approx(low[1], rel=0.02)
     beyond = length.sf((0.1e-3 / STD) ** 2)
-    assert found.risk[1] == pytest.approx(beyond, abs=0.003)
+    assert found.risk[1:] == pytest.approx(beyond, abs=0.003)
     assert found.outside == pytest.approx(found.risk.sum())
 
 
 def test_the_law_of_lengths_is_that_of_drawn_errors():
     rng = np.random.default_rng(56)
     mean = rng.normal(size=(40, 3)) * rng.choice([0.0, 0.02, 0.3], size=(40, 1))
-    std = 0.02 * np.exp(rng.normal(size=(40, 3)))
-    drawn = np.linalg.norm(
-        mean[:, None] + std[:, None] * rng.normal(size=(40, 50_000, 3)), axis=2
-    )
-    law = LengthLaw.of_normal(mean, std)
-    assert law.quantile(0.95) == pytest.approx(
-        np.quantile(drawn, 0.95, axis=1), rel=0.03
-    )
+    # Errors of one axis are drawn with those of the others, as one joint makes them.
+    root = 0.02 * rng.normal(size=(40, 3, 3)) * np.exp(rng.normal(size=(40, 1, 3)))
+    normal = rng.normal(size=(40, 50_000, 3))
+    drawn = np.linalg.norm(mean[:, None] + normal @ root.swapaxes(1, 2), axis=2)
+    law = LengthLaw.of_normal(mean, covariance_of(root))
+    assert law.bound == pytest.approx(np.quantile(drawn, 0.95, axis=1), rel=0.03)
+    assert ((drawn < law.least[:, None]).mean(axis=1) < 0.053).all()
     at = np.quantile(drawn, 0.9, axis=1)
     assert law.beyond(at) == pytest.approx(np.full(40, 0.1), abs=0.01)
-    whole = pool_quantile(law.at_nodes())
-    assert whole == pytest.approx(np.quantile(drawn, 0.95), rel=0.03)
+    assert law.mean == pytest.approx(drawn.mean(axis=1), rel=0.02)
+    whole = pool_bound(law, law.bound.max())
+    assert whole == pytest.approx(pool_bound(law, 3.0 * law.mean.max()), rel=1e-6)
+    assert whole == pytest.approx(np.quantile(drawn, 0.95), rel=0.02)
 
 
 def test_an_error_that_does_not_scatter_has_its_own_length():
-    law = LengthLaw.of_normal(np.array([[3e-3, 0, 4e-3]]), np.zeros((1, 3)))
-    assert law.quantile(0.95) == pytest.approx([5e-3], rel=2e-3)
+    law = LengthLaw.of_normal(np.array([[3e-3, 0, 4e-3]]), np.zeros((1, 6)))
+    assert law.bound == pytest.approx([5e-3], rel=2e-3)
+    assert law.least == pytest.approx([5e-3], rel=2e-3)
     assert law.beyond(4.9e-3) == pytest.approx([1.0])
 
 

@@ -490,8 +490,9 @@ def _next(traced: Investigation, seed: int) -> tuple[str, Floats]:
             )
             if nats < TELLING:
                 continue
+            rounds = int(np.ceil(NEAR / nats))
             worth = (
-                f"a round is worth about {nats:.1f} nats, {NEAR:.0f} tell them apart"
+                f"about {rounds} {'round' if rounds == 1 else 'rounds'} of these poses"
             )
             return f"tell {own} from {rival.family} ({worth})", poses
     name, poses = poses_that_sharpen(found.fit, seed)

@@ -4,6 +4,7 @@
 class ProgramPage {
   constructor(data) {
     const columns = new Columns(data.columns);
+    Table.take(data.fields);
     const listing = new Listing(data.listing);
     this.columns = columns;
     this.detail = new Detail(document.getElementById("detail"), columns, listing);

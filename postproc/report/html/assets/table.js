@@ -172,37 +172,32 @@ class Table {
 
 Table.LENGTH = 100;
 {
-  const axis = (k, name) => ({ key: name, label: name, kind: "number", title: `${name} of the correction, base frame [mm]`,
-    value: (c, i) => c.of("correction_mm", i)[k], cell: (c, i) => (c.size[i] > 0 ? Page.number(c.of("correction_mm", i)[k], 3) : "") });
-  Table.FIELDS = [
-    { key: "visit", label: "#", kind: "number", title: "Number of the visit, in program order",
-      value: (c, i) => c.visit[i], cell: (c, i) => String(c.visit[i]) },
-    { key: "line", label: "line", kind: "number", title: "Line of the move in the source",
-      value: (c, i) => c.file[i] * 1e9 + c.line[i], cell: (c, i) => c.place(i) },
-    { key: "name", label: "target", value: (c, i) => c.names[c.name[i]], cell: (c, i) => c.names[c.name[i]] },
-    { key: "move", label: "move", value: (c, i) => c.moves[c.move[i]], cell: (c, i) => c.moves[c.move[i]] },
-    { key: "status", label: "status", kind: "status", value: (c, i) => Table.URGENCY.indexOf(c.status_of(i)),
-      cell: (c, i) => `${Columns.STATUS[c.status_of(i)].mark} ${c.status_of(i)}` },
-    { key: "expected", label: "error mm", kind: "number", down: true, title: "Expected true error with the correction [mm]",
-      value: (c, i) => c.of("expected_mm", i)[1], cell: (c, i) => Page.number(c.of("expected_mm", i)[1], 3) },
-    { key: "bound", label: "95 % mm", kind: "number", down: true, title: "The error is below this with a probability of 95 % [mm]",
-      value: (c, i) => c.of("expected_mm", i)[2], cell: (c, i) => Page.number(c.of("expected_mm", i)[2], 3) },
-    { key: "verdict", label: "verdict", title: "Against the tolerance of the job",
-      value: (c, i) => c.verdicts[c.verdict[i]], cell: (c, i) => c.verdicts[c.verdict[i]] },
-    { key: "before", label: "before mm", kind: "number", down: true, title: "Expected true error without any correction [mm]",
-      value: (c, i) => c.of("expected_mm", i)[0], cell: (c, i) => Page.number(c.of("expected_mm", i)[0], 3) },
-    { key: "size", label: "|c| mm", kind: "number", down: true, title: "Length of the correction [mm]",
-      value: (c, i) => (c.size[i] > 0 ? c.size[i] : NaN), cell: (c, i) => (c.size[i] > 0 ? Page.number(c.size[i], 3) : "") },
-    axis(0, "dx"), axis(1, "dy"), axis(2, "dz"),
-    { key: "sigma", label: "± mm", kind: "number", down: true, title: "Standard error of the model there, length over the axes [mm]",
-      value: (c, i) => c.sigma[i], cell: (c, i) => Page.number(c.sigma[i], 3) },
-    { key: "sides", label: "J1–6", kind: "sides", title: "Direction in which each joint arrives: ↑ +, ↓ −, · not known",
-      value: (c, i) => c.arrows(i), cell: (c, i) => c.arrows(i) },
-    { key: "why", label: "reason", kind: "why", value: (c, i) => c.reasons[c.why[i]], cell: (c, i) => c.reasons[c.why[i]] },
-  ];
+  // What scripts add to the columns that the page states: how they are sorted and shown.
+  const number = (value) => ({ value, cell: (c, i) => Page.number(value(c, i), 3) });
+  const text = (value) => ({ value, cell: (c, i) => value(c, i) });
+  const changed = (value) => ({ value: (c, i) => (c.size[i] > 0 ? value(c, i) : NaN), cell: (c, i) => (c.size[i] > 0 ? Page.number(value(c, i), 3) : "") });
+  const axis = (k) => changed((c, i) => c.of("correction_mm", i)[k]);
+  const expected = (k) => number((c, i) => c.of("expected_mm", i)[k]);
+  Table.CELLS = {
+    visit: { value: (c, i) => c.visit[i], cell: (c, i) => String(c.visit[i]) },
+    line: { value: (c, i) => c.file[i] * 1e9 + c.line[i], cell: (c, i) => c.place(i) },
+    name: text((c, i) => c.names[c.name[i]]),
+    move: text((c, i) => c.moves[c.move[i]]),
+    status: { value: (c, i) => Table.URGENCY.indexOf(c.status_of(i)), cell: (c, i) => `${Columns.STATUS[c.status_of(i)].mark} ${c.status_of(i)}` },
+    expected: expected(1), bound: expected(2), before: expected(0),
+    verdict: text((c, i) => c.verdicts[c.verdict[i]]),
+    size: changed((c, i) => c.size[i]),
+    dx: axis(0), dy: axis(1), dz: axis(2),
+    sigma: number((c, i) => c.sigma[i]),
+    sides: text((c, i) => c.arrows(i)),
+    why: text((c, i) => c.reasons[c.why[i]]),
+  };
 }
-{
+Table.FIELDS = [];
+Table.PRINTED = [];
+Table.take = (fields) => {
+  Table.FIELDS = fields.map((field) => ({ ...field, ...Table.CELLS[field.key] }));
   const printed = ["visit", "line", "name", "status", "before", "expected", "bound", "verdict", "dx", "dy", "dz", "why"];
   Table.PRINTED = printed.map((key) => Table.FIELDS.find((f) => f.key === key));
-}
+};
 Table.URGENCY = ["conflict", "rejected", "runtime", "corrected", "unchanged"];
