@@ -10,7 +10,7 @@ from postproc.robot.cell import Cell
 from postproc.robot.trajectory import Motion
 from tests.language.neutral_job import NeutralJob, NeutralMove, drawn
 
-CHAIN = 6  # lines of a chain
+CHAIN = 5  # lines of a chain
 ZONE = 5.0  # [mm] of its corners
 MIDDLE = np.deg2rad([20.0, -25.0, -110.0, 30.0, 50.0, 20.0])
 
@@ -18,7 +18,7 @@ MIDDLE = np.deg2rad([20.0, -25.0, -110.0, 30.0, 50.0, 20.0])
 def ways(cell: Cell, seed: int, lines: int, arcs: int, chains: int = 0) -> NeutralJob:
     """Draw joint moves to places, and a line of 150 to 400 mm or an arc from each.
 
-    Behind them come chains: lines of 60 to 160 mm in a plane that turn by up to 60
+    Behind them come chains: lines of 120 to 300 mm in a plane that turn by up to 60
     degrees at fly points.
     """
     rng, job = np.random.default_rng(seed), drawn(cell, seed, 0)
@@ -64,7 +64,7 @@ def _chain(rng: np.random.Generator, cell: Cell) -> Iterator[list[NeutralMove]]:
         moves, q = [NeutralMove(Motion.JOINT, begin)], begin
         for k in range(CHAIN):
             way = np.cos(angle) * axes[0] + np.sin(angle) * axes[1]
-            flange[:3, 3] += rng.uniform(0.06, 0.16) * way
+            flange[:3, 3] += rng.uniform(0.12, 0.3) * way
             angle += np.deg2rad(rng.uniform(-60.0, 60.0))
             q = cell.arm.nearest(flange[None], q[None])[0]
             zone = ZONE if k < CHAIN - 1 else 0.0

@@ -23,6 +23,7 @@ from postproc.robot.cell import load_cell
 from tests.any_controller import EVERY
 from tests.conftest import ROOT
 from tests.language.neutral_job import LANGUAGES
+from tests.language.neutral_ways import ZONE as CORNER
 from tests.language.neutral_ways import ways
 from tests.language.true_error import NAMES
 from tests.written import cli
@@ -64,16 +65,23 @@ def compensated(
 ) -> Path:
     """Compensate a job in one language, with points and without; return its folder."""
     place = folder / name
-    place.mkdir()
+    place.mkdir(parents=True)
     job = ways(load_cell(cell), 1, lines, arcs, chains)
     for part, data in LANGUAGES[name](job).items():
         zone = b"    $FLY_DIST := 0.3\n" + ZONE  # as the other languages pass points
-        (place / part).write_bytes(data.replace(ZONE, zone))
-    at = ("--cell", cell, "--model", folder / "model.json")
+        (place / part).write_bytes(corners_once(data).replace(ZONE, zone))
+    at = ("--cell", cell, "--model", cell.parent / "model.json")
     for kind, more in (("plain", ()), ("points", POINTS)):
         (place / kind).mkdir()
         run("compensate", place / name, *at, "-o", place / kind / name, *more)
     return place
+
+
+def corners_once(data: bytes) -> bytes:
+    """Set the zone of corners once: a statement between fly moves keeps them whole."""
+    line = f"    $FLY_DIST := {CORNER:g}\n".encode()
+    first, *rest = data.split(line)
+    return first + line + b"".join(rest) if rest else first
 
 
 def deviations(place: Path, cell: Path, name: str, kind: str, arm: int) -> Floats:
