@@ -148,7 +148,8 @@ def draw_kinds(
     if name != MIXED:
         return (GearKind(name),) * 6, np.full(6, ELASTIC), np.ones(6)
     kinds = tuple(GearKind(str(kind)) for kind in rng.choice(list(_NAMES), 6))
-    return kinds, np.exp(rng.uniform(*np.log(WIDE), 6)), rng.uniform(0.0, 1.0, 6)
+    low, high = np.log(WIDE)
+    return kinds, np.exp(rng.uniform(low, high, 6)), rng.uniform(0.0, 1.0, 6)
 
 
 _NAMES = tuple(kind.value for kind in GearKind)
