@@ -267,7 +267,7 @@ def main() -> None:
     )
     for seed in range(first, last + 1):
         with tempfile.TemporaryDirectory() as folder:
-            study(seed, Path(folder), given.gears, programs)
+            study(seed, Path(folder), given.backlash_model, programs)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """What a joint may do between its flanks, and how likely each of it is.
 
 A model of a survey knows how far apart the flanks of a joint are. How the link gets
-from one to the other is one of five hypotheses. Each has a prior weight, and what was
+from one to the other is one of six hypotheses. Each has a prior weight, and what was
 read multiplies it: at arrivals from both sides, in reversals, along a measured path.
 A weight is never scaled up when another hypothesis is excluded: knowing more closes
 hypotheses and opens none, but where readings contradict what the model says.
@@ -32,30 +32,35 @@ class FlankKind(Enum):
     EARLIER = "changes its flank earlier"
     LATER = "changes its flank later"
     NEVER = "does not change its flank"
+    PUSHED = "is pushed by its drive in motion, as all that run on at stops"
     START = "begins on the other flank"
 
 
 _ORDER = (FlankKind.SHARP, FlankKind.ELASTIC, FlankKind.EARLIER, FlankKind.LATER,
-          FlankKind.NEVER)  # fmt: skip
-PRIOR = 0.55, 0.25, 0.06, 0.06, 0.08
-"""Of the five kinds, in their order, before anything is read."""
+          FlankKind.NEVER, FlankKind.PUSHED)  # fmt: skip
+PRIOR = 0.52, 0.23, 0.06, 0.06, 0.07, 0.06
+"""Of the six kinds, in their order, before anything is read.
 
-Likelihood = tuple[float, float, float, float, float]
-_EQUAL: Likelihood = (1.0, 1.0, 1.0, 1.0, 1.0)
+The last one is another one only for links that rest ahead of their drives at stops: by
+braking they run on, and on the way their drives push them.
+"""
+
+Likelihood = tuple[float, float, float, float, float, float]
+_EQUAL: Likelihood = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 # How likely readings are by each kind, beside the one that fits best; more than 1 where
 # they speak against what the model predicts.
-_BEHIND: Likelihood = (1.0, 1.0, 0.2, 0.7, 0.4)  # links are pushed at all arrivals
-_AHEAD: Likelihood = (0.5, 0.5, 1.0, 1.0, 1.0)  # they run on, or weight puts them there
+_BEHIND: Likelihood = (1.0, 1.0, 0.2, 0.7, 0.4, 0.0)  # links are pushed at all arrivals
+_AHEAD: Likelihood = (0.5, 0.5, 1.0, 1.0, 1.0, 4.0)  # they run on, or weight does it
 _AT_STOPS: dict[str, Likelihood] = {
-    "sharp": (1.0, 0.01, 1.0, 0.2, 0.02),
-    "between": (1.0, 1.0, 1.0, 1.0, 0.02),
-    "elastic": (0.01, 1.0, 1.0, 0.5, 0.02),
-    "unlike": (0.1, 0.2, 5.0, 1.0, 2.0),  # the steps are not those of the model
+    "sharp": (1.0, 0.01, 1.0, 0.2, 0.02, 0.02),
+    "between": (1.0, 1.0, 1.0, 1.0, 0.02, 0.02),
+    "elastic": (0.01, 1.0, 1.0, 0.5, 0.02, 0.02),
+    "unlike": (0.1, 0.2, 5.0, 1.0, 2.0, 2.0),  # the steps are not those of the model
 }
 _IN_MOTION: dict[str, Likelihood] = {
-    CONFIRMED: (1.0, 0.1, 0.1, 0.1, 0.01),
-    "refuted": (0.05, 1.0, 4.0, 4.0, 4.0),
-    "elsewhere": (0.05, 1.0, 4.0, 4.0, 0.1),
+    CONFIRMED: (1.0, 0.1, 0.1, 0.1, 0.01, 0.01),
+    "refuted": (0.05, 1.0, 4.0, 4.0, 4.0, 4.0),
+    "elsewhere": (0.05, 1.0, 4.0, 4.0, 0.1, 0.1),
 }
 
 

@@ -211,13 +211,13 @@ class SimulationSection(Strict):
     Attributes:
         seed: Of every random draw.
         effects: Further effects, comma separated; any motion of a part by its text.
-        backlash_model: What gears do in their gaps.
+        backlash_model: What gears do in their gaps; `mixed` draws it for each gear.
         track_rate_hz: Readings in a second of a tracker that follows the tool.
     """
 
     seed: NonNegativeInt = 1
     effects: str | None = None
-    backlash_model: Literal["sharp", "elastic", "gravity", "inertia"] = "sharp"
+    backlash_model: Literal["sharp", "elastic", "gravity", "inertia", "mixed"] = "sharp"
     track_rate_hz: Annotated[float, Field(ge=1.0, le=1000.0)] = 100.0
 
 

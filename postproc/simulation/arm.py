@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Bools, Floats
 from postproc.simulation.kinematics import (
     GRAVITY,
     Chain,
@@ -127,6 +127,34 @@ class GearKind(Enum):
     INERTIA = "inertia"
 
 
+MIXED = "mixed"  # of every gear one of these kinds is drawn
+WIDE = 1.5, 4.0  # [gaps] widths of elastic flanks that are drawn then
+ALL_SHARP = (GearKind.SHARP,) * 6
+
+
+def draw_kinds(
+    rng: np.random.Generator, name: str
+) -> tuple[tuple[GearKind, ...], Floats, Floats]:
+    """Draw the kinds of six gears.
+
+    Args:
+        rng: Random numbers of the gears alone.
+        name: The kind of all, or `MIXED`.
+
+    Returns:
+        The kinds; the gaps over which elastic flanks go; how much of half a sine they
+        go along, the rest of it evenly, (6,) each.
+    """
+    if name != MIXED:
+        return (GearKind(name),) * 6, np.full(6, ELASTIC), np.ones(6)
+    kinds = tuple(GearKind(str(kind)) for kind in rng.choice(list(_NAMES), 6))
+    low, high = np.log(WIDE)
+    return kinds, np.exp(rng.uniform(low, high, 6)), rng.uniform(0.0, 1.0, 6)
+
+
+_NAMES = tuple(kind.value for kind in GearKind)
+
+
 def even(q: Floats) -> Floats:
     """Leave gaps as wide at all joint angles, (n, 6)."""
     return np.ones_like(q)
@@ -139,7 +167,9 @@ class Gears:
     Attributes:
         gap: Half the gap of every gear, (6,) [rad] on the joint side.
         coupling: (6, 6), motor-side angles = coupling @ joint angles.
-        kind: What they do in their gaps.
+        kinds: What each of the six does in its gap.
+        reach: Gaps over which each goes from flank to flank if it is elastic, (6,).
+        bends: How much of half a sine an elastic flank goes along, (6,) from 0 to 1.
         body: The weights that preload them.
         friction: Torque about every joint that holds a link between the flanks, (6,)
             [N m].
@@ -150,7 +180,9 @@ class Gears:
 
     gap: Floats
     coupling: Floats
-    kind: GearKind = GearKind.SHARP
+    kinds: tuple[GearKind, ...] = ALL_SHARP
+    reach: Floats = field(default_factory=lambda: np.full(6, ELASTIC))
+    bends: Floats = field(default_factory=lambda: np.ones(6))
     body: LinkMasses | None = None
     friction: Floats = field(default_factory=lambda: np.full(6, np.inf))
     runs_on: Floats = field(default_factory=lambda: np.full(6, np.inf))
@@ -163,22 +195,27 @@ class Gears:
 
     def show_sides(self, arrivals: VirtualArrivals) -> Floats:
         """Return the sides that the links show, (n, 6) from -1 to 1."""
-        if self.kind is GearKind.ELASTIC:
-            return np.asarray(np.sin(np.pi / 2 * arrivals.flank))
-        if self.kind is GearKind.GRAVITY and self.body is not None:
+        sides = arrivals.flank
+        if (elastic := self.are(GearKind.ELASTIC)).any():
+            bent = np.sin(np.pi / 2 * sides)
+            sides = np.where(elastic, sides + self.bends * (bent - sides), sides)
+        if (heavy := self.are(GearKind.GRAVITY)).any() and self.body is not None:
             torque = total_torque(
                 self.body, arrivals.q, arrivals.payload, arrivals.payload_com
             )
             pushed = np.abs(torque) > self.friction  # forward: ahead of its motor
-            return np.where(pushed, -np.sign(torque), arrivals.flank)
-        return arrivals.flank
+            sides = np.where(heavy & pushed, -np.sign(torque), sides)
+        return np.asarray(sides)
+
+    def are(self, kind: GearKind) -> Bools:
+        """Return which gears are of a kind, (6,)."""
+        return np.array([own is kind for own in self.kinds])
 
     def brake(self, state: GearState, rate: Floats) -> GearState:
         """Return the state behind braking from joint speeds (6,) [rad/s]."""
-        if self.kind is not GearKind.INERTIA:
-            return state
         speed = self.coupling @ rate
-        flank = np.where(np.abs(speed) > self.runs_on, -np.sign(speed), state.flank)
+        on = self.are(GearKind.INERTIA) & (np.abs(speed) > self.runs_on)
+        flank = np.where(on, -np.sign(speed), state.flank)
         return replace(state, flank=flank)
 
 
@@ -260,7 +297,7 @@ def _steps(gears: Gears, state: GearState, angles: Floats) -> list[GearState]:
 
 def _step(gears: Gears, state: GearState, angle: Floats, gap: Floats) -> GearState:
     """Move every motor one way to the given angles (6,), over half gaps (6,)."""
-    reach = gap * (ELASTIC if gears.kind is GearKind.ELASTIC else 1.0)
+    reach = gap * np.where(gears.are(GearKind.ELASTIC), gears.reach, 1.0)
     side, flank = (
         np.clip(place + (angle - state.angle) / most, -1.0, 1.0)
         for place, most in ((state.side, gap), (state.flank, reach))

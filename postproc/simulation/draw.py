@@ -17,6 +17,7 @@ from postproc.simulation.arm import (
     VirtualArm,
     draw_as_built,
     draw_body,
+    draw_kinds,
 )
 from postproc.simulation.kinematics import (
     GRAVITY,
@@ -59,7 +60,7 @@ def virtual_arm(
     coupling: Floats | None = None,
     rows: int = 400,
     tool: Floats | None = None,
-    gears: GearKind | str = GearKind.SHARP,
+    gears: str = GearKind.SHARP.value,
     tracker: Floats | None = None,
     gravity: Floats = GRAVITY,
 ) -> VirtualArm:
@@ -74,7 +75,8 @@ def virtual_arm(
             else depends on it.
         tool: TCP (3,) or pose (4, 4) [m] that sizes in mm refer to; default a probe
             that stands off in all three axes.
-        gears: What the gears do in their gaps; nothing else depends on it.
+        gears: What the gears do in their gaps, see `draw_kinds`; nothing else depends
+            on it.
         tracker: Where the tracker stands, (3,) [m]; only what it reads wrongly depends
             on it.
         gravity: Acceleration of gravity in the arm base, (3,) [m/s^2].
@@ -92,6 +94,7 @@ def virtual_arm(
     gaps = [law for law in laws.values() if law.effect == "backlash"]
     gap = gaps[0] if gaps else planter.law(Planted("backlash"))
     rng, at = stream(seed, "arm"), planter.reference
+    kinds, reach, bends = draw_kinds(stream(seed, "gears"), gears)
     torque = total_torque(body, at.q, at.payload, at.payload_com)
     return replace(
         perfect,
@@ -104,7 +107,9 @@ def virtual_arm(
             perfect.gears,
             gap=_half_gap(gap),
             wave=_wave(gap),
-            kind=GearKind(gears),
+            kinds=kinds,
+            reach=reach,
+            bends=bends,
             body=body,
             friction=np.maximum(HELD * np.abs(torque).max(axis=0), LEAST_HELD),
             runs_on=RUNS_ON * chain.speed,

@@ -11,6 +11,7 @@ import pytest
 from postproc.language.language import Language
 from postproc.language.languages import language_of
 from tests.language.neutral_job import LANGUAGES
+from tests.language.neutral_ways import CHAIN
 from tests.language.true_paths import compensated, deviations, surveyed
 from tests.written import cli
 
@@ -28,6 +29,14 @@ def shop(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ways")
     cell = surveyed(folder, ARM, poses=80)
     return cell, {name: compensated(folder, cell, name, 3, 1) for name in LANGUAGES}
+
+
+@pytest.fixture(scope="module")
+def chained(shop):
+    """A chain of fly points, compensated for the same arm in every language."""
+    cell, _ = shop
+    folder = cell.parent / "chain"
+    return cell, {name: compensated(folder, cell, name, 0, 0, 1) for name in LANGUAGES}
 
 
 def inserted(place: Path, name: str) -> list[bytes]:
@@ -134,3 +143,17 @@ def test_arcs_of_rapid_are_cut_in_the_usual_mode(shop, tmp_path):
     made = (tmp_path / "made.mod").read_bytes()
     assert b"CirPathMode" in text and b"CirPathMode" not in made
     assert b"inserted (via)" in made
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_chains_of_fly_points_get_points(chained, name, tmp_path):
+    cell, places = chained
+    place, again = places[name], tmp_path / name
+    assert inserted(place, name)
+    plain, points = (
+        deviations(place, cell, name, kind, ARM) for kind in ("plain", "points")
+    )
+    assert len(points) == CHAIN and (points < plain + 0.05).all()
+    assert (points - plain).min() < -0.05
+    assert cli("restore", place / "points" / name, "-o", again).exit_code == 0
+    assert again.read_bytes() == (place / name).read_bytes()

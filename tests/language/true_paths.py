@@ -2,9 +2,10 @@
 
 python -m tests.language.true_paths --arms 62 63 64 --lines 8 --arcs 4
 
-Each arm is surveyed with reversals, a model is fitted, the same lines and arcs are
-compensated in every language, at their targets and with points on their ways, and the
-arm, which shares no code with the prediction, runs what was written.
+Each arm is surveyed with reversals, a model is fitted, the same lines, arcs and chains
+(`--chains`, lines that turn at fly points) are compensated in every language, at their
+targets and with points on their ways, and the arm, which shares no code with the
+prediction, runs what was written.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from postproc.robot.cell import load_cell
 from tests.any_controller import EVERY
 from tests.conftest import ROOT
 from tests.language.neutral_job import LANGUAGES
+from tests.language.neutral_ways import ZONE as CORNER
 from tests.language.neutral_ways import ways
 from tests.language.true_error import NAMES
 from tests.written import cli
@@ -58,18 +60,28 @@ def run(*arguments: object) -> None:
         raise RuntimeError(found.stderr)
 
 
-def compensated(folder: Path, cell: Path, name: str, lines: int, arcs: int) -> Path:
+def compensated(
+    folder: Path, cell: Path, name: str, lines: int, arcs: int, chains: int = 0
+) -> Path:
     """Compensate a job in one language, with points and without; return its folder."""
     place = folder / name
-    place.mkdir()
-    for part, data in LANGUAGES[name](ways(load_cell(cell), 1, lines, arcs)).items():
+    place.mkdir(parents=True)
+    job = ways(load_cell(cell), 1, lines, arcs, chains)
+    for part, data in LANGUAGES[name](job).items():
         zone = b"    $FLY_DIST := 0.3\n" + ZONE  # as the other languages pass points
-        (place / part).write_bytes(data.replace(ZONE, zone))
-    at = ("--cell", cell, "--model", folder / "model.json")
+        (place / part).write_bytes(corners_once(data).replace(ZONE, zone))
+    at = ("--cell", cell, "--model", cell.parent / "model.json")
     for kind, more in (("plain", ()), ("points", POINTS)):
         (place / kind).mkdir()
         run("compensate", place / name, *at, "-o", place / kind / name, *more)
     return place
+
+
+def corners_once(data: bytes) -> bytes:
+    """Set the zone of corners once: a statement between fly moves keeps them whole."""
+    line = f"    $FLY_DIST := {CORNER:g}\n".encode()
+    first, *rest = data.split(line)
+    return first + line + b"".join(rest) if rest else first
 
 
 def deviations(place: Path, cell: Path, name: str, kind: str, arm: int) -> Floats:
@@ -81,14 +93,14 @@ def deviations(place: Path, cell: Path, name: str, kind: str, arm: int) -> Float
     return 1e3 * np.maximum.reduceat(found.across, found.first[:-1])
 
 
-def table(arm: int, lines: int, arcs: int) -> list[str]:
+def table(arm: int, lines: int, arcs: int, chains: int) -> list[str]:
     """Write the rows of one arm."""
     rows = []
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         cell = surveyed(folder, arm)
         for name in LANGUAGES:
-            place = compensated(folder, cell, name, lines, arcs)
+            place = compensated(folder, cell, name, lines, arcs, chains)
             count = (place / "points" / name).read_bytes().count(b"postproc: inserted")
             language = NAMES[Path(name).suffix]
             for kind in ("written", "plain", "points"):
@@ -112,11 +124,12 @@ def main() -> int:
     parser.add_argument("--arms", type=int, nargs="+", default=[62, 63, 64])
     parser.add_argument("--lines", type=int, default=8)
     parser.add_argument("--arcs", type=int, default=4)
+    parser.add_argument("--chains", type=int, default=0)
     given = parser.parse_args()
     print("| arm | language | program | points | mean mm | 95 % | max mm |")
     print("|---|---|---|---|---|---|---|", flush=True)
     for arm in given.arms:
-        print("\n".join(table(arm, given.lines, given.arcs)), flush=True)
+        print("\n".join(table(arm, given.lines, given.arcs, given.chains)), flush=True)
     return 0
 
 

@@ -76,8 +76,13 @@ def test_links_ahead_of_their_drives_leave_all_open(bench_model, bench_cell) -> 
         -bench_model.values, bench_model.values,
     ))  # fmt: skip
     flank = known(braked, bench_cell)
-    assert {ELASTIC, FlankKind.EARLIER, LATER, NEVER} <= {*flank.open_kinds}
+    every = {ELASTIC, FlankKind.EARLIER, LATER, NEVER, FlankKind.PUSHED}
+    assert every == {*flank.open_kinds}
     assert flank.max_lag == 1.0
+    assert FlankKind.PUSHED in known(braked, bench_cell, UNLIKE).open_kinds
+    assert (
+        FlankKind.PUSHED not in known(braked, bench_cell, None, "confirmed").open_kinds
+    )
 
 
 def test_a_wider_flank_lacks_more(bench_model, bench_cell) -> None:

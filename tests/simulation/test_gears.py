@@ -123,7 +123,7 @@ def arm_with(kind: str):
 
 def shown(kind: str, path: np.ndarray, gears: Gears | None = None) -> np.ndarray:
     """Follow a path from rest on a forward flank; return what the links show."""
-    gears = gears or replace(GEARS, kind=GearKind(kind))
+    gears = gears or replace(GEARS, kinds=(GearKind(kind),) * 6)
     states = follow(gears, at_start(gears, path[0], np.ones(6)), path[1:])
     flank = np.array([s.flank for s in states])
     return gears.show_sides(make_arrivals(path[1:], flank=flank))
@@ -133,7 +133,20 @@ def test_the_kind_of_the_gears_changes_nothing_else() -> None:
     sharp, other = arm_with("sharp"), arm_with("elastic")
     arrivals = make_arrivals(Q[None], 1.0)
     np.testing.assert_array_equal(sharp.tcp(arrivals), other.tcp(arrivals))
-    assert sharp.gears.kind is GearKind.SHARP
+    assert set(sharp.gears.kinds) == {GearKind.SHARP}
+
+
+def test_mixed_gears_behave_one_by_one_as_their_kinds_do() -> None:
+    arms = [virtual_arm(seed, gears="mixed") for seed in range(8)]
+    assert {kind for arm in arms for kind in arm.gears.kinds} == {*GearKind}
+    path = Q + np.linspace(0.0, -6 * GAP, 50)[:, None]
+    for arm in arms:
+        whole = replace(arm.gears, gap=np.full(6, GAP), bends=np.ones(6))
+        found = shown("", path, whole)
+        for kind in GearKind:
+            alone = shown("", path, replace(whole, kinds=(kind,) * 6))
+            own = whole.are(kind)
+            np.testing.assert_array_equal(found[:, own], alone[:, own])
 
 
 def test_an_elastic_flank_goes_over_smoothly() -> None:

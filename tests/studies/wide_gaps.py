@@ -4,13 +4,15 @@
         [--half 0.01 0.1] [--gears sharp] [--repeats 6] [--states plain reversals ..]
 
 Every joint's half gap is drawn log-uniformly between the bounds [mrad], and what the
-joints scatter by is set [urad]. The job is lines of 300 to 900 mm with stops at
-50 mm/s. One row a state of knowledge: a plain survey (`plain`), one with reversals
-(`reversals`), that and a measured path (`track`); `+stops` preloads the backlash. A row
-says what 95 % of all the way stays within, the largest deviation, how much farther a
-place is than the same program without points [mm], the share of the way that is within
-0.05 mm and that is nearer than without, the share of moves whose promise holds, the
-moves with points, and the points a move has in the middle.
+joints scatter by is set [urad]. `--gears mixed` draws which kind of gear every joint
+has, and how wide elastic flanks are; both are printed beside what reversals say. The
+job is lines of 300 to 900 mm with stops at 50 mm/s. One row a state of knowledge: a
+plain survey (`plain`), one with reversals (`reversals`), that and a measured path
+(`track`); `+stops` preloads the backlash. A row says what 95 % of all the way stays
+within, the largest deviation, how much farther a place is than the same program without
+points [mm], the share of the way that is within 0.05 mm and that is nearer than
+without, the share of moves whose promise holds, the moves with points, and the points a
+move has in the middle.
 """
 
 from __future__ import annotations
@@ -26,9 +28,12 @@ from unittest.mock import patch
 import numpy as np
 
 from docs.studies import paths as study
+from postproc.model.flank_hypotheses import verdict_of
+from postproc.model.model import load_model
 from postproc.report.simulation import simulate_file
 from postproc.robot.cell import load_cell
-from postproc.simulation import draw
+from postproc.simulation import draw, virtual_arm
+from postproc.simulation.arm import MIXED, GearKind
 from postproc.simulation.laws import Draw, Law, backlash
 from postproc.simulation.path import PathScores
 from tests.written import cli
@@ -171,6 +176,22 @@ def main() -> None:
             bench = Bench(seed, place, given.lines, given.gears)
             for state in given.states:
                 row(bench, state, given.tolerance)
+            if given.gears == MIXED:
+                print(joints(bench), flush=True)
+
+
+def joints(bench: Bench) -> str:
+    """Say which gears an arm has, and what reversals say of them."""
+    gears = virtual_arm(bench.seed, gears=bench.gears).gears
+    known = load_model(bench.model("reversals")).flank_widths
+    found = []
+    for j, (kind, width) in enumerate(zip(gears.kinds, known, strict=True)):
+        wide = f" {gears.reach[j]:.1f}" if kind is GearKind.ELASTIC else ""
+        word, gap = verdict_of(width) or "uncertain", 2e3 * gears.gap[j]
+        if word in ("elastic", "between"):
+            word += f" {width[0]:g} to {width[1]:g}"
+        found.append(f"{j + 1} {kind.value}{wide} ({gap:.2f} mrad): {word}")
+    return f"{bench.seed:4d} joint " + "; ".join(found)
 
 
 def row(bench: Bench, state: str, tolerance: str) -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 
 import numpy as np
 
@@ -77,7 +76,7 @@ class FlankCases:
     @cached_property
     def cases(self) -> tuple[FlankCase, ...]:
         """Return the cases that make any difference."""
-        found = []
+        found, pushed = list[FlankCase](), np.zeros_like(self.off)
         for joint, flank in enumerate(self._flanks):
             sides = [*self._sides(joint, flank)]
             rows = [np.flatnonzero(np.abs(own - self.run.side[:, joint]) > CHANGED)
@@ -86,16 +85,36 @@ class FlankCases:
             moves = np.empty((len(self.off), 3))
             moves[every] = self._moves_of(joint, every)
             for (kind, weight, own), at in zip(sides, rows, strict=True):
-                if not len(at):
-                    continue
                 by = (own - self.run.side[:, joint])[at, None] * moves[at]
-                there = self.off[at] + by
-                along = np.einsum("si,si->s", there, self.tangent[at])
-                across = lengths(there - along[:, None] * self.tangent[at])
-                found.append(
-                    FlankCase(joint + 1, kind, weight, at, across, lengths(by))
-                )
-        return tuple(found)
+                if len(at):
+                    found.append(self._case(joint + 1, kind, weight, at, by))
+                if kind is FlankKind.PUSHED:
+                    pushed[at] += by
+        return (*found, *self._all_pushed(pushed))
+
+    def _case(
+        self, joint: int, kind: FlankKind, weight: float, at: Ints, by: Floats
+    ) -> FlankCase:
+        """Move the TCP by some way (k, 3) at samples (k,)."""
+        there = self.off[at] + by
+        along = np.einsum("si,si->s", there, self.tangent[at])
+        across = lengths(there - along[:, None] * self.tangent[at])
+        return FlankCase(joint, kind, weight, at, across, lengths(by))
+
+    def _all_pushed(self, by: Floats) -> Iterator[FlankCase]:
+        """Yield the case of all links that run on at stops; they have one cause.
+
+        It counts as one of the first of these joints.
+
+        Args:
+            by: What it moves the TCP by, (s, 3) [m].
+        """
+        kind = FlankKind.PUSHED
+        open_ = [j for j, flank in enumerate(self._flanks, 1) if flank.is_open(kind)]
+        at = np.flatnonzero(by.any(axis=1))
+        if len(open_) > 1 and len(at):
+            weight = max(self._flanks[j - 1].weight[kind] for j in open_)
+            yield self._case(open_[0], kind, weight, at, by[at])
 
     def on_moves(self, moves: Sequence[int]) -> dict[Key, FlankCase]:
         """Return the cases that make a difference on some moves."""
@@ -112,10 +131,8 @@ class FlankCases:
 
     @cached_property
     def _keys(self) -> tuple[Key, ...]:
-        kinds = groupby(self.cases, key=lambda case: (case.joint, case.kind))
-        return tuple(
-            (*kind, number) for kind, own in kinds for number, _ in enumerate(own)
-        )
+        kinds = [(case.joint, case.kind) for case in self.cases]
+        return tuple((*kind, kinds[:k].count(kind)) for k, kind in enumerate(kinds))
 
     @property
     def usually(self) -> Floats:
@@ -150,6 +167,8 @@ class FlankCases:
                 yield kind, weight, self._over(AT_ONCE)[:, joint]
             elif kind is FlankKind.LATER:
                 yield kind, weight, usual[self._behind]
+            elif kind is FlankKind.PUSHED:
+                yield kind, weight, -usual
             else:
                 yield kind, weight, usual[self.first[:-1]][self._move]
         least, most = self.run.least[:, joint], self.run.most[:, joint]

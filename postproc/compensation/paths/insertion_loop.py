@@ -70,6 +70,11 @@ IN_CORNER = (
 BY_HAND = "Change what the reason names, or put targets on its way in the program"
 MORE_ROOM = "Allow more points: compensation.max_inserted"
 SHORTER = "A lower speed, or a smaller [limits] segment_ms, allows shorter pieces"
+STEEP = "between points on it the correction would change faster than may be"
+TURNS = (
+    "Lead it where the wrist turns less on the way, or raise [limits] "
+    "correction_step_mm"
+)
 TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
 LATEST = 0.9  # of a way: the last place of it for a stop
 
@@ -278,7 +283,8 @@ def _report_insertions(now: PathPrediction) -> Insertions:
     left = {}
     for v in sorted(too_far):  # what is known of one half of an arc is so of both
         halved = (plan.left[h] for h in halves(visits, v) if h in plan.left)
-        left[v] = plan.left.get(v) or next(halved, why)
+        usual = STEEP if v in plan.shut and not plan.crowded else why
+        left[v] = plan.left.get(v) or next(halved, usual)
     return Insertions(
         now.own,
         task.tolerance,
@@ -324,8 +330,10 @@ def _cures(now: PathPrediction) -> dict[int, str]:
         elif paths.way[paths.after.largest[k]] < BEGINS and v not in plan.stops:
             start = MEASURE_STARTS if v in plan.unconfirmed else PRELOAD
             found[v] = start if can_stop(now.task, both[0]) else IN_CORNER
+        elif plan.crowded:
+            found[v] = MORE_ROOM
         else:
-            found[v] = MORE_ROOM if plan.crowded else SHORTER
+            found[v] = TURNS if v in plan.shut else SHORTER
     return found
 
 

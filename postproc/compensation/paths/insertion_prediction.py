@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -288,25 +288,30 @@ class InsertionTask:
 
         An arc is one way, from where it begins to where it ends.
         """
-        paths, found = self.first.paths, dict[int, MeantSides]()
-        sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
+        found = dict[int, MeantSides]()
         for move in {halves(self.visits, v) for v in plan.points}:
-            own = [paths.samples_to(v) for v in move]
-            side = np.array(paths.side[own[0].start : own[-1].stop])
-            side[:, sharp] = cross_at_once(side[:, sharp])
             half = bool(plan.halved.intersection(move))
-            if half:
-                side = (side + _evenly(side, [paths.way[rows] for rows in own])) / 2
-            for v, rows in zip(move, own, strict=True):
-                if v in plan.points:
-                    there = side[rows.start - own[0].start :]
-                    key = v, plan.points[v], half
-                    if key not in self._meant:
-                        self._meant[key] = self._mean(
-                            v, plan.points[v], rows, side[0], there
-                        )
-                    found[v] = self._meant[key]
+            keys = {v: (v, plan.points[v], half) for v in move if v in plan.points}
+            if not self._meant.keys() >= {*keys.values()}:
+                self._mean_on(move, keys.values(), half)
+            found.update({v: self._meant[key] for v, key in keys.items()})
         return found
+
+    def _mean_on(
+        self, move: tuple[int, ...], keys: Collection[MeantKey], half: bool
+    ) -> None:
+        """Say from which sides points on a move are meant to be passed, and keep it."""
+        paths, own = self.first.paths, [self.first.paths.samples_to(v) for v in move]
+        sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
+        side = np.array(paths.side[own[0].start : own[-1].stop])
+        side[:, sharp] = cross_at_once(side[:, sharp])
+        if half:
+            side = (side + _evenly(side, [paths.way[rows] for rows in own])) / 2
+        samples = dict(zip(move, own, strict=True))
+        for key in keys:
+            rows = samples[key[0]]
+            there = side[rows.start - own[0].start :]
+            self._meant[key] = self._mean(key[0], key[1], rows, side[0], there)
 
     def _mean(
         self, v: int, points: Sequence[float], rows: slice, begin: Floats, side: Floats

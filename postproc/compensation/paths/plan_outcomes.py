@@ -14,7 +14,7 @@ from postproc.compensation.paths.plan_rule import (
     PlanOutcome,
     choose_plan,
     negligible,
-    resolution,
+    tolerable_harm,
 )
 from postproc.model.flank_hypotheses import OPEN
 from postproc.robot.pose import MM
@@ -89,7 +89,7 @@ class MoveOutcomes:
         """
         worse = np.where(self.weight > OPEN, self.plans[plan].worse, 0.0)
         k = int(worse.argmax())
-        if worse[k] <= resolution(self.tolerance):
+        if worse[k] <= tolerable_harm(self.tolerance):
             return None
         key = None if k == 0 else self.keys[k - 1]
         return Objection(float(worse[k]), float(self.share[plan, k]), key)

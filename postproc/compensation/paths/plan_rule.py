@@ -16,6 +16,7 @@ from postproc.model.flank_hypotheses import OPEN
 from postproc.robot.pose import MM
 
 LEAST_STEP = 0.05 * MM  # [m] the finest promise, and harm that counts at the least
+PREDICTED = 0.01 * MM  # [m] what a deviation is predicted to: harm may be so much more
 NEGLIGIBLE = 0.2  # of the tolerance: steps that together never count against a plan
 
 
@@ -41,14 +42,25 @@ def resolution(tolerance: float) -> float:
     return max(LEAST_STEP, tolerance / 2)
 
 
+def tolerable_harm(tolerance: float) -> float:
+    """Return by how much a plan may be predicted worse than no points [m].
+
+    That much less than what counts as the prediction itself may be off by.
+
+    Args:
+        tolerance: Of paths [m].
+    """
+    return resolution(tolerance) - PREDICTED
+
+
 def choose_plan(
     plans: Sequence[PlanOutcome], weight: Floats, tolerance: float
 ) -> tuple[int, float]:
     """Choose the plan of a move.
 
     Of the plans that no open hypothesis makes worse anywhere than without points by
-    more than `resolution`, those with the least promise, and of these the one that is
-    expected to leave the path least. A promise is what 95 % of the way stays within
+    more than `tolerable_harm`, those with the least promise, and of these the one that
+    is expected to leave the path least. A promise is what 95 % of the way stays within
     under the worst open hypothesis, in whole steps of `resolution`. It is the least of
     largest values over sets that grow and shrink: to exclude a hypothesis never raises
     it.
@@ -64,13 +76,10 @@ def choose_plan(
     step, open_ = resolution(tolerance), weight > OPEN
     promise = [_promise(plan, open_, step) for plan in plans]
     expected = [float(plan.off @ weight) for plan in plans]
-    fit = [k for k, plan in enumerate(plans) if not _harms(plan, open_, step)]
+    most = tolerable_harm(tolerance)
+    fit = [k for k, plan in enumerate(plans) if not (plan.worse[open_] > most).any()]
     best = min(fit, key=lambda k: (promise[k], expected[k]))
     return best, promise[best]
-
-
-def _harms(plan: PlanOutcome, open_: Bools, step: float) -> bool:
-    return bool((plan.worse[open_] > step).any())
 
 
 def _promise(plan: PlanOutcome, open_: Bools, step: float) -> float:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import MagicMock as Mock
 
 import numpy as np
 import pytest
 
+from postproc.calibration.diagnosis import diagnose
 from postproc.calibration.diagnosis.candidates import Projection
 from postproc.calibration.diagnosis.diagnose import (
     KEPT,
@@ -35,6 +37,7 @@ from postproc.model.effects.curve import Curve
 from postproc.model.effects.probe import Probe
 from postproc.model.kinematics import ArmStates
 from postproc.model.model import Model, load_model
+from postproc.model.whitening import Whitener
 from postproc.report.diagnosis import tell
 from postproc.report.html import diagnosis_report
 from postproc.report.plots import plot_diagnosis
@@ -281,6 +284,34 @@ def test_noise_floor_comes_from_repeats_where_there_are_any(found: Extension) ->
     assert "30 repeats" in floor.source
     assert floor.size == pytest.approx(1.6 * sigma, rel=0.2)
     assert "estimated" in noise_floor(found.search.fit, tracker_known=False).source
+
+
+def test_rows_in_motion_make_no_noise_of_what_they_do_not_tell(
+    found: Extension,
+) -> None:
+    """Nothing is read along the motion; the floor was 900 mm where that counted."""
+    fit, rng = found.search.fit, np.random.default_rng(2)
+    heading = rng.normal(size=(len(fit.batch), 3))
+    heading /= np.linalg.norm(heading, axis=1)[:, None]
+    heading[::5] = np.nan
+    batch = ArmStates(ARM, fit.batch.states.with_(heading=heading))
+    whitener = Whitener.build(batch, fit.position, fit.noise.origin)
+    moving = replace(fit, batch=batch, whitener=whitener)
+    floor, usual = (noise_floor(one, tracker_known=False) for one in (moving, fit))
+    assert floor.source == usual.source == "estimated from the rows"
+    assert floor.size == pytest.approx(usual.size, rel=0.3)
+
+
+@pytest.mark.parametrize("nats", [0.01, 1.0])
+def test_poses_that_tell_nothing_apart_are_not_proposed(
+    nats: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    poses = np.zeros((2, 6))
+    monkeypatch.setattr(diagnose, "poses_that_separate", lambda *_: (nats, poses))
+    monkeypatch.setattr(diagnose, "poses_that_sharpen", lambda *_: ("a_2", poses + 1))
+    why, proposed = diagnose._next(Mock(standings=[Mock(confusable=[Mock()])]), 0)
+    assert ("nats" in why) == (nats > diagnose.TELLING)
+    assert (proposed == 0.0).all() == (nats > diagnose.TELLING)
 
 
 def test_multi_directional_variation_is_the_distance_between_the_sides() -> None:

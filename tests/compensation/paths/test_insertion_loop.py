@@ -452,6 +452,8 @@ def test_where_the_error_changes_fast_points_beside_it_are_taken_back(
     report = told(shop, "strict")
     assert all(target["status"] == "corrected" for target in report["targets"][2:])
     assert sum(path["inserted"] > 0 for path in report["path"]) > 5
+    found = messages(report, "path-tolerance-exceeded")
+    assert any("raise [limits] correction_step_mm" in text for text in found)
 
 
 def test_points_are_few_far_apart_and_told(shop: Path) -> None:

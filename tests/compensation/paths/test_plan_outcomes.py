@@ -11,7 +11,7 @@ import pytest
 from postproc.arrays import Floats
 from postproc.compensation.paths.flank_cases import FlankCase, FlankCases
 from postproc.compensation.paths.plan_outcomes import BEGINS, compare
-from postproc.model.flank_hypotheses import FlankKind
+from postproc.model.flank_hypotheses import FlankKind, FlankOfJoint
 from postproc.robot.pose import MM
 
 TOLERANCE = 0.1 * MM
@@ -81,3 +81,26 @@ def test_joints_with_small_steps_never_speak_against_a_plan() -> None:
         points = program(0.02, case(5, 60, 63, 0.2, moved))
         found = compare((program(0.1), points), (7,), TOLERANCE)
         assert bool(found.keys) == counts
+
+
+def test_links_that_run_on_at_stops_are_pushed_together_on_the_way() -> None:
+    side = np.tile([1.0, -1.0, 1.0, 0.0, 0.0, 0.0], (5, 1))
+    by_joint = np.zeros((6, 3))
+    by_joint[:3, 1] = 1e-5, 2e-5, 4e-5
+    run: Any = SimpleNamespace(side=side, least=side, most=side)
+    error: Any = lambda _, rows, there: there @ by_joint  # noqa: E731
+    cases = FlankCases(
+        run, error, np.zeros((5, 3)),
+        np.tile([1.0, 0.0, 0.0], (5, 1)), np.linspace(0.0, 0.1, 5), np.array([0, 5]),
+    )  # fmt: skip
+    kinds = [kind for kind in FlankKind if kind is not FlankKind.START]
+    pushed, still = (
+        FlankOfJoint(dict.fromkeys(kinds, 0.0) | own, 1.0, (1.0, 4.0))
+        for own in ({FlankKind.PUSHED: 0.24}, {})
+    )
+    vars(cases).update(_flanks=(pushed, still, pushed, *[still] * 3))
+    assert {case.kind for case in cases.cases} == {FlankKind.PUSHED}
+    assert [case.joint for case in cases.cases] == [1, 3, 1]
+    far = [case.across.max() for case in cases.cases]
+    assert far == pytest.approx([2e-5, 8e-5, 1e-4])
+    assert cases._keys[-1] == (1, FlankKind.PUSHED, 1)

@@ -11,7 +11,7 @@ from postproc.compensation.paths.plan_rule import (
     PlanOutcome,
     choose_plan,
     negligible,
-    resolution,
+    tolerable_harm,
 )
 from postproc.model.flank_hypotheses import OPEN
 from postproc.robot.pose import MM
@@ -51,7 +51,7 @@ def test_the_promise_holds_and_no_open_hypothesis_is_worse(move) -> None:
     best, promise = choose_plan(plans, weight, TOLERANCE)
     open_ = weight > OPEN
     assert (plans[best].off[open_] <= promise + 1e-9).all()
-    assert (plans[best].worse[open_] <= resolution(TOLERANCE)).all()
+    assert (plans[best].worse[open_] <= tolerable_harm(TOLERANCE)).all()
 
 
 def plan(off: list[float], worse: list[float]) -> PlanOutcome:
