@@ -19,7 +19,6 @@ from postproc.language.analysis.assigned_points import (
     NO_POINTS,
     Points,
     Scope,
-    TaskSymbols,
 )
 from postproc.language.analysis.call_context import CALLED, Context
 from postproc.language.analysis.call_graph import reach
@@ -36,6 +35,7 @@ from postproc.language.analysis.interpreter import (
     calls_around,
 )
 from postproc.language.analysis.move_runs import Runs, find_runs, rows_of_lines
+from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.language import Start
 from postproc.language.text.comment_directives import Comments
 from postproc.language.text.statement_table import StatementText
@@ -148,7 +148,7 @@ class TaskMachine(Interpreter[Arrived]):
     """
 
     comments: ClassVar[Comments]
-    task: TaskSymbols = field(kw_only=True)
+    task: TaskSymbols[Any] = field(kw_only=True)
     texts: Sequence[StatementText[Any]]
     start: Start
     visits: list[Any] = field(default_factory=list)
@@ -455,7 +455,7 @@ class TaskMachine(Interpreter[Arrived]):
         context = caller.find(at, CALLED)
         if context is None:
             context = caller.within(at, CALLED, self._place_of(found, caller, row))
-        own = file, module, context.place.scope.routine
+        own = self.task.unit(file), module, context.place.scope.routine
         here = here.with_points(here.points.leave(own))  # declared anew
         self.enter(context, context.place.flow.first, self.at_call(context, here))
 

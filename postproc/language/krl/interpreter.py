@@ -13,6 +13,8 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import HeadedRows
+from postproc.language.analysis.declarations import RoutinePlace
+from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
     NOWHERE,
     Arrived,
@@ -32,20 +34,19 @@ from postproc.language.krl.modal_state import (
 )
 from postproc.language.krl.moves import KrlGoals, own_numbers
 from postproc.language.krl.pose_encoding import COMMENTS
-from postproc.language.krl.program import whole
 from postproc.language.krl.statements import KrlText
 from postproc.language.krl.symbols import (
     FUNCTIONS,
     STILL,
     KrlTask,
-    list_changes,
-    operands_of,
+    list_calls,
+    values_of,
 )
 from postproc.language.language import Start
 from postproc.language.visits import START
 
 _PASSED = (
-    said.AccessHeader, said.KrlDeclaration, said.OutsideName, said.SpeedPart,
+    said.AccessHeader, ir.Declaration, said.OutsideName, said.SpeedPart,
 )  # fmt: skip
 _ACTING = (
     ir.Assignment, ir.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
@@ -98,7 +99,7 @@ class KrlMachine(TaskMachine):
         modes = modes.beside(self.task)
         first = self.task.files[0]
         here = Arrived(frozenset([START]), modes)
-        main = 0, first.name, first.routines[0]
+        main = RoutinePlace(0, first.name, first.routines[0])
         self.call_routine(main, self.root, -1, here)
         self.follow()
         for name, (file, row) in self._assumed.items():
@@ -160,7 +161,8 @@ class KrlMachine(TaskMachine):
         if one.name in self.task.odd_words:
             return False
         scope = context.place.scope
-        if self.task.place(one.name, scope) == (scope.module, scope.routine):
+        place = self.task.place(one.name, scope)
+        if place and place[1:3] == (scope.module, scope.routine):
             return True
         if one.name in self.task.beside:
             return False
@@ -170,14 +172,11 @@ class KrlMachine(TaskMachine):
     def _sets(self, one: ir.SourceStatement) -> set[str]:
         """Return the names of data that a statement sets, also as a loop."""
         named = {one.name} if isinstance(one, ir.ForLoop) else set()
-        return named | {data.name for data in list_changes(one, self.task.routines)}
+        return named | {data.name for data in self.task.list_changes(one)}
 
     def _calls_own(self, statements: Sequence[ir.SourceStatement]) -> bool:
         """Return True if a statement calls a routine of the files."""
-        called = {one.name for one in statements if isinstance(one, ir.Instruction)}
-        for part in ir.walk(*(x for one in statements for x in operands_of(one))):
-            if isinstance(part, ir.FunctionCall):
-                called.add(part.name)
+        called = set[str]().union(*map(list_calls, statements))
         return not called.isdisjoint(self.task.routines)
 
     @cached_property
@@ -244,7 +243,7 @@ class KrlMachine(TaskMachine):
             return here
         own = one.target if isinstance(one, ir.Assignment) else None
         store = here.modes.store
-        for target in list_changes(one, self.task.routines):
+        for target in self.task.list_changes(one):
             name = target.name
             if target is own or not _is_modal(name):
                 continue
@@ -299,7 +298,7 @@ class KrlMachine(TaskMachine):
         if found is not None:
             return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
-            for file, routine, _ in self.task.routines[name]:
+            for file, _, routine in self.task.routines[name]:
                 self.run_beside(file, routine)
             return self.unknown(context, row, here, "names several routines")
         if name == "bas":
@@ -330,7 +329,7 @@ class KrlMachine(TaskMachine):
         self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what a statement reads, and for what its functions do."""
-        for part in ir.walk(*operands_of(one)):
+        for part in values_of(one):
             if isinstance(part, ir.FunctionCall):
                 here = self._function(context, row, part.name, here)
             elif isinstance(part, ir.DataObject) and part.name.startswith("$"):
@@ -489,7 +488,7 @@ class KrlMachine(TaskMachine):
             if isinstance(one, said.InterruptSwitched) and one.word == "off":
                 own = whole(self.task.number(one.number, row, here))
                 return one.number is None or own == number
-            if not isinstance(one, said.KrlDeclaration):
+            if not isinstance(one, ir.Declaration):
                 return False
         return False
 
@@ -584,7 +583,7 @@ class KrlMachine(TaskMachine):
 
     def changes_of(self, one: ir.SourceStatement) -> Iterator[str]:
         """Yield the names of data that a statement changes, see `TaskMachine`."""
-        yield from (data.name for data in list_changes(one, self.task.routines))
+        yield from (data.name for data in self.task.list_changes(one))
 
     def routines_beside(self) -> Iterator[tuple[int, int, int]]:
         """Yield functions, and what interrupts and triggers do, see `TaskMachine`."""
@@ -680,11 +679,11 @@ class KrlMachine(TaskMachine):
                 return frozenset([word])
             case said.PathTrigger(action=action):
                 return self._own(file, action, called)
-        changed = list_changes(one, self.task.routines)
+        changed = self.task.list_changes(one)
         if any(_is_modal(target.name) for target in changed):
             return frozenset([MOVES])
         here = Scope(file, self.task.files[file].name, "")
-        parts = ir.walk(*operands_of(one))
+        parts = values_of(one)
         names = [p.name for p in parts if isinstance(p, ir.FunctionCall)]
         if isinstance(one, ir.Instruction):
             names.append(one.name)

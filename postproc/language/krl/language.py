@@ -99,7 +99,7 @@ class Krl(Language):
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone points of its data lists."""
-        return KrlCloner.of(KrlTask([read_krl(source) for source in sources]))
+        return KrlCloner(KrlTask([read_krl(source) for source in sources]))
 
     def splitter(self, sources: Sequence[Source]) -> Splitter:
         """Parse the files of a job to put points on the ways of its moves."""

@@ -17,6 +17,7 @@ from postproc.language.analysis.assigned_points import (
     Points,
     Scope,
 )
+from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.to_visits import (
     FoundGoal,
     FoundShift,
@@ -26,6 +27,7 @@ from postproc.language.analysis.to_visits import (
     not_reached,
     spell_element,
 )
+from postproc.language.analysis.values import KnownRecord, WrittenNumber
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame, six_numbers
 from postproc.language.krl.pose_encoding import (
@@ -37,13 +39,10 @@ from postproc.language.krl.pose_encoding import (
     abc_from_rotation,
     rotation_from_abc,
 )
-from postproc.language.krl.program import whole
 from postproc.language.krl.symbols import (
     AXES,
     OUTSIDE,
     POSITIONS,
-    KrlNumber,
-    KrlRecord,
     KrlTask,
 )
 from postproc.language.shifts import Shift, ShiftKind
@@ -206,7 +205,9 @@ class KrlGoals:
         if move.angle is None:
             return math.nan
         found = self.task.value(move.angle, row, here)
-        return math.radians(found.value) if isinstance(found, KrlNumber) else math.nan
+        return (
+            math.radians(found.value) if isinstance(found, WrittenNumber) else math.nan
+        )
 
 
 def motion_of(word: str) -> Motion:
@@ -294,7 +295,7 @@ class _Goal:
             return self._read_held(held)
         name = operand.name if isinstance(operand, ir.DataObject) else ""
         found = self.task.value(operand, self.row, self.here)
-        if not isinstance(found, KrlRecord) or not found.whole:
+        if not isinstance(found, KnownRecord) or not found.whole:
             return _unknown_goal(
                 self._explain_unknown(name) if name else AT_RUN_TIME, name=name
             )
@@ -344,11 +345,11 @@ class _Goal:
         """Read a point of which components have been set by themselves."""
         record = self.task.evaluate_held(held)
         found = _unknown_goal(PARTIAL)
-        if isinstance(record, KrlRecord) and record.whole:
+        if isinstance(record, KnownRecord) and record.whole:
             found = self._read_record(record)
         partial = found.why.code is Code.PARTIAL_TARGET
         known = found.target != Meaning.UNKNOWN and not partial
-        fields = dict(record.fields) if isinstance(record, KrlRecord) else {}
+        fields = dict(record.fields) if isinstance(record, KnownRecord) else {}
         lacks_axis = any(OUTSIDE[axis - 1] not in fields for axis in self.goals.aux)
         known = known and not (held.operand is None and lacks_axis)
         why = explain_components(held, name, self.task.files, known)
@@ -360,7 +361,7 @@ class _Goal:
             base, name, why, pins, found.target, found.values, found.aux
         )
 
-    def _read_record(self, found: KrlRecord) -> FoundGoal:
+    def _read_record(self, found: KnownRecord) -> FoundGoal:
         """Read joint angles or a position."""
         by_axes = {key for key, _ in found.fields} & set(AXES)
         return self._axes(found) if by_axes else self._pose(found)
@@ -374,7 +375,7 @@ class _Goal:
         """Say what is known of a point beside its numbers."""
         name = operand.name if isinstance(operand, ir.DataObject) else ""
         declared = self.task.datum(name, self.here)
-        shared = declared is not None and declared[1].shared
+        shared = declared is not None and declared[1].scope == "global"
         return FoundGoal(
             goal.target, goal.values, goal.file, goal.slots, NO_SLOTS,
             name + self._element(operand), goal.aux, goal.why,
@@ -398,7 +399,7 @@ class _Goal:
             return "" if index is None else f"[{','.join(map(str, index))}]"
         return ""
 
-    def _axes(self, found: KrlRecord) -> FoundGoal:
+    def _axes(self, found: KnownRecord) -> FoundGoal:
         """Read six joint angles; only PTP goes to them."""
         numbers = _numbers(found, AXES)
         if not self._by_joints:
@@ -413,13 +414,15 @@ class _Goal:
             aux=self._outside(found), why=why,
         )  # fmt: skip
 
-    def _pose(self, found: KrlRecord) -> FoundGoal:
+    def _pose(self, found: KnownRecord) -> FoundGoal:
         """Read X, Y, Z, A, B, C with S and T."""
         numbers = _numbers(found, PLACE)
         if numbers is None:
             return self._partial(found, PLACE[:3], Meaning.PARTIAL_POSE)
         flags = [found.get(name) for name in COMPONENTS[6:]]
-        written = [f if isinstance(f, KrlNumber) else KrlNumber(-1.0) for f in flags]
+        written = [
+            f if isinstance(f, WrittenNumber) else WrittenNumber(-1.0) for f in flags
+        ]
         values = [one.value for one in (*numbers, *written)]
         file, slots = _places(numbers)
         own = tuple(one.slot if one.file == file else -1 for one in written)
@@ -435,7 +438,7 @@ class _Goal:
         )  # fmt: skip
 
     def _partial(
-        self, found: KrlRecord, names: Sequence[str], meaning: Meaning
+        self, found: KnownRecord, names: Sequence[str], meaning: Meaning
     ) -> FoundGoal:
         """Read numbers of which some are missing: they stay what they were before.
 
@@ -460,7 +463,7 @@ class _Goal:
             return ODD_STATUS
         return ACCURATE if s > 0 and int(s) & MEASURED else NO_REASON
 
-    def _outside(self, found: KrlRecord) -> tuple[float, ...]:
+    def _outside(self, found: KnownRecord) -> tuple[float, ...]:
         """Return the external axes that count: declared by the cell, or not 0."""
         values = [found.number(name) for name in OUTSIDE]
         return tuple(
@@ -541,7 +544,7 @@ class _Goal:
     def _find_own_shift(self, other: ir.Operand) -> set[tuple[int, int]]:
         """Return where the numbers of a shift begin that stand in the move itself."""
         value = self.task.value(other, self.row, self.here)
-        numbers = _numbers(value, PLACE) if isinstance(value, KrlRecord) else None
+        numbers = _numbers(value, PLACE) if isinstance(value, KnownRecord) else None
         file, slots = _places(numbers or ())
         return {(file, slots[0])} if file == self.here.file and slots else set()
 
@@ -552,7 +555,9 @@ class _Goal:
         them at 0. Where the point has them elsewhere it is left like the point itself.
         """
         value = self.task.value(other, self.row, self.here)
-        own = self._outside(value if isinstance(value, KrlRecord) else KrlRecord(()))
+        own = self._outside(
+            value if isinstance(value, KnownRecord) else KnownRecord(())
+        )
         pairs = zip(own, base.aux, strict=True)
         return tuple(b if math.isnan(a) and b != 0.0 else a for a, b in pairs)
 
@@ -564,7 +569,7 @@ class _Goal:
         Those of data may serve other moves and sums too: they stay.
         """
         value = self.task.value(other, self.row, self.here)
-        record = value if isinstance(value, KrlRecord) else KrlRecord(())
+        record = value if isinstance(value, KnownRecord) else KnownRecord(())
         numbers = _numbers(record, PLACE)
         told = [n.value for n in numbers] if numbers else six_numbers(frame)
         kind = ShiftKind.OWN if behind else ShiftKind.FRAME
@@ -592,7 +597,7 @@ class _Goal:
         """Read ``LIN_REL {X 10}``, ``PTP_REL {A1 5}``: a step from where the arm is."""
         found = self.task.value(operand, self.row, self.here)
         if not isinstance(operand, said.KrlAggregate) or not isinstance(
-            found, KrlRecord
+            found, KnownRecord
         ):
             return _unknown_goal(AT_RUN_TIME)
         if not found.whole:
@@ -632,14 +637,14 @@ def _unknown_goal(why: Reason, name: str = "") -> FoundGoal:
     return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
 
 
-def _numbers(found: KrlRecord, names: Sequence[str]) -> list[KrlNumber] | None:
+def _numbers(found: KnownRecord, names: Sequence[str]) -> list[WrittenNumber] | None:
     """Return some components, None where one is missing."""
     values = [found.get(name) for name in names]
-    numbers = [value for value in values if isinstance(value, KrlNumber)]
+    numbers = [value for value in values if isinstance(value, WrittenNumber)]
     return numbers if len(numbers) == len(names) else None
 
 
-def _places(numbers: Sequence[KrlNumber]) -> tuple[int, tuple[int, ...]]:
+def _places(numbers: Sequence[WrittenNumber]) -> tuple[int, tuple[int, ...]]:
     """Return the file of numbers and their places, -1 where one is computed."""
     files = {one.file if one.slot >= 0 else -1 for one in numbers}
     if len(files) != 1 or -1 in files:

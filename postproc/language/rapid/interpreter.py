@@ -15,6 +15,7 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import HeadedRows
+from postproc.language.analysis.declarations import RoutinePlace
 from postproc.language.analysis.task_machine import (
     NOWHERE,
     Arrived,
@@ -51,13 +52,8 @@ from postproc.language.rapid.modal_state import (
 )
 from postproc.language.rapid.moves import Goals, are_targets, own_numbers, pose_of
 from postproc.language.rapid.pose_encoding import COMMENTS
-from postproc.language.rapid.program import RapidFile
-from postproc.language.rapid.symbols import (
-    RapidTask,
-    functions_in,
-    inside,
-    parameters_of,
-)
+from postproc.language.rapid.program import RapidFile, inside
+from postproc.language.rapid.symbols import RapidTask, functions_in
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
@@ -66,10 +62,10 @@ BY_NAME = "callbyvar"
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (
-    said.FileHeader, said.DataDeclaration, said.ConnectTrap, ir.Assignment,
+    said.FileHeader, ir.Declaration, said.ConnectTrap, ir.Assignment,
     said.TypeAlias,
 )  # fmt: skip
-_Place = tuple[int, str, HeadedRows]  # file, module and rows of a routine
+_Place = RoutinePlace
 _PASSED = (*_PLAIN, ir.SourceStatement, ir.LabelMark)
 
 
@@ -213,13 +209,14 @@ class RapidMachine(TaskMachine):
         if not known or self._is_recursive(scope.file, routine):
             return scope
         assert isinstance(call, ir.Instruction)
-        return self.task.bind(scope, routine, call, row, caller.place.scope)
+        found = RoutinePlace(scope.file, scope.module, routine)
+        return self.task.bind(found, call, row, caller.place.scope) or scope
 
     def _is_recursive(self, file: int, routine: HeadedRows) -> bool:
         """Return True if a routine has parameters and may come to call itself."""
         key = file, routine.first
         if key not in self._recursive:
-            found = bool(parameters_of(routine)) and key in self._find_reachable(key)
+            found = bool(routine.head.parameters) and key in self._find_reachable(key)
             self._recursive[key] = found
         return self._recursive[key]
 
@@ -426,14 +423,15 @@ class RapidMachine(TaskMachine):
     ) -> Iterator[Scope]:
         """Yield where the statements of a routine stand, by all calls of it."""
         file, module, routine = place
-        scope = self.task.scope_of(file, module, routine)
-        yield scope
-        if not parameters_of(routine) or (file, routine.first) in seen:
+        yield self.task.scope_of(file, module, routine)
+        if not routine.head.parameters or (file, routine.first) in seen:
             return
         seen = seen | {(file, routine.first)}
         for caller, row, call in self._calls_by_name[routine.head.name]:
             for there in self._scopes_of(caller, seen):
-                yield self.task.bind(scope, routine, call, row, there)
+                bound = self.task.bind(place, call, row, there)
+                if bound is not None:
+                    yield bound
 
     @cached_property
     def _calls_by_name(
@@ -516,7 +514,7 @@ class RapidMachine(TaskMachine):
         return change_modes(
             one.name, one.arguments, modes,
             lambda operand: self.task.number(operand, row, scope),
-            lambda operand: pose_of(self.task.record(operand, row, scope)),
+            lambda operand: pose_of(self.task.value(operand, row, scope)),
             lambda operand: self.goals.load(operand, row, scope),
         )  # fmt: skip
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing
 from postproc.language.analysis.task_machine import follow
@@ -42,8 +41,6 @@ from postproc.language.text.number_edits import Skeleton
 from postproc.language.text.source import Source
 from postproc.language.visits import never_reached
 
-# What the interpreter says of a statement where it is reached, knowing all modules.
-_SAID_AGAIN = (Code.UNKNOWN_INSTRUCTION, Code.LATE_BINDING)
 _BEGIN = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|![^\r\n]*[\r\n])*(?:%%%|MODULE\s)", re.I)
 
 
@@ -72,14 +69,13 @@ class Rapid(Language):
         files = [*task.files, *beside]
         machine = follow(lambda: RapidMachine.of(task, start, beside))
         visits = visits_of(machine)
-        moves = {k: [m.row for m in file.moves] for k, file in enumerate(task.files)}
+        moves = {k: file.moves for k, file in enumerate(task.files)}
         missed = machine.find_unreached(moves)
         system = frozenset(f.text.source.name for f in task.files if f.is_system)
         missed = {k: v for k, v in missed.items() if k not in system}
         told = never_reached(missed, "main", "module")
         own = (d for file in task.files for d in file.diagnostics)
-        own = (d for d in own if d.file not in system)
-        found = [d for d in own if d.code not in _SAID_AGAIN]
+        found = [d for d in own if d.file not in system]
         found += [*machine.diagnostics, *told]
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
         kept = tuple(f for f in files if f.text.source.name not in corrected)
@@ -88,7 +84,10 @@ class Rapid(Language):
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the modules of a task to clone points in them."""
-        return RapidCloner.of(*_tasks(sources, Start()))
+        task, beside = _tasks(sources, Start())
+        cloner = RapidCloner(task)
+        cloner.take_words(beside)  # data of one name may be shared with them
+        return cloner
 
     def splitter(self, sources: Sequence[Source]) -> Splitter:
         """Parse the modules of a task to put points on the ways of its moves."""

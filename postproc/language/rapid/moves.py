@@ -32,6 +32,7 @@ from postproc.language.analysis.to_visits import (
     not_reached,
     spell_element,
 )
+from postproc.language.analysis.values import Value, WrittenNumber
 from postproc.language.rapid.instructions import POINT, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
 from postproc.language.rapid.pose_encoding import (
@@ -39,13 +40,7 @@ from postproc.language.rapid.pose_encoding import (
     WIDTH,
     shift_point,
 )
-from postproc.language.rapid.symbols import (
-    SHIFTS,
-    Nested,
-    RapidTask,
-    WrittenNumber,
-)
-from postproc.language.rapid.targets import COUNTS
+from postproc.language.rapid.symbols import SHIFTS, RapidTask
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
@@ -202,7 +197,7 @@ class Goals:
         if isinstance(operand, ir.DataObject) and operand.name == "load0":
             if not operand.steps and "load0" not in self.task.declared:
                 return EMPTY_HAND
-        found = load_of(self.task.record(operand, row, scope))
+        found = load_of(self.task.value(operand, row, scope))
         return EMPTY_HAND if found and found[0] <= PLACEHOLDER else found
 
     def _total(
@@ -366,7 +361,7 @@ class Goals:
             plain = self._read_written(operand, joints, row, scope)
             if plain is not None:
                 return plain
-        found = _numbers(self.task.record(operand, row, scope), joints)
+        found = _numbers(self.task.value(operand, row, scope), joints)
         if found is None:
             why = self._explain_unknown(name, scope) if name else AT_RUN_TIME
             return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
@@ -450,7 +445,7 @@ class Goals:
         if found is None:
             code = Code.UNDECLARED_VARIABLE
             text = "is declared in none of the given files, or more than once"
-        elif found[1].declared.value is None and name not in self.task.written:
+        elif found[1].value is None and name not in self.task.written:
             text = "has no value in the given files: teach it first"
             code = Code.NO_VALUE
         elif self.task.is_changed_beside(*found):
@@ -478,7 +473,7 @@ class Goals:
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
         found = self.task.datum(name, scope)
-        if found and found[1].declared.kind == "pers" and name in self.task.written:
+        if found and found[1].kind == "pers" and name in self.task.written:
             return f"{name} is persistent: it keeps what it is given beyond this run"
         return ""
 
@@ -576,7 +571,7 @@ class Goals:
         self, kind: str, operand: ir.Operand, arguments: _Arguments
     ) -> FrameOfMove:
         name = operand.name if isinstance(operand, ir.DataObject) else f"the {kind}"
-        found = self.task.record(operand, arguments.row, arguments.scope)
+        found = self.task.value(operand, arguments.row, arguments.scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
             why = self._explain_unknown(name, arguments.scope)
@@ -623,7 +618,7 @@ class _Arguments:
             return ""
         found = self.task.datum(operand.name, scope)
         if found is not None:
-            return found[1].declared.type
+            return found[1].type
         if operand.name == "tool0":
             return "tooldata"
         if operand.name == "fine" or _ZONE.match(operand.name):
@@ -663,7 +658,7 @@ class _Arguments:
         usual = _ZONE.match(operand.name)
         if usual and there.is_built_in(operand.name):
             return float(usual[1]) or Z0
-        found = self.task.record(operand, there.row, there.scope)
+        found = self.task.value(operand, there.row, there.scope)
         if isinstance(found, tuple) and len(found) >= 2:
             stops, tcp = found[:2]
             if isinstance(stops, WrittenNumber) and isinstance(tcp, WrittenNumber):
@@ -681,7 +676,7 @@ class _Arguments:
         usual = _SPEED.match(operand.name)
         if usual and there.is_built_in(operand.name):
             return float(usual[1]) / 1000.0
-        found = self.task.record(operand, there.row, there.scope)
+        found = self.task.value(operand, there.row, there.scope)
         if isinstance(found, tuple) and found and isinstance(found[0], WrittenNumber):
             return found[0].value / 1000.0
         return np.nan
@@ -729,10 +724,13 @@ def own_numbers(one: ir.Instruction) -> list[int] | None:
     return slots[:7] if len(slots) == 17 else None
 
 
+_COUNTS = (3, 4, 4, 6), (6, 6)  # numbers of a robtarget and of a jointtarget
+
+
 def _plain_slots(operand: ir.Composite) -> list[int]:
     """Return the slots of ``[[1, 2, ..], ..]`` of a target, nothing for all else."""
     parts = [part.items for part in operand.items if isinstance(part, ir.Composite)]
-    if tuple(map(len, parts)) not in COUNTS or len(parts) != len(operand.items):
+    if tuple(map(len, parts)) not in _COUNTS or len(parts) != len(operand.items):
         return []
     leaves = [leaf for part in parts for leaf in part]
     slots = [leaf.slot for leaf in leaves if isinstance(leaf, ir.Num)]
@@ -740,7 +738,7 @@ def _plain_slots(operand: ir.Composite) -> list[int]:
 
 
 def _numbers(
-    found: Nested | None, joints: bool
+    found: Value | None, joints: bool
 ) -> tuple[list[WrittenNumber], tuple[float, ...]] | None:
     """Take a robtarget or jointtarget apart: its numbers, and the external axes."""
     counts = (6, 6) if joints else (3, 4, 4, 6)
@@ -768,7 +766,7 @@ def _places(numbers: Sequence[WrittenNumber]) -> tuple[int, tuple[int, ...]]:
     return files.pop(), tuple(slots + [-1] * (WIDTH - len(slots)))
 
 
-def _pose_numbers(found: Nested | None) -> list[float] | None:
+def _pose_numbers(found: Value | None) -> list[float] | None:
     """Return the seven numbers of a pose, None where it is none."""
     if not isinstance(found, tuple) or len(found) != 2:
         return None
@@ -782,7 +780,7 @@ def _pose_numbers(found: Nested | None) -> list[float] | None:
     return numbers if len(numbers) == 7 and _is_unit(numbers[3:]) else None
 
 
-def pose_of(found: Nested | None) -> tuple[float, ...]:
+def pose_of(found: Value | None) -> tuple[float, ...]:
     """Return the seven numbers of a pose, nothing where it is none."""
     return tuple(_pose_numbers(found) or ())
 
@@ -792,7 +790,7 @@ def pose_of_numbers(numbers: Sequence[float]) -> Pose:
     return flat(RAPID_DIALECT.poses(np.array([*numbers, 0.0, 0.0, 0.0, 0.0])[None]))
 
 
-def _tool_of(found: Nested | None) -> FrameOfMove | None:
+def _tool_of(found: Value | None) -> FrameOfMove | None:
     """Read ``[robhold, [[x,y,z],[q1..q4]], [load]]``."""
     if not isinstance(found, tuple) or len(found) < 2:
         return None
@@ -804,7 +802,7 @@ def _tool_of(found: Nested | None) -> FrameOfMove | None:
     return FrameOfMove(pose_of_numbers(pose), bool(held.value), load=stated)
 
 
-def load_of(found: Nested | None) -> tuple[float, ...]:
+def load_of(found: Value | None) -> tuple[float, ...]:
     """Return mass [kg] and centre [mm] of ``[mass, [x,y,z], ..]``, else nothing."""
     if not isinstance(found, tuple) or len(found) < 2:
         return ()
@@ -816,7 +814,7 @@ def load_of(found: Nested | None) -> tuple[float, ...]:
     return (mass.value, *at) if known else ()
 
 
-def _wobj_of(found: Nested | None) -> FrameOfMove | None:
+def _wobj_of(found: Value | None) -> FrameOfMove | None:
     """Read ``[robhold, ufprog, "ufmec", [uframe], [oframe]]``."""
     if not isinstance(found, tuple) or len(found) != 5:
         return None

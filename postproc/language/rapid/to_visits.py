@@ -57,8 +57,7 @@ def visits_of(machine: RapidMachine) -> Visits:
                 placed[key] = compose_poses(pose, pose_of_numbers(v.modes.shift))
         return _conditions(v, base, placed[key], id(v) in paused)
 
-    files = enumerate(machine.task.files)
-    moves = {k: [move.row for move in file.moves] for k, file in files}
+    moves = {k: file.moves for k, file in enumerate(machine.task.files)}
     return to_visits.visits_of(machine, RAPID_DIALECT, conditions, COMMENTS, moves)
 
 

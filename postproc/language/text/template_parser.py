@@ -9,7 +9,7 @@ from typing import Any
 
 import lark
 
-from postproc.language.ir import Num
+from postproc.language.ir import NotUnderstood, Num, SourceStatement
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.lexer import NAME_MARK, UNREADABLE
 from postproc.language.text.templates import open_name
@@ -63,6 +63,11 @@ class FormParser:
             return self._build(line_parser(self.grammar, "statement").parse(form))
         except (lark.exceptions.LarkError, DeeperError, ReservedWordError):
             return None
+
+    def parse_statement(self, form: str) -> SourceStatement:
+        """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
+        found = self.parse(form)
+        return found if isinstance(found, SourceStatement) else NotUnderstood()
 
     def _build(self, tree: lark.Tree[lark.Token]) -> object:
         """Build what a tree says, counting its names and its numbers."""
