@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import Scope
+from postproc.language.analysis.assigned_points import NO_POINTS, Scope
 from postproc.language.analysis.call_context import Context
-from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.analysis.declarations import RoutinePlace
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
+    MOVES,
     NOWHERE,
     Arrived,
+    Effects,
     TaskMachine,
 )
-from postproc.language.analysis.to_visits import FoundGoal, cell_pose
+from postproc.language.analysis.to_visits import cell_pose
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import HELD
 from postproc.language.krl.external_routines import AHEAD, ASSUMED, package_routines
@@ -32,8 +34,7 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoals, own_numbers
-from postproc.language.krl.pose_encoding import COMMENTS
+from postproc.language.krl.moves import KrlGoals, KrlVisit, own_numbers
 from postproc.language.krl.statements import KrlText
 from postproc.language.krl.symbols import (
     FUNCTIONS,
@@ -61,9 +62,8 @@ _ENDED = Reason(
     Code.ENDS_ELSEWHERE,
     "RESUME may end the way to it anywhere, while its interrupt is on",
 )
-MOVES, BRAKES, RESUMES = "moves", "brake", "resume"
-"""What statements may do to moves that are under way."""
-_Effects = tuple[frozenset[str], list[tuple[int, HeadedRows]]]
+BRAKES, RESUMES = "brake", "resume"
+"""What statements may do to moves that are under way, beside `MOVES`."""
 EVERY = -1  # interrupt whose number is not known
 FURTHEST_AHEAD = 5  # moves, by $ADVANCE
 
@@ -77,10 +77,9 @@ class KrlMachine(TaskMachine):
         goals: Reads destinations.
     """
 
-    comments = COMMENTS
+    procedures = ("def",)
     task: KrlTask = field(kw_only=True)
     goals: KrlGoals = field(kw_only=True)
-    _known: dict[tuple[int, int], _Effects] = field(default_factory=dict)
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
     _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
@@ -131,14 +130,6 @@ class KrlMachine(TaskMachine):
     def goes_on(self, one: ir.SourceStatement) -> bool:
         """Tell what does nothing, see `TaskMachine.goes_on`."""
         return isinstance(one, _PASSED)
-
-    def number(self, operand: ir.Operand | None, row: int, scope: Scope) -> float:
-        """Evaluate a number, see `TaskMachine.number`."""
-        return self.task.number(operand, row, scope)
-
-    def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
-        """Return where the statements of a routine stand."""
-        return self.task.scope_of(file, module, routine)
 
     def counts_alone(self, context: Context, row: int, one: ir.ForLoop) -> bool:
         """Return True if only the loop changes its variable, see `TaskMachine`.
@@ -259,11 +250,7 @@ class KrlMachine(TaskMachine):
         self, context: Context, row: int, one: said.KrlMove, here: Arrived
     ) -> Arrived:
         """Record the visits of a move."""
-        scope = context.place.scope
-        after = self.arrive(
-            context, row, here,
-            lambda: [*self.goals.visits(one, row, scope, here.modes, here.points)],
-        )  # fmt: skip
+        after = self.arrive(context, row, one, here)
         return replace(after, modes=replace(after.modes, halted=False, goes_on=False))
 
     def _modes(self, context: Context, row: int) -> ModeReader:
@@ -294,13 +281,8 @@ class KrlMachine(TaskMachine):
         self, context: Context, row: int, one: ir.Instruction, here: Arrived
     ) -> Arrived | None:
         name = one.name
-        found = self.task.routine(name, context.place.scope)
-        if found is not None:
-            return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
-            for file, _, routine in self.task.routines[name]:
-                self.run_beside(file, routine)
-            return self.unknown(context, row, here, "names several routines")
+            return self.call_named(context, row, name, here)
         if name == "bas":
             command = one.arguments[0].value if one.arguments else None
             if isinstance(command, said.EnumValue) and command.name.startswith("#out_"):
@@ -344,17 +326,10 @@ class KrlMachine(TaskMachine):
         self, context: Context, row: int, name: str, here: Arrived
     ) -> Arrived:
         """Allow for what a function does."""
-        found = self.task.routine(name, context.place.scope)
-        if found is not None:
-            if not self.may_act(found[0], found[2]):
-                return _halt(here, None)
-            self.run_beside(found[0], found[2])
-            what = f"calls the function {name}, which moves: it is not followed"
-            return self.unknown(context, row, here, what)
-        if name in FUNCTIONS or name in STILL or self.declares_motionless(name):
-            return here
-        what = f"calls the function {name}, which is not known: it may move"
-        return self.unknown(context, row, here, what)
+        still = name in FUNCTIONS or name in STILL or self.declares_motionless(name)
+        after = self.call_function(context, row, name, still, here)
+        own = name in self.task.routines
+        return _halt(here, None) if own and after is here else after
 
     # Interrupts and triggers.
 
@@ -363,7 +338,7 @@ class KrlMachine(TaskMachine):
     ) -> Arrived:
         """Declare an interrupt; one that nothing switches on may be on already."""
         self._met.add((context.place.scope.file, row))
-        effects = self._effects_of(context.place.scope.file, one.action)
+        effects = self.effects_of(one.action, context.place.scope)
         self._call_beside(context.place.scope.file, one.action)
         modes, number = here.modes, self._number_of(context, row, one.number)
         others = frozenset(d for d in modes.declared if d[0] != number)
@@ -440,32 +415,21 @@ class KrlMachine(TaskMachine):
         """Allow for a RESUME in the routine, see `TaskMachine.at_return`."""
         ending = {own for own in here.modes.declared if own[1] == _ENDED}
         numbers = {number for number, _ in ending}
-        at = context.place.scope.file, context.place.routine
+        scope = context.place.scope
+        at = RoutinePlace(scope.file, scope.module, context.place.routine)
         active = bool(ending & here.modes.active)
-        if not ending or not (active or self._may_switch(*at, numbers)):
+        if not ending or not (active or self._may_switch(at, numbers)):
             return here
         ended = here.forget()
         on = {own for own in ending if own[0] in self._still_enabled}
         left = (ended.modes.active - ending) | on
         return here.join(replace(ended, modes=ended.modes.with_(active=left)))
 
-    def _may_switch(self, file: int, routine: HeadedRows, numbers: set[int]) -> bool:
+    def _may_switch(self, routine: RoutinePlace, numbers: set[int]) -> bool:
         """Return True if a routine, or one that it calls, switches interrupts."""
         numbers = numbers | {EVERY}
         switching = {(k, r.first) for k, r, own, _ in self._switches if own in numbers}
-        return any(
-            (at, one.first) in switching for at, one in self._reach(file, routine)
-        )
-
-    def _reach(
-        self, file: int, routine: HeadedRows
-    ) -> Iterator[tuple[int, HeadedRows]]:
-        """Yield a routine and all that it may come to call."""
-        return reach(
-            [(file, routine)],
-            lambda one: self._direct(*one)[1],
-            lambda one: (one[0], one[1].first),
-        )
+        return any(one.key in switching for one in self.reach_from([routine]))
 
     @cached_property
     def _still_enabled(self) -> set[int]:
@@ -538,7 +502,7 @@ class KrlMachine(TaskMachine):
 
     def _number_of(self, context: Context, row: int, operand: ir.Operand | None) -> int:
         """Return the number of an interrupt, EVERY where it is not known."""
-        number = whole(self.number(operand, row, context.place.scope))
+        number = whole(self.task.number(operand, row, context.place.scope))
         return EVERY if number is None else number
 
     @cached_property
@@ -561,7 +525,7 @@ class KrlMachine(TaskMachine):
 
         What it does comes at some time in the next move, when the program is ahead.
         """
-        if not self._effects_of(context.place.scope.file, one.action):
+        if not self.effects_of(one.action, context.place.scope):
             return here
         self._call_beside(context.place.scope.file, one.action)
         return replace(
@@ -570,41 +534,25 @@ class KrlMachine(TaskMachine):
 
     def _call_beside(self, file: int, action: ir.SourceStatement) -> None:
         """Note the routines that an interrupt or a trigger calls."""
-        for called in self.calls_of(file, action):
-            self.run_beside(*called)
+        for at, _, called in self.calls_of(file, action):
+            self.run_beside(at, called)
 
-    def calls_of(
-        self, file: int, one: ir.SourceStatement
-    ) -> list[tuple[int, HeadedRows]]:
-        """Return the routines that a statement calls, see `TaskMachine`."""
-        called = list[tuple[int, HeadedRows]]()
-        self._own(file, one, called)
-        return called
+    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[RoutinePlace]:
+        """Return what an interrupt calls later, too."""
+        action = isinstance(one, said.InterruptDeclared)
+        return super().calls_of(file, one.action if action else one)
 
-    def changes_of(self, one: ir.SourceStatement) -> Iterator[str]:
-        """Yield the names of data that a statement changes, see `TaskMachine`."""
-        yield from (data.name for data in self.task.list_changes(one))
+    def is_beside(self, one: ir.SourceStatement) -> bool:
+        """Return True if a statement says what is done at another time."""
+        return isinstance(one, said.InterruptDeclared | said.PathTrigger)
 
-    def routines_beside(self) -> Iterator[tuple[int, int, int]]:
-        """Yield functions, and what interrupts and triggers do, see `TaskMachine`."""
-        for file, text in enumerate(self.texts):
-            for routine in self.task.files[file].routines:
-                if getattr(routine.head, "kind", "") == "deffct":
-                    yield file, routine.first, routine.last
-            for row in text.where(_is_beside):
-                yield file, row, row + 1
-                for at, routine in self.calls_of(file, text.statement(row).action):
-                    yield at, routine.first, routine.last
-
-    def goals_of(self, file: int, row: int) -> Iterator[FoundGoal]:
-        """Yield where a move goes, see `TaskMachine`."""
-        one, source = self.texts[file].statement(row), self.task.files[file]
-        around = (r for r in source.routines if r.first < row < r.last)
-        routine = next(around, None)
-        if routine is not None and isinstance(one, said.KrlMove):
-            scope = self.task.scope_of(file, source.name, routine)
-            for visit in self.goals.visits(one, row, scope, None):
-                yield visit.goal
+    def read_visits(
+        self, one: Any, row: int, scope: Scope, here: Arrived | None
+    ) -> Iterator[KrlVisit]:
+        """Read the visits of a move, see `TaskMachine.read_visits`."""
+        if isinstance(one, said.KrlMove):
+            modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
+            yield from self.goals.visits(one, row, scope, modes, points)
 
     def _robot_texts(self) -> Iterator[tuple[int, KrlText]]:
         """Yield files and statements, but for those of submit programs."""
@@ -627,7 +575,8 @@ class KrlMachine(TaskMachine):
                     continue
                 one = text.statement(row)
                 if isinstance(one, said.InterruptDeclared):
-                    effects = self._effects_of(file, one.action)
+                    here = Scope(file, self.task.files[file].name, "")
+                    effects = self.effects_of(one.action, here)
                     found |= {_INTERRUPT} if MOVES in effects else set()
                     found |= {_RESUMED} if effects - {MOVES} else set()
                 unseen_on |= (
@@ -639,64 +588,28 @@ class KrlMachine(TaskMachine):
 
     # What a routine may do, read off its text.
 
-    def may_act(self, file: int, routine: HeadedRows) -> bool:
-        """Return True if a routine moves, or changes how moves are carried out."""
-        return bool(self._routine_effects(file, routine))
-
-    def _routine_effects(self, file: int, routine: HeadedRows) -> frozenset[str]:
-        """Collect what a routine may do, and all that it calls."""
-        found = (self._direct(*one)[0] for one in self._reach(file, routine))
-        return frozenset().union(*found)
-
-    def _direct(self, file: int, routine: HeadedRows) -> _Effects:
-        """Collect what the statements of a routine do, and which routines they call."""
-        key = file, routine.first
-        if key not in self._known:
-            text, called = self.texts[file], list[tuple[int, HeadedRows]]()
-            rows = range(routine.first + 1, routine.last)
-            parts = [self._own(file, text.statement(row), called) for row in rows]
-            self._known[key] = frozenset().union(*parts), called
-        return self._known[key]
-
-    def _effects_of(self, file: int, one: ir.SourceStatement) -> frozenset[str]:
-        """Collect what a statement may do: move or set what moves need, end a move."""
-        called = list[tuple[int, HeadedRows]]()
-        found = [self._own(file, one, called)]
-        found += [self._routine_effects(*routine) for routine in called]
-        return frozenset().union(*found)
-
-    def _own(
-        self,
-        file: int,
-        one: ir.SourceStatement,
-        called: list[tuple[int, HeadedRows]],
-    ) -> frozenset[str]:
-        """Collect what a statement does itself, and note the routines that it calls."""
+    def own_effects(self, one: ir.SourceStatement) -> Effects:
+        """Return that a statement moves, sets what moves need, or ends moves."""
         match one:
             case said.KrlMove() | said.SplineBlock() | ir.NotUnderstood():
                 return frozenset([MOVES])
             case said.InterruptSwitched(word=word) if word in (BRAKES, RESUMES):
                 return frozenset([word])
             case said.PathTrigger(action=action):
-                return self._own(file, action, called)
-        changed = self.task.list_changes(one)
-        if any(_is_modal(target.name) for target in changed):
-            return frozenset([MOVES])
-        here = Scope(file, self.task.files[file].name, "")
-        parts = values_of(one)
-        names = [p.name for p in parts if isinstance(p, ir.FunctionCall)]
-        if isinstance(one, ir.Instruction):
-            names.append(one.name)
-        moves = False
-        for name in names:
-            found = self.task.routine(name, here)
-            if found is not None:
-                called.append((found[0], found[2]))
-            moves |= found is None and not self._is_still(name)
-        return frozenset([MOVES]) if moves else frozenset()
+                return self.own_effects(action)
+        modal = any(_is_modal(data.name) for data in self.task.list_changes(one))
+        return frozenset([MOVES] if modal else [])
 
-    def _is_still(self, name: str) -> bool:
-        """Return True if a routine without a text is known to be still."""
+    def names_called(self, one: ir.SourceStatement) -> Iterator[str]:
+        """Yield functions and the instruction; of a trigger what it does."""
+        parts = (
+            ir.walk(one.action) if isinstance(one, said.PathTrigger) else values_of(one)
+        )
+        calls = ir.Instruction | ir.FunctionCall
+        yield from (part.name for part in parts if isinstance(part, calls))
+
+    def is_still(self, name: str) -> bool:
+        """Return True for known routines and functions, and by the cell."""
         known = name in STILL or name in FUNCTIONS or self.declares_motionless(name)
         listed = name in package_routines() and not self._is_overruled(name)
         return known or listed
@@ -705,11 +618,6 @@ class KrlMachine(TaskMachine):
 def _is_interrupt(one: ir.SourceStatement) -> bool:
     """Return True if a statement declares or switches interrupts."""
     return isinstance(one, said.InterruptDeclared | said.InterruptSwitched)
-
-
-def _is_beside(one: ir.SourceStatement) -> bool:
-    """Return True if a statement says what is done at another time."""
-    return isinstance(one, said.InterruptDeclared | said.PathTrigger)
 
 
 def _is_modal(name: str) -> bool:

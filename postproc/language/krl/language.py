@@ -87,8 +87,7 @@ class Krl(Language):
         task = KrlTask(files, start.taught)
         machine = follow(lambda: KrlMachine.of(task, start))
         visits = visits_of(machine)
-        own = {k: f.moves for k, f in enumerate(files) if not f.is_system}
-        missed = machine.find_unreached(own)
+        missed = machine.find_unreached()
         told = never_reached(missed, f"DEF {files[0].routines[0].head.name}", "program")
         odd = (d for file in files for d in file.diagnostics)
         found = [*odd, *machine.diagnostics, *told]

@@ -12,7 +12,6 @@ import numpy as np
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import (
-    NO_POINTS,
     AssignedPoint,
     Points,
     Scope,
@@ -146,7 +145,7 @@ class KrlGoals:
         row: int,
         here: Scope,
         modes: object,
-        points: Points = NO_POINTS,
+        points: Points,
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")

@@ -69,10 +69,8 @@ class Rapid(Language):
         files = [*task.files, *beside]
         machine = follow(lambda: RapidMachine.of(task, start, beside))
         visits = visits_of(machine)
-        moves = {k: file.moves for k, file in enumerate(task.files)}
-        missed = machine.find_unreached(moves)
+        missed = machine.find_unreached()
         system = frozenset(f.text.source.name for f in task.files if f.is_system)
-        missed = {k: v for k, v in missed.items() if k not in system}
         told = never_reached(missed, "main", "module")
         own = (d for file in task.files for d in file.diagnostics)
         found = [d for d in own if d.file not in system]

@@ -36,7 +36,7 @@ from postproc.language.analysis.to_visits import (
     not_reached,
 )
 from postproc.language.analysis.values import Value, WrittenNumber, list_leaves
-from postproc.language.rapid.instructions import Signature
+from postproc.language.rapid.instructions import MOTIONS, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
 from postproc.language.rapid.pose_encoding import (
     RAPID_DIALECT,
@@ -148,13 +148,13 @@ class Goals:
     def visits(
         self,
         one: ir.Instruction,
-        signature: Signature,
         row: int,
         scope: Scope,
         modes: Modes,
-        points: Points = NO_POINTS,
+        points: Points,
     ) -> Iterator[RapidVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
+        signature = MOTIONS[one.name]
         ends = signature.operands(one.arguments)
         watched = points.watch()
         there = replace(scope, points=watched)
