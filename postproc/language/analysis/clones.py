@@ -149,7 +149,8 @@ class TaskCloner(Cloner):
         """Return the 1-based line that declares data."""
         place = cast(TaskPoint, named).place
         file, datum = next(iter(self.task.data_at(place).values()))
-        return self.task.files[file].text.line(datum.row)
+        line: int = self.task.files[file].text.line(datum.row)
+        return line
 
     def clone(
         self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]

@@ -423,7 +423,8 @@ class TaskSymbols(ABC, Generic[F]):
         self, data: ir.DataObject, row: int, here: Scope, depth: int
     ) -> tuple[Value | None, Sequence[str | ir.ElementStep], str]:
         """Return what data, or an element, hold; then further steps, and their type."""
-        name, steps = data.name, data.steps
+        name = data.name
+        steps: Sequence[str | ir.ElementStep] = data.steps
         count = next((k for k, s in enumerate(steps) if isinstance(s, str)), len(steps))
         whole = replace(data, steps=steps[:count]) if steps[count:] else data
         held = self.find_held(whole, row, here)

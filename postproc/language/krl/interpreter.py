@@ -539,8 +539,9 @@ class KrlMachine(TaskMachine):
 
     def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[RoutinePlace]:
         """Return what an interrupt calls later, too."""
-        action = isinstance(one, said.InterruptDeclared)
-        return super().calls_of(file, one.action if action else one)
+        if isinstance(one, said.InterruptDeclared):
+            one = one.action
+        return super().calls_of(file, one)
 
     def is_beside(self, one: ir.SourceStatement) -> bool:
         """Return True if a statement says what is done at another time."""

@@ -487,7 +487,7 @@ class KrlGoal(GoalReader):
 
     # Steps.
 
-    def _step(self, operand: ir.Operand) -> FoundGoal:
+    def _step(self, operand: ir.Operand | None) -> FoundGoal:
         """Read ``LIN_REL {X 10}``, ``PTP_REL {A1 5}``: a step from where the arm is."""
         found = self.task.value(operand, self.row, self.here)
         if not isinstance(operand, said.KrlAggregate) or not isinstance(

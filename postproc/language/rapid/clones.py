@@ -43,7 +43,8 @@ class RapidCloner(TaskCloner):
         """Spell a name as it is declared."""
         file, datum = self.task.data_at(place)[()]
         start, end = self.find_name(file, datum.row, datum.name)
-        return self.task.files[file].text.source.text[start:end]
+        declared: str = self.task.files[file].text.source.text[start:end]
+        return declared
 
     def declare(
         self, points: Sequence[TaskPoint], data: Sequence[tuple[int, Datum]], name: str
