@@ -12,7 +12,7 @@ from postproc import _native
 from postproc.exceptions import ProgramError
 from postproc.language import ir
 from postproc.language.krl import syntax as said
-from postproc.language.krl.language import skeleton_of
+from postproc.language.krl.language import Krl
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.statements import read_krl_statements
 from postproc.language.text.source import Source
@@ -159,8 +159,8 @@ def test_programs_of_others_are_read_without_loss():
             for line in between.replace("\r", "\n").split("\n"):
                 assert not line.partition(";")[0].strip()
             at = span.end
-        again = skeleton_of(read_krl(Source(path.name, bytes(source.data))).text)
-        assert again.shapes == skeleton_of(file.text).shapes
+        again = Krl().skeleton(read_krl(Source(path.name, bytes(source.data))))
+        assert again.shapes == Krl().skeleton(file).shapes
 
 
 @pytest.mark.parametrize(
