@@ -6,13 +6,12 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Scope
 from postproc.language.analysis.call_context import Context
-from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.analysis.declarations import RoutinePlace
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
@@ -35,7 +34,6 @@ from postproc.language.krl.modal_state import (
     ModeReader,
 )
 from postproc.language.krl.moves import KrlGoals, KrlVisit, own_numbers
-from postproc.language.krl.statements import KrlText
 from postproc.language.krl.symbols import (
     FUNCTIONS,
     STILL,
@@ -66,6 +64,25 @@ BRAKES, RESUMES = "brake", "resume"
 """What statements may do to moves that are under way, beside `MOVES`."""
 EVERY = -1  # interrupt whose number is not known
 FURTHEST_AHEAD = 5  # moves, by $ADVANCE
+
+
+class _InterruptStatement(NamedTuple):
+    """What a statement says of an interrupt.
+
+    Attributes:
+        file, row: The statement.
+        routine: The key of its routine.
+        word: decl, on, off, enable, disable, brake or resume.
+        number: Of the interrupt, EVERY where it is not known.
+        one: The statement.
+    """
+
+    file: int
+    row: int
+    routine: tuple[int, int]
+    word: str
+    number: int
+    one: Any
 
 
 @dataclass
@@ -340,7 +357,10 @@ class KrlMachine(TaskMachine):
         self._met.add((context.place.scope.file, row))
         effects = self.effects_of(one.action, context.place.scope)
         self._call_beside(context.place.scope.file, one.action)
-        modes, number = here.modes, self._number_of(context, row, one.number)
+        modes, number = (
+            here.modes,
+            self._number_of(context.place.scope, row, one.number),
+        )
         others = frozenset(d for d in modes.declared if d[0] != number)
         modes = replace(modes, declared=others)
         ends = RESUMES in effects
@@ -364,52 +384,35 @@ class KrlMachine(TaskMachine):
 
         They do not declare it, and nothing switches it on where it is declared.
         """
-        switching = {
-            (file, routine.first) for file, routine, own, word in self._switches
-            if word == "on" and own in (number, EVERY)
-        }  # fmt: skip
-        declaring = {  # file and first row of routines that may declare it
-            (file, routine.first) for file, routine, own, _ in self._declarations
-            if own in (number, EVERY)
-        }  # fmt: skip
+        switching = self._find_routines(("on",), {number, EVERY})
+        declaring = self._find_routines(("decl",), {number, EVERY})
         known = number != EVERY and bool(switching)
         return known and declaring.isdisjoint(switching)
 
     @cached_property
-    def _declarations(
-        self,
-    ) -> list[tuple[int, HeadedRows, int, said.InterruptDeclared]]:
-        """List interrupts: file, routine, number, and how they are declared."""
+    def _interrupts(self) -> list[_InterruptStatement]:
+        """List all that programs say of interrupts, but for submit programs."""
         found = []
-        for file, routine, row, one in self._in_routines():
-            if isinstance(one, said.InterruptDeclared):
-                here = Scope(file, self.task.files[file].name, "")
-                number = whole(self.task.number(one.number, row, here))
-                found.append((file, routine, EVERY if number is None else number, one))
+        for file, text in enumerate(self.texts):
+            if self.task.files[file].is_submit:
+                continue
+            here = Scope(file, self.task.files[file].name, "")
+            for row in text.where(_is_interrupt):
+                one, around = text.statement(row), self.task.routine_around(file, row)
+                word = "decl" if isinstance(one, said.InterruptDeclared) else one.word
+                number = self._number_of(here, row, one.number)
+                routine = around.key if around else (file, -1)
+                found.append(_InterruptStatement(file, row, routine, word, number, one))
         return found
 
-    @cached_property
-    def _switches(self) -> list[tuple[int, HeadedRows, int, str]]:
-        """List what switches interrupts: file, routine, number, and word."""
-        found = []
-        for file, routine, row, one in self._in_routines():
-            if isinstance(one, said.InterruptSwitched) and one.word in ("on", "off"):
-                here = Scope(file, self.task.files[file].name, "")
-                number = whole(self.task.number(one.number, row, here))
-                found.append(
-                    (file, routine, EVERY if number is None else number, one.word)
-                )
-        return found
-
-    def _in_routines(
-        self,
-    ) -> Iterator[tuple[int, HeadedRows, int, ir.SourceStatement]]:
-        """Yield what routines say of interrupts: file, routine, row."""
-        for file, text in self._robot_texts():
-            for routine in self.task.files[file].routines:
-                rows = text.where(_is_interrupt, routine.first + 1, routine.last)
-                for row in rows:
-                    yield file, routine, row, text.statement(row)
+    def _find_routines(
+        self, words: Sequence[str], numbers: set[int]
+    ) -> set[tuple[int, int]]:
+        """Return the routines that say something of some interrupts, by their keys."""
+        return {
+            one.routine for one in self._interrupts
+            if one.word in words and one.number in numbers
+        }  # fmt: skip
 
     def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Allow for a RESUME in the routine, see `TaskMachine.at_return`."""
@@ -427,31 +430,26 @@ class KrlMachine(TaskMachine):
 
     def _may_switch(self, routine: RoutinePlace, numbers: set[int]) -> bool:
         """Return True if a routine, or one that it calls, switches interrupts."""
-        numbers = numbers | {EVERY}
-        switching = {(k, r.first) for k, r, own, _ in self._switches if own in numbers}
+        switching = self._find_routines(("on", "off"), numbers | {EVERY})
         return any(one.key in switching for one in self.reach_from([routine]))
 
     @cached_property
     def _still_enabled(self) -> set[int]:
         """Numbers of interrupts whose routines may leave them on, EVERY for unknown."""
-        return {number for file, _, number, one in self._declarations
-                if not self._switches_itself_off(file, number, one)}  # fmt: skip
+        declared = (one for one in self._interrupts if one.word == "decl")
+        return {one.number for one in declared if not self._switches_itself_off(one)}
 
-    def _switches_itself_off(
-        self, file: int, number: int, declared: said.InterruptDeclared
-    ) -> bool:
+    def _switches_itself_off(self, declared: _InterruptStatement) -> bool:
         """Return True if the routine of an interrupt first of all switches it off."""
-        name = getattr(declared.action, "name", "")
-        found = self.task.routine(name, Scope(file, self.task.files[file].name, ""))
-        if found is None:
-            return False
-        at, _, routine = found
-        here = Scope(at, self.task.files[at].name, "")
-        for row in range(routine.first + 1, routine.last):
-            one = self.texts[at].statement(row)
+        name = getattr(declared.one.action, "name", "")
+        here = Scope(declared.file, self.task.files[declared.file].name, "")
+        found = self.task.routine(name, here)
+        for row in () if found is None else found.inside:
+            one = self.texts[found.file].statement(row)
             if isinstance(one, said.InterruptSwitched) and one.word == "off":
-                own = whole(self.task.number(one.number, row, here))
-                return one.number is None or own == number
+                there = Scope(found.file, found.module, "")
+                own = self._number_of(there, row, one.number)
+                return one.number is None or own == declared.number
             if not isinstance(one, ir.Declaration):
                 return False
         return False
@@ -460,7 +458,10 @@ class KrlMachine(TaskMachine):
         self, context: Context, row: int, one: said.InterruptSwitched, here: Arrived
     ) -> Arrived:
         self._met.add((context.place.scope.file, row))
-        modes, number = here.modes, self._number_of(context, row, one.number)
+        modes, number = (
+            here.modes,
+            self._number_of(context.place.scope, row, one.number),
+        )
         if one.word == "on":
             meant = {
                 d for d in modes.declared if EVERY in (number, d[0]) or d[0] == number
@@ -500,23 +501,15 @@ class KrlMachine(TaskMachine):
                 found[k] = found.get(k, frozenset()) | {why}
         return found
 
-    def _number_of(self, context: Context, row: int, operand: ir.Operand | None) -> int:
+    def _number_of(self, here: Scope, row: int, operand: ir.Operand | None) -> int:
         """Return the number of an interrupt, EVERY where it is not known."""
-        number = whole(self.task.number(operand, row, context.place.scope))
+        number = whole(self.task.number(operand, row, here))
         return EVERY if number is None else number
 
     @cached_property
     def _enabled_interrupts(self) -> set[int]:
         """Numbers of the interrupts that some statement switches on."""
-        found = set()
-        for file, text in self._robot_texts():
-            here = Scope(file, self.task.files[file].name, "")
-            for row in text.where(_is_interrupt):
-                one = text.statement(row)
-                if isinstance(one, said.InterruptSwitched) and one.word == "on":
-                    number = whole(self.task.number(one.number, row, here))
-                    found.add(EVERY if number is None else number)
-        return found
+        return {one.number for one in self._interrupts if one.word == "on"}
 
     def _trigger(
         self, context: Context, one: said.PathTrigger, here: Arrived
@@ -555,12 +548,6 @@ class KrlMachine(TaskMachine):
             modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
             yield from self.goals.visits(one, row, scope, modes, points)
 
-    def _robot_texts(self) -> Iterator[tuple[int, KrlText]]:
-        """Yield files and statements, but for those of submit programs."""
-        for file, text in enumerate(self.texts):
-            if not self.task.files[file].is_submit:
-                yield file, text
-
     @cached_property
     def everywhere(self) -> frozenset[Reason]:
         """Return why no target can be compensated, once all ways are followed.
@@ -570,19 +557,14 @@ class KrlMachine(TaskMachine):
         """
         odd = {"interrupt", "trigger"} & self.task.odd_words
         found, unseen_on = {_INTERRUPT} if odd else set(), False
-        for file, text in self._robot_texts():
-            for row in text.where(_is_interrupt):
-                if (file, row) in self._met:
-                    continue
-                one = text.statement(row)
-                if isinstance(one, said.InterruptDeclared):
-                    here = Scope(file, self.task.files[file].name, "")
-                    effects = self.effects_of(one.action, here)
-                    found |= {_INTERRUPT} if MOVES in effects else set()
-                    found |= {_RESUMED} if effects - {MOVES} else set()
-                unseen_on |= (
-                    isinstance(one, said.InterruptSwitched) and one.word == "on"
-                )
+        unseen = (d for d in self._interrupts if (d.file, d.row) not in self._met)
+        for file, _, _, word, _, one in unseen:
+            if word == "decl":
+                here = Scope(file, self.task.files[file].name, "")
+                effects = self.effects_of(one.action, here)
+                found |= {_INTERRUPT} if MOVES in effects else set()
+                found |= {_RESUMED} if effects - {MOVES} else set()
+            unseen_on |= word == "on"
         if unseen_on:
             found |= {why for v in self.visits for _, why in v.modes.declared}
         return frozenset(found)
