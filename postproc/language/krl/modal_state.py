@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
+from postproc.language.analysis.modal_state import ModalState
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value
 from postproc.language.krl import syntax as said
@@ -45,7 +46,7 @@ LOST_FRAME = no_frame(
 
 
 @dataclass(frozen=True)
-class KrlModes:
+class KrlModes(ModalState):
     """What holds until another statement changes it.
 
     Attributes:
@@ -71,9 +72,9 @@ class KrlModes:
         declared: Interrupts that may move the arm or end its moves, by number, and why
             targets are left while one of them is on.
         active: Those of them that may be on.
-        blocked: Why no target can be compensated; more than one reason.
     """
 
+    collected = ("declared", "active", "blocked")
     tool: KrlFrame
     base: KrlFrame
     interpolation: str = "#base"
@@ -95,29 +96,14 @@ class KrlModes:
     perhaps: bool = False
     declared: frozenset[tuple[int, Reason]] = frozenset()
     active: frozenset[tuple[int, Reason]] = frozenset()
-    blocked: frozenset[Reason] = frozenset()
+
+    def lost(self) -> KrlModes:
+        """Return it where nothing is known."""
+        return LOST
 
     def join(self, other: KrlModes) -> KrlModes:
         """Keep what is the same on another way here."""
-        differing = {
-            f.name: getattr(LOST, f.name)
-            for f in fields(self)
-            if getattr(self, f.name) != getattr(other, f.name)
-        }
-        differing["store"] = self.store.join(other.store)
-        for name in ("declared", "active", "blocked"):
-            differing[name] = getattr(self, name) | getattr(other, name)
-        return replace(self, **differing)
-
-    def forget(self) -> KrlModes:
-        """Forget all but why targets cannot be compensated."""
-        return replace(
-            LOST, declared=self.declared, active=self.active, blocked=self.blocked
-        )
-
-    def with_(self, **changed: Any) -> KrlModes:
-        """Return it with other values."""
-        return replace(self, **changed)
+        return replace(super().join(other), store=self.store.join(other.store))
 
     def beside(self, task: KrlTask) -> KrlModes:
         """Return it where submit programs may change what they set at any time."""
