@@ -279,7 +279,7 @@ class GoalReader(ABC):
 
     # Shifts: the point is moved along.
 
-    def shifted(self, base: FoundGoal, by: ReadShift) -> FoundGoal:
+    def apply_shift(self, base: FoundGoal, by: ReadShift) -> FoundGoal:
         """Return where a move goes that shifts a point.
 
         Args:

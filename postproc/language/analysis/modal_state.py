@@ -24,7 +24,7 @@ class ModalState(ABC):
     blocked: frozenset[Reason] = frozenset()
 
     @abstractmethod
-    def lost(self: M) -> M:
+    def unknown_state(self: M) -> M:
         """Return it where nothing is known."""
 
     def with_(self: M, **changed: Any) -> M:
@@ -33,7 +33,7 @@ class ModalState(ABC):
 
     def join(self: M, other: M) -> M:
         """Keep what is the same on another way here."""
-        lost = self.lost()
+        lost = self.unknown_state()
         found = {
             f.name: getattr(lost, f.name)
             for f in fields(self)
@@ -46,4 +46,4 @@ class ModalState(ABC):
     def forget(self: M) -> M:
         """Forget all but why targets cannot be compensated."""
         kept = {name: getattr(self, name) for name in self.collected}
-        return replace(self.lost(), **kept)
+        return replace(self.unknown_state(), **kept)

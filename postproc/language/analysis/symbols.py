@@ -145,13 +145,15 @@ class TaskSymbols(ABC, Generic[F]):
         if call.name not in ALIKE or len(call.arguments) != 1:
             return None
         number = self.number(call.arguments[0].value, row, here)
-        return _known(apply_function(call.name, number))
+        return _make_number(apply_function(call.name, number))
 
     def operate(self, operator: str, parts: Sequence[Value | None]) -> Value | None:
         """Compute what an operator gives, None where that is not known."""
         if operator == "/" and not self.divides:
             return None
-        return _known(apply_operator(operator, [number_in(part) for part in parts]))
+        return _make_number(
+            apply_operator(operator, [number_in(part) for part in parts])
+        )
 
     def build(
         self, operand: ir.Operand, row: int, here: Scope, depth: int
@@ -378,7 +380,7 @@ class TaskSymbols(ABC, Generic[F]):
             case ir.Num(slot=slot):
                 text = self.files[here.file].text
                 at = int(text.first[row]) + slot
-                return _known(float(text.value[at]), here.file, at)
+                return _make_number(float(text.value[at]), here.file, at)
             case ir.StringLiteral(text=written):
                 return written
             case ir.Composite(items=items):
@@ -421,10 +423,9 @@ class TaskSymbols(ABC, Generic[F]):
 
     def _evaluate_named(
         self, data: ir.DataObject, row: int, here: Scope, depth: int
-    ) -> tuple[Value | None, Sequence[str | ir.ElementStep], str]:
+    ) -> tuple[Value | None, tuple[str | ir.ElementStep, ...], str]:
         """Return what data, or an element, hold; then further steps, and their type."""
-        name = data.name
-        steps: Sequence[str | ir.ElementStep] = data.steps
+        name, steps = data.name, data.steps
         count = next((k for k, s in enumerate(steps) if isinstance(s, str)), len(steps))
         whole = replace(data, steps=steps[:count]) if steps[count:] else data
         held = self.find_held(whole, row, here)
@@ -684,6 +685,6 @@ def holds_odd(one: ir.SourceStatement) -> bool:
     return any(isinstance(part, ir.NotUnderstood) for part in ir.walk(one))
 
 
-def _known(value: float, file: int = -1, slot: int = -1) -> WrittenNumber | None:
+def _make_number(value: float, file: int = -1, slot: int = -1) -> WrittenNumber | None:
     """Return a number, None for one that is too large for any, or none."""
     return WrittenNumber(value, file, slot) if math.isfinite(value) else None

@@ -444,7 +444,9 @@ class KrlMachine(TaskMachine):
         name = getattr(declared.one.action, "name", "")
         here = Scope(declared.file, self.task.files[declared.file].name, "")
         found = self.task.routine(name, here)
-        for row in () if found is None else found.inside:
+        if found is None:
+            return False
+        for row in found.inside:
             one = self.texts[found.file].statement(row)
             if isinstance(one, said.InterruptSwitched) and one.word == "off":
                 there = Scope(found.file, found.module, "")

@@ -97,7 +97,7 @@ class KrlModes(ModalState):
     declared: frozenset[tuple[int, Reason]] = frozenset()
     active: frozenset[tuple[int, Reason]] = frozenset()
 
-    def lost(self) -> KrlModes:
+    def unknown_state(self) -> KrlModes:
         """Return it where nothing is known."""
         return LOST
 

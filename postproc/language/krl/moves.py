@@ -425,7 +425,7 @@ class KrlGoal(GoalReader):
         own, shifts = self._find_own_shift(other), f"{base.name} is shifted by what"
         shift = FrameReader(self.task, self.row, self.here, _NO, _NO).frame(other)
         if base.target != Meaning.POSE or not shift.pose:
-            return self.shifted(base, ReadShift(own=own, shifts=shifts))
+            return self.apply_shift(base, ReadShift(own=own, shifts=shifts))
         if behind and self._by_joints:
             return replace(
                 base, target=Meaning.UNKNOWN, values=self.nothing, why=NO_STATUS,
@@ -438,7 +438,7 @@ class KrlGoal(GoalReader):
         base = replace(base, stays=base.stays or base.slots[0] < 0)
         aux = self._outside_of(base, other) if behind else base.aux
         turned = f"{base.name} is turned too"
-        return self.shifted(
+        return self.apply_shift(
             base, ReadShift(by, values, turns, file, slots, own, aux, shifts, turned)
         )
 

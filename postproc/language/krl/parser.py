@@ -9,7 +9,7 @@ from typing import Any
 from postproc.language import ir
 from postproc.language.analysis.control_flow import EXIT
 from postproc.language.krl import syntax as said
-from postproc.language.text.common_rules import COMMON, declared_item, low
+from postproc.language.text.common_rules import COMMON, build_item, low
 from postproc.language.text.template_parser import Children, FormParser, Word
 
 # From trees to statements, rule by rule. Every function here is named after a rule of
@@ -134,7 +134,7 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "declared": _build_declaration,
     "built_in": _build_builtin,
     "flag": lambda c: FlagPart(c[0]),
-    "item": declared_item,
+    "item": build_item,
     "block_word": _block_word,
     "exit_loop": lambda c: ir.Leave(EXIT),
     "halt": lambda c: said.Waiting(),

@@ -83,7 +83,7 @@ class Modes(ModalState):
         }
         return self.join(replace(self, **counted))
 
-    def lost(self) -> Modes:
+    def unknown_state(self) -> Modes:
         """Return it where nothing is known."""
         return LOST
 

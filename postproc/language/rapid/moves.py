@@ -356,13 +356,13 @@ class RapidGoal(GoalReader):
         own = frozenset([(self.here.file, slots[0])] if slots[0] >= 0 else [])
         shifts, turned = f"{name} shifts it by what", f"{name} turns it"
         if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
-            return self.shifted(base, ReadShift(own=own, shifts=shifts))
+            return self.apply_shift(base, ReadShift(own=own, shifts=shifts))
         kind = ShiftKind.AXES if name == "offs" else ShiftKind.OWN
         # x, y, z, and all angles that are there, must be written as numbers.
         given = [*written[:3], *(one for one in written[3:] if one is not None)]
         if not all(isinstance(one, ir.Num) for one in given):
             slots = [-1] * len(slots)
-        return self.shifted(base, ReadShift(
+        return self.apply_shift(base, ReadShift(
             Shift(kind, (*shift, *angles), base.values),
             shift_point(np.array(base.values), name, shift, angles), any(angles),
             self.here.file, (*slots, *(-1,) * (WIDTH - len(slots))), own,

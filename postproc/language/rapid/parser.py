@@ -8,7 +8,7 @@ from typing import Any
 
 from postproc.language import ir
 from postproc.language.rapid import syntax as said
-from postproc.language.text.common_rules import COMMON, declared_item, low
+from postproc.language.text.common_rules import COMMON, build_item, low
 from postproc.language.text.template_parser import Children, FormParser, Word
 
 # From trees to statements, rule by rule. Every function here is named after a rule of
@@ -88,7 +88,7 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "mode": lambda c: BY_REFERENCE,
     "open_dimensions": lambda c: None,
     "data": _data,
-    "item": declared_item,
+    "item": build_item,
     "kind": lambda c: c[0],
     "alias": lambda c: said.TypeAlias(*map(low, _split_scope(c)[1])),
     "compact_if": lambda c: said.CompactIf(*c),

@@ -28,7 +28,7 @@ def count(c: Children) -> ir.ForLoop:
     return ir.ForLoop(low(c[0]), c[1], c[2], c[3] if len(c) > 3 else None)
 
 
-def declared_item(c: Children) -> ir.DeclaredItem:
+def build_item(c: Children) -> ir.DeclaredItem:
     """Build what is declared: its name, its dimensions and its value."""
     name, *rest = c
     sized = bool(rest) and isinstance(rest[0], SizePart)
