@@ -52,7 +52,7 @@ def list_data(
         )  # fmt: skip
 
 
-class RoutinePlace(NamedTuple):
+class TaskRoutine(NamedTuple):
     """A routine of a task.
 
     Attributes:

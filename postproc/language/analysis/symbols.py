@@ -22,7 +22,7 @@ from postproc.language.analysis.assigned_points import (
     source_of,
 )
 from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.analysis.declarations import Datum, RoutinePlace, TaskFile
+from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
 from postproc.language.analysis.functions import ALIKE, apply_function, apply_operator
 from postproc.language.analysis.uses import NamesUsed, match_arguments
 from postproc.language.analysis.values import (
@@ -173,32 +173,32 @@ class TaskSymbols(ABC, Generic[F]):
     # Names.
 
     @cached_property
-    def routines(self) -> Mapping[str, list[RoutinePlace]]:
+    def routines(self) -> Mapping[str, list[TaskRoutine]]:
         """Routines by name."""
-        found: dict[str, list[RoutinePlace]] = defaultdict(list)
+        found: dict[str, list[TaskRoutine]] = defaultdict(list)
         for number, file in enumerate(self.files):
             for rows in () if file.is_submit else file.routines:
-                place = RoutinePlace(number, file.module_of(rows), rows)
+                place = TaskRoutine(number, file.module_of(rows), rows)
                 found[rows.head.name].append(place)
         return found
 
     @cached_property
-    def routines_by_file(self) -> Mapping[int, list[RoutinePlace]]:
+    def routines_by_file(self) -> Mapping[int, list[TaskRoutine]]:
         """Routines by the file that they stand in."""
-        found: dict[int, list[RoutinePlace]] = defaultdict(list)
+        found: dict[int, list[TaskRoutine]] = defaultdict(list)
         for own in self.routines.values():
             for one in own:
                 found[one.file].append(one)
         return found
 
-    def routine(self, name: str, here: Scope) -> RoutinePlace | None:
+    def routine(self, name: str, here: Scope) -> TaskRoutine | None:
         """Find the routine that a name means, None where it is not sure."""
         known = self.routines.get(name, [])
         own = [one for one in known if one[:2] == (here.file, here.module)]
         found = own or [one for one in known if not one.rows.head.local]
         return found[0] if len(found) == 1 else None
 
-    def routine_around(self, file: int, row: int) -> RoutinePlace | None:
+    def routine_around(self, file: int, row: int) -> TaskRoutine | None:
         """Return the routine that a statement stands in, None where it is in none."""
         around = (one for one in self.routines_by_file[file] if row in one.inside)
         return next(around, None)
@@ -306,7 +306,7 @@ class TaskSymbols(ABC, Generic[F]):
     # What routines are called with.
 
     def bind(
-        self, routine: RoutinePlace, call: ir.Instruction | ir.FunctionCall, row: int,
+        self, routine: TaskRoutine, call: ir.Instruction | ir.FunctionCall, row: int,
         there: Scope,
     ) -> Scope | None:  # fmt: skip
         """Return where the statements of a routine stand, and what it is called with.

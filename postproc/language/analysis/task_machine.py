@@ -28,7 +28,7 @@ from postproc.language.analysis.control_flow import (
     flow_of,
     is_structural,
 )
-from postproc.language.analysis.declarations import RoutinePlace
+from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.interpreter import (
     NOT_UNROLLED,
     Counting,
@@ -151,7 +151,7 @@ class TaskMachine(Interpreter[Arrived]):
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
     _runs_in: dict[Context, Runs] = field(default_factory=dict)
     _numbers: dict[tuple[Context, int], list[int]] = field(default_factory=dict)
-    _read: dict[tuple[int, int], tuple[Effects, list[RoutinePlace]]] = field(
+    _read: dict[tuple[int, int], tuple[Effects, list[TaskRoutine]]] = field(
         default_factory=dict
     )
     _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
@@ -262,7 +262,7 @@ class TaskMachine(Interpreter[Arrived]):
         """Tell whether the handlers of a routine begin with a statement."""
         return False
 
-    def scopes_of(self, routine: RoutinePlace) -> Iterable[Scope]:
+    def scopes_of(self, routine: TaskRoutine) -> Iterable[Scope]:
         """Yield where the statements of a routine stand, by all calls of it."""
         yield self.task.scope_of(*routine)
 
@@ -270,7 +270,7 @@ class TaskMachine(Interpreter[Arrived]):
         """Return True if a statement runs otherwise than it is followed."""
         return False
 
-    def list_handlers(self, routine: RoutinePlace) -> Iterable[tuple[int, int, int]]:
+    def list_handlers(self, routine: TaskRoutine) -> Iterable[tuple[int, int, int]]:
         """Yield the handlers of a routine, as `beside`."""
         return ()
 
@@ -445,7 +445,7 @@ class TaskMachine(Interpreter[Arrived]):
         return self.unknown(context, row, here, what) if what else here
 
     def enter_routine(
-        self, context: Context, row: int, found: RoutinePlace,
+        self, context: Context, row: int, found: TaskRoutine,
         here: Arrived,
     ) -> Arrived | None:  # fmt: skip
         """Go on in a routine; one that is being run begins again as well.
@@ -472,7 +472,7 @@ class TaskMachine(Interpreter[Arrived]):
         return None
 
     def call_routine(
-        self, found: RoutinePlace, caller: Context, row: int, here: Arrived,
+        self, found: TaskRoutine, caller: Context, row: int, here: Arrived,
     ) -> None:  # fmt: skip
         """Begin a routine.
 
@@ -493,7 +493,7 @@ class TaskMachine(Interpreter[Arrived]):
         here = here.with_points(here.points.leave(own))  # declared anew
         self.enter(context, context.place.flow.first, self.at_call(context, here))
 
-    def _place_of(self, found: RoutinePlace, caller: Context, row: int) -> TaskPlace:
+    def _place_of(self, found: TaskRoutine, caller: Context, row: int) -> TaskPlace:
         """Return where the statements of a routine stand that is called."""
         file, module, routine = found
         key, text = (file, routine.first), self.texts[file]
@@ -594,7 +594,7 @@ class TaskMachine(Interpreter[Arrived]):
 
     # What routines may do, read off their texts.
 
-    def routine_effects(self, routine: RoutinePlace) -> Effects:
+    def routine_effects(self, routine: TaskRoutine) -> Effects:
         """Collect what a routine may do to moves, and all that it calls."""
         if routine.key not in self._effects:
             found = (self._read_routine(one)[0] for one in self.reach_from([routine]))
@@ -607,15 +607,13 @@ class TaskMachine(Interpreter[Arrived]):
         own |= self.own_effects(one)
         return own.union(*map(self.routine_effects, called))
 
-    def reach_from(self, routines: Iterable[RoutinePlace]) -> Iterator[RoutinePlace]:
+    def reach_from(self, routines: Iterable[TaskRoutine]) -> Iterator[TaskRoutine]:
         """Yield routines, and all that they may come to call."""
         return reach(
             routines, lambda one: self._read_routine(one)[1], lambda one: one.key
         )
 
-    def _read_routine(
-        self, routine: RoutinePlace
-    ) -> tuple[Effects, list[RoutinePlace]]:
+    def _read_routine(self, routine: TaskRoutine) -> tuple[Effects, list[TaskRoutine]]:
         """Read once what the statements of a routine do, and what they call."""
         if routine.key not in self._read:
             here = self.task.scope_of(*routine)
@@ -624,7 +622,7 @@ class TaskMachine(Interpreter[Arrived]):
 
     def read_rows(
         self, here: Scope, rows: range, but: Collection[str] = ()
-    ) -> tuple[Effects, list[RoutinePlace]]:
+    ) -> tuple[Effects, list[TaskRoutine]]:
         """Collect what statements may do to moves, and which routines they call.
 
         Args:
@@ -632,7 +630,7 @@ class TaskMachine(Interpreter[Arrived]):
             rows: .. and their rows.
             but: Names whose calls do not count.
         """
-        effects, called = frozenset[str](), list[RoutinePlace]()
+        effects, called = frozenset[str](), list[TaskRoutine]()
         for row in rows:
             one = self.texts[here.file].statement(row)
             names = (name for name in self.names_called(one) if name not in but)
@@ -643,9 +641,9 @@ class TaskMachine(Interpreter[Arrived]):
 
     def read_calls(
         self, names: Iterable[str], here: Scope
-    ) -> tuple[Effects, list[RoutinePlace]]:
+    ) -> tuple[Effects, list[TaskRoutine]]:
         """Return what calls of no routine may do, and the routines of the others."""
-        called, moves = list[RoutinePlace](), False
+        called, moves = list[TaskRoutine](), False
         for name in names:
             found = self.task.routine(name, here)
             called += [] if found is None else [found]
@@ -664,7 +662,7 @@ class TaskMachine(Interpreter[Arrived]):
         for file, _, routine in self.task.routines.get(name, ()):
             self.run_beside(file, routine)
 
-    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[RoutinePlace]:
+    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return the routines that a statement may call."""
         names = {*self.names_called(one)}
         return [found for name in names for found in self.task.routines.get(name, ())]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import is_point, source_of
-from postproc.language.analysis.declarations import RoutinePlace
+from postproc.language.analysis.declarations import TaskRoutine
 
 
 def match_arguments(
@@ -40,7 +40,7 @@ class NamesUsed:
         parts: Names of which moves go to elements or components.
     """
 
-    own: Mapping[str, Sequence[RoutinePlace]] = field(default_factory=dict)
+    own: Mapping[str, Sequence[TaskRoutine]] = field(default_factory=dict)
     written: set[str] = field(default_factory=set)
     changed: set[str] = field(default_factory=set)
     read: set[str] = field(default_factory=set)
@@ -69,7 +69,7 @@ class NamesUsed:
         """Return the point that a value shifts and what by, None for all else."""
         return None
 
-    def is_passed(self, routine: RoutinePlace) -> bool:
+    def is_passed(self, routine: TaskRoutine) -> bool:
         """Return True if what a routine does to its parameters is all that counts."""
         return False
 

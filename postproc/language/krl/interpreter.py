@@ -12,7 +12,7 @@ from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Scope
 from postproc.language.analysis.call_context import Context
-from postproc.language.analysis.declarations import RoutinePlace
+from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
     MOVES,
@@ -115,7 +115,7 @@ class KrlMachine(TaskMachine):
         modes = modes.beside(self.task)
         first = self.task.files[0]
         here = Arrived(frozenset([START]), modes)
-        main = RoutinePlace(0, first.name, first.routines[0])
+        main = TaskRoutine(0, first.name, first.routines[0])
         self.call_routine(main, self.root, -1, here)
         self.follow()
         for name, (file, row) in self._assumed.items():
@@ -419,7 +419,7 @@ class KrlMachine(TaskMachine):
         ending = {own for own in here.modes.declared if own[1] == _ENDED}
         numbers = {number for number, _ in ending}
         scope = context.place.scope
-        at = RoutinePlace(scope.file, scope.module, context.place.routine)
+        at = TaskRoutine(scope.file, scope.module, context.place.routine)
         active = bool(ending & here.modes.active)
         if not ending or not (active or self._may_switch(at, numbers)):
             return here
@@ -428,7 +428,7 @@ class KrlMachine(TaskMachine):
         left = (ended.modes.active - ending) | on
         return here.join(replace(ended, modes=ended.modes.with_(active=left)))
 
-    def _may_switch(self, routine: RoutinePlace, numbers: set[int]) -> bool:
+    def _may_switch(self, routine: TaskRoutine, numbers: set[int]) -> bool:
         """Return True if a routine, or one that it calls, switches interrupts."""
         switching = self._find_routines(("on", "off"), numbers | {EVERY})
         return any(one.key in switching for one in self.reach_from([routine]))
@@ -532,7 +532,7 @@ class KrlMachine(TaskMachine):
         for at, _, called in self.calls_of(file, action):
             self.run_beside(at, called)
 
-    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[RoutinePlace]:
+    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return what an interrupt calls later, too."""
         if isinstance(one, said.InterruptDeclared):
             one = one.action

@@ -15,7 +15,7 @@ from postproc.language.analysis.assigned_points import NO_POINTS, Scope
 from postproc.language.analysis.call_context import Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.analysis.declarations import RoutinePlace
+from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.task_machine import (
     MOVES,
     NOWHERE,
@@ -164,7 +164,7 @@ class RapidMachine(TaskMachine):
                     found |= set() if given >= ANYTHING else given
         return {name for name, value in found if value != getattr(AT_START, name)}
 
-    def _procedures(self) -> list[RoutinePlace]:
+    def _procedures(self) -> list[TaskRoutine]:
         routines = (one for found in self.task.routines.values() for one in found)
         return [one for one in routines if one.rows.head.kind == "proc"]
 
@@ -200,7 +200,7 @@ class RapidMachine(TaskMachine):
         if not known or self._is_recursive(scope.file, routine):
             return scope
         assert isinstance(call, ir.Instruction)
-        found = RoutinePlace(scope.file, scope.module, routine)
+        found = TaskRoutine(scope.file, scope.module, routine)
         return self.task.bind(found, call, row, caller.place.scope) or scope
 
     def _is_recursive(self, file: int, routine: HeadedRows) -> bool:
@@ -216,12 +216,12 @@ class RapidMachine(TaskMachine):
     def _find_reachable(self, file: int, routine: HeadedRows) -> set[tuple[int, int]]:
         """Return the routines that one may call, and those that they may call."""
 
-        def calls(one: RoutinePlace) -> Iterator[RoutinePlace]:
+        def calls(one: TaskRoutine) -> Iterator[TaskRoutine]:
             for row in one.inside:
                 statement = self.texts[one.file].statement(row)
                 yield from self.calls_of(one.file, statement)
 
-        first = calls(RoutinePlace(file, "", routine))
+        first = calls(TaskRoutine(file, "", routine))
         return {one.key for one in reach(first, calls, lambda one: one.key)}
 
     def handles(self, one: ir.SourceStatement) -> bool:
@@ -360,7 +360,7 @@ class RapidMachine(TaskMachine):
         for file, _, routine in self._procedures():
             self.run_beside(file, routine)
 
-    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[RoutinePlace]:
+    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return all procedures where a text names the one that is called."""
         inner = inside(one)
         if isinstance(inner, said.LateCall) or getattr(inner, "name", "") == BY_NAME:
@@ -371,7 +371,7 @@ class RapidMachine(TaskMachine):
         """Return True if a move calls a procedure on its way."""
         return getattr(inside(one), "name", "") in SYNCHRONOUS
 
-    def list_handlers(self, routine: RoutinePlace) -> Iterator[tuple[int, int, int]]:
+    def list_handlers(self, routine: TaskRoutine) -> Iterator[tuple[int, int, int]]:
         """Yield the rows from the first handler on."""
         rows = routine.inside
         heads = self.texts[routine.file].where(self.handles, rows.start, rows.stop)
@@ -386,12 +386,12 @@ class RapidMachine(TaskMachine):
             modes, points = (here.modes, here.points) if here else (AT_START, NO_POINTS)
             yield from self.goals.visits(one, row, scope, modes, points)
 
-    def scopes_of(self, routine: RoutinePlace) -> Iterator[Scope]:
+    def scopes_of(self, routine: TaskRoutine) -> Iterator[Scope]:
         """Yield what a routine is called with, too."""
         return self._scopes_of(routine, frozenset())
 
     def _scopes_of(
-        self, place: RoutinePlace, seen: frozenset[tuple[int, int]]
+        self, place: TaskRoutine, seen: frozenset[tuple[int, int]]
     ) -> Iterator[Scope]:
         yield self.task.scope_of(*place)
         head = place.rows.head
@@ -407,9 +407,9 @@ class RapidMachine(TaskMachine):
     @cached_property
     def _calls_by_name(
         self,
-    ) -> Mapping[str, list[tuple[RoutinePlace, int, ir.Instruction]]]:
+    ) -> Mapping[str, list[tuple[TaskRoutine, int, ir.Instruction]]]:
         """Return all calls of routines of the task, and where they stand."""
-        found = defaultdict[str, list[tuple[RoutinePlace, int, ir.Instruction]]](list)
+        found = defaultdict[str, list[tuple[TaskRoutine, int, ir.Instruction]]](list)
         for place in (r for own in self.task.routines.values() for r in own):
             for row in place.inside:
                 one = inside(self.texts[place.file].statement(row))
@@ -507,7 +507,7 @@ class RapidMachine(TaskMachine):
         return replace(here, modes=modes)
 
     def _list_set_modes(
-        self, routine: RoutinePlace
+        self, routine: TaskRoutine
     ) -> frozenset[tuple[str, Any]] | None:
         """Return the modes that a procedure may set; None where it may move the arm."""
         if not self.routine_effects(routine):

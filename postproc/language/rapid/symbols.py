@@ -12,7 +12,7 @@ import numpy as np
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
-from postproc.language.analysis.declarations import Datum, RoutinePlace
+from postproc.language.analysis.declarations import Datum, TaskRoutine
 from postproc.language.analysis.symbols import DEEPEST, TaskSymbols
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import (
@@ -116,7 +116,7 @@ class RapidTask(TaskSymbols[RapidFile]):
         uses.read |= self.odd_words
 
     def bind(
-        self, routine: RoutinePlace, call: ir.Instruction | ir.FunctionCall, row: int,
+        self, routine: TaskRoutine, call: ir.Instruction | ir.FunctionCall, row: int,
         there: Scope,
     ) -> Scope | None:  # fmt: skip
         """Add no argument where data are changed by their names in texts."""
@@ -318,7 +318,7 @@ class _RapidUses(NamesUsed):
         point, *others = operand.values or (None,)
         return point, others
 
-    def is_passed(self, routine: RoutinePlace) -> bool:
+    def is_passed(self, routine: TaskRoutine) -> bool:
         """Return True but for a local one, which need not be what is called."""
         return not routine.rows.head.local
 
