@@ -53,27 +53,12 @@ class Code(StrEnum):
         "Check its spelling. If the controller accepts it, put it into a routine and "
         "declare that routine under [routines] of the cell.",
     )
-    UNKNOWN_INSTRUCTION = (
-        "unknown-instruction",
-        WARNING,
-        "A RAPID instruction is neither known nor a routine of the given modules. It "
-        "may move the arm.",
-        'Give its module, or write name = "motionless" or name = "moves" under '
-        "[routines] of the cell.",
-    )
     UNKNOWN_ROUTINE = (
         "unknown-routine",
         WARNING,
         "A routine is called that no given file holds. It may move the arm and set "
         "frames: targets after it keep their values until these are set again.",
         "Give its file, or declare under [routines] of the cell what it does.",
-    )
-    LATE_BINDING = (
-        "late-binding",
-        WARNING,
-        "The name of a called procedure is known only while the program runs. The "
-        "procedure may move the arm.",
-        "Call the procedures by name, for instance in the branches of a TEST.",
     )
     BLOCK_STRUCTURE = (
         "block-structure",

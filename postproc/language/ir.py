@@ -247,3 +247,70 @@ class Instruction(SourceStatement):
     def values(self) -> tuple[Operand | None, ...]:
         """What is given, in the order in which it is written."""
         return tuple([one.value for one in self.arguments])
+
+
+# Declarations and routines.
+
+
+@dataclass(frozen=True, slots=True)
+class DeclaredItem(Node):
+    """One name of a declaration.
+
+    Attributes:
+        name: What is declared.
+        dimensions: Of an array.
+        value: What it is at first, None where nothing is said.
+    """
+
+    name: str
+    dimensions: tuple[Operand, ...] = ()
+    value: Operand | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration(SourceStatement):
+    """``LOCAL PERS tooldata t{2} := [..]``, ``DECL GLOBAL E6POS XP1={..}``.
+
+    Attributes:
+        type: Of the data.
+        items: What is declared.
+        kind: const, pers or var.
+        scope: local, task or global, "" where nothing is said.
+    """
+
+    type: str
+    items: tuple[DeclaredItem, ...]
+    kind: str = "var"
+    scope: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RoutineParameter:
+    r"""A parameter of a routine.
+
+    Attributes:
+        name: Its name.
+        by_reference: The routine may change what it is called with; others are copies.
+        optional: ``\name``.
+    """
+
+    name: str
+    by_reference: bool = False
+    optional: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RoutineHead(SourceStatement):
+    """``PROC name(..)``, ``FUNC type name(..)``, ``DEF name(..)``.
+
+    Attributes:
+        kind: proc, func, trap, def or deffct.
+        name: Its name.
+        parameters: Its parameters.
+        local: Only its own module or file knows it.
+    """
+
+    kind: str
+    name: str
+    parameters: tuple[RoutineParameter, ...] = ()
+    local: bool = False

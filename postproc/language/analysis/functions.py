@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 ALIKE = frozenset("abs sqrt sin cos tan".split())  # the same in all languages
 FUNCTIONS = ALIKE | {"round", "trunc"}
@@ -27,3 +28,25 @@ def apply_function(name: str, x: float) -> float:
     if name == "round":
         return float(math.floor(x + 0.5))
     return abs(x) if name == "abs" else float(math.trunc(x))
+
+
+def apply_operator(operator: str, parts: Sequence[float]) -> float:
+    """Compute what an operator gives, NaN where that is no number.
+
+    >>> apply_operator("-", [5.0]), apply_operator("*", [2.0, 4.0])
+    (-5.0, 8.0)
+    """
+    match operator, parts:
+        case "-", [a]:
+            return -a
+        case "+", [a]:
+            return a
+        case "+", [a, b]:
+            return a + b
+        case "-", [a, b]:
+            return a - b
+        case "*", [a, b]:
+            return a * b
+        case "/", [a, b] if b:
+            return a / b
+    return math.nan

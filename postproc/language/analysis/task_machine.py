@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import accumulate
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from postproc.language.analysis.assigned_points import (
     NO_POINTS,
     Points,
     Scope,
-    TaskSymbols,
 )
 from postproc.language.analysis.call_context import CALLED, Context
 from postproc.language.analysis.call_graph import reach
@@ -29,6 +28,7 @@ from postproc.language.analysis.control_flow import (
     flow_of,
     is_structural,
 )
+from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.interpreter import (
     NOT_UNROLLED,
     Counting,
@@ -36,27 +36,12 @@ from postproc.language.analysis.interpreter import (
     calls_around,
 )
 from postproc.language.analysis.move_runs import Runs, find_runs, rows_of_lines
+from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.language import Start
-from postproc.language.text.comment_directives import Comments
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import ELSEWHERE, Diagnostic
 
 DEEPEST = 60  # calls within calls
-
-
-class VisitLike(Protocol):
-    """An arrival as it is found."""
-
-    modes: Any
-    origins: frozenset[int]
-    count: int
-    goal: Any
-    agreed: bool
-    taken: frozenset[Any]
-    kept: bool
-
-    def forget_conditions(self) -> None:
-        """Forget what it is carried out with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +107,9 @@ class Arrived:
 NOWHERE = frozenset([ELSEWHERE])
 JUMPS = frozenset("goto return exit exitcycle raise retry trynext".split())
 """Words with which a statement leads to another place."""
+MOVES = "moves"
+Effects = frozenset[str]
+"""What statements may do to moves: `MOVES`, or more that a language names."""
 RECURSIVE = "calls itself: it is not followed"
 NOT_FOLLOWED = "is not followed, and may move the arm"
 _PLAIN = (ir.SourceStatement, ir.LabelMark)
@@ -133,6 +121,7 @@ class TaskMachine(Interpreter[Arrived]):
     """The ways through a task.
 
     Attributes:
+        procedures: Kinds of routines that are followed where they are called.
         task: What its names mean.
         texts: The statements of its files, the main one first.
         start: What the cell says.
@@ -147,8 +136,8 @@ class TaskMachine(Interpreter[Arrived]):
         lost: Visits behind which it may go anywhere.
     """
 
-    comments: ClassVar[Comments]
-    task: TaskSymbols = field(kw_only=True)
+    procedures: ClassVar[Collection[str]]
+    task: TaskSymbols[Any] = field(kw_only=True)
     texts: Sequence[StatementText[Any]]
     start: Start
     visits: list[Any] = field(default_factory=list)
@@ -162,6 +151,10 @@ class TaskMachine(Interpreter[Arrived]):
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
     _runs_in: dict[Context, Runs] = field(default_factory=dict)
     _numbers: dict[tuple[Context, int], list[int]] = field(default_factory=dict)
+    _read: dict[tuple[int, int], tuple[Effects, list[TaskRoutine]]] = field(
+        default_factory=dict
+    )
+    _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
     _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
 
     # What a language says.
@@ -194,22 +187,29 @@ class TaskMachine(Interpreter[Arrived]):
         """Allow for what the functions of a statement do."""
 
     @abstractmethod
-    def number(self, operand: ir.Operand | None, row: int, scope: Scope) -> float:
-        """Evaluate a number, NaN where it is not known before the program runs."""
+    def own_effects(self, one: ir.SourceStatement) -> Effects:
+        """Return what a statement may do to moves, but for what it calls."""
 
     @abstractmethod
-    def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
-        """Return where the statements of a routine stand."""
+    def names_called(self, one: ir.SourceStatement) -> Iterable[str]:
+        """Return the names of what a statement calls where it runs."""
 
     @abstractmethod
-    def calls_of(
-        self, file: int, one: ir.SourceStatement
-    ) -> Iterable[tuple[int, HeadedRows]]:
-        """Yield the routines that a statement calls: their files and places."""
+    def is_still(self, name: str) -> bool:
+        """Return True if what is no routine of the task is known not to move."""
 
     @abstractmethod
-    def goals_of(self, file: int, row: int) -> Iterable[Any]:
-        """Yield where a move goes that is not followed."""
+    def read_visits(
+        self, one: Any, row: int, scope: Scope, here: Arrived | None
+    ) -> Iterable[Any]:
+        """Read the visits of a move, nothing for all else.
+
+        Args:
+            one: The statement.
+            row: Its row.
+            scope: Where it stands.
+            here: How the arm comes to it, None where that does not count.
+        """
 
     @abstractmethod
     def places_of(self, one: Any) -> Sequence[int] | None:
@@ -262,13 +262,17 @@ class TaskMachine(Interpreter[Arrived]):
         """Tell whether the handlers of a routine begin with a statement."""
         return False
 
-    def changes_of(self, one: ir.SourceStatement) -> Iterable[str]:
-        """Yield the names of data that a statement changes."""
-        return [one.target.name] if isinstance(one, ir.Assignment) else []
+    def scopes_of(self, routine: TaskRoutine) -> Iterable[Scope]:
+        """Yield where the statements of a routine stand, by all calls of it."""
+        yield self.task.scope_of(*routine)
 
-    def routines_beside(self) -> Iterable[tuple[int, int, int]]:
-        """Yield statements that run otherwise than they are followed, as `beside`."""
-        return []
+    def is_beside(self, one: Any) -> bool:
+        """Return True if a statement runs otherwise than it is followed."""
+        return False
+
+    def list_handlers(self, routine: TaskRoutine) -> Iterable[tuple[int, int, int]]:
+        """Yield the handlers of a routine, as `beside`."""
+        return ()
 
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Allow for what may happen in a routine as long as it runs."""
@@ -340,10 +344,10 @@ class TaskMachine(Interpreter[Arrived]):
     ) -> Counting | None:
         """Return the rounds of a loop, None where they are not known."""
         scope = context.place.scope
-        first, last = (self.number(x, row, scope) for x in (loop.first, loop.last))
+        first, last = (self.task.number(x, row, scope) for x in (loop.first, loop.last))
         step = self.usual_step(first, last)
         if loop.step is not None:
-            step = self.number(loop.step, row, scope)
+            step = self.task.number(loop.step, row, scope)
         return Counting.of(first, last, step)
 
     def begin_round(
@@ -373,7 +377,7 @@ class TaskMachine(Interpreter[Arrived]):
         key = place.scope.file, place.flow.first
         if key not in self._runs:
             text = place.text
-            apart |= rows_of_lines(text, self.comments.list_taught(text.source))
+            apart |= rows_of_lines(text, self.task.comments.list_taught(text.source))
             self._runs[key] = find_runs(
                 text, place.flow, apart, self.places_of, self.is_plain
             )
@@ -409,8 +413,39 @@ class TaskMachine(Interpreter[Arrived]):
         )
         return self.unknown(context, row, here, what)
 
+    def call_named(
+        self, context: Context, row: int, name: str, here: Arrived
+    ) -> Arrived | None:
+        """Call a routine of the task by its name; None where it goes on there."""
+        found = self.task.routine(name, context.place.scope)
+        if found is not None:
+            return self.enter_routine(context, row, found, here)
+        self.run_named_beside(name)
+        return self.unknown(context, row, here, "names several routines")
+
+    def call_function(
+        self, context: Context, row: int, name: str, still: bool, here: Arrived
+    ) -> Arrived:
+        """Allow for what a function does.
+
+        Args:
+            context: Where the call stands.
+            row: .. and its row.
+            name: Of the function.
+            still: It is known not to move, if it is none of the task.
+            here: How the arm comes to it.
+        """
+        found = self.task.routine(name, context.place.scope)
+        what = ""
+        if found is None and (name in self.task.routines or not still):
+            what = f"calls the function {name}, which is not known: it may move"
+        elif found is not None and self.routine_effects(found):
+            self.run_beside(found.file, found.rows)
+            what = f"calls the function {name}, which moves: it is not followed"
+        return self.unknown(context, row, here, what) if what else here
+
     def enter_routine(
-        self, context: Context, row: int, found: tuple[int, str, HeadedRows],
+        self, context: Context, row: int, found: TaskRoutine,
         here: Arrived,
     ) -> Arrived | None:  # fmt: skip
         """Go on in a routine; one that is being run begins again as well.
@@ -437,8 +472,7 @@ class TaskMachine(Interpreter[Arrived]):
         return None
 
     def call_routine(
-        self, found: tuple[int, str, HeadedRows], caller: Context, row: int,
-        here: Arrived,
+        self, found: TaskRoutine, caller: Context, row: int, here: Arrived,
     ) -> None:  # fmt: skip
         """Begin a routine.
 
@@ -455,13 +489,11 @@ class TaskMachine(Interpreter[Arrived]):
         context = caller.find(at, CALLED)
         if context is None:
             context = caller.within(at, CALLED, self._place_of(found, caller, row))
-        own = file, module, context.place.scope.routine
+        own = self.task.unit(file), module, context.place.scope.routine
         here = here.with_points(here.points.leave(own))  # declared anew
         self.enter(context, context.place.flow.first, self.at_call(context, here))
 
-    def _place_of(
-        self, found: tuple[int, str, HeadedRows], caller: Context, row: int
-    ) -> TaskPlace:
+    def _place_of(self, found: TaskRoutine, caller: Context, row: int) -> TaskPlace:
         """Return where the statements of a routine stand that is called."""
         file, module, routine = found
         key, text = (file, routine.first), self.texts[file]
@@ -469,7 +501,7 @@ class TaskMachine(Interpreter[Arrived]):
             rows = text.where(is_structural, routine.first + 1, routine.last)
             handlers = text.where(self.handles, routine.first + 1, routine.last)
             self._flows[key] = flow_of(text.statement, rows, routine, handlers)
-        scope = self.scope_of(file, module, routine)
+        scope = self.task.scope_of(file, module, routine)
         if caller is not self.root:
             scope = self.bind_arguments(scope, routine, caller, row)
         return TaskPlace(scope, routine, self._flows[key], text, self.offsets[file])
@@ -480,24 +512,20 @@ class TaskMachine(Interpreter[Arrived]):
         return [0, *accumulate(len(text) + 1 for text in self.texts)]
 
     def arrive(
-        self,
-        context: Context,
-        row: int,
-        here: Arrived,
-        read: Callable[[], Sequence[VisitLike]],
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Record the visits of a move; the arm then stands at the last.
 
         Args:
             context: Where the move stands.
-            row: Its statement.
+            row: Its row.
+            one: .. and what it says.
             here: How the arm comes to it.
-            read: Reads its visits, where it is met first.
         """
         self.reached.add((context.place.scope.file, row))
         known = self._numbers.get((context, row))
         if known is None:
-            found = read()
+            found = [*self.read_visits(one, row, context.place.scope, here)]
             known = [*range(len(self.visits), len(self.visits) + len(found))]
             self._numbers[context, row] = known
             self.visits += found
@@ -528,10 +556,10 @@ class TaskMachine(Interpreter[Arrived]):
         given = [visit for visit in self.visits if visit.goal.given or visit.taken]
         if not given:
             return
-        rows = self._rows_of({*self.beside, *self.routines_beside()})
+        rows = self._rows_of({*self.beside, *self._list_beside()})
         lost = {
-            name for at, row in rows
-            for name in self.changes_of(self.texts[at].statement(row))
+            data.name for at, row in rows
+            for data in self.task.list_changes(self.texts[at].statement(row))
         }  # fmt: skip
         for visit in given:
             if not visit.agreed or any(lost & one.names for one in visit.goal.given):
@@ -564,11 +592,101 @@ class TaskMachine(Interpreter[Arrived]):
         message = f"{text.quote(row)} {what}" if quote else what
         self.diagnostics.add(text.diagnostic(row, code, message))
 
+    # What routines may do, read off their texts.
+
+    def routine_effects(self, routine: TaskRoutine) -> Effects:
+        """Collect what a routine may do to moves, and all that it calls."""
+        if routine.key not in self._effects:
+            found = (self._read_routine(one)[0] for one in self.reach_from([routine]))
+            self._effects[routine.key] = frozenset().union(*found)
+        return self._effects[routine.key]
+
+    def effects_of(self, one: ir.SourceStatement, here: Scope) -> Effects:
+        """Collect what a statement may do to moves, and all that it calls."""
+        own, called = self.read_calls(self.names_called(one), here)
+        own |= self.own_effects(one)
+        return own.union(*map(self.routine_effects, called))
+
+    def reach_from(self, routines: Iterable[TaskRoutine]) -> Iterator[TaskRoutine]:
+        """Yield routines, and all that they may come to call."""
+        return reach(
+            routines, lambda one: self._read_routine(one)[1], lambda one: one.key
+        )
+
+    def _read_routine(self, routine: TaskRoutine) -> tuple[Effects, list[TaskRoutine]]:
+        """Read once what the statements of a routine do, and what they call."""
+        if routine.key not in self._read:
+            here = self.task.scope_of(*routine)
+            self._read[routine.key] = self.read_rows(here, routine.inside)
+        return self._read[routine.key]
+
+    def read_rows(
+        self, here: Scope, rows: range, but: Collection[str] = ()
+    ) -> tuple[Effects, list[TaskRoutine]]:
+        """Collect what statements may do to moves, and which routines they call.
+
+        Args:
+            here: Where they stand.
+            rows: .. and their rows.
+            but: Names whose calls do not count.
+        """
+        effects, called = frozenset[str](), list[TaskRoutine]()
+        for row in rows:
+            one = self.texts[here.file].statement(row)
+            names = (name for name in self.names_called(one) if name not in but)
+            own, found = self.read_calls(names, here)
+            effects |= own | self.own_effects(one)
+            called += found
+        return effects, called
+
+    def read_calls(
+        self, names: Iterable[str], here: Scope
+    ) -> tuple[Effects, list[TaskRoutine]]:
+        """Return what calls of no routine may do, and the routines of the others."""
+        called, moves = list[TaskRoutine](), False
+        for name in names:
+            found = self.task.routine(name, here)
+            called += [] if found is None else [found]
+            unknown = name in self.task.routines or not self.is_still(name)
+            moves |= found is None and unknown
+        return frozenset([MOVES] if moves else []), called
+
     # What runs, and is not followed.
 
     def run_beside(self, file: int, routine: HeadedRows) -> None:
         """Note a routine that runs at a time, or in a way, that is not followed."""
         self.beside.add((file, routine.first, routine.last))
+
+    def run_named_beside(self, name: str) -> None:
+        """Note all routines of a name."""
+        for file, _, routine in self.task.routines.get(name, ()):
+            self.run_beside(file, routine)
+
+    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
+        """Return the routines that a statement may call."""
+        names = {*self.names_called(one)}
+        return [found for name in names for found in self.task.routines.get(name, ())]
+
+    def _list_beside(self) -> Iterator[tuple[int, int, int]]:
+        """Yield what runs otherwise than it is followed, as `beside`.
+
+        Those are all routines but procedures, handlers, and what the language says.
+        """
+        for file, text in enumerate(self.texts):
+            for routine in self.task.routines_by_file.get(file, ()):
+                if routine.rows.head.kind not in self.procedures:
+                    yield file, routine.inside.start, routine.inside.stop
+                yield from self.list_handlers(routine)
+            for row in text.where(self.is_beside):
+                yield file, row, row + 1
+
+    def goals_of(self, file: int, row: int) -> Iterator[Any]:
+        """Yield where a move goes that is not followed."""
+        routine = self.task.routine_around(file, row)
+        for scope in () if routine is None else self.scopes_of(routine):
+            one = self.texts[file].statement(row)
+            for visit in self.read_visits(one, row, scope, None):
+                yield visit.goal
 
     def rows_beside(self) -> Iterator[tuple[int, int]]:
         """Yield statements that run in ways that are not followed: file and row."""
@@ -583,19 +701,19 @@ class TaskMachine(Interpreter[Arrived]):
         """Yield the routines that some statements call."""
         file, first, behind = part
         for row in range(first, behind):
-            for at, one in self.calls_of(file, self.texts[file].statement(row)):
+            for at, _, one in self.calls_of(file, self.texts[file].statement(row)):
                 yield at, one.first, one.last
 
-    def find_unreached(self, moves: Mapping[int, Iterable[int]]) -> dict[str, Ints]:
-        """Return the lines of moves that no way leads to, by file.
-
-        Args:
-            moves: Rows of moves, by file.
-        """
+    def find_unreached(self) -> dict[str, Ints]:
+        """Return the lines of moves that no way leads to, by file."""
         found = {}
-        for file, rows in moves.items():
-            text = self.texts[file]
-            lines = {text.line(row) for row in rows if (file, row) not in self.reached}
+        for number, file in enumerate(self.task.files):
+            if file.is_system:
+                continue
+            text, rows = file.text, file.moves
+            lines = {
+                text.line(row) for row in rows if (number, row) not in self.reached
+            }
             if lines:
                 found[text.source.name] = np.array(sorted(lines), dtype=np.int64)
         return found

@@ -11,11 +11,12 @@ import numpy as np
 from postproc.exceptions import ProgramError
 from postproc.files import read_input
 from postproc.language.analysis.assigned_points import Scope
+from postproc.language.analysis.values import KnownRecord
 from postproc.language.archive import Archive
 from postproc.language.krl.files import SHARED_LIST
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import read_krl
-from postproc.language.krl.symbols import AXES, OUTSIDE, KrlRecord, KrlTask
+from postproc.language.krl.symbols import AXES, OUTSIDE, KrlTask
 from postproc.language.text.source import source_from_bytes
 from postproc.robot.pose import record_from_pose
 
@@ -55,13 +56,13 @@ def read_archive(folder: Path) -> Archive | None:
     )
 
 
-def _entries(task: KrlTask, table: str) -> Iterator[tuple[int, KrlRecord]]:
+def _entries(task: KrlTask, table: str) -> Iterator[tuple[int, KnownRecord]]:
     """Yield the entries of a table that are set."""
     here = Scope(0, task.files[0].name, "")
     for datum in task.files[0].data:
         if datum.name == table and datum.index:
             value = task.value(datum.value, datum.row, here)
-            if not isinstance(value, KrlRecord):
+            if not isinstance(value, KnownRecord):
                 continue
             given = any(abs(value.number(name.lower())) > 0.0 for name in _PLACE)
             if value.get("m") is not None:
@@ -70,11 +71,11 @@ def _entries(task: KrlTask, table: str) -> Iterator[tuple[int, KrlRecord]]:
                 yield datum.index[0], value
 
 
-def _numbers_of_load(value: KrlRecord) -> tuple[float, ...]:
+def _numbers_of_load(value: KnownRecord) -> tuple[float, ...]:
     """Return mass [kg] and centre [mm]; zero where the centre is not known."""
     centre = value.get("cm")
-    if not isinstance(centre, KrlRecord):
-        centre = KrlRecord(())
+    if not isinstance(centre, KnownRecord):
+        centre = KnownRecord(())
     own = np.array([centre.number(name) for name in ("x", "y", "z")])
     return (value.number("m"), *np.nan_to_num(own).tolist())
 
@@ -85,7 +86,7 @@ def _home(task: KrlTask) -> tuple[float, ...]:
     for datum in task.files[0].data:
         if datum.name == "xhome" and datum.value is not None:
             value = task.value(datum.value, datum.row, here)
-            if isinstance(value, KrlRecord):
+            if isinstance(value, KnownRecord):
                 found = tuple(value.number(axis) for axis in AXES)
                 return () if np.isnan(found).any() else found
     return ()

@@ -12,6 +12,8 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import IDENTITY, Pose, compose_poses, flat
+from postproc.language.analysis.symbols import whole
+from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
 from postproc.language.krl.abstract_state import (
     CORRECTIONS,
     NOTHING_SET,
@@ -24,14 +26,7 @@ from postproc.language.krl.pose_encoding import (
     KRL_DIALECT,
     abc_from_rotation,
 )
-from postproc.language.krl.program import whole
-from postproc.language.krl.symbols import (
-    CONFIG,
-    KrlNumber,
-    KrlRecord,
-    KrlTask,
-    KrlValue,
-)
+from postproc.language.krl.symbols import CONFIG, KrlTask
 from postproc.robot.pose import MM
 
 
@@ -120,7 +115,7 @@ class FrameReader:
         first = arguments[0] if arguments else None
         value = self.task.value(first, self.row, self.here)
         match name:
-            case "stool2" if isinstance(value, KrlRecord):
+            case "stool2" if isinstance(value, KnownRecord):
                 found = self.read_numbered("$tool", value.number("tool_no"))
                 still = value.get("ipo_frame") != "#base"
                 return replace(found, remote=still) if still else found
@@ -203,7 +198,9 @@ class FrameReader:
         file, datum = found
         there = Scope(file, self.task.files[file].name, "")
         value = self.task.value(datum.value, datum.row, there)
-        known = value.number("mach_def_index") if isinstance(value, KrlRecord) else 1.0
+        known = (
+            value.number("mach_def_index") if isinstance(value, KnownRecord) else 1.0
+        )
         return not known == 0.0
 
     def _unknown(self, shown: str, name: str) -> Reason:
@@ -242,7 +239,7 @@ class FrameReader:
 
 def pose_of(value: object) -> Pose:
     """Convert the components of a frame, empty where it is none."""
-    if not isinstance(value, KrlRecord):
+    if not isinstance(value, KnownRecord):
         return ()
     numbers = [value.number(name) for name in COMPONENTS[:6]]
     if any(map(math.isnan, numbers)):
@@ -260,7 +257,9 @@ def six_numbers(frame: KrlFrame) -> list[float]:
 UPRIGHT = 1e-6  # cosine of B up to which A and C are not told apart
 
 
-def set_component(held: object, name: str, value: float) -> KrlFrame | KrlRecord | None:
+def set_component(
+    held: object, name: str, value: float
+) -> KrlFrame | KnownRecord | None:
     """Return a frame of which one component is set, a record where not all are known.
 
     Args:
@@ -268,20 +267,20 @@ def set_component(held: object, name: str, value: float) -> KrlFrame | KrlRecord
         name: The component.
         value: Its number [mm, deg], NaN where only the run tells it.
     """
-    fields = dict[str, KrlValue]()
+    fields = dict[str, Value]()
     if isinstance(held, KrlFrame) and held.pose:
         numbers = six_numbers(held)
         upright = abs(math.cos(math.radians(numbers[4]))) < UPRIGHT
         known = zip(COMPONENTS[:6], numbers, strict=True)
-        fields = {} if upright else {key: KrlNumber(one) for key, one in known}
-    elif isinstance(held, KrlRecord):
+        fields = {} if upright else {key: WrittenNumber(one) for key, one in known}
+    elif isinstance(held, KnownRecord):
         fields = dict(held.fields)
     fields.pop(name, None)
     if name not in COMPONENTS[:6]:
         return None
     if not math.isnan(value):
-        fields[name] = KrlNumber(value)
-    record = KrlRecord(tuple(sorted(fields.items(), key=lambda one: one[0])))
+        fields[name] = WrittenNumber(value)
+    record = KnownRecord(tuple(sorted(fields.items(), key=lambda one: one[0])))
     pose = pose_of(record)
     if not pose:
         return record

@@ -53,7 +53,7 @@ class KrlSplitter(LayoutSplitter):
     def hinders(self, file: int, line: int) -> str:
         """Say why a move must stay in one piece, see `Splitter.hinders`."""
         own = self.files[file]
-        row = _row_of(own, line)
+        row = own.find_move(line)
         move = own.text.statement(row)
         if not isinstance(move, said.KrlMove):
             return "it does not stand alone on its line"
@@ -118,7 +118,7 @@ class KrlSplitter(LayoutSplitter):
     def stops(self, file: int, line: int) -> bool:
         """Return True if the arm may stop once more, see `Splitter.stops`."""
         own = self.files[file]
-        for one in map(own.text.statement, range(_row_of(own, line) - 1, -1, -1)):
+        for one in map(own.text.statement, range(own.find_move(line) - 1, -1, -1)):
             if not _is_setting(one):
                 return isinstance(one, said.KrlMove)
         return False
@@ -126,7 +126,7 @@ class KrlSplitter(LayoutSplitter):
     def layout(self, file: int, line: int) -> KrlLayout:
         """Look at a move, see `LayoutSplitter.layout`."""
         text = self.files[file].text
-        source, (_, end) = text.source, text.span(_row_of(self.files[file], line))
+        source, (_, end) = text.source, text.span(self.files[file].find_move(line))
         start = int(source.line_starts[line - 1])
         code = source.text[start:end].rstrip()
         head = _HEAD.match(code)
@@ -141,18 +141,6 @@ class KrlSplitter(LayoutSplitter):
         settings = code[with_.end() : stop].strip() if with_ else ""
         indent, word = code[: head.start(1)], head[1].lower()
         return KrlLayout(source, start, code, indent, ";", word, ends[0], settings)
-
-
-def _row_of(file: KrlFile, line: int) -> int:
-    """Return the only move on a line.
-
-    Raises:
-        CloneError: There are others.
-    """
-    rows = [row for row in file.moves if file.text.line(row) == line]
-    if len(rows) != 1:
-        raise CloneError("no single move stands on its line")
-    return rows[0]
 
 
 def _is_setting(one: ir.SourceStatement) -> bool:

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, NamedTuple
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import Scope
+from postproc.language.analysis.assigned_points import NO_POINTS, Scope
 from postproc.language.analysis.call_context import Context
-from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.conditions import cell_pose
-from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.analysis.found_visits import FoundGoal
+from postproc.language.analysis.declarations import TaskRoutine
+from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
+    MOVES,
     NOWHERE,
     Arrived,
+    Effects,
     TaskMachine,
 )
 from postproc.language.krl import syntax as said
@@ -31,22 +33,19 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoals, own_numbers
-from postproc.language.krl.pose_encoding import COMMENTS
-from postproc.language.krl.program import whole
-from postproc.language.krl.statements import KrlText
+from postproc.language.krl.moves import KrlGoals, KrlVisit, own_numbers
 from postproc.language.krl.symbols import (
     FUNCTIONS,
     STILL,
     KrlTask,
-    list_changes,
-    operands_of,
+    list_calls,
+    values_of,
 )
 from postproc.language.language import Start
 from postproc.language.visits import START
 
 _PASSED = (
-    said.AccessHeader, said.KrlDeclaration, said.OutsideName, said.SpeedPart,
+    said.AccessHeader, ir.Declaration, said.OutsideName, said.SpeedPart,
 )  # fmt: skip
 _ACTING = (
     ir.Assignment, ir.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
@@ -61,11 +60,29 @@ _ENDED = Reason(
     Code.ENDS_ELSEWHERE,
     "RESUME may end the way to it anywhere, while its interrupt is on",
 )
-MOVES, BRAKES, RESUMES = "moves", "brake", "resume"
-"""What statements may do to moves that are under way."""
-_Effects = tuple[frozenset[str], list[tuple[int, HeadedRows]]]
+BRAKES, RESUMES = "brake", "resume"
+"""What statements may do to moves that are under way, beside `MOVES`."""
 EVERY = -1  # interrupt whose number is not known
 FURTHEST_AHEAD = 5  # moves, by $ADVANCE
+
+
+class _InterruptStatement(NamedTuple):
+    """What a statement says of an interrupt.
+
+    Attributes:
+        file, row: The statement.
+        routine: The key of its routine.
+        word: decl, on, off, enable, disable, brake or resume.
+        number: Of the interrupt, EVERY where it is not known.
+        one: The statement.
+    """
+
+    file: int
+    row: int
+    routine: tuple[int, int]
+    word: str
+    number: int
+    one: Any
 
 
 @dataclass
@@ -77,10 +94,9 @@ class KrlMachine(TaskMachine):
         goals: Reads destinations.
     """
 
-    comments = COMMENTS
+    procedures = ("def",)
     task: KrlTask = field(kw_only=True)
     goals: KrlGoals = field(kw_only=True)
-    _known: dict[tuple[int, int], _Effects] = field(default_factory=dict)
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
     _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
@@ -99,7 +115,7 @@ class KrlMachine(TaskMachine):
         modes = modes.beside(self.task)
         first = self.task.files[0]
         here = Arrived(frozenset([START]), modes)
-        main = 0, first.name, first.routines[0]
+        main = TaskRoutine(0, first.name, first.routines[0])
         self.call_routine(main, self.root, -1, here)
         self.follow()
         for name, (file, row) in self._assumed.items():
@@ -132,14 +148,6 @@ class KrlMachine(TaskMachine):
         """Tell what does nothing, see `TaskMachine.goes_on`."""
         return isinstance(one, _PASSED)
 
-    def number(self, operand: ir.Operand | None, row: int, scope: Scope) -> float:
-        """Evaluate a number, see `TaskMachine.number`."""
-        return self.task.number(operand, row, scope)
-
-    def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
-        """Return where the statements of a routine stand."""
-        return self.task.scope_of(file, module, routine)
-
     def counts_alone(self, context: Context, row: int, one: ir.ForLoop) -> bool:
         """Return True if only the loop changes its variable, see `TaskMachine`.
 
@@ -161,7 +169,8 @@ class KrlMachine(TaskMachine):
         if one.name in self.task.odd_words:
             return False
         scope = context.place.scope
-        if self.task.place(one.name, scope) == (scope.module, scope.routine):
+        place = self.task.place(one.name, scope)
+        if place and place[1:3] == (scope.module, scope.routine):
             return True
         if one.name in self.task.beside:
             return False
@@ -171,14 +180,11 @@ class KrlMachine(TaskMachine):
     def _sets(self, one: ir.SourceStatement) -> set[str]:
         """Return the names of data that a statement sets, also as a loop."""
         named = {one.name} if isinstance(one, ir.ForLoop) else set()
-        return named | {data.name for data in list_changes(one, self.task.routines)}
+        return named | {data.name for data in self.task.list_changes(one)}
 
     def _calls_own(self, statements: Sequence[ir.SourceStatement]) -> bool:
         """Return True if a statement calls a routine of the files."""
-        called = {one.name for one in statements if isinstance(one, ir.Instruction)}
-        for part in ir.walk(*(x for one in statements for x in operands_of(one))):
-            if isinstance(part, ir.FunctionCall):
-                called.add(part.name)
+        called = set[str]().union(*map(list_calls, statements))
         return not called.isdisjoint(self.task.routines)
 
     @cached_property
@@ -245,7 +251,7 @@ class KrlMachine(TaskMachine):
             return here
         own = one.target if isinstance(one, ir.Assignment) else None
         store = here.modes.store
-        for target in list_changes(one, self.task.routines):
+        for target in self.task.list_changes(one):
             name = target.name
             if target is own or not _is_modal(name):
                 continue
@@ -261,11 +267,7 @@ class KrlMachine(TaskMachine):
         self, context: Context, row: int, one: said.KrlMove, here: Arrived
     ) -> Arrived:
         """Record the visits of a move."""
-        scope = context.place.scope
-        after = self.arrive(
-            context, row, here,
-            lambda: [*self.goals.visits(one, row, scope, here.modes, here.points)],
-        )  # fmt: skip
+        after = self.arrive(context, row, one, here)
         return replace(after, modes=replace(after.modes, halted=False, goes_on=False))
 
     def _modes(self, context: Context, row: int) -> ModeReader:
@@ -296,13 +298,8 @@ class KrlMachine(TaskMachine):
         self, context: Context, row: int, one: ir.Instruction, here: Arrived
     ) -> Arrived | None:
         name = one.name
-        found = self.task.routine(name, context.place.scope)
-        if found is not None:
-            return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
-            for file, routine, _ in self.task.routines[name]:
-                self.run_beside(file, routine)
-            return self.unknown(context, row, here, "names several routines")
+            return self.call_named(context, row, name, here)
         if name == "bas":
             command = one.arguments[0].value if one.arguments else None
             if isinstance(command, said.EnumValue) and command.name.startswith("#out_"):
@@ -331,7 +328,7 @@ class KrlMachine(TaskMachine):
         self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what a statement reads, and for what its functions do."""
-        for part in ir.walk(*operands_of(one)):
+        for part in values_of(one):
             if isinstance(part, ir.FunctionCall):
                 here = self._function(context, row, part.name, here)
             elif isinstance(part, ir.DataObject) and part.name.startswith("$"):
@@ -346,17 +343,10 @@ class KrlMachine(TaskMachine):
         self, context: Context, row: int, name: str, here: Arrived
     ) -> Arrived:
         """Allow for what a function does."""
-        found = self.task.routine(name, context.place.scope)
-        if found is not None:
-            if not self.may_act(found[0], found[2]):
-                return _halt(here, None)
-            self.run_beside(found[0], found[2])
-            what = f"calls the function {name}, which moves: it is not followed"
-            return self.unknown(context, row, here, what)
-        if name in FUNCTIONS or name in STILL or self.declares_motionless(name):
-            return here
-        what = f"calls the function {name}, which is not known: it may move"
-        return self.unknown(context, row, here, what)
+        still = name in FUNCTIONS or name in STILL or self.declares_motionless(name)
+        after = self.call_function(context, row, name, still, here)
+        own = name in self.task.routines
+        return _halt(here, None) if own and after is here else after
 
     # Interrupts and triggers.
 
@@ -365,9 +355,12 @@ class KrlMachine(TaskMachine):
     ) -> Arrived:
         """Declare an interrupt; one that nothing switches on may be on already."""
         self._met.add((context.place.scope.file, row))
-        effects = self._effects_of(context.place.scope.file, one.action)
+        effects = self.effects_of(one.action, context.place.scope)
         self._call_beside(context.place.scope.file, one.action)
-        modes, number = here.modes, self._number_of(context, row, one.number)
+        modes, number = (
+            here.modes,
+            self._number_of(context.place.scope, row, one.number),
+        )
         others = frozenset(d for d in modes.declared if d[0] != number)
         modes = replace(modes, declared=others)
         ends = RESUMES in effects
@@ -391,106 +384,75 @@ class KrlMachine(TaskMachine):
 
         They do not declare it, and nothing switches it on where it is declared.
         """
-        switching = {
-            (file, routine.first) for file, routine, own, word in self._switches
-            if word == "on" and own in (number, EVERY)
-        }  # fmt: skip
-        declaring = {  # file and first row of routines that may declare it
-            (file, routine.first) for file, routine, own, _ in self._declarations
-            if own in (number, EVERY)
-        }  # fmt: skip
+        switching = self._find_routines(("on",), {number, EVERY})
+        declaring = self._find_routines(("decl",), {number, EVERY})
         known = number != EVERY and bool(switching)
         return known and declaring.isdisjoint(switching)
 
     @cached_property
-    def _declarations(
-        self,
-    ) -> list[tuple[int, HeadedRows, int, said.InterruptDeclared]]:
-        """List interrupts: file, routine, number, and how they are declared."""
+    def _interrupts(self) -> list[_InterruptStatement]:
+        """List all that programs say of interrupts, but for submit programs."""
         found = []
-        for file, routine, row, one in self._in_routines():
-            if isinstance(one, said.InterruptDeclared):
-                here = Scope(file, self.task.files[file].name, "")
-                number = whole(self.task.number(one.number, row, here))
-                found.append((file, routine, EVERY if number is None else number, one))
+        for file, text in enumerate(self.texts):
+            if self.task.files[file].is_submit:
+                continue
+            here = Scope(file, self.task.files[file].name, "")
+            for row in text.where(_is_interrupt):
+                one, around = text.statement(row), self.task.routine_around(file, row)
+                word = "decl" if isinstance(one, said.InterruptDeclared) else one.word
+                number = self._number_of(here, row, one.number)
+                routine = around.key if around else (file, -1)
+                found.append(_InterruptStatement(file, row, routine, word, number, one))
         return found
 
-    @cached_property
-    def _switches(self) -> list[tuple[int, HeadedRows, int, str]]:
-        """List what switches interrupts: file, routine, number, and word."""
-        found = []
-        for file, routine, row, one in self._in_routines():
-            if isinstance(one, said.InterruptSwitched) and one.word in ("on", "off"):
-                here = Scope(file, self.task.files[file].name, "")
-                number = whole(self.task.number(one.number, row, here))
-                found.append(
-                    (file, routine, EVERY if number is None else number, one.word)
-                )
-        return found
-
-    def _in_routines(
-        self,
-    ) -> Iterator[tuple[int, HeadedRows, int, ir.SourceStatement]]:
-        """Yield what routines say of interrupts: file, routine, row."""
-        for file, text in self._robot_texts():
-            for routine in self.task.files[file].routines:
-                rows = text.where(_is_interrupt, routine.first + 1, routine.last)
-                for row in rows:
-                    yield file, routine, row, text.statement(row)
+    def _find_routines(
+        self, words: Sequence[str], numbers: set[int]
+    ) -> set[tuple[int, int]]:
+        """Return the routines that say something of some interrupts, by their keys."""
+        return {
+            one.routine for one in self._interrupts
+            if one.word in words and one.number in numbers
+        }  # fmt: skip
 
     def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Allow for a RESUME in the routine, see `TaskMachine.at_return`."""
         ending = {own for own in here.modes.declared if own[1] == _ENDED}
         numbers = {number for number, _ in ending}
-        at = context.place.scope.file, context.place.routine
+        scope = context.place.scope
+        at = TaskRoutine(scope.file, scope.module, context.place.routine)
         active = bool(ending & here.modes.active)
-        if not ending or not (active or self._may_switch(*at, numbers)):
+        if not ending or not (active or self._may_switch(at, numbers)):
             return here
         ended = here.forget()
         on = {own for own in ending if own[0] in self._still_enabled}
         left = (ended.modes.active - ending) | on
         return here.join(replace(ended, modes=ended.modes.with_(active=left)))
 
-    def _may_switch(self, file: int, routine: HeadedRows, numbers: set[int]) -> bool:
+    def _may_switch(self, routine: TaskRoutine, numbers: set[int]) -> bool:
         """Return True if a routine, or one that it calls, switches interrupts."""
-        numbers = numbers | {EVERY}
-        switching = {(k, r.first) for k, r, own, _ in self._switches if own in numbers}
-        return any(
-            (at, one.first) in switching for at, one in self._reach(file, routine)
-        )
-
-    def _reach(
-        self, file: int, routine: HeadedRows
-    ) -> Iterator[tuple[int, HeadedRows]]:
-        """Yield a routine and all that it may come to call."""
-        return reach(
-            [(file, routine)],
-            lambda one: self._direct(*one)[1],
-            lambda one: (one[0], one[1].first),
-        )
+        switching = self._find_routines(("on", "off"), numbers | {EVERY})
+        return any(one.key in switching for one in self.reach_from([routine]))
 
     @cached_property
     def _still_enabled(self) -> set[int]:
         """Numbers of interrupts whose routines may leave them on, EVERY for unknown."""
-        return {number for file, _, number, one in self._declarations
-                if not self._switches_itself_off(file, number, one)}  # fmt: skip
+        declared = (one for one in self._interrupts if one.word == "decl")
+        return {one.number for one in declared if not self._switches_itself_off(one)}
 
-    def _switches_itself_off(
-        self, file: int, number: int, declared: said.InterruptDeclared
-    ) -> bool:
+    def _switches_itself_off(self, declared: _InterruptStatement) -> bool:
         """Return True if the routine of an interrupt first of all switches it off."""
-        name = getattr(declared.action, "name", "")
-        found = self.task.routine(name, Scope(file, self.task.files[file].name, ""))
+        name = getattr(declared.one.action, "name", "")
+        here = Scope(declared.file, self.task.files[declared.file].name, "")
+        found = self.task.routine(name, here)
         if found is None:
             return False
-        at, _, routine = found
-        here = Scope(at, self.task.files[at].name, "")
-        for row in range(routine.first + 1, routine.last):
-            one = self.texts[at].statement(row)
+        for row in found.inside:
+            one = self.texts[found.file].statement(row)
             if isinstance(one, said.InterruptSwitched) and one.word == "off":
-                own = whole(self.task.number(one.number, row, here))
-                return one.number is None or own == number
-            if not isinstance(one, said.KrlDeclaration):
+                there = Scope(found.file, found.module, "")
+                own = self._number_of(there, row, one.number)
+                return one.number is None or own == declared.number
+            if not isinstance(one, ir.Declaration):
                 return False
         return False
 
@@ -498,7 +460,10 @@ class KrlMachine(TaskMachine):
         self, context: Context, row: int, one: said.InterruptSwitched, here: Arrived
     ) -> Arrived:
         self._met.add((context.place.scope.file, row))
-        modes, number = here.modes, self._number_of(context, row, one.number)
+        modes, number = (
+            here.modes,
+            self._number_of(context.place.scope, row, one.number),
+        )
         if one.word == "on":
             meant = {
                 d for d in modes.declared if EVERY in (number, d[0]) or d[0] == number
@@ -538,23 +503,15 @@ class KrlMachine(TaskMachine):
                 found[k] = found.get(k, frozenset()) | {why}
         return found
 
-    def _number_of(self, context: Context, row: int, operand: ir.Operand | None) -> int:
+    def _number_of(self, here: Scope, row: int, operand: ir.Operand | None) -> int:
         """Return the number of an interrupt, EVERY where it is not known."""
-        number = whole(self.number(operand, row, context.place.scope))
+        number = whole(self.task.number(operand, row, here))
         return EVERY if number is None else number
 
     @cached_property
     def _enabled_interrupts(self) -> set[int]:
         """Numbers of the interrupts that some statement switches on."""
-        found = set()
-        for file, text in self._robot_texts():
-            here = Scope(file, self.task.files[file].name, "")
-            for row in text.where(_is_interrupt):
-                one = text.statement(row)
-                if isinstance(one, said.InterruptSwitched) and one.word == "on":
-                    number = whole(self.task.number(one.number, row, here))
-                    found.add(EVERY if number is None else number)
-        return found
+        return {one.number for one in self._interrupts if one.word == "on"}
 
     def _trigger(
         self, context: Context, one: said.PathTrigger, here: Arrived
@@ -563,7 +520,7 @@ class KrlMachine(TaskMachine):
 
         What it does comes at some time in the next move, when the program is ahead.
         """
-        if not self._effects_of(context.place.scope.file, one.action):
+        if not self.effects_of(one.action, context.place.scope):
             return here
         self._call_beside(context.place.scope.file, one.action)
         return replace(
@@ -572,47 +529,26 @@ class KrlMachine(TaskMachine):
 
     def _call_beside(self, file: int, action: ir.SourceStatement) -> None:
         """Note the routines that an interrupt or a trigger calls."""
-        for called in self.calls_of(file, action):
-            self.run_beside(*called)
+        for at, _, called in self.calls_of(file, action):
+            self.run_beside(at, called)
 
-    def calls_of(
-        self, file: int, one: ir.SourceStatement
-    ) -> list[tuple[int, HeadedRows]]:
-        """Return the routines that a statement calls, see `TaskMachine`."""
-        called = list[tuple[int, HeadedRows]]()
-        self._own(file, one, called)
-        return called
+    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
+        """Return what an interrupt calls later, too."""
+        if isinstance(one, said.InterruptDeclared):
+            one = one.action
+        return super().calls_of(file, one)
 
-    def changes_of(self, one: ir.SourceStatement) -> Iterator[str]:
-        """Yield the names of data that a statement changes, see `TaskMachine`."""
-        yield from (data.name for data in list_changes(one, self.task.routines))
+    def is_beside(self, one: ir.SourceStatement) -> bool:
+        """Return True if a statement says what is done at another time."""
+        return isinstance(one, said.InterruptDeclared | said.PathTrigger)
 
-    def routines_beside(self) -> Iterator[tuple[int, int, int]]:
-        """Yield functions, and what interrupts and triggers do, see `TaskMachine`."""
-        for file, text in enumerate(self.texts):
-            for routine in self.task.files[file].routines:
-                if getattr(routine.head, "kind", "") == "deffct":
-                    yield file, routine.first, routine.last
-            for row in text.where(_is_beside):
-                yield file, row, row + 1
-                for at, routine in self.calls_of(file, text.statement(row).action):
-                    yield at, routine.first, routine.last
-
-    def goals_of(self, file: int, row: int) -> Iterator[FoundGoal]:
-        """Yield where a move goes, see `TaskMachine`."""
-        one, source = self.texts[file].statement(row), self.task.files[file]
-        around = (r for r in source.routines if r.first < row < r.last)
-        routine = next(around, None)
-        if routine is not None and isinstance(one, said.KrlMove):
-            scope = self.task.scope_of(file, source.name, routine)
-            for visit in self.goals.visits(one, row, scope, None):
-                yield visit.goal
-
-    def _robot_texts(self) -> Iterator[tuple[int, KrlText]]:
-        """Yield files and statements, but for those of submit programs."""
-        for file, text in enumerate(self.texts):
-            if not self.task.files[file].is_submit:
-                yield file, text
+    def read_visits(
+        self, one: Any, row: int, scope: Scope, here: Arrived | None
+    ) -> Iterator[KrlVisit]:
+        """Read the visits of a move, see `TaskMachine.read_visits`."""
+        if isinstance(one, said.KrlMove):
+            modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
+            yield from self.goals.visits(one, row, scope, modes, points)
 
     @cached_property
     def everywhere(self) -> frozenset[Reason]:
@@ -623,82 +559,42 @@ class KrlMachine(TaskMachine):
         """
         odd = {"interrupt", "trigger"} & self.task.odd_words
         found, unseen_on = {_INTERRUPT} if odd else set(), False
-        for file, text in self._robot_texts():
-            for row in text.where(_is_interrupt):
-                if (file, row) in self._met:
-                    continue
-                one = text.statement(row)
-                if isinstance(one, said.InterruptDeclared):
-                    effects = self._effects_of(file, one.action)
-                    found |= {_INTERRUPT} if MOVES in effects else set()
-                    found |= {_RESUMED} if effects - {MOVES} else set()
-                unseen_on |= (
-                    isinstance(one, said.InterruptSwitched) and one.word == "on"
-                )
+        unseen = (d for d in self._interrupts if (d.file, d.row) not in self._met)
+        for file, _, _, word, _, one in unseen:
+            if word == "decl":
+                here = Scope(file, self.task.files[file].name, "")
+                effects = self.effects_of(one.action, here)
+                found |= {_INTERRUPT} if MOVES in effects else set()
+                found |= {_RESUMED} if effects - {MOVES} else set()
+            unseen_on |= word == "on"
         if unseen_on:
             found |= {why for v in self.visits for _, why in v.modes.declared}
         return frozenset(found)
 
     # What a routine may do, read off its text.
 
-    def may_act(self, file: int, routine: HeadedRows) -> bool:
-        """Return True if a routine moves, or changes how moves are carried out."""
-        return bool(self._routine_effects(file, routine))
-
-    def _routine_effects(self, file: int, routine: HeadedRows) -> frozenset[str]:
-        """Collect what a routine may do, and all that it calls."""
-        found = (self._direct(*one)[0] for one in self._reach(file, routine))
-        return frozenset().union(*found)
-
-    def _direct(self, file: int, routine: HeadedRows) -> _Effects:
-        """Collect what the statements of a routine do, and which routines they call."""
-        key = file, routine.first
-        if key not in self._known:
-            text, called = self.texts[file], list[tuple[int, HeadedRows]]()
-            rows = range(routine.first + 1, routine.last)
-            parts = [self._own(file, text.statement(row), called) for row in rows]
-            self._known[key] = frozenset().union(*parts), called
-        return self._known[key]
-
-    def _effects_of(self, file: int, one: ir.SourceStatement) -> frozenset[str]:
-        """Collect what a statement may do: move or set what moves need, end a move."""
-        called = list[tuple[int, HeadedRows]]()
-        found = [self._own(file, one, called)]
-        found += [self._routine_effects(*routine) for routine in called]
-        return frozenset().union(*found)
-
-    def _own(
-        self,
-        file: int,
-        one: ir.SourceStatement,
-        called: list[tuple[int, HeadedRows]],
-    ) -> frozenset[str]:
-        """Collect what a statement does itself, and note the routines that it calls."""
+    def own_effects(self, one: ir.SourceStatement) -> Effects:
+        """Return that a statement moves, sets what moves need, or ends moves."""
         match one:
             case said.KrlMove() | said.SplineBlock() | ir.NotUnderstood():
                 return frozenset([MOVES])
             case said.InterruptSwitched(word=word) if word in (BRAKES, RESUMES):
                 return frozenset([word])
             case said.PathTrigger(action=action):
-                return self._own(file, action, called)
-        changed = list_changes(one, self.task.routines)
-        if any(_is_modal(target.name) for target in changed):
-            return frozenset([MOVES])
-        here = Scope(file, self.task.files[file].name, "")
-        parts = ir.walk(*operands_of(one))
-        names = [p.name for p in parts if isinstance(p, ir.FunctionCall)]
-        if isinstance(one, ir.Instruction):
-            names.append(one.name)
-        moves = False
-        for name in names:
-            found = self.task.routine(name, here)
-            if found is not None:
-                called.append((found[0], found[2]))
-            moves |= found is None and not self._is_still(name)
-        return frozenset([MOVES]) if moves else frozenset()
+                return self.own_effects(action)
+        modal = any(_is_modal(data.name) for data in self.task.list_changes(one))
+        return frozenset([MOVES] if modal else [])
 
-    def _is_still(self, name: str) -> bool:
-        """Return True if a routine without a text is known to be still."""
+    def names_called(self, one: ir.SourceStatement) -> Iterator[str]:
+        """Yield functions and the instruction; of a trigger what it does."""
+        parts = (
+            ir.walk(one.action) if isinstance(one, said.PathTrigger) else values_of(one)
+        )
+        calls = ir.Instruction | ir.FunctionCall
+        yield from (part.name for part in parts if isinstance(part, calls))
+
+    def is_still(self, name: str) -> bool:
+        """Return True for known routines and functions, and by the cell."""
         known = name in STILL or name in FUNCTIONS or self.declares_motionless(name)
         listed = name in package_routines() and not self._is_overruled(name)
         return known or listed
@@ -707,11 +603,6 @@ class KrlMachine(TaskMachine):
 def _is_interrupt(one: ir.SourceStatement) -> bool:
     """Return True if a statement declares or switches interrupts."""
     return isinstance(one, said.InterruptDeclared | said.InterruptSwitched)
-
-
-def _is_beside(one: ir.SourceStatement) -> bool:
-    """Return True if a statement says what is done at another time."""
-    return isinstance(one, said.InterruptDeclared | said.PathTrigger)
 
 
 def _is_modal(name: str) -> bool:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
 
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing
 from postproc.language import ir
+from postproc.language.analysis.task_language import TaskLanguage, check_routines
 from postproc.language.analysis.task_machine import follow
 from postproc.language.archive import Archive
 from postproc.language.krl import syntax as said
@@ -20,14 +19,12 @@ from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import KrlFile, read_krl
-from postproc.language.krl.statements import KrlText
 from postproc.language.krl.symbols import KrlTask
 from postproc.language.krl.to_visits import visits_of
 from postproc.language.krl.user_sources import acting_sources
 from postproc.language.language import (
     Cloner,
     JobReading,
-    Language,
     Splitter,
     Start,
 )
@@ -36,14 +33,8 @@ from postproc.language.measuring_program import (
     refuse_other_name,
 )
 from postproc.language.text.blocks import read_once
-from postproc.language.text.grammars import line_parser
-from postproc.language.text.number_edits import Skeleton
 from postproc.language.text.source import Source
-from postproc.language.visits import never_reached
 
-_BEGIN = re.compile(
-    rb"(?:\xef\xbb\xbf)?(?:\s|;[^\r\n]*[\r\n])*(?:&\w|(?:GLOBAL\s+)?DEF\s)", re.I
-)
 # Switches of the controller's own accuracy model, and the words that switch it off.
 _ACCURACY = {
     "$abs_accur": ("#none", "#off", "false"),
@@ -53,7 +44,7 @@ _ACCURACY = {
 }
 
 
-class Krl(Language):
+class Krl(TaskLanguage):
     """The language of KUKA controllers."""
 
     name = "KRL"
@@ -61,12 +52,25 @@ class Krl(Language):
     suffixes = KrlFileName.programs
     comment = ";"
     dialect = KRL_DIALECT
-    tells_accuracy = False
+    grammar = "krl"
+    begins = re.compile(
+        rb"(?:\xef\xbb\xbf)?(?:\s|;[^\r\n]*[\r\n])*(?:&\w|(?:GLOBAL\s+)?DEF\s)", re.I
+    )
+    joints = re.compile(r"[^;\"]*?\{\s*(?:(?:E6)?AXIS\s*:\s*)?A1\s", re.I)
+    names = (
+        re.compile(
+            r"\s*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:DECL\s+)?"
+            r"(?:E6POS|POS|FRAME|E6AXIS|AXIS)\s+([A-Za-z_$]\w*(?:\[[^\]]*\])?)",
+            re.I,
+        ),
+        re.compile(r"\s*([A-Za-z_$]\w*(?:\[[^\]]*\])?)\s*="),
+        re.compile(r"\s*([A-Za-z_]\w*)\s+([A-Za-z_$]\w*(?:\[[^\]]*\])?)?"),
+    )
     names_numbers = True
 
-    def recognises(self, text: bytes) -> bool:
-        """Tell whether a source begins there, behind comments."""
-        return _BEGIN.match(text) is not None
+    def read_file(self, source: Source) -> KrlFile:
+        """Read a source, a data list or a submit program."""
+        return read_krl(source)
 
     def read(
         self,
@@ -79,44 +83,25 @@ class Krl(Language):
         if files[0].is_submit:
             problem = "is a submit program, which moves no arm"
             raise ProgramError(sources[0].name, problem, "Give the .src of a program")
-        if not files[0].routines:
-            problem, cure = "the file holds no routine", "Give the .src of a program"
-            raise ProgramError(sources[0].name, problem, cure)
+        check_routines(files[0], "Give the .src of a program")
         _refuse_own_accuracy(files)
         _refuse_doubles(files)
         task = KrlTask(files, start.taught)
         machine = follow(lambda: KrlMachine.of(task, start))
         visits = visits_of(machine)
-        own = {k: f.moves for k, f in enumerate(files) if not f.is_system}
-        missed = machine.find_unreached(own)
-        told = never_reached(missed, f"DEF {files[0].routines[0].head.name}", "program")
         odd = (d for file in files for d in file.diagnostics)
-        found = [*odd, *machine.diagnostics, *told]
-        corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
-        kept = tuple(f for f in files if f.text.source.name not in corrected)
-        texts = tuple(skeleton_of(file.text) for file in files)
-        return JobReading(texts, visits, tuple(sorted(set(found))), kept, missed)
+        main = f"DEF {files[0].routines[0].head.name}", "program"
+        return self.report(machine, visits, files, odd, main)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone points of its data lists."""
-        return KrlCloner.of(KrlTask([read_krl(source) for source in sources]))
+        return KrlCloner(KrlTask([read_krl(source) for source in sources]))
 
     def splitter(self, sources: Sequence[Source]) -> Splitter:
         """Parse the files of a job to put points on the ways of its moves."""
         from postproc.language.krl.insert_moves import KrlSplitter
 
         return KrlSplitter(tuple(read_krl(source) for source in sources))
-
-    def target_names(
-        self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
-    ) -> Iterator[str]:
-        """Name data by their declarations, and other lines by how they begin."""
-        for line in wanted:
-            yield _name_begin(lines[line - 1]) if line else ""
-
-    def holds_joints(self, line: str) -> bool:
-        """Tell whether a line holds joint angles."""
-        return _JOINTS.match(line) is not None
 
     def reads(
         self,
@@ -141,36 +126,8 @@ class Krl(Language):
         refuse_other_name(program, file.name, file.stem)
         return write_krl(program)
 
-    def prepare(self) -> None:
-        """Load the parser of statements."""
-        line_parser("krl", "statement")
-
 
 LANGUAGE = Krl
-
-_DECLARED = re.compile(
-    r"\s*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:DECL\s+)?"
-    r"(?:E6POS|POS|FRAME|E6AXIS|AXIS)\s+([A-Za-z_$]\w*(?:\[[^\]]*\])?)",
-    re.I,
-)
-_GIVEN = re.compile(r"\s*([A-Za-z_$]\w*(?:\[[^\]]*\])?)\s*=")
-_MOVED = re.compile(r"\s*([A-Za-z_]\w*)\s+([A-Za-z_$]\w*(?:\[[^\]]*\])?)?")
-_JOINTS = re.compile(r"[^;\"]*?\{\s*(?:(?:E6)?AXIS\s*:\s*)?A1\s", re.I)
-
-
-def _name_begin(line: bytes) -> str:
-    """Name what a line declares, gives a value to or moves to."""
-    text = line.decode("latin-1")
-    found = _DECLARED.match(text) or _GIVEN.match(text)
-    if found:
-        return found[1]
-    words = _MOVED.match(text)
-    return " ".join(filter(None, words.groups())) if words else ""
-
-
-def skeleton_of(text: KrlText) -> Skeleton:
-    """Take over what the statements of a text tell, for comparing it with another."""
-    return text.skeleton(lambda source: skeleton_of(read_krl(source).text))
 
 
 def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:

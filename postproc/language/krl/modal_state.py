@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
+from postproc.language.analysis.modal_state import ModalState
+from postproc.language.analysis.symbols import whole
+from postproc.language.analysis.values import KnownRecord, Value
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import (
     CORRECTION_FRAMES,
@@ -29,13 +32,7 @@ from postproc.language.krl.frames import (
     no_frame,
     set_component,
 )
-from postproc.language.krl.program import whole
-from postproc.language.krl.symbols import (
-    KrlRecord,
-    KrlTask,
-    KrlValue,
-    is_word,
-)
+from postproc.language.krl.symbols import KrlTask, is_word
 from postproc.language.visits import OrientationLaw
 from postproc.robot.pose import MM
 
@@ -49,7 +46,7 @@ LOST_FRAME = no_frame(
 
 
 @dataclass(frozen=True)
-class KrlModes:
+class KrlModes(ModalState):
     """What holds until another statement changes it.
 
     Attributes:
@@ -75,9 +72,9 @@ class KrlModes:
         declared: Interrupts that may move the arm or end its moves, by number, and why
             targets are left while one of them is on.
         active: Those of them that may be on.
-        blocked: Why no target can be compensated; more than one reason.
     """
 
+    collected = ("declared", "active", "blocked")
     tool: KrlFrame
     base: KrlFrame
     interpolation: str = "#base"
@@ -89,9 +86,9 @@ class KrlModes:
     circle: str = ""
     through: bool = False
     ahead: bool | None = True
-    fdat: KrlValue | None = None
-    pdat: KrlValue | None = None
-    ldat: KrlValue | None = None
+    fdat: Value | None = None
+    pdat: Value | None = None
+    ldat: Value | None = None
     halted: bool | None = False
     goes_on: bool = False
     load: tuple[float, ...] = CELL_LOAD
@@ -99,29 +96,14 @@ class KrlModes:
     perhaps: bool = False
     declared: frozenset[tuple[int, Reason]] = frozenset()
     active: frozenset[tuple[int, Reason]] = frozenset()
-    blocked: frozenset[Reason] = frozenset()
+
+    def unknown_state(self) -> KrlModes:
+        """Return it where nothing is known."""
+        return LOST
 
     def join(self, other: KrlModes) -> KrlModes:
         """Keep what is the same on another way here."""
-        differing = {
-            f.name: getattr(LOST, f.name)
-            for f in fields(self)
-            if getattr(self, f.name) != getattr(other, f.name)
-        }
-        differing["store"] = self.store.join(other.store)
-        for name in ("declared", "active", "blocked"):
-            differing[name] = getattr(self, name) | getattr(other, name)
-        return replace(self, **differing)
-
-    def forget(self) -> KrlModes:
-        """Forget all but why targets cannot be compensated."""
-        return replace(
-            LOST, declared=self.declared, active=self.active, blocked=self.blocked
-        )
-
-    def with_(self, **changed: Any) -> KrlModes:
-        """Return it with other values."""
-        return replace(self, **changed)
+        return replace(super().join(other), store=self.store.join(other.store))
 
     def beside(self, task: KrlTask) -> KrlModes:
         """Return it where submit programs may change what they set at any time."""
@@ -358,7 +340,7 @@ class ModeReader:
 
     def _component(
         self, held: object, parts: Sequence[str | ir.ElementStep], value: ir.Operand
-    ) -> KrlFrame | KrlRecord | None:
+    ) -> KrlFrame | KnownRecord | None:
         """Set a component of a frame, None where what it then is is not known."""
         if len(parts) != 1 or not isinstance(parts[0], str):
             return None
@@ -402,9 +384,9 @@ class ModeReader:
         given = operand.arguments
         return given[at].value if at < len(given) else None
 
-    def _record(self, operand: ir.Operand | None) -> KrlRecord:
+    def _record(self, operand: ir.Operand | None) -> KnownRecord:
         found = self.task.value(operand, self.row, self.here)
-        return found if isinstance(found, KrlRecord) else KrlRecord((), whole=False)
+        return found if isinstance(found, KnownRecord) else KnownRecord((), whole=False)
 
     def _word(self, operand: ir.Operand, field: str) -> str:
         """Read ``#BASE``, or what ``SIPO_MODE(FP1.IPO_FRAME)`` gives, "" if unknown."""
@@ -412,7 +394,7 @@ class ModeReader:
         if isinstance(operand, ir.FunctionCall):
             inside = self._argument(operand)
             found = self.task.value(inside, self.row, self.here)
-            if isinstance(found, KrlRecord):
+            if isinstance(found, KnownRecord):
                 found = found.get(field)
         return found.lower() if isinstance(found, str) else ""
 
@@ -423,7 +405,7 @@ class ModeReader:
             return False
         ways = [found.get(name) for name in ("aux_pt", "target_pt")]
         return all(
-            isinstance(way, KrlRecord) and way.get("ori") == "#interpolate"
+            isinstance(way, KnownRecord) and way.get("ori") == "#interpolate"
             for way in ways
         )
 
@@ -509,7 +491,7 @@ class ModeReader:
         file, datum = found
         there = Scope(file, self.task.files[file].name, "")
         value = self.task.value(datum.value, datum.row, there)
-        load = load_of(value) if isinstance(value, KrlRecord) else LOST_LOAD
+        load = load_of(value) if isinstance(value, KnownRecord) else LOST_LOAD
         return replace(modes, load=load)
 
     # BAS(#command, value), as the controller's bas.src carries it out.
@@ -589,7 +571,7 @@ class ModeReader:
 
     def _frames(self, modes: KrlModes) -> KrlModes:
         """Take the frames of FDAT_ACT, and the load of its tool."""
-        held = modes.fdat if isinstance(modes.fdat, KrlRecord) else KrlRecord(())
+        held = modes.fdat if isinstance(modes.fdat, KnownRecord) else KnownRecord(())
         reader = self.frames(modes)
         found = {
             name[1:]: reader.read_numbered(name, held.number(field))
@@ -604,7 +586,7 @@ class ModeReader:
 
     def _joint_data(self, modes: KrlModes) -> KrlModes:
         """Take the blending of PDAT_ACT."""
-        held = modes.pdat if isinstance(modes.pdat, KrlRecord) else KrlRecord(())
+        held = modes.pdat if isinstance(modes.pdat, KnownRecord) else KnownRecord(())
         size = number_or_unknown(held.number("apo_dist"))
         if held.get("apo_mode") == "#cdis":
             return replace(modes, distance=size, overlap=UNKNOWN)
@@ -612,8 +594,8 @@ class ModeReader:
 
     def _path_data(self, modes: KrlModes) -> KrlModes:
         """Take blending and orientation of LDAT_ACT."""
-        lost = KrlRecord((), whole=False)
-        held = modes.ldat if isinstance(modes.ldat, KrlRecord) else lost
+        lost = KnownRecord((), whole=False)
+        held = modes.ldat if isinstance(modes.ldat, KnownRecord) else lost
         word = held.get("ori_typ")
         return replace(
             modes,
@@ -622,7 +604,7 @@ class ModeReader:
             circle=self._circle(held),
         )
 
-    def _circle(self, held: KrlRecord) -> str:
+    def _circle(self, held: KnownRecord) -> str:
         """Return how the tool turns on arcs by LDAT_ACT, which may leave it out."""
         word = held.get("circ_typ")
         if isinstance(word, str):
@@ -630,10 +612,10 @@ class ModeReader:
         return self._default_circle if held.whole and word is None else ""
 
 
-def load_of(record: KrlRecord) -> tuple[float, ...]:
+def load_of(record: KnownRecord) -> tuple[float, ...]:
     """Return the load that a record states, see `KrlModes.load`."""
     centre = record.get("cm")
-    known = _centre_of(centre) if isinstance(centre, KrlRecord) else ()
+    known = _centre_of(centre) if isinstance(centre, KnownRecord) else ()
     return _load_of(record.number("m"), known)
 
 
@@ -644,7 +626,7 @@ def _load_of(mass: float, centre: tuple[float, ...]) -> tuple[float, ...]:
     return (mass, *centre) if mass >= 0 else CELL_LOAD
 
 
-def _centre_of(record: KrlRecord) -> tuple[float, ...]:
+def _centre_of(record: KnownRecord) -> tuple[float, ...]:
     """Return a centre of mass [m], () where it is not known."""
     found = tuple(record.number(name) * MM for name in ("x", "y", "z"))
     return () if any(map(math.isnan, found)) else found

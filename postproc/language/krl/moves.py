@@ -12,24 +12,26 @@ import numpy as np
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import (
-    NO_POINTS,
     AssignedPoint,
     Points,
     Scope,
 )
-from postproc.language.analysis.found_visits import (
-    FoundGoal,
-    FoundShift,
-    FoundVisit,
-    explain_components,
-    hold_numbers,
-    not_reached,
-    spell_element,
+from postproc.language.analysis.found_visits import FoundGoal, FoundVisit, not_reached
+from postproc.language.analysis.goals import (
+    AT_RUN_TIME,
+    COMPUTED,
+    RUN_TIME,
+    GoalReader,
+    ReadShift,
+    locate_numbers,
 )
+from postproc.language.analysis.symbols import whole
+from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame, six_numbers
 from postproc.language.krl.pose_encoding import (
     COMPONENTS,
+    KRL_DIALECT,
     MEASURED,
     NOT_WRITTEN,
     UNKNOWN_STATUS,
@@ -37,13 +39,10 @@ from postproc.language.krl.pose_encoding import (
     abc_from_rotation,
     rotation_from_abc,
 )
-from postproc.language.krl.program import whole
 from postproc.language.krl.symbols import (
     AXES,
     OUTSIDE,
     POSITIONS,
-    KrlNumber,
-    KrlRecord,
     KrlTask,
 )
 from postproc.language.shifts import Shift, ShiftKind
@@ -54,10 +53,6 @@ from postproc.robot.trajectory import Motion
 NOTHING = (math.nan,) * WIDTH
 NO_SLOTS = (-1,) * WIDTH
 PLACE = COMPONENTS[:6]
-RUN_TIME = "it is known only when the program runs"
-AT_RUN_TIME = Reason(
-    Code.RUNTIME_VALUE, "the target is known only when the program runs"
-)
 
 
 def no_target(text: str) -> Reason:
@@ -97,9 +92,7 @@ ACCURATE = Reason(
 NOT_BY_JOINTS = Reason(
     Code.TRAJECTORY_UNKNOWN, "the target is joint angles, and the move to it is no PTP"
 )
-COMPUTED = Reason(Code.COMPUTED_TARGET, "the target is computed from other data")
 ODD_STATUS = Reason(Code.CONFIGURATION_UNKNOWN, "S or T is no valid number")
-_OF_NUMBERS = (None, Code.PARTIAL_TARGET, Code.COMPUTED_TARGET)
 ANGLE = Reason(
     Code.ENDS_ELSEWHERE, f"CA ends the arc elsewhere than at its end point: {RUN_TIME}"
 )
@@ -148,7 +141,7 @@ class KrlGoals:
         row: int,
         here: Scope,
         modes: object,
-        points: Points = NO_POINTS,
+        points: Points,
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
@@ -161,28 +154,30 @@ class KrlGoals:
                 isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
             )
         if kind not in _POINTS[block is not None, in_joints]:
-            goal = not_reached(_Goal(self, move, row, here).end(move.to), SPLINE)
+            goal = not_reached(self._reader(move, row, here).end(move.to), SPLINE)
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
-        watched = points.watch()
-        reader = _Goal(self, move, row, replace(here, points=watched))
+        reader = self._reader(move, row, replace(here, points=points))
         angle = self._angle(move, row, here)
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
         if move.via is not None:
-            goal = _note_given(reader.end(move.via), watched)
+            goal = reader.end(move.via)
             yield KrlVisit(
                 here, row, motion, True, goal, modes, why=why, **given, move=move
             )
         goal = reader.end(move.to)
         if why:
             goal = not_reached(goal, ANGLE)
-        goal = _note_given(goal, watched)
         yield KrlVisit(
             here, row, motion, False, goal, modes,
             why=SPLINE if in_joints else NO_REASON,
             arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
         )  # fmt: skip
+
+    def _reader(self, move: said.KrlMove, row: int, here: Scope) -> KrlGoal:
+        within = self.block(row, here) is not None
+        return KrlGoal(self.task, row, here, move, within, self.aux)
 
     def block(self, row: int, here: Scope) -> range | None:
         """Return the rows of the spline block that a move stands in."""
@@ -206,7 +201,9 @@ class KrlGoals:
         if move.angle is None:
             return math.nan
         found = self.task.value(move.angle, row, here)
-        return math.radians(found.value) if isinstance(found, KrlNumber) else math.nan
+        return (
+            math.radians(found.value) if isinstance(found, WrittenNumber) else math.nan
+        )
 
 
 def motion_of(word: str) -> Motion:
@@ -236,206 +233,126 @@ def own_numbers(move: said.KrlMove) -> list[int] | None:
 
 
 @dataclass(frozen=True)
-class _Goal:
-    """Reads the ends of one move."""
+class KrlGoal(GoalReader):
+    """Reads the ends of one move.
 
-    goals: KrlGoals
+    Attributes:
+        move: The move.
+        in_block: It stands in a spline block.
+        axes: External axes that the cell declares.
+    """
+
+    task: KrlTask
     move: said.KrlMove
-    row: int
-    here: Scope
-
-    @property
-    def task(self) -> KrlTask:
-        return self.goals.task
+    in_block: bool
+    axes: Collection[int] = ()
+    dialect = KRL_DIALECT
+    brackets = "[]"
+    shout = True
+    system = "it stands in a system file, which is read and not rewritten"
 
     @property
     def _by_joints(self) -> bool:
         return motion_of(self.move.word) == Motion.JOINT
 
-    def end(self, operand: ir.Operand) -> FoundGoal:
-        """Read a destination."""
+    def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
+        """Read steps, home positions, where the arm is, and products of frames."""
         if self.move.word.endswith("_rel"):
             return self._step(operand)
         match operand:
             case ir.DataObject(name=name) if name in PRESENT:
                 return self._stay(name)
             case ir.DataObject(name=name) if name in BEFORE:
-                return _unknown_goal(no_target(RUN_TIME), name=name)
+                return self.unknown(no_target(RUN_TIME), name)
             case ir.DataObject(name=name) if name in HOMES:
                 return self._home(operand)
             case ir.Operation(operator=":", operands=(first, second)):
                 return self._product(first, second)
-            case said.KrlAggregate() | ir.DataObject():
-                return self._point(operand)
-            case ir.FunctionCall():
-                return self._read_returned(operand)
-            case _:
-                return _unknown_goal(AT_RUN_TIME)
+        return None
 
     # Points.
 
-    def _read_returned(self, call: ir.FunctionCall) -> FoundGoal:
-        """Read what a function of the files returns: its numbers stay."""
-        returned = self.task.find_returned(call, self.row, self.here)
-        if returned is None:
-            return _unknown_goal(AT_RUN_TIME)
-        operand, row, here = returned
-        found = replace(self, row=row, here=here).end(operand)
-        text = f"the function {call.name.upper()} returns the target"
-        why = found.why or Reason(Code.COMPUTED_TARGET, text)
-        return hold_numbers(
-            found, "", why, found.pins or text, found.target, found.values, found.aux
-        )
-
-    def _point(self, operand: said.KrlAggregate | ir.DataObject) -> FoundGoal:
-        """Read a point that is written or named."""
-        held = self.task.find_held(operand, self.row, self.here)
-        if held is not None:
-            return self._read_held(held)
-        name = operand.name if isinstance(operand, ir.DataObject) else ""
-        found = self.task.value(operand, self.row, self.here)
-        if not isinstance(found, KrlRecord) or not found.whole:
-            return _unknown_goal(
-                self._explain_unknown(name) if name else AT_RUN_TIME, name=name
-            )
-        goal = self._read_record(found)
-        if not name and goal.file >= 0:
-            return replace(goal, pins=self._system(goal.file))
-        if not name:
-            return goal
-        if goal.why.code is Code.PARTIAL_TARGET:  # what data lack may be told elsewhere
-            return _unknown_goal(PARTIAL, name=name)
-        return self._describe_point(goal, operand)
-
-    def _read_held(self, held: AssignedPoint) -> FoundGoal:
-        """Read the destination that assignments gave to a point."""
-        there = replace(self, row=held.row, here=held.scope)
-        goal = _unknown_goal(AT_RUN_TIME)
-        match held.operand:
-            case said.KrlAggregate() | ir.DataObject():
-                goal = there._point(held.operand)
-            case ir.Operation(operator=":", operands=(first, second)):
-                goal = there._product(first, second)
-            case ir.FunctionCall():
-                goal = there._read_returned(held.operand)
-        why = [self._explain_pinned(place[-1], goal) for place in held.chain]
-        why += [
-            f"{place[-1]} stands in a data list: it outlives the run"
-            for place in held.chain
-            if not place[2]
-        ]
-        pins, name = (
-            next(filter(None, (goal.pins, *why)), ""),
-            spell_element(held, "[]"),
-        )
-        if held.components:
-            return self._set_components(held, goal, name, pins)
-        if goal.why.code is Code.PARTIAL_TARGET:  # the others are what they were before
-            goal = _unknown_goal(PARTIAL)
-        unknown, shift = goal.target == Meaning.UNKNOWN, goal.shift
-        if shift is not None:
-            shift = replace(shift, pins=shift.pins or pins)
-        name = held.name if unknown else name
-        return replace(goal, name=name, pins=pins, shift=shift)
-
-    def _set_components(
-        self, held: AssignedPoint, base: FoundGoal, name: str, pins: str
-    ) -> FoundGoal:
-        """Read a point of which components have been set by themselves."""
-        record = self.task.evaluate_held(held)
-        found = _unknown_goal(PARTIAL)
-        if isinstance(record, KrlRecord) and record.whole:
-            found = self._read_record(record)
-        partial = found.why.code is Code.PARTIAL_TARGET
-        known = found.target != Meaning.UNKNOWN and not partial
-        fields = dict(record.fields) if isinstance(record, KrlRecord) else {}
-        lacks_axis = any(OUTSIDE[axis - 1] not in fields for axis in self.goals.aux)
-        known = known and not (held.operand is None and lacks_axis)
-        why = explain_components(held, name, self.task.files, known)
-        if held.operand is not None and found.why.code not in _OF_NUMBERS:
-            why = found.why
-        if not known:
-            return hold_numbers(base, name, why, pins)
-        return hold_numbers(
-            base, name, why, pins, found.target, found.values, found.aux
-        )
-
-    def _read_record(self, found: KrlRecord) -> FoundGoal:
+    def read_value(self, value: Value | None, name: str) -> FoundGoal | None:
         """Read joint angles or a position."""
-        by_axes = {key for key, _ in found.fields} & set(AXES)
-        return self._axes(found) if by_axes else self._pose(found)
+        if not isinstance(value, KnownRecord) or not value.whole:
+            return None
+        by_axes = {key for key, _ in value.fields} & set(AXES)
+        goal = self._axes(value) if by_axes else self._pose(value)
+        if name and goal.why.code is Code.PARTIAL_TARGET:
+            return self.unknown(PARTIAL, name)  # what it lacks may be told elsewhere
+        return replace(goal, name=name)
 
-    def _explain_unknown(self, name: str) -> Reason:
+    def is_shared(self, name: str) -> bool:
+        """Return True for GLOBAL data."""
+        declared = self.task.datum(name, self.here)
+        return declared is not None and declared[1].scope == "global"
+
+    def explain_unknown(self, name: str) -> Reason:
         """Say why a name stands for no known point."""
         code, text = self.task.explain_unknown(name, self.here)
         return Reason(code, f"{name} {text}")
 
-    def _describe_point(self, goal: FoundGoal, operand: ir.Operand) -> FoundGoal:
-        """Say what is known of a point beside its numbers."""
-        name = operand.name if isinstance(operand, ir.DataObject) else ""
-        declared = self.task.datum(name, self.here)
-        shared = declared is not None and declared[1].shared
-        return FoundGoal(
-            goal.target, goal.values, goal.file, goal.slots, NO_SLOTS,
-            name + self._element(operand), goal.aux, goal.why,
-            self._explain_pinned(name, goal), shared,
-        )  # fmt: skip
-
-    def _explain_pinned(self, name: str, goal: FoundGoal) -> str:
+    def explain_pinned(self, name: str, file: int) -> str:
         """Say why a point must keep its numbers."""
-        if goal.file >= 0 and self.task.files[goal.file].is_system:
-            place = self.task.files[goal.file].text.source.name
+        if file >= 0 and self.task.files[file].is_system:
+            place = self.task.files[file].text.source.name
             return f"{name} stands in {place}, which all programs share"
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
         return ""
 
-    def _element(self, operand: ir.Operand) -> str:
-        """Spell which element of an array is meant, "" where it is none."""
-        steps = operand.steps if isinstance(operand, ir.DataObject) else ()
-        for step in steps:
-            index = self.task.index(step, self.row, self.here)
-            return "" if index is None else f"[{','.join(map(str, index))}]"
-        return ""
+    def explain_kept(self, held: AssignedPoint) -> Iterator[str]:
+        """Say that points of lists keep what they are given."""
+        for place in held.chain:
+            if not place[2]:
+                yield f"{place[-1]} stands in a data list: it outlives the run"
 
-    def _axes(self, found: KrlRecord) -> FoundGoal:
+    def is_followed_whole(self, held: AssignedPoint, value: Value | None) -> bool:
+        """Return True unless an external axis that the cell declares is missing."""
+        fields = dict(value.fields) if isinstance(value, KnownRecord) else {}
+        lacks_axis = any(OUTSIDE[axis - 1] not in fields for axis in self.axes)
+        return held.operand is not None or not lacks_axis
+
+    def _axes(self, found: KnownRecord) -> FoundGoal:
         """Read six joint angles; only PTP goes to them."""
         numbers = _numbers(found, AXES)
         if not self._by_joints:
-            return _unknown_goal(NOT_BY_JOINTS)
+            return self.unknown(NOT_BY_JOINTS)
         if numbers is None:
             return self._partial(found, AXES, Meaning.PARTIAL_JOINTS)
-        file, slots = _places(numbers)
+        file, slots = locate_numbers(numbers, WIDTH)
         values = [number.value for number in numbers]
         why = NO_REASON if file >= 0 else COMPUTED
         return FoundGoal(
-            Meaning.JOINTS, (*values, 0.0, 0.0), file, (*slots, -1, -1), NO_SLOTS,
+            Meaning.JOINTS, (*values, 0.0, 0.0), file, slots, NO_SLOTS,
             aux=self._outside(found), why=why,
         )  # fmt: skip
 
-    def _pose(self, found: KrlRecord) -> FoundGoal:
+    def _pose(self, found: KnownRecord) -> FoundGoal:
         """Read X, Y, Z, A, B, C with S and T."""
         numbers = _numbers(found, PLACE)
         if numbers is None:
             return self._partial(found, PLACE[:3], Meaning.PARTIAL_POSE)
         flags = [found.get(name) for name in COMPONENTS[6:]]
-        written = [f if isinstance(f, KrlNumber) else KrlNumber(-1.0) for f in flags]
+        written = [
+            f if isinstance(f, WrittenNumber) else WrittenNumber(-1.0) for f in flags
+        ]
         values = [one.value for one in (*numbers, *written)]
-        file, slots = _places(numbers)
+        file, slots = locate_numbers(numbers, WIDTH)
         own = tuple(one.slot if one.file == file else -1 for one in written)
         aux, why = self._outside(found), self._status(values[6], values[7])
         if self._by_joints and NOT_WRITTEN in values[6:]:
-            return _unknown_goal(NO_STATUS)
+            return self.unknown(NO_STATUS)
         if self._by_joints and why.code is Code.CONFIGURATION_UNKNOWN:
-            return _unknown_goal(why)
+            return self.unknown(why)
         why = why or (NO_REASON if file >= 0 else COMPUTED)
         return FoundGoal(
-            Meaning.POSE, tuple(values), file, (*slots, *own), NO_SLOTS, aux=aux,
+            Meaning.POSE, tuple(values), file, (*slots[:6], *own), NO_SLOTS, aux=aux,
             why=why,
         )  # fmt: skip
 
     def _partial(
-        self, found: KrlRecord, names: Sequence[str], meaning: Meaning
+        self, found: KnownRecord, names: Sequence[str], meaning: Meaning
     ) -> FoundGoal:
         """Read numbers of which some are missing: they stay what they were before.
 
@@ -443,11 +360,10 @@ class _Goal:
         told by where the arm is, and a joint move needs S and T.
         """
         given = {key for key, _ in found.fields}
-        in_block = self.goals.block(self.row, self.here) is not None
         moves_so = (meaning == Meaning.PARTIAL_JOINTS) == self._by_joints
-        alone = not in_block and self.move.via is None and bool(given & {*names})
+        alone = not self.in_block and self.move.via is None and bool(given & {*names})
         if not (moves_so and alone and given <= {*names, *OUTSIDE}):
-            return _unknown_goal(PARTIAL)
+            return self.unknown(PARTIAL)
         values = [found.number(name) for name in names]
         values += [math.nan] * (WIDTH - len(values))
         return FoundGoal(meaning, tuple(values), aux=self._outside(found), why=PARTIAL)
@@ -460,11 +376,11 @@ class _Goal:
             return ODD_STATUS
         return ACCURATE if s > 0 and int(s) & MEASURED else NO_REASON
 
-    def _outside(self, found: KrlRecord) -> tuple[float, ...]:
+    def _outside(self, found: KnownRecord) -> tuple[float, ...]:
         """Return the external axes that count: declared by the cell, or not 0."""
         values = [found.number(name) for name in OUTSIDE]
         return tuple(
-            value if value != 0.0 or axis in self.goals.aux else math.nan
+            value if value != 0.0 or axis in self.axes else math.nan
             for axis, value in enumerate(values, start=1)
         )
 
@@ -473,9 +389,8 @@ class _Goal:
 
         On an arc or in a spline block that is where the arc or the block begins.
         """
-        within = self.goals.block(self.row, self.here) is not None
-        if within or self.move.via is not None:
-            return _unknown_goal(no_target(RUN_TIME), name=name)
+        if self.in_block or self.move.via is not None:
+            return self.unknown(no_target(RUN_TIME), name)
         meaning = Meaning.BY if self._by_joints else Meaning.RELATIVE_UFRAME
         why = no_target("it stays where it is")
         return FoundGoal(meaning, (0.0,) * WIDTH, name=name, why=why)
@@ -486,7 +401,7 @@ class _Goal:
         stated = name in self.task.written or self.task.place(name, self.here)
         if name in HOME and not stated:
             return FoundGoal(Meaning.HOME, NOTHING, name=name)
-        goal = self._point(operand)
+        goal = self.plain_goal(operand)
         if goal.target == Meaning.JOINTS:
             return FoundGoal(Meaning.HOME, goal.values, name=name)
         return replace(goal, why=goal.why or AT_HOME)
@@ -501,49 +416,34 @@ class _Goal:
         behind = isinstance(first, ir.DataObject) and self._is_point(first)
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, ir.DataObject):
-            return _unknown_goal(AT_RUN_TIME)
-        base = self._point(point)
-        holds = base.holds | self._find_own_shift(other)
-        frames = FrameReader(self.task, self.row, self.here, _NO, _NO)
-        shift = frames.frame(other)
+            return self.unknown(AT_RUN_TIME)
+        base = self.plain_goal(point)
+        own, shifts = self._find_own_shift(other), f"{base.name} is shifted by what"
+        shift = FrameReader(self.task, self.row, self.here, _NO, _NO).frame(other)
         if base.target != Meaning.POSE or not shift.pose:
-            pins = base.pins or f"{base.name} is shifted by what {RUN_TIME}"
-            return FoundGoal(
-                Meaning.UNKNOWN, NOTHING, base.file, follows=base.origin,
-                name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
-                stays=base.stays, holds=holds,
-            )  # fmt: skip
+            return self.apply_shift(base, ReadShift(own=own, shifts=shifts))
         if behind and self._by_joints:
-            pins = base.pins or f"{base.name} is shifted without S and T"
-            return FoundGoal(
-                Meaning.UNKNOWN, NOTHING, base.file, follows=base.origin,
-                name=base.name, why=NO_STATUS, pins=pins, stays=base.stays,
-                holds=holds,
+            return replace(
+                base, target=Meaning.UNKNOWN, values=self.nothing, why=NO_STATUS,
+                slots=(-1,) * WIDTH, follows=base.origin,
+                pins=base.pins or f"{base.name} is shifted without S and T",
+                holds=base.holds | own,
             )  # fmt: skip
         values, turns = _link(base.values, shift, behind)
-        if base.stays or base.slots[0] < 0:
-            aux = self._outside_of(base, other) if behind else base.aux
-            why = base.why or COMPUTED
-            kept = replace(base, holds=holds)
-            return hold_numbers(
-                kept, base.name, why, base.pins, base.target, values, aux
-            )
-        found = self._shift(base, other, shift, behind)
-        turned = turns and found.slots[0] < 0
-        pins = base.pins or (f"{base.name} is turned too" if turned else "")
-        return FoundGoal(
-            Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name,
-            self._outside_of(base, other) if behind else base.aux,
-            base.why, pins, base.shared, found,
-            holds=holds if found.slots[0] < 0 else base.holds,
-        )  # fmt: skip
+        by, file, slots = self._shift(base, other, shift, behind)
+        base = replace(base, stays=base.stays or base.slots[0] < 0)
+        aux = self._outside_of(base, other) if behind else base.aux
+        turned = f"{base.name} is turned too"
+        return self.apply_shift(
+            base, ReadShift(by, values, turns, file, slots, own, aux, shifts, turned)
+        )
 
-    def _find_own_shift(self, other: ir.Operand) -> set[tuple[int, int]]:
+    def _find_own_shift(self, other: ir.Operand) -> frozenset[tuple[int, int]]:
         """Return where the numbers of a shift begin that stand in the move itself."""
         value = self.task.value(other, self.row, self.here)
-        numbers = _numbers(value, PLACE) if isinstance(value, KrlRecord) else None
-        file, slots = _places(numbers or ())
-        return {(file, slots[0])} if file == self.here.file and slots else set()
+        numbers = _numbers(value, PLACE) if isinstance(value, KnownRecord) else None
+        file, slots = locate_numbers(numbers or (), WIDTH)
+        return frozenset([(file, slots[0])] if file == self.here.file else [])
 
     def _outside_of(self, base: FoundGoal, other: ir.Operand) -> tuple[float, ...]:
         """Return the external axes of ``point : other``: those that stand on the right.
@@ -552,34 +452,29 @@ class _Goal:
         them at 0. Where the point has them elsewhere it is left like the point itself.
         """
         value = self.task.value(other, self.row, self.here)
-        own = self._outside(value if isinstance(value, KrlRecord) else KrlRecord(()))
+        own = self._outside(
+            value if isinstance(value, KnownRecord) else KnownRecord(())
+        )
         pairs = zip(own, base.aux, strict=True)
         return tuple(b if math.isnan(a) and b != 0.0 else a for a, b in pairs)
 
     def _shift(
         self, base: FoundGoal, other: ir.Operand, frame: KrlFrame, behind: bool
-    ) -> FoundShift:
+    ) -> tuple[Shift, int, tuple[int, ...]]:
         """Say how a point is shifted, and where the numbers of that stand.
 
         Those of data may serve other moves and sums too: they stay.
         """
         value = self.task.value(other, self.row, self.here)
-        record = value if isinstance(value, KrlRecord) else KrlRecord(())
+        record = value if isinstance(value, KnownRecord) else KnownRecord(())
         numbers = _numbers(record, PLACE)
         told = [n.value for n in numbers] if numbers else six_numbers(frame)
         kind = ShiftKind.OWN if behind else ShiftKind.FRAME
         shift = Shift(kind, tuple(told), base.values, flagged=not behind)
-        written = isinstance(other, said.KrlAggregate) and numbers is not None
-        file, slots = _places(numbers) if numbers and written else (-1, ())
-        if base.why or base.slots[0] < 0 or file != self.here.file:
-            return FoundShift(shift)
-        return FoundShift(shift, file, (*slots, -1, -1), self._system(file))
-
-    def _system(self, file: int) -> str:
-        """Say that numbers stand in a system file, "" where they do not."""
-        if not self.task.files[file].is_system:
-            return ""
-        return "it stands in a system file, which is read and not rewritten"
+        written = numbers if isinstance(other, said.KrlAggregate) else None
+        file, slots = locate_numbers(written or (), WIDTH)
+        own = file == self.here.file
+        return shift, file, slots if own else (-1,) * WIDTH
 
     def _is_point(self, operand: ir.DataObject) -> bool:
         """Tell whether data is a position, and no frame."""
@@ -588,15 +483,15 @@ class _Goal:
 
     # Steps.
 
-    def _step(self, operand: ir.Operand) -> FoundGoal:
+    def _step(self, operand: ir.Operand | None) -> FoundGoal:
         """Read ``LIN_REL {X 10}``, ``PTP_REL {A1 5}``: a step from where the arm is."""
         found = self.task.value(operand, self.row, self.here)
         if not isinstance(operand, said.KrlAggregate) or not isinstance(
-            found, KrlRecord
+            found, KnownRecord
         ):
-            return _unknown_goal(AT_RUN_TIME)
+            return self.unknown(AT_RUN_TIME)
         if not found.whole:
-            return _unknown_goal(AT_RUN_TIME)
+            return self.unknown(AT_RUN_TIME)
         names = {key for key, _ in found.fields}
         values = {name: found.number(name) for name in names - {"s", "t"}}
         if self._by_joints and names <= {*AXES, *OUTSIDE}:
@@ -605,7 +500,7 @@ class _Goal:
         place = tuple(values.get(name, 0.0) for name in PLACE[:3])
         turned = any(values.get(name, 0.0) for name in PLACE[3:])
         if self._by_joints or turned or self.move.via is not None:
-            return _unknown_goal(no_target("a step that is not followed"))
+            return self.unknown(no_target("a step that is not followed"))
         tool = "#tool" in self.move.words
         meaning = Meaning.RELATIVE_TOOL if tool else Meaning.RELATIVE_UFRAME
         return self._step_goal(meaning, (*place, *(0.0,) * 5), values)
@@ -614,7 +509,7 @@ class _Goal:
         self, meaning: Meaning, values: tuple[float, ...], given: dict[str, float]
     ) -> FoundGoal:
         if any(given.get(name, 0.0) for name in OUTSIDE):
-            return _unknown_goal(no_target("it moves an external axis"))
+            return self.unknown(no_target("it moves an external axis"))
         why = no_target("it goes on from where the arm is")
         return FoundGoal(meaning, values, why=why)
 
@@ -622,29 +517,11 @@ class _Goal:
 _NO = no_frame(RUN_TIME)
 
 
-def _note_given(goal: FoundGoal, watched: Points) -> FoundGoal:
-    """Note what a goal takes of assigned points."""
-    return replace(goal, given=watched.given) if watched.given else goal
-
-
-def _unknown_goal(why: Reason, name: str = "") -> FoundGoal:
-    """Return a destination that nobody knows."""
-    return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
-
-
-def _numbers(found: KrlRecord, names: Sequence[str]) -> list[KrlNumber] | None:
+def _numbers(found: KnownRecord, names: Sequence[str]) -> list[WrittenNumber] | None:
     """Return some components, None where one is missing."""
     values = [found.get(name) for name in names]
-    numbers = [value for value in values if isinstance(value, KrlNumber)]
+    numbers = [value for value in values if isinstance(value, WrittenNumber)]
     return numbers if len(numbers) == len(names) else None
-
-
-def _places(numbers: Sequence[KrlNumber]) -> tuple[int, tuple[int, ...]]:
-    """Return the file of numbers and their places, -1 where one is computed."""
-    files = {one.file if one.slot >= 0 else -1 for one in numbers}
-    if len(files) != 1 or -1 in files:
-        return -1, (-1,) * len(numbers)
-    return files.pop(), tuple(one.slot for one in numbers)
 
 
 def _link(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
 
 from postproc.language import ir
 from postproc.language.analysis.control_flow import EXIT
 from postproc.language.krl import syntax as said
+from postproc.language.text.common_rules import COMMON, build_item, low
 from postproc.language.text.template_parser import Children, FormParser, Word
 
 # From trees to statements, rule by rule. Every function here is named after a rule of
@@ -23,27 +24,19 @@ class TypePart(str):
     """The type of data, or of a function's value."""
 
 
-class SubscriptPart(tuple[Any, ...]):
-    """Indices, or the dimensions of an array."""
-
-
 class BlendPart(str):
     """A word of blending, or the frame of a relative move."""
 
 
-def _low(text: str) -> str:
-    return str(text).lower()
-
-
 def _tokens(c: Children, kind: str) -> list[str]:
-    return [_low(x) for x in c if isinstance(x, Word) and x.kind == kind]
+    return [low(x) for x in c if isinstance(x, Word) and x.kind == kind]
 
 
-def _routine(kind: str) -> Callable[[Children], said.KrlRoutine]:
-    def build(c: Children) -> said.KrlRoutine:
+def _routine(kind: str) -> Callable[[Children], ir.RoutineHead]:
+    def build(c: Children) -> ir.RoutineHead:
         parameters = next((x for x in c if type(x) is tuple), ())
-        shared = bool(_tokens(c, "GLOBAL"))
-        return said.KrlRoutine(kind, _tokens(c, "NAME")[0], parameters, shared)
+        local = not _tokens(c, "GLOBAL")
+        return ir.RoutineHead(kind, _tokens(c, "NAME")[0], parameters, local)
 
     return build
 
@@ -57,11 +50,12 @@ _BUILT_IN = frozenset(
 )
 
 
-def _build_declaration(c: Children) -> said.KrlDeclaration:
-    flags = {_low(x) for x in c if isinstance(x, FlagPart)}
+def _build_declaration(c: Children) -> ir.Declaration:
+    flags = {low(x) for x in c if isinstance(x, FlagPart)}
     type_ = next(str(x) for x in c if isinstance(x, TypePart))
-    items = tuple(x for x in c if isinstance(x, said.DeclaredItem))
-    return said.KrlDeclaration(type_, items, "global" in flags, "const" in flags)
+    items = tuple(x for x in c if isinstance(x, ir.DeclaredItem))
+    kind = "const" if "const" in flags else "var"
+    return ir.Declaration(type_, items, kind, "global" if "global" in flags else "")
 
 
 def _build_builtin(c: Children) -> ir.SourceStatement:
@@ -69,38 +63,16 @@ def _build_builtin(c: Children) -> ir.SourceStatement:
     return found if found.type in _BUILT_IN else ir.NotUnderstood()
 
 
-def _item(c: Children) -> said.DeclaredItem:
-    name, *rest = c
-    sized = bool(rest) and isinstance(rest[0], SubscriptPart)
-    dimensions = tuple(rest[0]) if sized else ()
-    value = rest[-1] if len(rest) > sized else None
-    return said.DeclaredItem(_low(name), dimensions, value)
-
-
-def _branch(word: str) -> Callable[[Children], ir.Branch]:
-    return lambda c: ir.Branch(word, tuple(c))
-
-
-def _for(c: Children) -> ir.ForLoop:
-    return ir.ForLoop(_low(c[0]), c[1], c[2], c[3] if len(c) > 3 else None)
-
-
 _WORDS = {"endswitch": "endtest"}  # as neutral flow calls it
 
 
 def _block_word(c: Children) -> ir.BlockWord:
-    word = _low(c[0])
+    word = low(c[0])
     return ir.BlockWord(_WORDS.get(word, word))
 
 
-def _operation(c: Children) -> ir.Operation:
-    operator = next(x for x in c if isinstance(x, Word))
-    operands = tuple(x for x in c if not isinstance(x, Word))
-    return ir.Operation(str(operator).upper(), operands)
-
-
 def _move(c: Children) -> said.KrlMove:
-    word = next(_low(x) for x in c if isinstance(x, Word))
+    word = next(low(x) for x in c if isinstance(x, Word))
     operands = [x for x in c if isinstance(x, ir.Operand)]
     arc = word.split("_")[0] in ("circ", "scirc")
     via, to = operands[:2] if arc else (None, operands[0])
@@ -110,7 +82,7 @@ def _move(c: Children) -> said.KrlMove:
 
 def _build_switch(c: Children) -> said.InterruptSwitched:
     number = next((x for x in c if isinstance(x, ir.Operand)), None)
-    return said.InterruptSwitched(_low(c[0]), number)
+    return said.InterruptSwitched(low(c[0]), number)
 
 
 def _trigger(c: Children) -> said.PathTrigger:
@@ -127,7 +99,7 @@ def _settings(c: Children) -> tuple[ir.Assignment, ...]:
 
 
 def _spline(c: Children) -> said.SplineBlock:
-    return said.SplineBlock(_low(c[0]), _blends(c), _settings(c))
+    return said.SplineBlock(low(c[0]), _blends(c), _settings(c))
 
 
 def _build_call(make: Callable[[str, tuple[ir.Argument, ...]], Any]) -> Any:
@@ -135,7 +107,7 @@ def _build_call(make: Callable[[str, tuple[ir.Argument, ...]], Any]) -> Any:
         given = c[1]
         if len(given) == 1 and given[0].value is None:
             given = ()
-        return make(_low(c[0]), given)
+        return make(low(c[0]), given)
 
     return build
 
@@ -147,38 +119,24 @@ def _aggregate(c: Children) -> said.KrlAggregate:
 
 
 def _field(c: Children) -> said.NamedField:
-    return said.NamedField(_low(c[0]), c[-1])
+    return said.NamedField(low(c[0]), c[-1])
 
 
-RULES: dict[str, Callable[[Children], Any]] = {
-    "statement": lambda c: c[0],
+RULES: Mapping[str, Callable[[Children], Any]] = {
+    **COMMON,
     "header": lambda c: said.AccessHeader(),
     "procedure": _routine("def"),
     "function": _routine("deffct"),
-    "data_list": lambda c: said.DataList(_low(c[0]), bool(_tokens(c, "PUBLIC"))),
-    "end": lambda c: ir.BlockWord(_low(c[0])),
-    "type": lambda c: TypePart(_low(c[0])),
-    "parameters": lambda c: tuple(c),
-    "parameter": lambda c: _tokens(c, "NAME")[0],
+    "data_list": lambda c: said.DataList(low(c[0]), bool(_tokens(c, "PUBLIC"))),
+    "type": lambda c: TypePart(low(c[0])),
+    "parameter": lambda c: ir.RoutineParameter(_tokens(c, "NAME")[0], True),
     "empty_dimensions": lambda c: None,
     "declared": _build_declaration,
     "built_in": _build_builtin,
     "flag": lambda c: FlagPart(c[0]),
-    "item": _item,
-    "if_then": _branch("if"),
-    "for_to": _for,
-    "while_do": _branch("while"),
-    "loop": _branch("loop"),
-    "repeat": _branch("repeat"),
-    "until": _branch("until"),
-    "switch": _branch("test"),
-    "case": _branch("case"),
-    "default": _branch("default"),
-    "label": lambda c: ir.LabelMark(_low(c[0])),
+    "item": build_item,
     "block_word": _block_word,
     "exit_loop": lambda c: ir.Leave(EXIT),
-    "goto": lambda c: ir.JumpTo(_low(c[0])),
-    "return_value": lambda c: ir.Leave("return", *c),
     "halt": lambda c: said.Waiting(),
     "continue_": lambda c: said.ContinueWord(),
     "wait": lambda c: said.Waiting(c[0]),
@@ -194,26 +152,17 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "arc_relative": _move,
     "spline": _spline,
     "spline_end": _spline,
-    "blend": lambda c: BlendPart(_low(c[0])),
+    "blend": lambda c: BlendPart(low(c[0])),
     "settings": lambda c: tuple(c),
     "setting": lambda c: ir.Assignment(*c),
-    "assignment": lambda c: ir.Assignment(*c),
     "proceed": lambda c: ir.Instruction("on_error_proceed", ()),
     "instruction": _build_call(ir.Instruction),
     "arguments": lambda c: tuple(c),
     "argument": lambda c: ir.Argument(c[0] if c else None),
-    "infix": _operation,
-    "prefix": _operation,
-    "number": lambda c: c[0],
-    "string": lambda c: ir.StringLiteral(str(c[0])),
-    "enumerated": lambda c: said.EnumValue(_low(c[0])),
+    "enumerated": lambda c: said.EnumValue(low(c[0])),
     "function_call": _build_call(ir.FunctionCall),
     "aggregate": _aggregate,
     "field": _field,
-    "reference": lambda c: ir.DataObject(_low(c[0]), tuple(c[1:])),
-    "component": lambda c: _low(c[0]),
-    "element": lambda c: ir.ElementStep(tuple(c[0])),
-    "subscripts": SubscriptPart,
 }
 
 LONGEST = 1 << 14  # characters of a form; a line has some hundred
@@ -247,5 +196,4 @@ def parse_statement(form: str) -> ir.SourceStatement:
         words = words[1:]
     if words[0] in _NAMES_ONLY and len(words) > 1:
         return said.OutsideName()
-    found = _PARSER.parse(form)
-    return found if isinstance(found, ir.SourceStatement) else ir.NotUnderstood()
+    return _PARSER.parse_statement(form)

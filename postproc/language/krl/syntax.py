@@ -36,60 +36,11 @@ class AccessHeader(SourceStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class KrlRoutine(SourceStatement):
-    """``GLOBAL DEF name(..)``, ``DEFFCT type name(..)``.
-
-    Attributes:
-        kind: def or deffct.
-        name: Its name.
-        parameters: Names of its parameters.
-        shared: Other files know it, though it is not the first of its file.
-    """
-
-    kind: str
-    name: str
-    parameters: tuple[str, ...] = ()
-    shared: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class DataList(SourceStatement):
     """``DEFDAT name PUBLIC``."""
 
     name: str
     public: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class DeclaredItem:
-    """One name of a declaration.
-
-    Attributes:
-        name: What is declared.
-        dimensions: Of an array.
-        value: What it is at first, None where nothing is said.
-    """
-
-    name: str
-    dimensions: tuple[Operand, ...] = ()
-    value: Operand | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class KrlDeclaration(SourceStatement):
-    """``DECL GLOBAL E6POS XP1={..}``.
-
-    Attributes:
-        type: Of the data.
-        items: What is declared.
-        shared: Every program knows it.
-        constant: It never changes.
-    """
-
-    type: str
-    items: tuple[DeclaredItem, ...]
-    shared: bool = False
-    constant: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -66,4 +66,4 @@ def _acts_by_text(name: str, text: bytes) -> bool:
         return False
     file = read_krl(source_from_bytes(name, text))
     machine = KrlMachine.of(KrlTask([file]), Start())
-    return any(machine.may_act(0, routine) for routine in file.routines)
+    return any(map(machine.routine_effects, machine.task.routines_by_file[0]))

@@ -9,28 +9,15 @@ from functools import lru_cache
 from itertools import count, zip_longest
 from typing import Any
 
-import lark
-
 from postproc.language import ir
 from postproc.language.ir import Num
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.text.grammars import line_parser
+from postproc.language.text.common_rules import COMMON, branch, low
 from postproc.language.text.lexer import NAME_MARK, UNREADABLE
+from postproc.language.text.template_parser import FAILED, Children, FormParser, Word
 from postproc.language.text.templates import open_name
 
 # Parts of a line on their way from tree to statement, told apart by type.
-
-
-class Mark(str):
-    """A token: text with the name of its terminal."""
-
-    kind: str
-
-    def __new__(cls, text: str, kind: str) -> Mark:
-        """Remember the terminal beside the text."""
-        mark = super().__new__(cls, text)
-        mark.kind = kind
-        return mark
 
 
 class NamesPart(tuple[str, ...]):
@@ -78,16 +65,11 @@ class DestinationPart(tuple[Any, ...]):
 # Every function here is named after a rule of ``grammars/pdl2.lark`` and takes the
 # rule's children: tokens (strings that know their type) and what other rules gave.
 
-Children = Sequence[Any]
 Rule = Callable[[Children], Any]
 
 
-def _name(mark: str) -> str:
-    return str(mark).lower()
-
-
 def _of(children: Children, kind: type) -> tuple[Any, ...]:
-    return tuple(c for c in children if isinstance(c, kind) and type(c) is not Mark)
+    return tuple(c for c in children if isinstance(c, kind) and type(c) is not Word)
 
 
 def _statement(children: Children) -> ir.SourceStatement | None:
@@ -104,13 +86,13 @@ def _read_attributes(children: Children, first: int) -> tuple[str, tuple[str, ..
     """Return the exporting program and the other attributes."""
     rest = children[first:]
     exported = [str(c) for c in rest if isinstance(c, ExportedPart)]
-    words = tuple(_name(c) for c in rest if type(c) is Mark)
+    words = tuple(low(c) for c in rest if type(c) is Word)
     return (exported[0] if exported else ""), words
 
 
 def _program_attribute(c: Children) -> int:
     """Return the slot of ``PROG_ARM=n``, -1 for any other attribute."""
-    arm = len(c) == 2 and _name(c[0]) == "prog_arm" and isinstance(c[1], ir.Num)
+    arm = len(c) == 2 and low(c[0]) == "prog_arm" and isinstance(c[1], ir.Num)
     return c[1].slot if arm else -1
 
 
@@ -123,9 +105,7 @@ def _arm_slot(c: Children) -> int:
 def _routine(c: Children) -> ast.Routine:
     parameters = _of(c, list)
     exported, _ = _read_attributes(c, 1)
-    return ast.Routine(
-        _name(c[0]), tuple(parameters[0]) if parameters else (), exported
-    )
+    return ast.Routine(low(c[0]), tuple(parameters[0]) if parameters else (), exported)
 
 
 def _variables(c: Children) -> ast.Declare:
@@ -150,7 +130,7 @@ def _motion(c: Children) -> ast.Move:
 def _move(fly: bool, c: Children) -> ast.Move:
     arm = _of(c, ArmPart)
     how, where, via, frame = _of(c, DestinationPart)[0]
-    trajectory = [str(m).upper() for m in c if type(m) is Mark]
+    trajectory = [str(m).upper() for m in c if type(m) is Word]
     return ast.Move(
         fly=fly,
         arm=arm[0][0] if arm else None,
@@ -178,8 +158,8 @@ def _absolute(c: Children) -> DestinationPart:
 
 
 def _destination(c: Children) -> DestinationPart:
-    frame = str(c[-1]).upper() if type(c[-1]) is Mark else ""
-    where = tuple(x for x in c[1:] if type(x) is not Mark)
+    frame = str(c[-1]).upper() if type(c[-1]) is Word else ""
+    where = tuple(x for x in c[1:] if type(x) is not Word)
     return DestinationPart((c[0].kind, where, None, frame))
 
 
@@ -203,13 +183,13 @@ def _terms(c: Children) -> tuple[ir.DataObject | ir.FunctionCall, ...]:
 
 
 def _soup_word(c: Children) -> ir.DataObject | None:
-    name = type(c[0]) is Mark and c[0].kind == "NAME" if c else False
-    return ir.DataObject(_name(c[0])) if name else None
+    name = type(c[0]) is Word and c[0].kind == "NAME" if c else False
+    return ir.DataObject(low(c[0])) if name else None
 
 
 def _reference(c: Children) -> ir.DataObject:
-    steps = tuple(_name(s) if isinstance(s, str) else s for s in c[1:])
-    return ir.DataObject(_name(c[0]), steps)
+    steps = tuple(low(s) if isinstance(s, str) else s for s in c[1:])
+    return ir.DataObject(low(c[0]), steps)
 
 
 def _one_or_pair(c: Children) -> ir.Operand:
@@ -218,11 +198,11 @@ def _one_or_pair(c: Children) -> ir.Operand:
 
 def _for(c: Children) -> ir.ForLoop:
     step = c[4] if len(c) > 4 else None
-    return ir.ForLoop(_name(c[0]), c[1], c[3], step, c[2].kind == "DOWNTO")
+    return ir.ForLoop(low(c[0]), c[1], c[3], step, c[2].kind == "DOWNTO")
 
 
 def _beside(c: Children) -> BesidePart:
-    inside = c[0] if len(c) == 1 else ir.FunctionCall(_name(c[0]), c[1])
+    inside = c[0] if len(c) == 1 else ir.FunctionCall(low(c[0]), c[1])
     return BesidePart((inside,))
 
 
@@ -232,11 +212,7 @@ def _case(c: Children) -> ir.Branch:
 
 
 def _call(make: type[ir.Instruction]) -> Rule:
-    return lambda c: make(_name(c[0]), c[1] if len(c) > 1 else ())
-
-
-def _branch(word: str) -> Rule:
-    return lambda c: ir.Branch(word, tuple(c))
+    return lambda c: make(low(c[0]), c[1] if len(c) > 1 else ())
 
 
 def _word(word: str) -> Rule:
@@ -251,47 +227,45 @@ def _assign(c: Children) -> ir.Assignment:
     return ir.Assignment(target, value)
 
 
-RULES: dict[str, Rule] = {
+RULES: Mapping[str, Rule] = {
+    **COMMON,
     "line": _statement,
-    "labelled": lambda c: ir.LabelMark(_name(c[0]).rstrip(": "), _statement(c)),
-    "program": lambda c: ast.ProgramHead(_name(c[0]), max([-1, *_of(c, int)])),
+    "labelled": lambda c: ir.LabelMark(low(c[0]).rstrip(": "), _statement(c)),
+    "program": lambda c: ast.ProgramHead(low(c[0]), max([-1, *_of(c, int)])),
     "program_attribute": _program_attribute,
     "import": lambda c: ast.Import(_unquote(c[0])),
     "section": lambda c: ast.DeclarationSection(_statement(c)),
     "begin": lambda c: ast.Begin(),
-    "end": lambda c: ast.End(_name(c[0]) if c else ""),
+    "end": lambda c: ast.End(low(c[0]) if c else ""),
     "routine": _routine,
     "parameters": _parameters,
     "parameter": lambda c: [ast.FormalParameter(n.lower(), c[1]) for n in c[0]],
     "variables": _variables,
-    "constant": lambda c: ast.Constant(_name(c[0]), c[1]),
-    "structure": lambda c: ast.Structure(_name(c[0])),
+    "constant": lambda c: ast.Constant(low(c[0]), c[1]),
+    "structure": lambda c: ast.Structure(low(c[0])),
     "node_fields": _node_fields,
     "end_structure": lambda c: ast.EndStructure(),
     "names": lambda c: NamesPart(str(n) for n in c),
-    "exported": lambda c: ExportedPart(_name(c[0])),
+    "exported": lambda c: ExportedPart(low(c[0])),
     "attribute": lambda c: c[0],
-    "simple_type": lambda c: ast.Type(_name(c[0]), arm=_arm_slot(c)),
+    "simple_type": lambda c: ast.Type(low(c[0]), arm=_arm_slot(c)),
     "array_type": lambda c: ast.Type(c[-1].name, array=True, arm=c[-1].arm),
-    "path_type": lambda c: ast.Type(_name(c[0]), path=True),
+    "path_type": lambda c: ast.Type(low(c[0]), path=True),
     "dimensions": lambda c: None,
     "dimension": lambda c: None,
-    "if": _branch("if"),
+    "if": branch("if"),
     "else": _word("else"),
     "endif": _word("endif"),
-    "select": _branch("test"),
+    "select": branch("test"),
     "case": _case,
     "choice": _one_or_pair,
     "endselect": _word("endtest"),
     "for": _for,
     "endfor": _word("endfor"),
-    "while": _branch("while"),
+    "while": branch("while"),
     "endwhile": _word("endwhile"),
-    "repeat": _branch("repeat"),
-    "until": _branch("until"),
     "cycle": _word("cycle"),
     "exit_cycle": lambda c: ir.Leave("exitcycle"),
-    "goto": lambda c: ir.JumpTo(_name(c[0])),
     "return": lambda c: ir.Leave("return", *c),
     "condition": lambda c: ir.Branch("condition"),
     "when": lambda c: ast.When(_statement(c[1:]), c[0].terms),
@@ -327,15 +301,14 @@ RULES: dict[str, Rule] = {
     "parenthesised": lambda c: (
         ir.Operation("()", (c[0],)) if isinstance(c[0], ir.DataObject) else c[0]
     ),
-    "number": lambda c: c[0],
     "string": lambda c: ir.StringLiteral(_unquote(c[0])),
     "aggregate": lambda c: ir.Composite(tuple(c)),
-    "invoke": lambda c: ir.FunctionCall(_name(c[0]), c[1]),
+    "invoke": lambda c: ir.FunctionCall(low(c[0]), c[1]),
     "arguments": tuple,
     "argument": lambda c: ir.Argument(c[0] if c else None),
     "reference": _reference,
     "step": lambda c: c[0],
-    "field": lambda c: _name(c[0]),
+    "field": lambda c: low(c[0]),
     "index": lambda c: ir.ElementStep(tuple(c)),
     "subscript": _one_or_pair,
 }
@@ -463,18 +436,15 @@ VALUE_RULES: Mapping[str, Rule] = {
 LONGEST = 1 << 18  # characters of a form; lines of real programs have some hundreds
 DEEPEST = 200  # operators or parentheses within each other; followed by recursion
 
-_FAILED = object()
-
-
-class _TooDeepError(Exception):
-    """A line holds more operators within each other than any program does."""
+_PARSER = FormParser("pdl2", RULES, (), LONGEST, DEEPEST, "line")
+_VALUE_PARSER = FormParser("lsv", VALUE_RULES, (), LONGEST, DEEPEST, "line")
 
 
 @lru_cache(maxsize=8192)
 def parse_form(form: str) -> ir.SourceStatement:
     """Parse the form of a logical line of PDL2, `Unknown` where the grammar cannot."""
-    found = _parse("pdl2", form, RULES)
-    if found is _FAILED:
+    found = _PARSER.parse(form)
+    if found is FAILED:
         numbered = count()
         text = re.sub(NAME_MARK, lambda _: open_name(next(numbered)), form)
         return ir.NotUnderstood(text if form[:2] != UNREADABLE else form[2:])
@@ -484,34 +454,5 @@ def parse_form(form: str) -> ir.SourceStatement:
 @lru_cache(maxsize=8192)
 def parse_value_form(form: str) -> EntryPart | None:
     """Parse the form of a line of a variable file, None where the grammar cannot."""
-    found = _parse("lsv", form, VALUE_RULES)
+    found = _VALUE_PARSER.parse(form)
     return found if isinstance(found, EntryPart) else None
-
-
-def _parse(name: str, form: str, rules: Mapping[str, Rule]) -> object:
-    """Parse a form and build what it says, _FAILED where the grammar has no rule."""
-    if form.startswith(UNREADABLE) or len(form) > LONGEST:
-        return _FAILED
-    try:
-        return _build(line_parser(name, "line").parse(form), rules)
-    except (lark.exceptions.LarkError, _TooDeepError):
-        return _FAILED
-
-
-def _build(tree: lark.Tree[lark.Token], rules: Mapping[str, Rule]) -> object:
-    """Build what a tree says, counting its names and its numbers."""
-    names, slots = count(), count()
-
-    def walk(node: lark.Tree[lark.Token] | lark.Token, depth: int = 0) -> object:
-        if depth > DEEPEST:
-            raise _TooDeepError
-        if isinstance(node, lark.Token):
-            if node.type == "NUMBER":
-                return ir.Num(next(slots))
-            text = open_name(next(names)) if node == NAME_MARK else str(node)
-            return Mark(text, node.type)
-        return rules[str(node.data)](
-            [walk(child, depth + 1) for child in node.children]
-        )
-
-    return walk(tree)

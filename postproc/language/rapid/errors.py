@@ -10,8 +10,8 @@ from itertools import pairwise
 from postproc.language import ir
 from postproc.language.analysis.control_flow import CLOSING, ControlFlow
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.symbols import SHIFTS, functions_in, inside
-from postproc.language.rapid.targets import operands_of
+from postproc.language.rapid.program import inside
+from postproc.language.rapid.symbols import SHIFTS, functions_in
 from postproc.language.text.statement_table import StatementText
 
 Numbers = frozenset[str] | None
@@ -264,22 +264,15 @@ def may_be_skipped(one: ir.SourceStatement) -> bool:
         return False
     concurrent = any(argument.name == "conc" for argument in one.arguments)
     asks = any(name not in SHIFTS for name in functions_in(one))
-    indexed = any(map(_is_indexed, operands_of(one)))
+    indexed = any(map(_is_indexed, one.values))
     return concurrent or asks or indexed or one.name in COUPLING
 
 
 def _is_indexed(operand: ir.Operand | None) -> bool:
-    """Return True if an operand is an element whose index is no number."""
-    match operand:
-        case ir.DataObject(steps=steps):
-            found = [at for at in steps if isinstance(at, ir.ElementStep)]
-            indices = [index for at in found for index in at.subscripts]
-            return not all(isinstance(index, ir.Num) for index in indices)
-        case ir.FunctionCall(arguments=arguments):
-            return any(_is_indexed(argument.value) for argument in arguments)
-        case ir.Composite(items=items) | ir.Operation(operands=items):
-            return any(map(_is_indexed, items))
-    return False
+    """Return True if an operand holds an element whose index is no number."""
+    found = (part for part in ir.walk(operand) if isinstance(part, ir.ElementStep))
+    indices = (index for step in found for index in step.subscripts)
+    return not all(isinstance(index, ir.Num) for index in indices)
 
 
 COUPLING = ("syncmoveoff", "syncmoveundo", "dropwobj", "corrdiscon", "softdeact")

@@ -52,7 +52,7 @@ class RapidSplitter(LayoutSplitter):
     def hinders(self, file: int, line: int) -> str:
         """Say why a move must stay in one piece, see `Splitter.hinders`."""
         own = self.task.files[file]
-        row = _row_of(own, line)
+        row = own.find_move(line)
         move = own.text.statement(row)
         if not isinstance(move, ir.Instruction):
             return "it does not stand alone on its line"
@@ -90,7 +90,7 @@ class RapidSplitter(LayoutSplitter):
     def stops(self, file: int, line: int) -> bool:
         """Return True if the arm may stop once more, see `Splitter.stops`."""
         own = self.task.files[file]
-        row = _row_of(own, line)
+        row = own.find_move(line)
         for one in map(own.text.statement, range(row - 1, -1, -1)):
             if not isinstance(one, ir.Instruction) or one.name not in _MOTION:
                 return isinstance(one, ir.Instruction) and one.name in _PLAIN
@@ -99,7 +99,7 @@ class RapidSplitter(LayoutSplitter):
     def layout(self, file: int, line: int) -> RapidLayout:
         """Look at a move, see `LayoutSplitter.layout`."""
         text = self.task.files[file].text
-        source, row = text.source, _row_of(self.task.files[file], line)
+        source, row = text.source, self.task.files[file].find_move(line)
         start, (begin, end) = int(source.line_starts[line - 1]), text.span(row)
         if source.text[start:begin].strip() or not ends_line(source, end):
             raise CloneError("it does not stand alone on its line")
@@ -119,18 +119,6 @@ class RapidSplitter(LayoutSplitter):
         return RapidLayout(
             source, start, code, indent, "!", tuple(items), longest=LONGEST_STATEMENT
         )
-
-
-def _row_of(file: RapidFile, line: int) -> int:
-    """Return the only move on a line.
-
-    Raises:
-        CloneError: There are others.
-    """
-    rows = [move.row for move in file.moves if file.text.line(move.row) == line]
-    if len(rows) != 1:
-        raise CloneError("several moves stand on its line")
-    return rows[0]
 
 
 @dataclass(frozen=True)

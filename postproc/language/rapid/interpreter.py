@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import Scope
+from postproc.language.analysis.assigned_points import NO_POINTS, Scope
 from postproc.language.analysis.call_context import Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.analysis.found_visits import FoundGoal
+from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.task_machine import (
+    MOVES,
     NOWHERE,
     Arrived,
+    Effects,
     TaskMachine,
 )
 from postproc.language.language import Start
@@ -49,15 +51,15 @@ from postproc.language.rapid.modal_state import (
     change_modes,
     list_set_modes,
 )
-from postproc.language.rapid.moves import Goals, are_targets, own_numbers, pose_of
-from postproc.language.rapid.pose_encoding import COMMENTS
-from postproc.language.rapid.program import RapidFile
-from postproc.language.rapid.symbols import (
-    RapidTask,
-    functions_in,
-    inside,
-    parameters_of,
+from postproc.language.rapid.moves import (
+    Goals,
+    RapidVisit,
+    are_targets,
+    own_numbers,
+    pose_of,
 )
+from postproc.language.rapid.program import RapidFile, inside, is_move
+from postproc.language.rapid.symbols import RapidTask, functions_in
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
@@ -66,10 +68,9 @@ BY_NAME = "callbyvar"
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (
-    said.FileHeader, said.DataDeclaration, said.ConnectTrap, ir.Assignment,
+    said.FileHeader, ir.Declaration, said.ConnectTrap, ir.Assignment,
     said.TypeAlias,
 )  # fmt: skip
-_Place = tuple[int, str, HeadedRows]  # file, module and rows of a routine
 _PASSED = (*_PLAIN, ir.SourceStatement, ir.LabelMark)
 
 
@@ -84,7 +85,7 @@ class RapidMachine(TaskMachine):
         restarts: What holds where a cycle ends before that.
     """
 
-    comments = COMMENTS
+    procedures = ("proc",)
     task: RapidTask = field(kw_only=True)
     goals: Goals = field(kw_only=True)
     ends: list[Arrived] = field(default_factory=list)
@@ -92,10 +93,6 @@ class RapidMachine(TaskMachine):
     _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
     _exits: dict[Context, tuple[ErrorExit, ...]] = field(default_factory=dict)
     _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
-    _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
-    _direct: dict[tuple[int, int], tuple[bool, list[_Place]]] = field(
-        default_factory=dict
-    )
 
     @classmethod
     def of(
@@ -124,11 +121,11 @@ class RapidMachine(TaskMachine):
                 "that holds main, with the others of its task in the same folder",
             )  # fmt: skip
         every = [one for own in self.task.routines.values() for one in own]
-        traps = [one for one in every if _kind(one[2]) == "trap"]
-        if any(self._moves(*trap) for trap in traps):
+        traps = [one for one in every if one.rows.head.kind == "trap"]
+        if any(map(self.routine_effects, traps)):
             here = replace(here, modes=replace(here.modes, blocked=frozenset([_TRAP])))
-        for file, module, routine in found:
-            self.call_routine((file, module, routine), self.root, -1, here)
+        for routine in found:
+            self.call_routine(routine, self.root, -1, here)
         self.follow()
         again = self._next_cycle(here)
         if len(mains) == 1 and again != here:
@@ -154,14 +151,12 @@ class RapidMachine(TaskMachine):
         known, found = read_known_instructions(), set[tuple[str, Any]]()
         modal = {name for name, kind in known.items() if kind == "modal"}
         modal -= {*self.task.routines, *STOPPED}
-        for file, module, routine in (
-            one for routines in self.task.routines.values() for one in routines
-        ):
-            scope = self.task.scope_of(file, module, routine)
-            text = self.texts[file]
+        for routine in (r for own in self.task.routines.values() for r in own):
+            scope, rows = self.task.scope_of(*routine), routine.inside
+            text = self.texts[routine.file]
             for row in text.where(
                 lambda one: getattr(inside(one), "name", "") in modal,
-                routine.first + 1, routine.last,
+                rows.start, rows.stop,
             ):  # fmt: skip
                 one = inside(text.statement(row))
                 if isinstance(one, ir.Instruction):
@@ -169,9 +164,9 @@ class RapidMachine(TaskMachine):
                     found |= set() if given >= ANYTHING else given
         return {name for name, value in found if value != getattr(AT_START, name)}
 
-    def _procedures(self) -> list[tuple[int, str, HeadedRows]]:
+    def _procedures(self) -> list[TaskRoutine]:
         routines = (one for found in self.task.routines.values() for one in found)
-        return [one for one in routines if _kind(one[2]) == "proc"]
+        return [one for one in routines if one.rows.head.kind == "proc"]
 
     def acts(self, one: ir.SourceStatement) -> bool:
         """Tell instructions, see `TaskMachine.acts`."""
@@ -193,14 +188,6 @@ class RapidMachine(TaskMachine):
         """Return all (None) where an error may lead to any statement."""
         return None if self._exits_of(context) else set()
 
-    def number(self, operand: ir.Operand | None, row: int, scope: Scope) -> float:
-        """Evaluate a number, see `TaskMachine.number`."""
-        return self.task.number(operand, row, scope)
-
-    def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
-        """Return where the statements of a routine stand."""
-        return self.task.scope_of(file, module, routine)
-
     def bind_arguments(
         self, scope: Scope, routine: HeadedRows, caller: Context, row: int
     ) -> Scope:
@@ -213,29 +200,29 @@ class RapidMachine(TaskMachine):
         if not known or self._is_recursive(scope.file, routine):
             return scope
         assert isinstance(call, ir.Instruction)
-        return self.task.bind(scope, routine, call, row, caller.place.scope)
+        found = TaskRoutine(scope.file, scope.module, routine)
+        return self.task.bind(found, call, row, caller.place.scope) or scope
 
     def _is_recursive(self, file: int, routine: HeadedRows) -> bool:
         """Return True if a routine has parameters and may come to call itself."""
         key = file, routine.first
         if key not in self._recursive:
-            found = bool(parameters_of(routine)) and key in self._find_reachable(key)
+            found = bool(routine.head.parameters) and key in self._find_reachable(
+                file, routine
+            )
             self._recursive[key] = found
         return self._recursive[key]
 
-    def _find_reachable(self, routine: tuple[int, int]) -> set[tuple[int, int]]:
+    def _find_reachable(self, file: int, routine: HeadedRows) -> set[tuple[int, int]]:
         """Return the routines that one may call, and those that they may call."""
-        last = {
-            (at, r.first): r.last for at, rs in self._by_file.items() for _, _, r in rs
-        }
 
-        def calls(one: tuple[int, int]) -> Iterator[tuple[int, int]]:
-            file, first = one
-            for row in range(first + 1, last[one]):
-                for at, called in self.calls_of(file, self.texts[file].statement(row)):
-                    yield at, called.first
+        def calls(one: TaskRoutine) -> Iterator[TaskRoutine]:
+            for row in one.inside:
+                statement = self.texts[one.file].statement(row)
+                yield from self.calls_of(one.file, statement)
 
-        return {*reach(calls(routine), calls, tuple)}
+        first = calls(TaskRoutine(file, "", routine))
+        return {one.key for one in reach(first, calls, lambda one: one.key)}
 
     def handles(self, one: ir.SourceStatement) -> bool:
         """Tell whether a handler begins, see `TaskMachine.handles`."""
@@ -272,8 +259,8 @@ class RapidMachine(TaskMachine):
 
             clauses = clauses_of(text, context.place.flow, read)
             rows = context.place.flow.handlers
-            moves, called = self._read_rows(scope, rows, (EXIT_CYCLE,))
-            if moves := moves or self._reach_moves(called):
+            effects, called = self.read_rows(scope, rows, (EXIT_CYCLE,))
+            if moves := bool(effects.union(*map(self.routine_effects, called))):
                 self.beside.add((scope.file, rows.start, rows.stop))
             self._handlers[key] = ErrorHandlers(clauses, moves)
         return self._handlers[key]
@@ -364,99 +351,70 @@ class RapidMachine(TaskMachine):
         if not isinstance(one, said.LateCall):
             return
         if _is_text(one.procedure):
-            self._run_named_beside(_name_procedure(one.procedure))
+            self.run_named_beside(_name_procedure(one.procedure))
         else:
             self._run_all_beside()
-
-    def _run_named_beside(self, name: str) -> None:
-        """Note all routines of a name."""
-        for file, _, routine in self.task.routines.get(name, []):
-            self.run_beside(file, routine)
 
     def _run_all_beside(self) -> None:
         """Note that every procedure may be called."""
         for file, _, routine in self._procedures():
             self.run_beside(file, routine)
 
-    def calls_of(
-        self, file: int, one: ir.SourceStatement
-    ) -> list[tuple[int, HeadedRows]]:
-        """Return the routines that a statement calls, see `TaskMachine`."""
+    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
+        """Return all procedures where a text names the one that is called."""
         inner = inside(one)
-        names = {*functions_in(one)}
         if isinstance(inner, said.LateCall) or getattr(inner, "name", "") == BY_NAME:
-            return [(at, routine) for at, _, routine in self._procedures()]
-        if isinstance(inner, ir.Instruction):
-            texts = [a.value for a in inner.arguments if _is_text(a.value)]
-            late = inner.name in SYNCHRONOUS
-            names |= {inner.name, *(_name_procedure(text) for text in texts if late)}
-        found = [one for name in names for one in self.task.routines.get(name, [])]
-        return [(at, routine) for at, _, routine in found]
+            return self._procedures()
+        return super().calls_of(file, one)
 
-    def changes_of(self, one: ir.SourceStatement) -> Iterator[str]:
-        """Yield the names of data that a statement changes, see `TaskMachine`."""
-        yield from super().changes_of(inside(one))
+    def is_beside(self, one: ir.SourceStatement) -> bool:
+        """Return True if a move calls a procedure on its way."""
+        return getattr(inside(one), "name", "") in SYNCHRONOUS
 
-    def routines_beside(self) -> Iterator[tuple[int, int, int]]:
-        """Yield traps, functions, handlers and what moves call, see `TaskMachine`."""
-        for file, places in self._by_file.items():
-            text = self.texts[file]
-            for _, _, routine in places:
-                rows = range(routine.first + 1, routine.last)
-                if _kind(routine) != "proc":
-                    yield file, rows.start, rows.stop
-                heads = text.where(self.handles, rows.start, rows.stop)
-                yield from ((file, row, rows.stop) for row in heads[:1])
-            for row in text.where(_is_synchronous):
-                yield file, row, row + 1
+    def list_handlers(self, routine: TaskRoutine) -> Iterator[tuple[int, int, int]]:
+        """Yield the rows from the first handler on."""
+        rows = routine.inside
+        heads = self.texts[routine.file].where(self.handles, rows.start, rows.stop)
+        yield from ((routine.file, row, rows.stop) for row in heads[:1])
 
-    def goals_of(self, file: int, row: int) -> Iterator[FoundGoal]:
-        """Yield where a move goes, see `TaskMachine`."""
-        one = inside(self.texts[file].statement(row))
-        around = (r for r in self._by_file[file] if r[2].first < row < r[2].last)
-        place = next(around, None)
-        signature = MOTIONS.get(getattr(one, "name", ""))
-        if place and signature and isinstance(one, ir.Instruction):
-            for scope in self._scopes_of(place):
-                for visit in self.goals.visits(one, signature, row, scope, AT_START):
-                    yield visit.goal
+    def read_visits(
+        self, one: Any, row: int, scope: Scope, here: Arrived | None
+    ) -> Iterator[RapidVisit]:
+        """Read the visits of a move, see `TaskMachine.read_visits`."""
+        one = inside(one)
+        if is_move(one):
+            modes, points = (here.modes, here.points) if here else (AT_START, NO_POINTS)
+            yield from self.goals.visits(one, row, scope, modes, points)
+
+    def scopes_of(self, routine: TaskRoutine) -> Iterator[Scope]:
+        """Yield what a routine is called with, too."""
+        return self._scopes_of(routine, frozenset())
 
     def _scopes_of(
-        self, place: _Place, seen: frozenset[tuple[int, int]] = frozenset()
+        self, place: TaskRoutine, seen: frozenset[tuple[int, int]]
     ) -> Iterator[Scope]:
-        """Yield where the statements of a routine stand, by all calls of it."""
-        file, module, routine = place
-        scope = self.task.scope_of(file, module, routine)
-        yield scope
-        if not parameters_of(routine) or (file, routine.first) in seen:
+        yield self.task.scope_of(*place)
+        head = place.rows.head
+        if not head.parameters or place.key in seen:
             return
-        seen = seen | {(file, routine.first)}
-        for caller, row, call in self._calls_by_name[routine.head.name]:
+        seen = seen | {place.key}
+        for caller, row, call in self._calls_by_name[head.name]:
             for there in self._scopes_of(caller, seen):
-                yield self.task.bind(scope, routine, call, row, there)
+                bound = self.task.bind(place, call, row, there)
+                if bound is not None:
+                    yield bound
 
     @cached_property
     def _calls_by_name(
         self,
-    ) -> Mapping[str, list[tuple[_Place, int, ir.Instruction]]]:
+    ) -> Mapping[str, list[tuple[TaskRoutine, int, ir.Instruction]]]:
         """Return all calls of routines of the task, and where they stand."""
-        found = defaultdict[str, list[tuple[_Place, int, ir.Instruction]]](list)
-        for places in self._by_file.values():
-            for place in places:
-                file, _, routine = place
-                for row in range(routine.first + 1, routine.last):
-                    one = inside(self.texts[file].statement(row))
-                    if isinstance(one, ir.Instruction):
-                        found[one.name].append((place, row, one))
-        return found
-
-    @cached_property
-    def _by_file(self) -> Mapping[int, list[tuple[int, str, HeadedRows]]]:
-        """Return the routines of every file."""
-        found = defaultdict[int, list[tuple[int, str, HeadedRows]]](list)
-        for routines in self.task.routines.values():
-            for one in routines:
-                found[one[0]].append(one)
+        found = defaultdict[str, list[tuple[TaskRoutine, int, ir.Instruction]]](list)
+        for place in (r for own in self.task.routines.values() for r in own):
+            for row in place.inside:
+                one = inside(self.texts[place.file].statement(row))
+                if isinstance(one, ir.Instruction):
+                    found[one.name].append((place, row, one))
         return found
 
     def _compact(
@@ -477,17 +435,13 @@ class RapidMachine(TaskMachine):
         """Run an instruction; None where it goes on in a routine."""
         here = self.after_functions(context, row, one, here)
         name, scope = one.name, context.place.scope
-        found = self.task.routine(name, scope)
         if name in MOTIONS and name not in self.task.routines:
             return self._move(context, row, one, here)
-        if found is not None:
-            self.reached.add((scope.file, row))
-            if self._is_recursive(found[0], found[2]):
-                self.run_beside(found[0], found[2])
-            return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
-            self._run_named_beside(name)
-            return self.unknown(context, row, here, "names several routines")
+            found = self.task.routine(name, scope)
+            if found is not None and self._is_recursive(found.file, found.rows):
+                self.run_beside(found.file, found.rows)
+            return self.call_named(context, row, name, here)
         kind = read_known_instructions().get(name)
         if name in WAITING or self.declares_motionless(name):
             self.pause(here)
@@ -516,7 +470,7 @@ class RapidMachine(TaskMachine):
         return change_modes(
             one.name, one.arguments, modes,
             lambda operand: self.task.number(operand, row, scope),
-            lambda operand: pose_of(self.task.record(operand, row, scope)),
+            lambda operand: pose_of(self.task.value(operand, row, scope)),
             lambda operand: self.goals.load(operand, row, scope),
         )  # fmt: skip
 
@@ -524,16 +478,8 @@ class RapidMachine(TaskMachine):
         self, context: Context, row: int, one: ir.Instruction, here: Arrived
     ) -> Arrived:
         """Record the visits of a move."""
-        signature, scope = MOTIONS[one.name], context.place.scope
         self._interrupt(context, row, one, here)
-        after = self.arrive(
-            context, row, here,
-            lambda: [
-                *self.goals.visits(
-                    one, signature, row, scope, here.modes, here.points
-                )
-            ],
-        )  # fmt: skip
+        after = self.arrive(context, row, one, here)
         (last,) = after.origins
         if self.visits[last].kept and math.isnan(self.visits[last].zone_mm):
             after = replace(after, modes=after.modes.settle())
@@ -551,9 +497,9 @@ class RapidMachine(TaskMachine):
         if self.declares_motionless(name) and name not in self.task.routines:
             return here
         found = self.task.routine(name, context.place.scope)
-        given = None if found is None else self._list_set_modes(*found)
+        given = None if found is None else self._list_set_modes(found)
         if given is None:
-            self._run_named_beside(name)
+            self.run_named_beside(name)
             what = "calls a procedure on its way that may move the arm"
             what = what if found else f"{what}: it is in no file of the task"
             here = self.unknown(context, row, here, what)
@@ -561,16 +507,18 @@ class RapidMachine(TaskMachine):
         return replace(here, modes=modes)
 
     def _list_set_modes(
-        self, file: int, module: str, routine: HeadedRows
+        self, routine: TaskRoutine
     ) -> frozenset[tuple[str, Any]] | None:
         """Return the modes that a procedure may set; None where it may move the arm."""
-        if not self._moves(file, module, routine):
+        if not self.routine_effects(routine):
             return frozenset()
-        scope, found = self.task.scope_of(file, module, routine), set[tuple[str, Any]]()
-        for row in range(routine.first + 1, routine.last):
-            one = inside(self.texts[file].statement(row))
-            if self._asks_moving(scope, self.texts[file].statement(row)):
+        scope, found = self.task.scope_of(*routine), set[tuple[str, Any]]()
+        for row in routine.inside:
+            one = self.texts[routine.file].statement(row)
+            effects, called = self.read_calls(functions_in(one), scope)
+            if effects.union(*map(self.routine_effects, called)):
                 return None
+            one = inside(one)
             own = isinstance(one, ir.Instruction) and one.name in self.task.routines
             if isinstance(one, ir.Instruction) and not own:
                 kind = read_known_instructions().get(one.name)
@@ -581,9 +529,7 @@ class RapidMachine(TaskMachine):
                     continue
                 if kind == "still" or self.declares_motionless(one.name):
                     continue
-            if own or isinstance(one, ir.Instruction | said.LateCall):
-                return None
-            if isinstance(one, ir.NotUnderstood):
+            if own or isinstance(one, ir.Instruction) or self.own_effects(one):
                 return None
         return frozenset(found)
 
@@ -591,96 +537,35 @@ class RapidMachine(TaskMachine):
         self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what the functions of a statement do, and for its errors."""
-        here = self._after_functions(context, row, one, here)
-        self._fail(context, row, one, here)
-        return here
-
-    def _after_functions(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
-    ) -> Arrived:
         for name in functions_in(one):
-            found = self.task.routine(name, context.place.scope)
-            own = name in self.task.routines
-            if not own and name in WAITING:
+            if name in WAITING and name not in self.task.routines:
                 self.pause(here)
-            if not own and self._is_still_function(name):
-                continue
-            if found is None:
-                what = f"calls the function {name}, which is not known: it may move"
-                here = self.unknown(context, row, here, what)
-            elif self._moves(*found):
-                self.run_beside(found[0], found[2])
-                what = f"calls the function {name}, which moves: it is not followed"
-                here = self.unknown(context, row, here, what)
+            still = name in STILL_FUNCTIONS or self.declares_motionless(name)
+            here = self.call_function(context, row, name, still, here)
+        self._fail(context, row, one, here)
         return here
 
     # What a routine may do, read off its text.
 
-    def _moves(self, file: int, module: str, routine: HeadedRows) -> bool:
-        """Tell whether a routine moves, or changes how moves are carried out."""
-        key = file, routine.first
-        if key not in self._moving:
-            self._moving[key] = self._reach_moves([(file, module, routine)])
-        return self._moving[key]
+    def own_effects(self, one: ir.SourceStatement) -> Effects:
+        """Return that what is not understood, or called late, may move."""
+        odd = isinstance(inside(one), said.LateCall | ir.NotUnderstood)
+        return frozenset([MOVES] if odd else [])
 
-    def _reach_moves(self, waiting: list[_Place]) -> bool:
-        """Return True if routines, or those that they call, may move the arm."""
-        return any(
-            self._read_routine(one)[0]
-            for one in reach(
-                waiting,
-                lambda one: self._read_routine(one)[1],
-                lambda one: (one[0], one[2].first),
-            )
-        )
+    def names_called(self, one: ir.SourceStatement) -> Iterator[str]:
+        """Yield functions, the instruction, and what a move calls by a text."""
+        yield from functions_in(one)
+        one = inside(one)
+        if isinstance(one, ir.Instruction):
+            yield one.name
+            texts = (text for text in one.values if _is_text(text))
+            late = one.name in SYNCHRONOUS
+            yield from (_name_procedure(text) for text in texts if late)
 
-    def _read_routine(self, routine: _Place) -> tuple[bool, list[_Place]]:
-        """Read once what the statements of a routine do, see `_read_rows`."""
-        file, module, rows = routine
-        key = file, rows.first
-        if key not in self._direct:
-            scope = self.task.scope_of(file, module, rows)
-            self._direct[key] = self._read_rows(scope, range(rows.first + 1, rows.last))
-        return self._direct[key]
-
-    def _read_rows(
-        self, scope: Scope, rows: range, passed: tuple[str, ...] = ()
-    ) -> tuple[bool, list[_Place]]:
-        """Say whether statements may move the arm themselves, and what they call."""
-        text, called = self.texts[scope.file], list[_Place]()
-        for row in rows:
-            one = inside(text.statement(row))
-            if isinstance(one, said.LateCall | ir.NotUnderstood):
-                return True, []
-            names = [*functions_in(text.statement(row))]
-            still = [self._is_still_function(name) for name in names]
-            if isinstance(one, ir.Instruction) and one.name not in passed:
-                names.append(one.name)
-                still.append(self._is_still(one.name))
-            for name, harmless in zip(names, still, strict=True):
-                found = self.task.routine(name, scope)
-                called += [] if found is None else [found]
-                if found is None and (name in self.task.routines or not harmless):
-                    return True, []
-        return False, called
-
-    def _asks_moving(self, scope: Scope, one: ir.SourceStatement) -> bool:
-        """Return True if a function of a statement may move the arm or set modes."""
-        for name in functions_in(one):
-            found = self.task.routine(name, scope)
-            own = name in self.task.routines
-            if found is not None and self._moves(*found):
-                return True
-            if found is None and (own or not self._is_still_function(name)):
-                return True
-        return False
-
-    def _is_still_function(self, name: str) -> bool:
-        return name in STILL_FUNCTIONS or self.declares_motionless(name)
-
-    def _is_still(self, name: str) -> bool:
-        still = read_known_instructions().get(name) == "still" or name in HARMLESS
-        return still or self.declares_motionless(name)
+    def is_still(self, name: str) -> bool:
+        """Return True for known instructions and functions, and by the cell."""
+        known = read_known_instructions().get(name) == "still" or name in HARMLESS
+        return known or name in STILL_FUNCTIONS or self.declares_motionless(name)
 
 
 _LEFT = "may move the arm, or change how it moves, in a way that is not followed"
@@ -694,11 +579,6 @@ _HANDLER = Reason(
 )
 
 
-def _is_synchronous(one: ir.SourceStatement) -> bool:
-    """Return True if a move calls a procedure on its way."""
-    return getattr(inside(one), "name", "") in SYNCHRONOUS
-
-
 def _is_text(operand: ir.Operand | None) -> TypeGuard[ir.StringLiteral]:
     return isinstance(operand, ir.StringLiteral)
 
@@ -706,7 +586,3 @@ def _is_text(operand: ir.Operand | None) -> TypeGuard[ir.StringLiteral]:
 def _name_procedure(text: ir.StringLiteral) -> str:
     """Return the procedure that a text names, without its module."""
     return text.text.strip('"').lower().rpartition(":")[2]
-
-
-def _kind(routine: HeadedRows) -> str:
-    return getattr(routine.head, "kind", "")

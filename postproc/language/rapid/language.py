@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from postproc.arrays import Floats
-from postproc.diagnostics import Code
-from postproc.exceptions import ProgramError
 from postproc.files import FolderListing
+from postproc.language.analysis.task_language import TaskLanguage, check_routines
 from postproc.language.analysis.task_machine import follow
 from postproc.language.archive import Archive
 from postproc.language.language import (
     Cloner,
     JobReading,
-    Language,
     Splitter,
     Start,
 )
@@ -33,21 +30,13 @@ from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, read_rapid
-from postproc.language.rapid.statements import RapidText
 from postproc.language.rapid.symbols import RapidTask, other_tasks
 from postproc.language.rapid.to_visits import visits_of
 from postproc.language.text.blocks import read_once
-from postproc.language.text.grammars import line_parser
-from postproc.language.text.number_edits import Skeleton
 from postproc.language.text.source import Source
-from postproc.language.visits import never_reached
-
-# What the interpreter says of a statement where it is reached, knowing all modules.
-_SAID_AGAIN = (Code.UNKNOWN_INSTRUCTION, Code.LATE_BINDING)
-_BEGIN = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|![^\r\n]*[\r\n])*(?:%%%|MODULE\s)", re.I)
 
 
-class Rapid(Language):
+class Rapid(TaskLanguage):
     """The language of ABB controllers."""
 
     name = "RAPID"
@@ -55,11 +44,22 @@ class Rapid(Language):
     suffixes = RapidFileName.programs
     comment = "!"
     dialect = RAPID_DIALECT
-    tells_accuracy = False
+    grammar = "rapid"
+    begins = re.compile(
+        rb"(?:\xef\xbb\xbf)?(?:\s|![^\r\n]*[\r\n])*(?:%%%|MODULE\s)", re.I
+    )
+    joints = re.compile(r"[^!\"]*?\b(?:jointtarget\s|\w+AbsJ\b|\w+ExtJ\b)", re.I)
+    names = (
+        re.compile(
+            r"\s*(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+\w+\s+([A-Za-z_]\w*)", re.I
+        ),
+        re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\\[^,;]*,)?\s*([A-Za-z_]\w*)?"),
+    )
+    goes_on = True
 
-    def recognises(self, text: bytes) -> bool:
-        """Tell whether a module begins there, behind comments and a header."""
-        return _BEGIN.match(text) is not None
+    def read_file(self, source: Source) -> RapidFile:
+        """Read a module."""
+        return read_rapid(source)
 
     def read(
         self,
@@ -72,23 +72,18 @@ class Rapid(Language):
         files = [*task.files, *beside]
         machine = follow(lambda: RapidMachine.of(task, start, beside))
         visits = visits_of(machine)
-        moves = {k: [m.row for m in file.moves] for k, file in enumerate(task.files)}
-        missed = machine.find_unreached(moves)
         system = frozenset(f.text.source.name for f in task.files if f.is_system)
-        missed = {k: v for k, v in missed.items() if k not in system}
-        told = never_reached(missed, "main", "module")
         own = (d for file in task.files for d in file.diagnostics)
-        own = (d for d in own if d.file not in system)
-        found = [d for d in own if d.code not in _SAID_AGAIN]
-        found += [*machine.diagnostics, *told]
-        corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
-        kept = tuple(f for f in files if f.text.source.name not in corrected)
-        texts = tuple(skeleton_of(file.text) for file in files)
-        return JobReading(texts, visits, tuple(sorted(found)), kept, missed, system)
+        odd = (d for d in own if d.file not in system)
+        found = self.report(machine, visits, files, odd, ("main", "module"))
+        return replace(found, untouched=system)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the modules of a task to clone points in them."""
-        return RapidCloner.of(*_tasks(sources, Start()))
+        task, beside = _tasks(sources, Start())
+        cloner = RapidCloner(task)
+        cloner.take_words(beside)  # data of one name may be shared with them
+        return cloner
 
     def splitter(self, sources: Sequence[Source]) -> Splitter:
         """Parse the modules of a task to put points on the ways of its moves."""
@@ -96,23 +91,6 @@ class Rapid(Language):
 
         task, beside = _tasks(sources, Start())
         return RapidSplitter(task, tuple(beside))
-
-    def target_names(
-        self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
-    ) -> Iterator[str]:
-        """Name data by their declarations, and other lines by how they begin."""
-        name, seen = "", 0
-        for line in wanted:
-            if line == 0:
-                yield ""
-                continue
-            before = (_name_begin(lines[k]) for k in range(line - 1, seen - 1, -1))
-            name, seen = next(filter(None, before), name), line
-            yield name
-
-    def holds_joints(self, line: str) -> bool:
-        """Tell whether a line declares joint angles, or moves to some."""
-        return _JOINTS.match(line) is not None
 
     def reads(
         self,
@@ -137,10 +115,6 @@ class Rapid(Language):
 
         return write_rapid(program)
 
-    def prepare(self) -> None:
-        """Load the parser of statements."""
-        line_parser("rapid", "statement")
-
 
 LANGUAGE = Rapid
 
@@ -155,9 +129,7 @@ def _tasks(
     """
     own = [source for source in sources if not RapidFileName(source.name).task_beside]
     files = [read_once(source, known, read_rapid) for source in own]
-    if not files[0].routines:
-        problem, cure = "the file holds no routine", "Give a RAPID module"
-        raise ProgramError(sources[0].name, problem, cure)
+    check_routines(files[0], "Give a RAPID module")
     before = {file.text.source.name: file for file in known}
     beside = []
     for source in sources[len(own) :]:
@@ -165,25 +137,3 @@ def _tasks(
         same = file is not None and file.text.source == source
         beside.append(file if file is not None and same else read_rapid(source))
     return RapidTask(files, start.taught, other_tasks(beside)), beside
-
-
-_DECLARED = re.compile(
-    r"\s*(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+\w+\s+([A-Za-z_]\w*)", re.I
-)
-_WORDS = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\\[^,;]*,)?\s*([A-Za-z_]\w*)?")
-_JOINTS = re.compile(r"[^!\"]*?\b(?:jointtarget\s|\w+AbsJ\b|\w+ExtJ\b)", re.I)
-
-
-def _name_begin(line: bytes) -> str:
-    """Name what a line begins, "" where it goes on with what another began."""
-    text = line.decode("latin-1")
-    declared = _DECLARED.match(text)
-    if declared:
-        return declared[1]
-    words = _WORDS.match(text)
-    return " ".join(filter(None, words.groups())) if words else ""
-
-
-def skeleton_of(text: RapidText) -> Skeleton:
-    """Take over what the statements of a text tell, for comparing it with another."""
-    return text.skeleton(lambda source: skeleton_of(read_rapid(source).text))

@@ -8,6 +8,7 @@ from typing import Any
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
+from postproc.language.analysis.modal_state import ModalState
 from postproc.language.visits import OrientationLaw, Switch
 
 NO_SHIFT = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # position [mm] and quaternion
@@ -17,7 +18,7 @@ UNKNOWN_GRIP: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
-class Modes:
+class Modes(ModalState):
     """What holds until another instruction changes it.
 
     Attributes:
@@ -29,11 +30,11 @@ class Modes:
         override: Share of the programmed speed, NaN where not known.
         grip: What GripLoad has put into the hand: mass [kg] and its centre in the tool
             frame [mm]; empty: not known.
-        blocked: Why no target can be compensated; more than one reason.
         pending: Modes, and values that a procedure may give them while the program
             runs ahead, until the arm has stopped.
     """
 
+    collected = ("blocked", "pending")
     shift: tuple[float, ...] = NO_SHIFT
     confl: Switch = Switch.ON
     confj: Switch = Switch.ON
@@ -42,19 +43,7 @@ class Modes:
     wrist: bool = False
     override: float = 1.0
     grip: tuple[float, ...] = EMPTY_HAND
-    blocked: frozenset[Reason] = frozenset()
     pending: frozenset[tuple[str, Any]] = frozenset()
-
-    def join(self, other: Modes) -> Modes:
-        """Keep what is the same on another way here."""
-        differing = {
-            f.name: getattr(LOST, f.name)
-            for f in fields(self)
-            if getattr(self, f.name) != getattr(other, f.name)
-        }
-        differing["blocked"] = self.blocked | other.blocked
-        differing["pending"] = self.pending | other.pending
-        return replace(self, **differing)
 
     def allowing(self, more: frozenset[tuple[str, Any]] = frozenset()) -> Modes:
         """Allow for values that a procedure may have set, or sets later.
@@ -94,9 +83,9 @@ class Modes:
         }
         return self.join(replace(self, **counted))
 
-    def forget(self) -> Modes:
-        """Forget all but why targets cannot be compensated."""
-        return replace(LOST, blocked=self.blocked, pending=self.pending)
+    def unknown_state(self) -> Modes:
+        """Return it where nothing is known."""
+        return LOST
 
 
 AT_START = Modes()

@@ -14,42 +14,38 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import (
     NO_POINTS,
-    AssignedPoint,
     Points,
     Scope,
 )
 from postproc.language.analysis.conditions import IDENTITY, Pose, compose_poses, flat
 from postproc.language.analysis.found_visits import (
     FoundGoal,
-    FoundShift,
     FoundVisit,
-    explain_components,
     explain_disagreement,
-    hold_numbers,
     not_reached,
-    spell_element,
 )
-from postproc.language.rapid.instructions import POINT, Signature
+from postproc.language.analysis.goals import (
+    AT_RUN_TIME,
+    COMPUTED,
+    RUN_TIME,
+    GoalReader,
+    ReadShift,
+    locate_numbers,
+)
+from postproc.language.analysis.values import Value, WrittenNumber, list_leaves
+from postproc.language.rapid.instructions import MOTIONS, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
 from postproc.language.rapid.pose_encoding import (
     RAPID_DIALECT,
     WIDTH,
     shift_point,
 )
-from postproc.language.rapid.symbols import (
-    SHIFTS,
-    Nested,
-    RapidTask,
-    WrittenNumber,
-)
-from postproc.language.rapid.targets import COUNTS
+from postproc.language.rapid.symbols import SHIFTS, RapidTask
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
 UNUSED = 1e8  # values of external axes from here on (9E9) say that there is none
-NOTHING = (np.nan,) * WIDTH
-NO_SLOTS = (-1,) * WIDTH
 _ZONE = re.compile(r"z(\d+)$")
 _SPEED = re.compile(r"v(\d+)$")
 _STEM = re.compile(
@@ -59,10 +55,6 @@ SHORTEST = 0.5  # length of what counts as a quaternion
 Z0 = 0.3  # [mm]
 PLACEHOLDER = 0.01  # [kg] masses up to here, as of tool0, state nothing
 UNKNOWN_ZONE = -1.0
-RUN_TIME = "it is known only when the program runs"
-AT_RUN_TIME = Reason(
-    Code.RUNTIME_VALUE, "the target is known only when the program runs"
-)
 # Options whose moves are left.
 _LEFT_BY = {
     "id": Reason(Code.COORDINATED_ARMS, "it moves together with another arm (\\ID)"),
@@ -78,7 +70,6 @@ AT_A_STOP = (
     "calibj",
 )  # they weld standing still
 _LOAD_UNKNOWN = Reason(Code.LOAD_UNKNOWN, "the load that \\TLoad names is not known")
-_COMPUTED = Reason(Code.COMPUTED_TARGET, "the target is computed from other data")
 _NO_QUATERNION = Reason(
     Code.UNREADABLE_NUMBER, "the four numbers of its orientation are no quaternion"
 )
@@ -92,7 +83,6 @@ _STAYS = Reason(
 _CARRIED = Reason(
     Code.CONVEYOR, "its work object is moved by a mechanical unit (ufmec, ufprog)"
 )
-_SYSTEM = "it stands in a system module, which is read and not rewritten"
 
 
 @dataclass(frozen=True)
@@ -155,38 +145,34 @@ class Goals:
     def visits(
         self,
         one: ir.Instruction,
-        signature: Signature,
         row: int,
         scope: Scope,
         modes: Modes,
-        points: Points = NO_POINTS,
+        points: Points,
     ) -> Iterator[RapidVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
+        signature = MOTIONS[one.name]
         ends = signature.operands(one.arguments)
         watched = points.watch()
         there = replace(scope, points=watched)
         tool, wobj, zone, speed = self._conditions(one, ends, row, there)
         motion = _motion(one.name, signature)
+        start = replace(scope, points=points)
+        reader = RapidGoal(self.task, row, start, signature.joints, self._slots)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
         total, untold = self._total(one, row, there)
         why = why or untold
-        if signature.via >= 0:
-            goal = self._read_end(ends[1], signature, row, scope, points)
+        for via in (True, False) if signature.via >= 0 else (False,):
+            goal = reader.end(ends[via])
+            if not (via or signature.reaches):
+                goal = not_reached(goal, why)
             yield RapidVisit(
-                scope, row, motion, True, goal, modes, why=why,
+                scope, row, motion, via, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
                 taken=watched.given,
             )  # fmt: skip
-        goal = self._read_end(ends[0], signature, row, scope, points)
-        if not signature.reaches:
-            goal = not_reached(goal, why)
-        yield RapidVisit(
-            scope, row, motion, False, goal, modes, why=why,
-            tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
-                taken=watched.given,
-        )  # fmt: skip
 
     def load(
         self, operand: ir.Operand | None, row: int, scope: Scope
@@ -199,7 +185,7 @@ class Goals:
         if isinstance(operand, ir.DataObject) and operand.name == "load0":
             if not operand.steps and "load0" not in self.task.declared:
                 return EMPTY_HAND
-        found = load_of(self.task.record(operand, row, scope))
+        found = load_of(self.task.value(operand, row, scope))
         return EMPTY_HAND if found and found[0] <= PLACEHOLDER else found
 
     def _total(
@@ -242,303 +228,6 @@ class Goals:
             self._known[key] = one, found  # it keeps its id from being used again
         return found
 
-    def _read_end(
-        self, operand: ir.Operand | None, signature: Signature, row: int,
-        scope: Scope, points: Points,
-    ) -> FoundGoal:  # fmt: skip
-        """Read a destination, and note what it takes of assigned points."""
-        watched = points.watch()
-        there = replace(scope, points=watched)
-        goal = self.goal(operand, signature, row, there)
-        return replace(goal, given=watched.given) if watched.given else goal
-
-    def _read_held(self, held: AssignedPoint, signature: Signature) -> FoundGoal:
-        """Read the destination that assignments gave to a point."""
-        found = FoundGoal(Meaning.UNKNOWN, NOTHING)
-        if held.operand is not None:
-            found = self.goal(held.operand, signature, held.row, held.scope)
-        why = [self._explain_pinned(p[-1], Scope(*p[:3])) for p in held.chain]
-        pins = next(filter(None, (found.pins, *why)), "")
-        name = spell_element(held, "{}")
-        if held.components:
-            return self._set_components(held, found, signature.joints, pins)
-        shift = found.shift
-        if shift is not None:
-            shift = replace(shift, pins=shift.pins or pins)
-        return replace(found, name=name, pins=pins, shift=shift)
-
-    def _set_components(
-        self, held: AssignedPoint, base: FoundGoal, joints: bool, pins: str
-    ) -> FoundGoal:
-        """Read a point of which components have been set by themselves."""
-        name = spell_element(held, "{}")
-        found = _numbers(self.task.evaluate_held(held), joints)
-        why = explain_components(held, name, self.task.files, found is not None)
-        if found is None:
-            return hold_numbers(base, name, why, pins)
-        values = [one.value for one in found[0]]
-        values += [0.0] * (WIDTH - len(values))
-        if not (joints or _is_unit(values[3:7])):
-            return hold_numbers(base, name, _NO_QUATERNION, pins)
-        meaning = Meaning.JOINTS if joints else Meaning.POSE
-        return hold_numbers(base, name, why, pins, meaning, tuple(values), found[1])
-
-    def goal(
-        self,
-        operand: ir.Operand | None,
-        signature: Signature,
-        row: int,
-        scope: Scope,
-    ) -> FoundGoal:
-        """Read a destination, also of an assigned point.
-
-        Numbers of system modules are to stay.
-        """
-        held = self.task.find_held(operand, row, scope)
-        if held is not None:
-            return self._read_held(held, signature)
-        found = self._goal(operand, signature, row, scope)
-        if found.pins or found.file < 0 or not self.task.files[found.file].is_system:
-            return found
-        return replace(found, pins=_SYSTEM)
-
-    def _goal(
-        self,
-        operand: ir.Operand | None,
-        signature: Signature,
-        row: int,
-        scope: Scope,
-    ) -> FoundGoal:
-        passed = [*self.task.find_given(operand, scope)]
-        if passed:  # given to a routine, which may read it
-            _, operand, row, scope = passed[-1]
-        match operand:
-            case ir.Composite() | ir.DataObject():
-                found = self._point(operand, signature.joints, row, scope)
-                names = sorted({name for name, *_ in passed})
-                why = [self._explain_pinned(one, scope) for one in names]
-                return replace(found, pins=next(filter(None, why), found.pins))
-            case ir.FunctionCall(name=name, arguments=arguments) if (
-                name in SHIFTS
-                and name not in self.task.routines
-                and not signature.joints
-            ):
-                shifted = self._read_shifted(name, arguments, row, scope)
-                if not passed or shifted.shift is None:
-                    return shifted
-                # Its numbers stay.
-                held, turned = shifted.shift.shift, "it is shifted and turned"
-                pins = shifted.pins or (turned if any(held.numbers[3:]) else "")
-                return replace(shifted, shift=FoundShift(held), pins=pins)
-            case ir.FunctionCall():
-                return self._read_returned(operand, signature, row, scope)
-            case _:
-                return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
-
-    def _read_returned(
-        self, call: ir.FunctionCall, signature: Signature, row: int, scope: Scope
-    ) -> FoundGoal:
-        """Read what a function of the task returns: its numbers stay."""
-        returned = self.task.find_returned(call, row, scope)
-        if returned is None:
-            return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
-        operand, at, there = returned
-        found = self.goal(operand, signature, at, there)
-        text = f"the function {call.name} returns the target"
-        why = found.why or Reason(Code.COMPUTED_TARGET, text)
-        return hold_numbers(
-            found, "", why, found.pins or text, found.target, found.values, found.aux
-        )
-
-    def _point(
-        self,
-        operand: ir.Composite | ir.DataObject,
-        joints: bool,
-        row: int,
-        scope: Scope,
-    ) -> FoundGoal:
-        """Read a point that is written or named."""
-        name = operand.name if isinstance(operand, ir.DataObject) else ""
-        if isinstance(operand, ir.Composite):
-            plain = self._read_written(operand, joints, row, scope)
-            if plain is not None:
-                return plain
-        found = _numbers(self.task.record(operand, row, scope), joints)
-        if found is None:
-            why = self._explain_unknown(name, scope) if name else AT_RUN_TIME
-            return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
-        shown = name + self._element(operand, row, scope)
-        main, aux = found
-        file, slots = self._own_places(main, operand, row, scope)
-        values = [number.value for number in main]
-        values += [0.0] * (WIDTH - len(values))
-        known = joints or _is_unit(values[3:7])
-        why = NO_REASON if known else _NO_QUATERNION
-        return FoundGoal(
-            Meaning.JOINTS if joints else Meaning.POSE,
-            tuple(values),
-            file,
-            slots,
-            name=shown,
-            aux=aux,
-            why=why or (NO_REASON if file >= 0 else _COMPUTED),
-            pins=self._explain_pinned(name, scope),
-        )
-
-    def _own_places(
-        self,
-        numbers: Sequence[WrittenNumber],
-        operand: ir.Composite | ir.DataObject,
-        row: int,
-        scope: Scope,
-    ) -> tuple[int, tuple[int, ...]]:
-        """Find where numbers stand, nowhere if not all in the point's own statement.
-
-        Other data that a point is built from may serve other points and sums too.
-        """
-        file, slots = _places(numbers)
-        holder = scope.file
-        if isinstance(operand, ir.DataObject):
-            found = self.task.constant(operand.name, scope)
-            holder, row = (found[0], found[1].row) if found else (-1, -1)
-        if file < 0 or file != holder:
-            return -1, NO_SLOTS
-        first, behind = self.task.files[file].text.first[row : row + 2].tolist()
-        own = all(first <= one.slot < behind for one in numbers)
-        return (file, slots) if own else (-1, NO_SLOTS)
-
-    def _read_written(
-        self, operand: ir.Composite, joints: bool, row: int, scope: Scope
-    ) -> FoundGoal | None:
-        """Read a point whose numbers all stand in the move, None for others."""
-        if id(operand) not in self._slots:
-            self._slots[id(operand)] = operand, _plain_slots(operand)
-        slots = self._slots[id(operand)][1]
-        if len(slots) != (12 if joints else 17):
-            return None
-        text = self.task.files[scope.file].text
-        first = int(text.first[row])
-        places = [first + slot for slot in slots]
-        values = text.value[places].tolist()
-        count = len(slots) - 6
-        main = values[:count] + [0.0] * (WIDTH - count)
-        if not np.isfinite(values).all() or not (joints or _is_unit(main[3:7])):
-            return None
-        aux = tuple(np.nan if abs(v) > UNUSED else v for v in values[count:])
-        at = tuple(places[:count] + [-1] * (WIDTH - count))
-        target = Meaning.JOINTS if joints else Meaning.POSE
-        return FoundGoal(target, tuple(main), scope.file, at, aux=aux)
-
-    def _element(self, operand: ir.Operand, row: int, scope: Scope) -> str:
-        """Spell which element of an array is meant, "" where it is none."""
-        steps = operand.steps if isinstance(operand, ir.DataObject) else ()
-        spelt = []
-        for step in steps:
-            if isinstance(step, str):
-                spelt.append(f".{step}")
-            else:
-                at = (self.task.number(one, row, scope) for one in step.subscripts)
-                spelt.append("{" + ",".join(f"{k:g}" for k in at) + "}")
-        return "".join(spelt)
-
-    def _explain_unknown(self, name: str, scope: Scope) -> Reason:
-        """Say why a name stands for no known point."""
-        found, code = self.task.datum(name, scope), Code.RUNTIME_VALUE
-        if found is None:
-            code = Code.UNDECLARED_VARIABLE
-            text = "is declared in none of the given files, or more than once"
-        elif found[1].declared.value is None and name not in self.task.written:
-            text = "has no value in the given files: teach it first"
-            code = Code.NO_VALUE
-        elif self.task.is_changed_beside(*found):
-            code = Code.BESIDE_PROGRAM
-            text = f"may be changed by another task at any time: {RUN_TIME}"
-        elif self.task.constant(name, scope) is None:
-            text = f"may be changed by the program: {RUN_TIME}"
-        else:
-            text = f"has an element or value that is not known: {RUN_TIME}"
-        return Reason(code, f"{name} {text}")
-
-    def _explain_pinned(self, name: str, scope: Scope) -> str:
-        """Say why a point must keep its numbers."""
-        if not name:
-            return ""
-        if name in self.task.twins:
-            return (
-                f"{name} stands beside its original (o_): the controller limits how "
-                "far apart they may be"
-            )
-        if "getdataval" in self.task.find_calls:
-            return f"GetDataVal may take {name} by a name in a string"
-        if self.task.is_used_beside(name, scope):
-            return f"{name} is data of another task too, which has its numbers as well"
-        if name in self.task.read:
-            return f"{name} is used otherwise than as a destination too"
-        found = self.task.datum(name, scope)
-        if found and found[1].declared.kind == "pers" and name in self.task.written:
-            return f"{name} is persistent: it keeps what it is given beyond this run"
-        return ""
-
-    def _read_shifted(
-        self, name: str, arguments: Sequence[ir.Argument], row: int, scope: Scope
-    ) -> FoundGoal:
-        """Read Offs and RelTool: the point is moved along, the shift stays."""
-        by = self.task.read_shift(arguments, row, scope)
-        if by is None:
-            return FoundGoal(Meaning.UNKNOWN, NOTHING, why=AT_RUN_TIME)
-        (shift, angles), turns = by, {one.name: one.value for one in arguments}
-        placed = [one.value for one in arguments if not one.name]
-        base = self.goal(placed[0], POINT, row, scope)
-        at = int(self.task.files[scope.file].text.first[row])
-        x = placed[1]
-        own = {(scope.file, at + x.slot)} if isinstance(x, ir.Num) else set()
-        holds = base.holds | own
-        if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
-            pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
-            return FoundGoal(
-                Meaning.UNKNOWN, NOTHING, base.file, follows=base.origin,
-                name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
-                stays=base.stays, holds=holds,
-            )  # fmt: skip
-        values = shift_point(np.array(base.values), name, shift, angles)
-        turned = any(angles)
-        if base.stays:
-            return replace(base, values=values, holds=holds)
-        kind = ShiftKind.AXES if name == "offs" else ShiftKind.OWN
-        found = self._place_shift(
-            Shift(kind, (*shift, *angles), base.values), base, [*placed[1:], *(
-                turns.get(axis) for axis in ("rx", "ry", "rz")
-            )], row, scope,
-        )  # fmt: skip
-        fixed = found.slots[0] < 0
-        pins = base.pins or (f"{name} turns it" if turned and fixed else "")
-        return FoundGoal(
-            Meaning.POSE, values, base.file, NO_SLOTS, base.origin, base.name, base.aux,
-            base.why, pins, shift=found, holds=holds if fixed else base.holds,
-        )  # fmt: skip
-
-    def _place_shift(
-        self,
-        shift: Shift,
-        base: FoundGoal,
-        numbers: Sequence[ir.Operand | None],
-        row: int,
-        scope: Scope,
-    ) -> FoundShift:
-        """Say where the numbers of a shift stand, nowhere where they must stay."""
-        if base.shift is not None:
-            shift = shift.around(base.shift.shift, RAPID_DIALECT)
-        first = int(self.task.files[scope.file].text.first[row])
-        slots = [first + n.slot if isinstance(n, ir.Num) else -1 for n in numbers]
-        # x, y, z, and all angles that are there, must be written as numbers.
-        written = all(isinstance(one, ir.Num) for one in numbers[:3])
-        written &= all(one is None or isinstance(one, ir.Num) for one in numbers)
-        if base.why or base.origin[0] < 0 or not written:
-            return FoundShift(shift)
-        rest = (-1,) * (WIDTH - len(slots))
-        pins = _SYSTEM if self.task.files[scope.file].is_system else ""
-        return FoundShift(shift, scope.file, (*slots, *rest), pins)
-
     # Tools and work objects.
 
     def _is_assigned(self, operand: ir.Operand | None) -> bool:
@@ -573,16 +262,145 @@ class Goals:
         self, kind: str, operand: ir.Operand, arguments: _Arguments
     ) -> FrameOfMove:
         name = operand.name if isinstance(operand, ir.DataObject) else f"the {kind}"
-        found = self.task.record(operand, arguments.row, arguments.scope)
+        found = self.task.value(operand, arguments.row, arguments.scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
-            why = self._explain_unknown(name, arguments.scope)
+            there = RapidGoal(
+                self.task, arguments.row, arguments.scope, False, self._slots
+            )
+            why = there.explain_unknown(name)
             return FrameOfMove((), kind == "tool", why)
         return replace(read, taught=self.task.is_taught(name, found))
 
 
 WORLD = FrameOfMove(IDENTITY, False)
 FLANGE = FrameOfMove(IDENTITY, True)
+
+
+@dataclass(frozen=True)
+class RapidGoal(GoalReader):
+    """Reads the ends of one move.
+
+    Attributes:
+        joints: They are jointtargets.
+        slots: Of points that are written in moves, by the identity of these.
+    """
+
+    task: RapidTask
+    joints: bool
+    slots: dict[int, tuple[ir.Composite, list[int]]]
+    dialect = RAPID_DIALECT
+    brackets = "{}"
+    system = "it stands in a system module, which is read and not rewritten"
+
+    def read_value(self, value: Value | None, name: str) -> FoundGoal | None:
+        """Take a robtarget or jointtarget apart."""
+        counts = _COUNTS[self.joints]
+        if not isinstance(value, tuple) or len(value) != len(counts):
+            return None
+        parts = [[*list_leaves(part)] for part in value]
+        own = [[x for x in part if isinstance(x, WrittenNumber)] for part in parts]
+        if own != parts or tuple(map(len, own)) != counts:
+            return None
+        numbers = [one for part in own[:-1] for one in part]
+        file, slots = locate_numbers(numbers, WIDTH)
+        goal = self._goal_of([x.value for x in numbers], [x.value for x in own[-1]])
+        why = goal.why or (NO_REASON if file >= 0 else COMPUTED)
+        return replace(goal, file=file, slots=slots, why=why)
+
+    def _goal_of(self, numbers: list[float], outside: list[float]) -> FoundGoal:
+        """Return where numbers and external axes lead."""
+        values = numbers + [0.0] * (WIDTH - len(numbers))
+        known = self.joints or _is_unit(values[3:7])
+        return FoundGoal(
+            Meaning.JOINTS if self.joints else Meaning.POSE, tuple(values),
+            aux=tuple(np.nan if abs(value) > UNUSED else value for value in outside),
+            why=NO_REASON if known else _NO_QUATERNION,
+        )  # fmt: skip
+
+    def read_point(self, operand: ir.Operand | None) -> FoundGoal:
+        """Read a point; fast where all of its numbers stand in the move."""
+        if isinstance(operand, ir.Composite):
+            if id(operand) not in self.slots:
+                self.slots[id(operand)] = operand, _plain_slots(operand)
+            slots, count = self.slots[id(operand)][1], 6 if self.joints else 11
+            if len(slots) == count + 6:
+                text = self.task.files[self.here.file].text
+                at = [int(text.first[self.row]) + slot for slot in slots]
+                values = text.value[at].tolist()
+                found = self._goal_of(values[:count], values[count:])
+                if np.isfinite(values).all() and not found.why:
+                    own = (*at[:count], *(-1,) * (WIDTH - count))
+                    return replace(found, file=self.here.file, slots=own)
+        return super().read_point(operand)
+
+    def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
+        """Read Offs and RelTool: the point is moved along."""
+        if not isinstance(operand, ir.FunctionCall) or operand.name not in SHIFTS:
+            return None
+        if operand.name in self.task.routines or self.joints:
+            return None
+        name, arguments = operand.name, operand.arguments
+        by = self.task.read_shift(arguments, self.row, self.here)
+        if by is None:
+            return self.unknown(AT_RUN_TIME)
+        (shift, angles), turns = by, {one.name: one.value for one in arguments}
+        placed = [one.value for one in arguments if not one.name]
+        base = replace(self, joints=False).goal(placed[0])
+        written = [*placed[1:], *(turns.get(axis) for axis in ("rx", "ry", "rz"))]
+        first = int(self.task.files[self.here.file].text.first[self.row])
+        slots = [first + n.slot if isinstance(n, ir.Num) else -1 for n in written]
+        own = frozenset([(self.here.file, slots[0])] if slots[0] >= 0 else [])
+        shifts, turned = f"{name} shifts it by what", f"{name} turns it"
+        if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
+            return self.apply_shift(base, ReadShift(own=own, shifts=shifts))
+        kind = ShiftKind.AXES if name == "offs" else ShiftKind.OWN
+        # x, y, z, and all angles that are there, must be written as numbers.
+        given = [*written[:3], *(one for one in written[3:] if one is not None)]
+        if not all(isinstance(one, ir.Num) for one in given):
+            slots = [-1] * len(slots)
+        return self.apply_shift(base, ReadShift(
+            Shift(kind, (*shift, *angles), base.values),
+            shift_point(np.array(base.values), name, shift, angles), any(angles),
+            self.here.file, (*slots, *(-1,) * (WIDTH - len(slots))), own,
+            shifts=shifts, turned=turned,
+        ))  # fmt: skip
+
+    def explain_unknown(self, name: str) -> Reason:
+        """Say why a name stands for no known point."""
+        found, code = self.task.datum(name, self.here), Code.RUNTIME_VALUE
+        if found is None:
+            code = Code.UNDECLARED_VARIABLE
+            text = "is declared in none of the given files, or more than once"
+        elif found[1].value is None and name not in self.task.written:
+            text = "has no value in the given files: teach it first"
+            code = Code.NO_VALUE
+        elif self.task.is_changed_beside(*found):
+            code = Code.BESIDE_PROGRAM
+            text = f"may be changed by another task at any time: {RUN_TIME}"
+        elif self.task.constant(name, self.here) is None:
+            text = f"may be changed by the program: {RUN_TIME}"
+        else:
+            text = f"has an element or value that is not known: {RUN_TIME}"
+        return Reason(code, f"{name} {text}")
+
+    def explain_pinned(self, name: str, file: int) -> str:
+        """Say why a point must keep its numbers."""
+        if name in self.task.twins:
+            return (
+                f"{name} stands beside its original (o_): the controller limits how "
+                "far apart they may be"
+            )
+        if "getdataval" in self.task.find_calls:
+            return f"GetDataVal may take {name} by a name in a string"
+        if self.task.is_used_beside(name, self.here):
+            return f"{name} is data of another task too, which has its numbers as well"
+        if name in self.task.read:
+            return f"{name} is used otherwise than as a destination too"
+        found = self.task.datum(name, self.here)
+        if found and found[1].kind == "pers" and name in self.task.written:
+            return f"{name} is persistent: it keeps what it is given beyond this run"
+        return ""
 
 
 @dataclass
@@ -620,7 +438,7 @@ class _Arguments:
             return ""
         found = self.task.datum(operand.name, scope)
         if found is not None:
-            return found[1].declared.type
+            return found[1].type
         if operand.name == "tool0":
             return "tooldata"
         if operand.name == "fine" or _ZONE.match(operand.name):
@@ -660,7 +478,7 @@ class _Arguments:
         usual = _ZONE.match(operand.name)
         if usual and there.is_built_in(operand.name):
             return float(usual[1]) or Z0
-        found = self.task.record(operand, there.row, there.scope)
+        found = self.task.value(operand, there.row, there.scope)
         if isinstance(found, tuple) and len(found) >= 2:
             stops, tcp = found[:2]
             if isinstance(stops, WrittenNumber) and isinstance(tcp, WrittenNumber):
@@ -678,7 +496,7 @@ class _Arguments:
         usual = _SPEED.match(operand.name)
         if usual and there.is_built_in(operand.name):
             return float(usual[1]) / 1000.0
-        found = self.task.record(operand, there.row, there.scope)
+        found = self.task.value(operand, there.row, there.scope)
         if isinstance(found, tuple) and found and isinstance(found[0], WrittenNumber):
             return found[0].value / 1000.0
         return np.nan
@@ -726,10 +544,16 @@ def own_numbers(one: ir.Instruction) -> list[int] | None:
     return slots[:7] if len(slots) == 17 else None
 
 
+_COUNTS: tuple[tuple[int, ...], ...] = (
+    (3, 4, 4, 6),
+    (6, 6),
+)  # numbers of a robtarget and of a jointtarget
+
+
 def _plain_slots(operand: ir.Composite) -> list[int]:
     """Return the slots of ``[[1, 2, ..], ..]`` of a target, nothing for all else."""
     parts = [part.items for part in operand.items if isinstance(part, ir.Composite)]
-    if tuple(map(len, parts)) not in COUNTS or len(parts) != len(operand.items):
+    if tuple(map(len, parts)) not in _COUNTS or len(parts) != len(operand.items):
         return []
     leaves = [leaf for part in parts for leaf in part]
     slots = [leaf.slot for leaf in leaves if isinstance(leaf, ir.Num)]
@@ -737,7 +561,7 @@ def _plain_slots(operand: ir.Composite) -> list[int]:
 
 
 def _numbers(
-    found: Nested | None, joints: bool
+    found: Value | None, joints: bool
 ) -> tuple[list[WrittenNumber], tuple[float, ...]] | None:
     """Take a robtarget or jointtarget apart: its numbers, and the external axes."""
     counts = (6, 6) if joints else (3, 4, 4, 6)
@@ -756,16 +580,7 @@ def _numbers(
     return [one for part in parts[:-1] for one in part], outside
 
 
-def _places(numbers: Sequence[WrittenNumber]) -> tuple[int, tuple[int, ...]]:
-    """Return the file of numbers and their places, -1 where one is computed."""
-    files = {one.file if one.slot >= 0 else -1 for one in numbers}
-    if len(files) != 1 or -1 in files:
-        return -1, NO_SLOTS
-    slots = [one.slot for one in numbers]
-    return files.pop(), tuple(slots + [-1] * (WIDTH - len(slots)))
-
-
-def _pose_numbers(found: Nested | None) -> list[float] | None:
+def _pose_numbers(found: Value | None) -> list[float] | None:
     """Return the seven numbers of a pose, None where it is none."""
     if not isinstance(found, tuple) or len(found) != 2:
         return None
@@ -779,7 +594,7 @@ def _pose_numbers(found: Nested | None) -> list[float] | None:
     return numbers if len(numbers) == 7 and _is_unit(numbers[3:]) else None
 
 
-def pose_of(found: Nested | None) -> tuple[float, ...]:
+def pose_of(found: Value | None) -> tuple[float, ...]:
     """Return the seven numbers of a pose, nothing where it is none."""
     return tuple(_pose_numbers(found) or ())
 
@@ -789,7 +604,7 @@ def pose_of_numbers(numbers: Sequence[float]) -> Pose:
     return flat(RAPID_DIALECT.poses(np.array([*numbers, 0.0, 0.0, 0.0, 0.0])[None]))
 
 
-def _tool_of(found: Nested | None) -> FrameOfMove | None:
+def _tool_of(found: Value | None) -> FrameOfMove | None:
     """Read ``[robhold, [[x,y,z],[q1..q4]], [load]]``."""
     if not isinstance(found, tuple) or len(found) < 2:
         return None
@@ -801,7 +616,7 @@ def _tool_of(found: Nested | None) -> FrameOfMove | None:
     return FrameOfMove(pose_of_numbers(pose), bool(held.value), load=stated)
 
 
-def load_of(found: Nested | None) -> tuple[float, ...]:
+def load_of(found: Value | None) -> tuple[float, ...]:
     """Return mass [kg] and centre [mm] of ``[mass, [x,y,z], ..]``, else nothing."""
     if not isinstance(found, tuple) or len(found) < 2:
         return ()
@@ -813,7 +628,7 @@ def load_of(found: Nested | None) -> tuple[float, ...]:
     return (mass.value, *at) if known else ()
 
 
-def _wobj_of(found: Nested | None) -> FrameOfMove | None:
+def _wobj_of(found: Value | None) -> FrameOfMove | None:
     """Read ``[robhold, ufprog, "ufmec", [uframe], [oframe]]``."""
     if not isinstance(found, tuple) or len(found) != 5:
         return None

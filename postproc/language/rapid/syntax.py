@@ -21,65 +21,10 @@ class ModuleHead(SourceStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class RoutineParameter:
-    r"""A parameter of a routine.
-
-    Attributes:
-        name: Its name.
-        by_reference: ``VAR``, ``PERS`` or ``INOUT``: the routine may change what it is
-            called with; others are copies.
-        optional: ``\name``.
-    """
-
-    name: str
-    by_reference: bool = False
-    optional: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class RoutineHead(SourceStatement):
-    """``PROC name(..)``, ``FUNC type name(..)``, ``TRAP name``.
-
-    Attributes:
-        kind: proc, func or trap.
-        name: Its name.
-        parameters: Its parameters.
-        local: Only its module knows it.
-        returns: The type of a function's value.
-    """
-
-    kind: str
-    name: str
-    parameters: tuple[RoutineParameter, ...] = ()
-    local: bool = False
-    returns: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class RecordHead(SourceStatement):
     """``RECORD name``."""
 
     name: str
-
-
-@dataclass(frozen=True, slots=True)
-class DataDeclaration(SourceStatement):
-    """``LOCAL PERS tooldata t{2} := [..]``.
-
-    Attributes:
-        kind: const, var or pers.
-        type, name: Of the data.
-        scope: local, task or "".
-        dimensions: Of an array.
-        value: What it is at first, None where nothing is said.
-    """
-
-    kind: str
-    type: str
-    name: str
-    scope: str = ""
-    dimensions: tuple[Operand, ...] = ()
-    value: Operand | None = None
 
 
 @dataclass(frozen=True, slots=True)

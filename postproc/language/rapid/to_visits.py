@@ -60,8 +60,7 @@ def visits_of(machine: RapidMachine) -> Visits:
         conditions = _conditions(v, base, placed[key], id(v) in paused)
         return Arrival(conditions, _reasons(v), v.goal.target == Meaning.POSE)
 
-    files = enumerate(machine.task.files)
-    moves = {k: [move.row for move in file.moves] for k, file in files}
+    moves = {k: file.moves for k, file in enumerate(machine.task.files)}
     return to_visits.visits_of(machine, RAPID_DIALECT, arrive, COMMENTS, moves)
 
 

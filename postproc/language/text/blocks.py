@@ -8,8 +8,9 @@ from typing import Any, Protocol, TypeVar
 
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
+from postproc.language import ir
 from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.ir import SourceStatement
+from postproc.language.analysis.declarations import Datum, list_data
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Diagnostic
@@ -24,12 +25,14 @@ class BlockWords:
         within: From a word to the kind of block that it divides.
         scopes: Kinds of modules, routines and records.
         outer: Those of them that hold others.
+        routines: Those that run.
     """
 
     ends: Mapping[str, str]
     within: Mapping[str, str]
     scopes: Collection[str]
     outer: Collection[str]
+    routines: Collection[str]
 
 
 @dataclass
@@ -40,26 +43,55 @@ class Outline:
         text: Its statements.
         words: The words of the language.
         scopes: Modules, routines and records by kind, as they end.
-        diagnostics: Blocks that do not close.
+        data: What they declare.
+        diagnostics: Blocks that do not close, and what is not understood.
     """
 
     text: StatementText[Any]
     words: BlockWords
     scopes: dict[str, list[HeadedRows]] = field(default_factory=dict)
+    data: list[Datum] = field(default_factory=list)
     diagnostics: list[Diagnostic] = field(default_factory=list)
-    _open: list[tuple[str, int, SourceStatement]] = field(default_factory=list)
+    _open: list[tuple[str, int, ir.SourceStatement]] = field(default_factory=list)
 
     def of(self, *kinds: str) -> list[HeadedRows]:
-        """Return the scopes of some kinds, in the order of their ends."""
+        """Return the scopes of some kinds, in the order of the file."""
         found = [scope for kind in kinds for scope in self.scopes.get(kind, [])]
-        return sorted(found, key=lambda scope: scope.last)
+        return sorted(found, key=lambda scope: scope.first)
 
     def name(self, *kinds: str) -> str:
         """Return the name of the innermost open scope of some kinds."""
         heads = (said for kind, _, said in reversed(self._open) if kind in kinds)
         return getattr(next(heads, None), "name", "")
 
-    def begin(self, kind: str, row: int, said: SourceStatement) -> None:
+    @property
+    def routine(self) -> str:
+        """The name of the routine that is open, "" without one."""
+        return self.name(*self.words.routines)
+
+    def take(self, row: int, one: ir.SourceStatement, module: str) -> None:
+        """Take the next statement.
+
+        Args:
+            row: Its row.
+            one: What it says.
+            module: Name of the module that it stands in.
+        """
+        match one:
+            case ir.Declaration():
+                self.data += list_data(one, row, module, self.routine)
+            case ir.RoutineHead(kind=kind):
+                self.begin(kind, row, one)
+            case ir.ForLoop():
+                self.open("for", row, one)
+            case ir.Branch(word=word) if word in self.words.ends.values():
+                self.open(word, row, one)
+            case ir.Branch(word=word) | ir.BlockWord(word=word):
+                self.word(word, row)
+            case ir.NotUnderstood():
+                self.complain(row, Code.UNKNOWN_STATEMENT, "is not understood")
+
+    def begin(self, kind: str, row: int, said: ir.SourceStatement) -> None:
         """Open a scope: routines and records stand in outer ones only."""
         kinds = [kind for kind, _, _ in self._open]
         if kind in self.words.outer:
@@ -69,7 +101,7 @@ class Outline:
             self._close_until(around, row - 1)
         self.open(kind, row, said)
 
-    def open(self, kind: str, row: int, said: SourceStatement) -> None:
+    def open(self, kind: str, row: int, said: ir.SourceStatement) -> None:
         """Open a block."""
         self._open.append((kind, row, said))
 
@@ -78,7 +110,11 @@ class Outline:
         kinds = [kind for kind, _, _ in self._open]
         if word in self.words.within:
             if kinds[-1:] != [self.words.within[word]]:
-                self._complain(row, f"stands in no {self.words.within[word].upper()}")
+                self.complain(
+                    row,
+                    Code.OPEN_BLOCK,
+                    f"stands in no {self.words.within[word].upper()}",
+                )
         elif word in self.words.ends:
             self._end(word, row, kinds)
 
@@ -91,7 +127,7 @@ class Outline:
         last = max((k + 1 for k, own in enumerate(kinds) if own in scopes), default=0)
         inner = kinds if kind in scopes else kinds[last:]
         if kind not in inner:
-            self._complain(row, f"ends no {kind.upper()}")
+            self.complain(row, Code.OPEN_BLOCK, f"ends no {kind.upper()}")
             return
         at = len(kinds) - 1 - list(reversed(kinds)).index(kind)
         self._close_until(at + 1, row - 1)
@@ -102,20 +138,21 @@ class Outline:
         words = {kind: word for word, kind in self.words.ends.items()}
         while len(self._open) > depth:
             kind, begun, said = self._open.pop()
-            self._complain(begun, f"has no {words[kind].upper()}")
+            self.complain(begun, Code.OPEN_BLOCK, f"has no {words[kind].upper()}")
             self._close((kind, begun, said), row, ended=False)
 
     def _close(
-        self, block: tuple[str, int, SourceStatement], row: int, ended: bool = True
+        self, block: tuple[str, int, ir.SourceStatement], row: int, ended: bool = True
     ) -> None:
         kind, begun, said = block
         if kind in self.words.scopes:
             scope = HeadedRows(said, begun, row, ended)
             self.scopes.setdefault(kind, []).append(scope)
 
-    def _complain(self, row: int, what: str) -> None:
+    def complain(self, row: int, code: Code, what: str) -> None:
+        """Say what is wrong with a statement."""
         message = f"{self.text.quote(row)} {what}"
-        self.diagnostics.append(self.text.diagnostic(row, Code.OPEN_BLOCK, message))
+        self.diagnostics.append(self.text.diagnostic(row, code, message))
 
 
 class StatementFile(Protocol):

@@ -9,12 +9,14 @@ from typing import Any
 
 import lark
 
-from postproc.language.ir import Num
+from postproc.language.ir import NotUnderstood, Num, SourceStatement
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.lexer import NAME_MARK, UNREADABLE
 from postproc.language.text.templates import open_name
 
 Children = Sequence[Any]
+FAILED = object()
+"""What stands for a form that a grammar cannot read."""
 
 
 class Word(str):
@@ -42,11 +44,12 @@ class FormParser:
     """Parses forms with a grammar, and builds what its rules say.
 
     Attributes:
-        grammar: Its name; statements are its start symbol.
+        grammar: Its name.
         rules: What each rule makes of what its children gave.
         reserved: Words that name nothing.
         longest: Characters of a form, at the most.
         deepest: Operators or brackets within each other; followed by recursion.
+        start: The start symbol of the grammar.
     """
 
     grammar: str
@@ -54,15 +57,21 @@ class FormParser:
     reserved: Collection[str]
     longest: int
     deepest: int
+    start: str = "statement"
 
-    def parse(self, form: str) -> object | None:
-        """Build what a form says, None where the grammar cannot read it."""
+    def parse(self, form: str) -> object:
+        """Build what a form says, `FAILED` where the grammar cannot read it."""
         if form.startswith(UNREADABLE) or len(form) > self.longest:
-            return None
+            return FAILED
         try:
-            return self._build(line_parser(self.grammar, "statement").parse(form))
+            return self._build(line_parser(self.grammar, self.start).parse(form))
         except (lark.exceptions.LarkError, DeeperError, ReservedWordError):
-            return None
+            return FAILED
+
+    def parse_statement(self, form: str) -> SourceStatement:
+        """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
+        found = self.parse(form)
+        return found if isinstance(found, SourceStatement) else NotUnderstood()
 
     def _build(self, tree: lark.Tree[lark.Token]) -> object:
         """Build what a tree says, counting its names and its numbers."""

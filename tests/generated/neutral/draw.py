@@ -405,9 +405,23 @@ class Draw:
         if kind == "step":
             return self._move(kind, Shifted(Named(""), self._still_offset()), 0)
         if kind == "arc":
-            via = Inline(self._literal()) if rng.random() < 0.5 else self._fixed()
-            return self._move(kind, Inline(self._literal()), 0, via)
+            return self._move(kind, Inline(self._literal()), 0, self._via())
         return self._move(kind, self._point(), zone)
+
+    def _via(self) -> Point:
+        """Draw the point on the way of an arc: no move ends there.
+
+        An arc that begins at its own middle point is none that a controller drives.
+        """
+        rng, points = self.rng, self.made.points
+        own = (name for name, (_, file) in points.items() if file == self.file)
+        names = [name for name in own if name.startswith("u")]
+        if rng.random() < 0.5:
+            return Inline(self._literal())
+        if not names or rng.random() < 0.5:
+            names = [f"u{len(points)}"]
+            points[names[0]] = (self._literal(), self.file)
+        return Named(rng.choice(names))
 
     def _still_offset(self) -> tuple[int, int, int]:
         rng = self.rng

@@ -12,7 +12,7 @@ from postproc import _native
 from postproc.exceptions import ProgramError
 from postproc.language import ir
 from postproc.language.krl import syntax as said
-from postproc.language.krl.language import skeleton_of
+from postproc.language.krl.language import Krl
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.statements import read_krl_statements
 from postproc.language.text.source import Source
@@ -88,21 +88,26 @@ def one(text):
 X = ir.DataObject("x")
 
 
+def given_as(name):
+    """Return a parameter, which a routine may change."""
+    return ir.RoutineParameter(name, True)
+
+
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
         ("&ACCESS RVP", said.AccessHeader()),
         ("GLOBAL DEF Weld1(a :IN, b[] :OUT)",
-         said.KrlRoutine("def", "weld1", ("a", "b"), True)),
-        ("deffct real f ( )", said.KrlRoutine("deffct", "f")),
+         ir.RoutineHead("def", "weld1", (given_as("a"), given_as("b")))),
+        ("deffct real f ( )", ir.RoutineHead("deffct", "f", (), True)),
         ("DEFDAT $CONFIG", said.DataList("$config")),
         ("DEFDAT m PUBLIC", said.DataList("m", True)),
         ("END", ir.BlockWord("end")),
         ("ENDSWITCH", ir.BlockWord("endtest")),
-        ("DECL GLOBAL CONST INT N=3", said.KrlDeclaration(
-            "int", (said.DeclaredItem("n", (), ir.Num(0)),), True, True)),
-        ("INT i, j[4]", said.KrlDeclaration("int", (
-            said.DeclaredItem("i"), said.DeclaredItem("j", (ir.Num(0),))))),
+        ("DECL GLOBAL CONST INT N=3", ir.Declaration(
+            "int", (ir.DeclaredItem("n", (), ir.Num(0)),), "const", "global")),
+        ("INT i, j[4]", ir.Declaration("int", (
+            ir.DeclaredItem("i"), ir.DeclaredItem("j", (ir.Num(0),))))),
         ("ASYPTP XP1", ir.NotUnderstood()),
         ("EXT weld(REAL :IN)", said.OutsideName()),
         ("GLOBAL ENUM kind a, b", said.OutsideName()),
@@ -154,8 +159,8 @@ def test_programs_of_others_are_read_without_loss():
             for line in between.replace("\r", "\n").split("\n"):
                 assert not line.partition(";")[0].strip()
             at = span.end
-        again = skeleton_of(read_krl(Source(path.name, bytes(source.data))).text)
-        assert again.shapes == skeleton_of(file.text).shapes
+        again = Krl().skeleton(read_krl(Source(path.name, bytes(source.data))))
+        assert again.shapes == Krl().skeleton(file).shapes
 
 
 @pytest.mark.parametrize(
@@ -165,4 +170,5 @@ def test_programs_of_others_are_read_without_loss():
 def test_functions_return_arrays_too(type_):
     for begin in ("", "GLOBAL "):
         found = one(f"{begin}DEFFCT {type_} Label(n:IN)")
-        assert found == said.KrlRoutine("deffct", "label", ("n",), bool(begin))
+        wanted = ir.RoutineHead("deffct", "label", (given_as("n"),), not begin)
+        assert found == wanted

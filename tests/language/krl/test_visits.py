@@ -678,3 +678,15 @@ def test_flags_are_checked_on_joint_moves_alone():
 def test_what_is_read_into_a_point_changes_it(line):
     found = job(line, "PTP XP1", "LIN XP2")
     assert reasons(found)[0] == "" and "may be changed" in reasons(found)[1]
+
+
+def test_numbers_of_other_data_stay():
+    """Constants that a point is built from may serve other points too."""
+    numbers = {"dx": 100.0, "dy": 200.0, "dz": 300.0, "da": 0.0, "db": 0.0, "dc": 180.0}
+    data = "\n".join(f"DECL REAL {name}={value}" for name, value in numbers.items())
+    lines = ["LIN {X dx,Y dy,Z dz,A da,B db,C dc}", "LIN {X dx,Y dy,Z 0,A 0,B 0,C 0}"]
+    found = job(*OLD.split("\n"), *lines, data=f"{DATA}\n{data}").visits
+    texts = {found.reasons[k].text for k in found.reason.tolist()}
+    assert texts == {"the target is computed from other data"}
+    assert found.literal.tolist() == [-1, -1]
+    np.testing.assert_array_equal(found.values[0, :6], [*numbers.values()])

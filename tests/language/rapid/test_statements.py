@@ -74,7 +74,7 @@ def one(text):
     return found.statement(0)
 
 
-given = said.RoutineParameter
+given = ir.RoutineParameter
 X, P10 = ir.DataObject("x"), ir.DataObject("p10")
 
 
@@ -84,23 +84,24 @@ X, P10 = ir.DataObject("x"), ir.DataObject("p10")
         ("MODULE Main(SYSMODULE, NOSTEPIN)",
          said.ModuleHead("main", ("sysmodule", "nostepin"))),
         ("LOCAL PROC weld1(num a, \\switch b | INOUT robtarget p{*}, \\VAR num c)",
-         said.RoutineHead("proc", "weld1", (
+         ir.RoutineHead("proc", "weld1", (
              given("a"), given("b", True, True),
              given("p", True), given("c", True, True)), True)),
         ("PROC weld(num a\\switch b|switch c,\\num d{*,*})",
-         said.RoutineHead("proc", "weld", (
+         ir.RoutineHead("proc", "weld", (
              given("a"), given("b", True, True),
              given("c"), given("d", True, True)))),
         ("FUNC robtarget near2(robtarget p)",
-         said.RoutineHead("func", "near2", (given("p"),), False, "robtarget")),
-        ("TRAP t_stop", said.RoutineHead("trap", "t_stop")),
+         ir.RoutineHead("func", "near2", (given("p"),))),
+        ("TRAP t_stop", ir.RoutineHead("trap", "t_stop")),
         ("LOCAL RECORD seam", said.RecordHead("seam")),
         ("EndProc", ir.BlockWord("endproc")),
         ("TASK PERS num n{2, 3};",
-         said.DataDeclaration("pers", "num", "n", "task", (ir.Num(0), ir.Num(1)))),
+         ir.Declaration("num", (
+             ir.DeclaredItem("n", (ir.Num(0), ir.Num(1))),), "pers", "task")),
         ("CONST string s:=\"a;\"\"!b\";",
-         said.DataDeclaration("const", "string", "s", "", (),
-                              ir.StringLiteral('"a;""!b"'))),
+         ir.Declaration("string", (
+             ir.DeclaredItem("s", (), ir.StringLiteral('"a;""!b"')),), "const")),
         ("ALIAS num level;", said.TypeAlias("num", "level")),
         ("IF x = 1 OR NOT y THEN", ir.Branch("if", (ir.Operation("OR", (
             ir.Operation("=", (X, ir.Num(0))),

@@ -14,10 +14,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from postproc.exceptions import PostprocError
+from postproc.language.analysis.goals import RUN_TIME
 from postproc.language.language import Start
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.language import Rapid
-from postproc.language.rapid.moves import RUN_TIME
 from postproc.language.text.source import source_from_bytes
 
 BESIDE = (RUN_TIME, "external axes")  # reasons of lines that do not count

@@ -1,0 +1,331 @@
+"""Where moves go: points that are written, named, assigned, returned or shifted."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, TypeVar
+
+from postproc.diagnostics import Code, Reason
+from postproc.language import ir
+from postproc.language.analysis.assigned_points import AssignedPoint, Scope
+from postproc.language.analysis.found_visits import (
+    FoundGoal,
+    FoundShift,
+    explain_components,
+    hold_numbers,
+    spell_element,
+)
+from postproc.language.analysis.symbols import TaskSymbols
+from postproc.language.analysis.values import Value, WrittenNumber
+from postproc.language.pose_encoding import Dialect
+from postproc.language.shifts import Shift
+from postproc.language.visits import Meaning
+
+RUN_TIME = "it is known only when the program runs"
+AT_RUN_TIME = Reason(
+    Code.RUNTIME_VALUE, "the target is known only when the program runs"
+)
+COMPUTED = Reason(Code.COMPUTED_TARGET, "the target is computed from other data")
+_OF_NUMBERS = (None, Code.PARTIAL_TARGET, Code.COMPUTED_TARGET)
+G = TypeVar("G", bound="GoalReader")
+
+
+@dataclass(frozen=True)
+class ReadShift:
+    """How a move shifts a point, as far as that is known.
+
+    Attributes:
+        by: What by, None where that is not known.
+        values: Numbers of the shifted point, (w,).
+        turns: It turns the point, too.
+        file, slots: Where its numbers stand, w as of a target; -1 where they stay.
+        own: File and first number of a shift that stands in the move itself.
+        aux: External axes of the shifted point, None where they are those of the point.
+        shifts, turned: What messages say that it does: shift by what .., turn.
+    """
+
+    by: Shift | None = None
+    values: tuple[float, ...] = ()
+    turns: bool = False
+    file: int = -1
+    slots: tuple[int, ...] = (-1,)
+    own: frozenset[tuple[int, int]] = frozenset()
+    aux: tuple[float, ...] | None = None
+    shifts: str = ""
+    turned: str = ""
+
+
+@dataclass(frozen=True)
+class GoalReader(ABC):
+    """Reads the ends of one move.
+
+    Attributes:
+        task: What names mean.
+        row, here: Where the move stands.
+        dialect: What numbers of targets mean.
+        brackets: Around the index of an element.
+        shout: Names are upper case in messages.
+        system: Why numbers of files that are not rewritten must stay.
+    """
+
+    task: TaskSymbols[Any]
+    row: int
+    here: Scope
+    dialect: ClassVar[Dialect]
+    brackets: ClassVar[str]
+    shout: ClassVar[bool] = False
+    system: ClassVar[str]
+
+    # What a language says.
+
+    @abstractmethod
+    def read_value(self, value: Value | None, name: str) -> FoundGoal | None:
+        """Read a point that is known, None where it is none that can be gone to.
+
+        Args:
+            value: The point.
+            name: Of the point, "" where it is written.
+        """
+
+    @abstractmethod
+    def explain_unknown(self, name: str) -> Reason:
+        """Say why a name stands for no known point."""
+
+    @abstractmethod
+    def explain_pinned(self, name: str, file: int) -> str:
+        """Say why a point must keep its numbers, "" where it need not.
+
+        Args:
+            name: Of the point.
+            file: Where its numbers stand, -1 for nowhere.
+        """
+
+    def is_shared(self, name: str) -> bool:
+        """Return True if other programs may read a point too."""
+        return False
+
+    def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
+        """Read what only this language can go to, None for all else."""
+        return None
+
+    def explain_kept(self, held: AssignedPoint) -> Iterator[str]:
+        """Say why what an assigned point was given must keep its numbers."""
+        return iter(())
+
+    def is_followed_whole(self, held: AssignedPoint, value: Value | None) -> bool:
+        """Return True if all that a move needs of an assigned point is known."""
+        return True
+
+    # Ends.
+
+    @property
+    def nothing(self) -> tuple[float, ...]:
+        """The numbers of a target that is not known."""
+        return (math.nan,) * self.dialect.width
+
+    def unknown(self, why: Reason, name: str = "") -> FoundGoal:
+        """Return a destination that is not known."""
+        return FoundGoal(Meaning.UNKNOWN, self.nothing, name=name, why=why)
+
+    def at(self: G, row: int, here: Scope) -> G:
+        """Return what reads operands that stand elsewhere."""
+        return replace(self, row=row, here=here)
+
+    def end(self, operand: ir.Operand | None) -> FoundGoal:
+        """Read a destination, and note what it takes of assigned points."""
+        watched = self.here.points.watch()
+        goal = self.at(self.row, replace(self.here, points=watched)).goal(operand)
+        return replace(goal, given=watched.given) if watched.given else goal
+
+    def goal(self, operand: ir.Operand | None) -> FoundGoal:
+        """Read a destination."""
+        return self.read_special(operand) or self.plain_goal(operand)
+
+    def plain_goal(self, operand: ir.Operand | None) -> FoundGoal:
+        """Read a destination that every language has."""
+        held = self.task.find_held(operand, self.row, self.here)
+        if held is not None:
+            return self._read_held(held)
+        found = self._read(operand)
+        if found.pins or found.file < 0 or not self.task.files[found.file].is_system:
+            return found
+        return replace(found, pins=self.system)
+
+    def _read(self, operand: ir.Operand | None) -> FoundGoal:
+        """Read a destination that is no assigned point."""
+        passed = [*self.task.find_given(operand, self.here)]
+        if not passed:
+            if isinstance(operand, ir.FunctionCall):
+                return self._read_returned(operand)
+            return self.read_point(operand)
+        _, operand, row, here = passed[-1]  # given to a routine, which may read it
+        found = self.at(row, here).goal(operand)
+        why = (self.explain_pinned(name, -1) for name in sorted({p[0] for p in passed}))
+        pins = next(filter(None, why), found.pins)
+        if found.shift is None:
+            return replace(found, pins=pins)
+        held = found.shift.shift  # its numbers stay
+        turned = "it is shifted and turned" if any(held.numbers[3:]) else ""
+        return replace(found, shift=FoundShift(held), pins=found.pins or turned)
+
+    def _read_returned(self, call: ir.FunctionCall) -> FoundGoal:
+        """Read what a function of the task returns: its numbers stay."""
+        returned = self.task.find_returned(call, self.row, self.here)
+        if returned is None:
+            return self.unknown(AT_RUN_TIME)
+        operand, row, here = returned
+        found = self.at(row, here).goal(operand)
+        name = call.name.upper() if self.shout else call.name
+        text = f"the function {name} returns the target"
+        why = found.why or Reason(Code.COMPUTED_TARGET, text)
+        return hold_numbers(
+            found, "", why, found.pins or text, found.target, found.values, found.aux
+        )
+
+    # Points.
+
+    def read_point(self, operand: ir.Operand | None) -> FoundGoal:
+        """Read a point that is written or named."""
+        name = operand.name if isinstance(operand, ir.DataObject) else ""
+        goal = self.read_value(self.task.value(operand, self.row, self.here), name)
+        if goal is None:
+            why = self.explain_unknown(name) if name else AT_RUN_TIME
+            return self.unknown(why, name)
+        if goal.target == Meaning.UNKNOWN or not (name or goal.slots[0] >= 0):
+            return goal
+        if goal.file >= 0 and not self._is_own(goal, operand):
+            goal = replace(goal, file=-1, slots=(-1,) * len(goal.slots))
+            goal = replace(goal, why=goal.why or COMPUTED)
+        if not name:
+            return goal
+        return replace(
+            goal, name=name + self._spell_steps(operand),
+            pins=self.explain_pinned(name, goal.file), shared=self.is_shared(name),
+        )  # fmt: skip
+
+    def _is_own(self, goal: FoundGoal, operand: ir.Operand | None) -> bool:
+        """Return True if all numbers of a point stand in its own statement.
+
+        Other data that it is built from may serve other points and sums too.
+        """
+        file, row = self.here.file, self.row
+        if isinstance(operand, ir.DataObject):
+            index = next(filter(None, map(self._index, operand.steps)), ())
+            found = self.task.constant(operand.name, self.here, index)
+            found = found or self.task.constant(operand.name, self.here)
+            file, row = (found[0], found[1].row) if found else (-1, -1)
+        if goal.file != file:
+            return False
+        first, behind = self.task.files[file].text.first[row : row + 2].tolist()
+        return all(first <= slot < behind for slot in goal.slots if slot >= 0)
+
+    def _index(self, step: str | ir.ElementStep) -> tuple[int, ...] | None:
+        return self.task.index(step, self.row, self.here)
+
+    def _spell_steps(self, operand: ir.Operand | None) -> str:
+        """Spell which element or component is meant, "" where it is the whole."""
+        steps = operand.steps if isinstance(operand, ir.DataObject) else ()
+        spelt = ""
+        for step in steps:
+            index = ",".join(map(str, self._index(step) or ()))
+            inside = f"{self.brackets[0]}{index}{self.brackets[1]}"
+            spelt += f".{step}" if isinstance(step, str) else inside
+        return spelt
+
+    # What assignments gave.
+
+    def _read_held(self, held: AssignedPoint) -> FoundGoal:
+        """Read the destination that assignments gave to a point."""
+        there, name = self.at(held.row, held.scope), spell_element(held, self.brackets)
+        goal = self.unknown(AT_RUN_TIME)
+        if held.operand is not None:
+            goal = there.goal(held.operand)
+        why = [self._explain_chain(place, goal) for place in held.chain]
+        why += self.explain_kept(held)
+        pins = next(filter(None, (goal.pins, *why)), "")
+        if held.components:
+            return self._set_components(held, goal, name, pins)
+        if goal.why.code is Code.PARTIAL_TARGET:  # the others are what they were before
+            goal = self.unknown(goal.why)
+        shift = goal.shift
+        if shift is not None:
+            shift = replace(shift, pins=shift.pins or pins)
+        return replace(goal, name=name, pins=pins, shift=shift)
+
+    def _explain_chain(self, place: tuple[int, str, str, str], goal: FoundGoal) -> str:
+        return self.at(self.row, Scope(*place[:3])).explain_pinned(place[-1], goal.file)
+
+    def _set_components(
+        self, held: AssignedPoint, base: FoundGoal, name: str, pins: str
+    ) -> FoundGoal:
+        """Read a point of which components have been set by themselves."""
+        value = self.task.evaluate_held(held)
+        found = self.read_value(value, "") or self.unknown(AT_RUN_TIME)
+        partial = found.why.code is Code.PARTIAL_TARGET
+        known = found.target != Meaning.UNKNOWN and not partial
+        known = known and self.is_followed_whole(held, value)
+        why = explain_components(held, name, self.task.files, known)
+        own = found.why.code not in (*_OF_NUMBERS, Code.RUNTIME_VALUE)
+        if held.operand is not None and own:
+            why = found.why
+        if not known:
+            return hold_numbers(base, name, why, pins)
+        return hold_numbers(
+            base, name, why, pins, found.target, found.values, found.aux
+        )
+
+    # Shifts: the point is moved along.
+
+    def apply_shift(self, base: FoundGoal, by: ReadShift) -> FoundGoal:
+        """Return where a move goes that shifts a point.
+
+        Args:
+            base: The point.
+            by: How it is shifted.
+        """
+        holds = base.holds | by.own
+        if base.target != Meaning.POSE or by.by is None:
+            pins = base.pins or f"{by.shifts} {RUN_TIME}"
+            return FoundGoal(
+                Meaning.UNKNOWN, self.nothing, base.file, follows=base.origin,
+                name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
+                stays=base.stays, holds=holds,
+            )  # fmt: skip
+        aux = base.aux if by.aux is None else by.aux
+        if base.stays:
+            why, kept = base.why or COMPUTED, replace(base, holds=holds)
+            return hold_numbers(
+                kept, base.name, why, base.pins, base.target, by.values, aux
+            )
+        found = FoundShift(by.by)
+        if base.shift is not None:
+            found = FoundShift(by.by.around(base.shift.shift, self.dialect))
+        if not base.why and base.origin[0] >= 0 and by.slots[0] >= 0:
+            pins = self.system if self.task.files[by.file].is_system else ""
+            found = FoundShift(found.shift, by.file, by.slots, pins)
+        fixed = found.slots[0] < 0
+        pins = base.pins or (by.turned if by.turns and fixed else "")
+        return FoundGoal(
+            Meaning.POSE, by.values, base.file, (-1,) * len(by.values), base.origin,
+            base.name, aux, base.why, pins, base.shared, found,
+            holds=holds if fixed else base.holds,
+        )  # fmt: skip
+
+
+def locate_numbers(
+    numbers: Sequence[WrittenNumber], width: int
+) -> tuple[int, tuple[int, ...]]:
+    """Return the file of numbers and their places, -1 where one is computed.
+
+    Args:
+        numbers: The numbers.
+        width: How many places there are.
+    """
+    files = {one.file if one.slot >= 0 else -1 for one in numbers}
+    if len(files) != 1 or -1 in files:
+        return -1, (-1,) * width
+    slots = tuple(one.slot for one in numbers)
+    return files.pop(), slots + (-1,) * (width - len(slots))

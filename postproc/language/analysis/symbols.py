@@ -1,0 +1,690 @@
+"""What the names of a task mean: its data, routines, and values that are known."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import ClassVar, Generic, TypeVar
+
+from postproc.language import ir
+from postproc.language.analysis.assigned_points import (
+    NO_POINTS,
+    AssignedPoint,
+    Component,
+    Place,
+    PointPart,
+    Points,
+    Scope,
+    source_of,
+)
+from postproc.language.analysis.control_flow import HeadedRows
+from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
+from postproc.language.analysis.functions import ALIKE, apply_function, apply_operator
+from postproc.language.analysis.uses import NamesUsed, match_arguments
+from postproc.language.analysis.values import (
+    KnownRecord,
+    Layout,
+    Value,
+    WrittenNumber,
+    number_in,
+    put_together,
+    spell_components,
+    step_into,
+    take_apart,
+)
+from postproc.language.text.comment_directives import Comments
+
+DEEPEST = 20  # names that stand for names
+Given = tuple[ir.Operand, int, Scope]
+"""An operand, its row and where that stands."""
+F = TypeVar("F", bound=TaskFile)
+
+
+@dataclass
+class TaskSymbols(ABC, Generic[F]):
+    """What the names of a task mean, as far as ways through it ask.
+
+    Attributes:
+        files: Its files, the one that runs first.
+        taught: Lower-case names of data that were taught with the arm, by the cell.
+        comments: How the language writes them.
+        layouts: Components of data by type.
+        followed: Types of data whose assignments are followed.
+        constants: Names that the language gives values to.
+        functions: Kinds of routines that return values.
+        by_name: Records hold their components by name, not by their order.
+        divides: ``a / b`` is known, whatever kind of numbers they are.
+        apart: Data may be declared in one place and get their first value elsewhere.
+    """
+
+    files: Sequence[F]
+    taught: Collection[str] = frozenset()
+    comments: ClassVar[Comments]
+    layouts: ClassVar[Mapping[str, Layout]]
+    followed: ClassVar[Collection[str]]
+    constants: ClassVar[Mapping[str, float]] = {}
+    functions: ClassVar[str]
+    by_name: ClassVar[bool] = False
+    divides: ClassVar[bool] = True
+    apart: ClassVar[bool] = False
+    _own: dict[Place, dict[tuple[int, ...], tuple[int, Datum]]] = field(
+        default_factory=lambda: defaultdict(dict), init=False
+    )
+    _shared: dict[str, set[Place]] = field(
+        default_factory=lambda: defaultdict(set), init=False
+    )
+    _doubled: set[Place] = field(default_factory=set, init=False)
+    _names: dict[int, tuple[ir.Operand, frozenset[str]]] = field(
+        default_factory=dict, init=False
+    )
+    _changes: dict[int, tuple[ir.SourceStatement, Sequence[ir.DataObject]]] = field(
+        default_factory=dict, init=False
+    )
+
+    def __post_init__(self) -> None:
+        """Index data by the scopes that declare them."""
+        for number, file in enumerate(self.files):
+            for datum in file.data:
+                self._declare(number, datum)
+
+    def _declare(self, number: int, datum: Datum) -> None:
+        place = self.unit(number), datum.module, datum.routine, datum.name
+        own = self._own[place]
+        if datum.index in own and not self.apart:
+            self._doubled.add(place)
+        elif datum.index in own and own[datum.index][1].value is not None:
+            if datum.value is None:
+                return
+            datum = replace(datum, value=None)  # which of the two holds?
+        own[datum.index] = number, datum
+        if not datum.routine and self.shares(number, datum):
+            self._shared[datum.name].add(place)
+
+    # What a language says.
+
+    @abstractmethod
+    def new_uses(self) -> NamesUsed:
+        """Return what notes the names that statements change and take."""
+
+    @abstractmethod
+    def shares(self, file: int, datum: Datum) -> bool:
+        """Return True if other modules know data of a module."""
+
+    @abstractmethod
+    def keeps(self, file: int, datum: Datum) -> bool:
+        """Return True if data hold their first value for as long as the task runs."""
+
+    @abstractmethod
+    def outlives(self, datum: Datum) -> bool:
+        """Return True if what data are given is there when the task runs again."""
+
+    def is_followed(self, name: str, datum: Datum, here: Scope) -> bool:
+        """Return True if nothing but assignments changes data."""
+        return name not in self.uses.changed
+
+    def fits(self, type_: str, component: str, value: float) -> bool:
+        """Return True if data, or a component, hold a number as it is given."""
+        return True
+
+    def spell(self, type_: str, component: str) -> list[str]:
+        """Return the values that data, or a part of them, hold, as they are spelt."""
+        return spell_components(self.layouts.get(type_, {}), component)
+
+    def unit(self, file: int) -> int:
+        """Return the file that stands for all that a file shares its names with."""
+        return file
+
+    def apply(
+        self, call: ir.FunctionCall, row: int, here: Scope, depth: int
+    ) -> Value | None:
+        """Return what a function of the controller gives, None where not known."""
+        if call.name not in ALIKE or len(call.arguments) != 1:
+            return None
+        number = self.number(call.arguments[0].value, row, here)
+        return _make_number(apply_function(call.name, number))
+
+    def operate(self, operator: str, parts: Sequence[Value | None]) -> Value | None:
+        """Compute what an operator gives, None where that is not known."""
+        if operator == "/" and not self.divides:
+            return None
+        return _make_number(
+            apply_operator(operator, [number_in(part) for part in parts])
+        )
+
+    def build(
+        self, operand: ir.Operand, row: int, here: Scope, depth: int
+    ) -> Value | None:
+        """Evaluate a value that only this language has, None where it is not known."""
+        return None
+
+    def note_in(self, uses: NamesUsed, file: F, one: ir.SourceStatement) -> None:
+        """Note what a statement of a file changes and takes."""
+        uses.note(one)
+
+    def note_odd(self, uses: NamesUsed) -> None:
+        """Note what may be changed and taken by what is not understood, or beside."""
+        uses.changed |= self.odd_words
+        uses.read |= self.odd_words
+
+    # Names.
+
+    @cached_property
+    def routines(self) -> Mapping[str, list[TaskRoutine]]:
+        """Routines by name."""
+        found: dict[str, list[TaskRoutine]] = defaultdict(list)
+        for number, file in enumerate(self.files):
+            for rows in () if file.is_submit else file.routines:
+                place = TaskRoutine(number, file.module_of(rows), rows)
+                found[rows.head.name].append(place)
+        return found
+
+    @cached_property
+    def routines_by_file(self) -> Mapping[int, list[TaskRoutine]]:
+        """Routines by the file that they stand in."""
+        found: dict[int, list[TaskRoutine]] = defaultdict(list)
+        for own in self.routines.values():
+            for one in own:
+                found[one.file].append(one)
+        return found
+
+    def routine(self, name: str, here: Scope) -> TaskRoutine | None:
+        """Find the routine that a name means, None where it is not sure."""
+        known = self.routines.get(name, [])
+        own = [one for one in known if one[:2] == (here.file, here.module)]
+        found = own or [one for one in known if not one.rows.head.local]
+        return found[0] if len(found) == 1 else None
+
+    def routine_around(self, file: int, row: int) -> TaskRoutine | None:
+        """Return the routine that a statement stands in, None where it is in none."""
+        around = (one for one in self.routines_by_file[file] if row in one.inside)
+        return next(around, None)
+
+    def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
+        """Return where the statements of a routine stand."""
+        given = frozenset(one.name for one in routine.head.parameters)
+        return Scope(file, module, routine.head.name, given)
+
+    def scope_of_datum(self, file: int, datum: Datum) -> Scope:
+        """Return where data are declared."""
+        return Scope(file, datum.module, datum.routine)
+
+    def place(self, name: str, here: Scope) -> Place | None:
+        """Find where the data are declared that a name means, None if not known."""
+        if name in here.parameters:
+            return None
+        for routine in (here.routine, ""):
+            place = self.unit(here.file), here.module, routine, name
+            if place in self._own:
+                return place
+        shared = self._shared.get(name, ())
+        return next(iter(shared)) if len(shared) == 1 else None
+
+    def data_at(self, place: Place) -> Mapping[tuple[int, ...], tuple[int, Datum]]:
+        """Return the file and the data that are declared in a place, by their index."""
+        return self._own.get(place, {})
+
+    def datum(
+        self, name: str, here: Scope, index: tuple[int, ...] = ()
+    ) -> tuple[int, Datum] | None:
+        """Find the data, or an element, that a name means, None if not known."""
+        place = self.place(name, here)
+        if place is None or place in self._doubled:
+            return None
+        return self._own[place].get(index)
+
+    def constant(
+        self, name: str, here: Scope, index: tuple[int, ...] = ()
+    ) -> tuple[int, Datum] | None:
+        """Find data that hold what they were declared with for as long as it runs."""
+        found = self.datum(name, here, index)
+        if found is None or found[1].value is None or not self.keeps(*found):
+            return None
+        return found
+
+    @cached_property
+    def declared(self) -> frozenset[str]:
+        """Names of all data."""
+        return frozenset(datum.name for file in self.files for datum in file.data)
+
+    @cached_property
+    def taught_lines(self) -> Sequence[frozenset[int]]:
+        """Lines of every file that a comment marks as taught."""
+        return [self.comments.list_taught(file.text.source) for file in self.files]
+
+    # What statements change and take.
+
+    @cached_property
+    def uses(self) -> NamesUsed:
+        """The names that statements change and take."""
+        uses = self.new_uses()
+        for file in (one for one in self.files if not one.is_submit):
+            for one in file.text.said:
+                self.note_in(uses, file, one)
+        self.note_odd(uses)
+        data = [datum for file in self.files for datum in file.data]
+        kept = {datum.name for datum in data if self.outlives(datum)}
+        for own in self.routines.values():  # parameters may stand for any data
+            kept.update(one.name for r in own for one in r.rows.head.parameters)
+        alone = self.declared - kept
+        uses.read |= {one for target, one in uses.copies if target not in alone}
+        uses.pass_on()
+        return uses
+
+    @cached_property
+    def written(self) -> frozenset[str]:
+        """Names of data that something may change."""
+        return frozenset(self.uses.written | self.uses.changed)
+
+    @cached_property
+    def read(self) -> frozenset[str]:
+        """Names of data that something but the destination of a move takes."""
+        return frozenset(self.uses.read)
+
+    @cached_property
+    def odd_words(self) -> frozenset[str]:
+        """Words of what is not understood: each may name what is set there."""
+        return self.words_of_odd()
+
+    def words_of_odd(self, but: Collection[str] = ()) -> frozenset[str]:
+        """Return words of what is not understood, and does not begin with some."""
+        texts = (file.text for file in self.files if not file.is_submit)
+        found = (one.words(one.where(holds_odd), but) for one in texts)
+        return frozenset().union(*found)
+
+    def list_changes(self, one: ir.SourceStatement) -> Sequence[ir.DataObject]:
+        """Return the data that a statement may change, also what it does later."""
+        if id(one) not in self._changes:
+            uses = self.new_uses()
+            uses.note(one)
+            self._changes[id(one)] = one, uses.targets
+        return self._changes[id(one)][1]
+
+    # What routines are called with.
+
+    def bind(
+        self, routine: TaskRoutine, call: ir.Instruction | ir.FunctionCall, row: int,
+        there: Scope,
+    ) -> Scope | None:  # fmt: skip
+        """Return where the statements of a routine stand, and what it is called with.
+
+        A parameter that something may change has no value that is known.
+
+        Args:
+            routine: The routine.
+            call: The call.
+            row: Its row.
+            there: Where it stands.
+
+        Returns:
+            None where the call does not fit.
+        """
+        pairs = match_arguments(routine.rows.head.parameters, call.arguments)
+        if pairs is None:
+            return None
+        given = tuple(
+            (parameter.name, argument.value, row, there)
+            for parameter, argument in pairs
+            if argument.value is not None and parameter.name not in self.written
+        )
+        return replace(self.scope_of(*routine), given=given)
+
+    def behind(
+        self, operand: ir.Operand | None, row: int, here: Scope
+    ) -> tuple[ir.Operand | None, int, Scope]:
+        """Return what stands behind a parameter or a call of a function, and its place.
+
+        That is the operand itself where it is neither, or not known.
+        """
+        for _ in range(DEEPEST):
+            for _, given, at, there in self.find_given(operand, here):
+                operand, row, here = given, at, there
+            if not isinstance(operand, ir.FunctionCall):
+                break
+            returned = self.find_returned(operand, row, here)
+            if returned is None:
+                break
+            operand, row, here = returned
+        return operand, row, here
+
+    def find_given(
+        self, operand: ir.Operand | None, here: Scope
+    ) -> Iterator[tuple[str, ir.Operand, int, Scope]]:
+        """Yield the parameters that an operand stands for, as in `Scope.given`."""
+        while isinstance(operand, ir.DataObject) and not operand.steps:
+            if operand.name in dict(here.loops):
+                return
+            found = (one for one in here.given if one[0] == operand.name)
+            given = next(found, None)
+            if given is None:
+                return
+            yield given
+            _, operand, _, here = given
+
+    # Values.
+
+    def number(self, operand: ir.Operand | None, row: int, here: Scope) -> float:
+        """Evaluate a number, NaN where it is not known before the program runs."""
+        return number_in(self.value(operand, row, here))
+
+    def value(
+        self, operand: ir.Operand | None, row: int, here: Scope, depth: int = 0
+    ) -> Value | None:
+        """Evaluate an operand, None where it is not known before the program runs."""
+        if depth > DEEPEST:
+            return None
+        match operand:
+            case ir.Num(slot=slot):
+                text = self.files[here.file].text
+                at = int(text.first[row]) + slot
+                return _make_number(float(text.value[at]), here.file, at)
+            case ir.StringLiteral(text=written):
+                return written
+            case ir.Composite(items=items):
+                parts = [self.value(one, row, here, depth) for one in items]
+                known = tuple(part for part in parts if part is not None)
+                return known if len(known) == len(parts) else None
+            case ir.Operation(operator=operator, operands=operands):
+                parts = [self.value(one, row, here, depth) for one in operands]
+                return self.operate(operator, parts)
+            case ir.DataObject():
+                return self._evaluate_data(operand, row, here, depth)
+            case ir.FunctionCall(name=name):
+                returned = self.find_returned(operand, row, here)
+                if returned is not None:
+                    return self.value(*returned, depth + 1)
+                own = name in self.routines
+                return None if own else self.apply(operand, row, here, depth)
+            case None:
+                return None
+            case _:
+                return self.build(operand, row, here, depth)
+
+    def _evaluate_data(
+        self, data: ir.DataObject, row: int, here: Scope, depth: int
+    ) -> Value | None:
+        """Evaluate data by name, and what the steps behind it lead to."""
+        name, steps, loops = data.name, data.steps, dict(here.loops)
+        if name in loops:
+            return None if steps else WrittenNumber(loops[name])
+        if name in here.parameters:
+            given = next((one[1:] for one in here.given if one[0] == name), None)
+            value, type_ = given and self.value(*given, depth + 1), ""
+        else:
+            value, steps, type_ = self._evaluate_named(data, row, here, depth + 1)
+        layout = self.layouts.get(type_, {})
+        for step in steps:
+            into = step if isinstance(step, str) else self.index(step, row, here)
+            value, layout = step_into(value, into, layout)
+        return value
+
+    def _evaluate_named(
+        self, data: ir.DataObject, row: int, here: Scope, depth: int
+    ) -> tuple[Value | None, tuple[str | ir.ElementStep, ...], str]:
+        """Return what data, or an element, hold; then further steps, and their type."""
+        name, steps = data.name, data.steps
+        count = next((k for k, s in enumerate(steps) if isinstance(s, str)), len(steps))
+        whole = replace(data, steps=steps[:count]) if steps[count:] else data
+        held = self.find_held(whole, row, here)
+        if held is not None:
+            value = self.evaluate_held(held, depth)
+            return value, steps[count:], self.type_of(held.place)
+        if not steps and self.place(name, here) is None and name in self.constants:
+            return WrittenNumber(self.constants[name]), steps, ""
+        found = None
+        if self.apart and steps and isinstance(steps[0], ir.ElementStep):
+            index = self.index(steps[0], row, here)
+            found = index and self.constant(name, here, index)
+            steps = steps[1:]
+        else:
+            found = self.constant(name, here)
+        if not found:
+            return None, (), ""
+        file, datum = found
+        there = self.scope_of_datum(file, datum)
+        return self.value(datum.value, datum.row, there, depth), steps, datum.type
+
+    def index(
+        self, step: ir.ElementStep | str, row: int, here: Scope
+    ) -> tuple[int, ...] | None:
+        """Return the index of an element from 1, None where it is not known."""
+        if isinstance(step, str):
+            return None
+        values = [whole(self.number(one, row, here)) for one in step.subscripts]
+        known = tuple(k for k in values if k is not None)
+        return known if len(known) == len(values) and known else None
+
+    # What assignments give to data.
+
+    def type_of(self, place: Place) -> str:
+        """Return the type of data by their place."""
+        return self._own[place][()][1].type
+
+    def locate(self, data: ir.DataObject, row: int, here: Scope) -> PointPart | None:
+        """Find the point that only assignments change, None for all other data."""
+        place = self.place(data.name, here)
+        found = None if place is None else self.datum(data.name, here)
+        if place is None or found is None or found[1].type not in self.followed:
+            return None
+        file, datum = found
+        if not self.is_followed(data.name, datum, here):
+            return None
+        steps = data.steps
+        index: tuple[int, ...] | None = ()
+        if datum.dimensions:
+            index = self._find_element(file, datum, steps[:1], row, here)
+            steps = steps[1:]
+        component = ".".join(step for step in steps if isinstance(step, str))
+        known = all(isinstance(step, str) for step in steps)
+        known = known and bool(self.spell(datum.type, component))
+        return PointPart(place, index if known else None, component)
+
+    def _find_element(
+        self, file: int, datum: Datum, steps: Sequence[str | ir.ElementStep],
+        row: int, here: Scope,
+    ) -> tuple[int, ...] | None:  # fmt: skip
+        """Return the index of an element, None where it is not known, or no element."""
+        there = self.scope_of_datum(file, datum)
+        sizes = [self.number(one, datum.row, there) for one in datum.dimensions]
+        found = self.index(steps[0], row, here) if steps else None
+        if found is None or len(found) != len(sizes):
+            return None
+        inside = all(1 <= at <= n for at, n in zip(found, sizes, strict=True))
+        return found if inside else None
+
+    def evaluate_components(
+        self, part: PointPart, value: ir.Operand, row: int, here: Scope
+    ) -> Sequence[tuple[str, float | None]]:
+        """Return the components that an assignment sets, and what it gives to them.
+
+        Args:
+            part: What is set.
+            value: What it is given.
+            row: The assignment.
+            here: Where it stands.
+        """
+        found, type_ = self.value(value, row, here), self.type_of(part.place)
+        names = self.spell(type_, part.component)
+        if isinstance(found, KnownRecord):
+            fitting = found.whole and not part.component and type_ in self.layouts
+            found = found if fitting else None
+        fields, alone = take_apart(found, names), names == [part.component]
+        known = {
+            name: one.value for name, one in fields.items()
+            if isinstance(one, WrittenNumber)
+            and not (alone and not self.fits(type_, name, one.value))
+        }  # fmt: skip
+        own = (known or names) if self.by_name else (fields or names)
+        return [(name, known.get(name)) for name in own]
+
+    def evaluate_held(self, held: AssignedPoint, depth: int = 0) -> Value | None:
+        """Evaluate what assignments gave to data, None where it is not known."""
+        type_, base = self.type_of(held.place), None
+        if held.operand is not None:
+            base = self.value(held.operand, held.row, held.scope, depth)
+        if isinstance(base, WrittenNumber) and not self.fits(type_, "", base.value):
+            base = None
+        if not held.components:
+            return base
+        names = spell_components(layout := self.layouts.get(type_, {}), "")
+        fields = take_apart(base, names)
+        for one in held.components:
+            fields.pop(one.name, None)
+            if one.value is not None:
+                fields[one.name] = WrittenNumber(one.value)
+        if self.by_name and layout:
+            known = all(one.value is not None for one in held.components)
+            known &= held.operand is None or (
+                isinstance(base, KnownRecord) and base.whole
+            )
+            return KnownRecord(tuple(fields.items()), known)
+        return put_together(fields, layout) if len(fields) >= len(names) else None
+
+    def names_of(self, operand: ir.Operand) -> frozenset[str]:
+        """Return the names of all data and functions in an operand."""
+        key = id(operand)
+        if key not in self._names:
+            named = ir.DataObject | ir.FunctionCall
+            parts = (x for x in ir.walk(operand) if isinstance(x, named))
+            self._names[key] = operand, frozenset(one.name for one in parts)
+        return self._names[key][1]
+
+    def calls_routine(self, operand: ir.Operand) -> bool:
+        """Return True if an operand calls a function of the task."""
+        return not self.names_of(operand).isdisjoint(self.routines)
+
+    def find_held(
+        self, operand: ir.Operand | None, row: int, here: Scope
+    ) -> AssignedPoint | None:
+        """Return what assignments gave to the point that an operand names."""
+        if not (here.points.routines and isinstance(operand, ir.DataObject)):
+            return None
+        part = self.locate(operand, row, here)
+        if part is None or part.index is None or part.component:
+            return None
+        return here.points.find((part.place, part.index))
+
+    def assign(
+        self, points: Points, one: ir.Assignment, row: int, here: Scope
+    ) -> Points:
+        """Return what points hold behind an assignment.
+
+        Args:
+            points: What they hold before it.
+            one: The assignment.
+            row: Its row.
+            here: Where it stands.
+        """
+        part = self.locate(one.target, row, here)
+        if part is None:
+            return points
+        if part.index is None:
+            return points.forget(part.place)
+        there = replace(here, points=points.watch())
+        return points.give(self._give_value(part, part.index, one.value, row, there))
+
+    def _give_value(
+        self, part: PointPart, index: tuple[int, ...], value: ir.Operand, row: int,
+        here: Scope,
+    ) -> AssignedPoint:  # fmt: skip
+        """Return what a point holds that is given a value, or a component of it."""
+        place, points, own = part.place, here.points, frozenset([part.place[-1]])
+        plain = replace(here, points=NO_POINTS)
+        known = self.find_held(value, row, here)
+        if known is not None and not part.component:
+            copied = known.copied | {known.place}
+            return replace(
+                known, place=place, index=index, copied=copied, names=known.names | own
+            )
+        names = self.names_of(value)
+        if not (part.component or self._takes_held(value, row, here)):
+            return AssignedPoint(place, value, row, plain, index, names=own | names)
+        found = self.evaluate_components(part, value, row, here)
+        numbers = [Component(name, number, here.file, row) for name, number in found]
+        names = names.union(own, *(point.names for point in points.given))
+        if part.component:
+            before = points.held.get((place, index))
+            point = before or AssignedPoint(place, None, row, plain, index)
+            return point.with_components(numbers, names | own)
+        if not points.given:  # what it is given never changes
+            return AssignedPoint(place, value, row, plain, index, names=names)
+        source = source_of(value)
+        base = self.find_held(source, row, here)
+        if base is None:
+            point = AssignedPoint(place, source, row, plain, index)
+        else:
+            copied = base.copied | {base.place}
+            point = replace(base, place=place, index=index, copied=copied)
+        return point.with_components(numbers, names)
+
+    def find_returned(
+        self, call: ir.FunctionCall, row: int, here: Scope
+    ) -> tuple[ir.Operand, int, Scope] | None:
+        """Return what a function returns, its row and where that stands.
+
+        None for functions that do more than to set points of their own, or call others.
+
+        Args:
+            call: The call.
+            row: Its row.
+            here: Where it stands.
+        """
+        found = self.routine(call.name, here)
+        if found is None or found.rows.head.kind != self.functions:
+            return None
+        scope, points = self.bind(found, call, row, here), here.points
+        if scope is None:
+            return None
+        own = self.unit(scope.file), scope.module, scope.routine
+        for at in found.inside:
+            one = self.files[found.file].text.statement(at)
+            if isinstance(one, ir.Declaration):
+                continue
+            scope = replace(scope, points=points)
+            if not isinstance(one, ir.Assignment | ir.Leave) or one.value is None:
+                return None
+            if self.calls_routine(one.value):
+                return None
+            if isinstance(one, ir.Leave):
+                return (one.value, at, scope) if one.word == "return" else None
+            part = self.locate(one.target, at, scope)
+            if part is None or part.place[:3] != own:
+                return None
+            points = self.assign(points, one, at, scope)
+        return None
+
+    def _takes_held(self, value: ir.Operand, row: int, here: Scope) -> bool:
+        """Return True if a value may be made from what assigned points hold."""
+        if not here.points.routines:
+            return False
+        if self.calls_routine(value):
+            return True
+        parts = (
+            self.locate(ir.DataObject(name), row, here) for name in self.names_of(value)
+        )
+        return any(part and part.place in here.points for part in parts)
+
+
+LARGEST = 1 << 31  # whole number that counts or names anything
+
+
+def whole(value: float) -> int | None:
+    """Return a whole number, None where it is none.
+
+    >>> whole(3.0), whole(2.5), whole(float("inf"))
+    (3, None, None)
+    """
+    return int(value) if abs(value) < LARGEST and value == int(value) else None
+
+
+def holds_odd(one: ir.SourceStatement) -> bool:
+    """Return True if a statement, or what a condition leads to, is not understood."""
+    return any(isinstance(part, ir.NotUnderstood) for part in ir.walk(one))
+
+
+def _make_number(value: float, file: int = -1, slot: int = -1) -> WrittenNumber | None:
+    """Return a number, None for one that is too large for any, or none."""
+    return WrittenNumber(value, file, slot) if math.isfinite(value) else None

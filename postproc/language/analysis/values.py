@@ -1,0 +1,139 @@
+"""Values that are known before a program runs: numbers, texts, records, arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class WrittenNumber:
+    """A number: its value, and where it is written.
+
+    Attributes:
+        value: Its value.
+        file, slot: Where it stands; slot -1 where it is computed.
+    """
+
+    value: float
+    file: int = -1
+    slot: int = -1
+
+
+@dataclass(frozen=True)
+class KnownRecord:
+    """The components of an aggregate by name, those that are known.
+
+    Attributes:
+        fields: Names and values.
+        whole: All that are written are known.
+    """
+
+    fields: tuple[tuple[str, Value], ...]
+    whole: bool = True
+
+    def get(self, name: str) -> Value | None:
+        """Return a component, None where it is not there."""
+        return next((value for key, value in self.fields if key == name), None)
+
+    def number(self, name: str) -> float:
+        """Return a component that is a number, NaN where it is none."""
+        return number_in(self.get(name))
+
+
+Value = WrittenNumber | KnownRecord | str | tuple["Value", ...]
+"""A tuple is an array, or a record whose components go by their order."""
+
+Layout = Mapping[str, "Layout"]
+"""The components of a record in their order, and their own; a value has none."""
+
+
+def number_in(found: Value | None) -> float:
+    """Return a number, NaN where there is none."""
+    return found.value if isinstance(found, WrittenNumber) else math.nan
+
+
+def leaves_of(layout: Layout, prefix: str = "") -> list[str]:
+    """Spell the values of a record in their order, with all that they are in."""
+    found: list[str] = []
+    for name, inside in layout.items():
+        found += leaves_of(inside, f"{prefix}{name}.") if inside else [prefix + name]
+    return found
+
+
+def spell_components(layout: Layout, component: str) -> list[str]:
+    """Return the values of a record, or of a part of it, as they are spelt.
+
+    That of data that are no record is "".
+
+    >>> pose = {"trans": {"x": {}, "y": {}}, "rot": {"q1": {}}}
+    >>> spell_components(pose, "trans"), spell_components(pose, "x")
+    (['trans.x', 'trans.y'], [])
+    """
+    every = leaves_of(layout)
+    if not component:
+        return every or [""]
+    return [one for one in every if f"{one}.".startswith(f"{component}.")]
+
+
+def list_leaves(found: Value | None) -> Iterator[WrittenNumber | KnownRecord | str]:
+    """Yield the values of a record or an array in their order."""
+    if isinstance(found, tuple):
+        for one in found:
+            yield from list_leaves(one)
+    elif found is not None:
+        yield found
+
+
+def without_places(found: Value | None) -> Value | None:
+    """Return values without where they are written."""
+    if isinstance(found, tuple):
+        parts = [without_places(one) for one in found]
+        return tuple(one for one in parts if one is not None)
+    return WrittenNumber(found.value) if isinstance(found, WrittenNumber) else found
+
+
+def take_apart(found: Value | None, names: list[str]) -> dict[str, Value]:
+    """Return the values in a record by their names, nothing where it has others.
+
+    Args:
+        found: The record.
+        names: How its values are spelt, in their order.
+    """
+    if isinstance(found, KnownRecord):
+        return dict(found.fields)
+    own = [*list_leaves(found)]
+    return dict(zip(names, own, strict=True)) if len(own) == len(names) else {}
+
+
+def put_together(found: Mapping[str, Value], layout: Layout, prefix: str = "") -> Value:
+    """Put the values of a record together; those of other data are their only one."""
+    if not layout:
+        return found[prefix.rstrip(".")]
+    return tuple(
+        put_together(found, inside, f"{prefix}{name}.")
+        for name, inside in layout.items()
+    )
+
+
+def step_into(
+    value: Value | None, step: str | tuple[int, ...] | None, layout: Layout
+) -> tuple[Value | None, Layout]:
+    """Return a component or an element of a value, None without; and its layout.
+
+    Args:
+        value: The value.
+        step: The name of a component, or the index of an element from 1.
+        layout: Of the value, where it is a record.
+    """
+    if isinstance(step, str):
+        inside = layout.get(step, {})
+        if isinstance(value, KnownRecord):
+            return value.get(step), inside
+        step, layout = ([*layout].index(step) + 1,) if step in layout else (), inside
+    for index in step or (0,):
+        if not isinstance(value, tuple) or not 1 <= index <= len(value):
+            return None, layout
+        value = value[index - 1]
+    return value, layout
