@@ -688,5 +688,5 @@ def test_numbers_of_other_data_stay():
     found = job(*OLD.split("\n"), *lines, data=f"{DATA}\n{data}").visits
     texts = {found.reasons[k].text for k in found.reason.tolist()}
     assert texts == {"the target is computed from other data"}
-    assert found.literal.tolist() == [-1, -1]
-    np.testing.assert_array_equal(found.values[0, :6], [*numbers.values()])
+    assert found.target.literal.tolist() == [-1, -1]
+    np.testing.assert_array_equal(found.target.values[0, :6], [*numbers.values()])

@@ -11,6 +11,7 @@ import pytest
 from postproc.compensation.program import read_program
 from postproc.language import ir
 from postproc.language.pdl2 import parser
+from postproc.language.text import template_parser
 from postproc.language.visits import ELSEWHERE
 from tests.bench.growth import KINDS, Files, chain, routines, terms, tree
 
@@ -74,7 +75,7 @@ def test_a_line_of_more_terms_than_are_followed_is_listed(n, job_cell):
 
 
 def test_a_line_that_no_program_has_is_not_even_parsed(monkeypatch):
-    monkeypatch.setattr(parser, "line_parser", lambda name, start: pytest.fail())
+    monkeypatch.setattr(template_parser, "line_parser", lambda *named: pytest.fail())
     text = "n := " + "n + " * (parser.LONGEST // 4) + "n"
     assert isinstance(parser.parse_form(text), ir.NotUnderstood)
 
