@@ -125,7 +125,7 @@ def frame_order(one: Case, rng: np.random.Generator) -> Claims:
 
     def swapped(v: Visits) -> Visits:
         inverse = _frames(v, "base", np.linalg.inv)
-        return replace(inverse, base=v.frame.uframe, uframe=v.frame.base)
+        return inverse.with_columns(base=v.frame.uframe, uframe=v.frame.base)
 
     return read_as(one, swapped)
 
