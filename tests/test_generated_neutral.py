@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 
 import numpy as np
 import pytest
@@ -12,12 +11,14 @@ from tests.any_controller import told
 from tests.conftest import CELL
 from tests.generated.found import AVERAGED, KNOWN, LOADED, UNSURE, Found, within
 from tests.generated.neutral import landing
-from tests.generated.neutral.draw import FEATURES, Draw
+from tests.generated.neutral.draw import FEATURES, FOREIGN, Draw
 from tests.generated.neutral.follow import follow
-from tests.generated.neutral.in_rapid import counters
 from tests.generated.neutral.landing import case, compensated, given_back, lands
+from tests.generated.neutral.languages import LANGUAGES as WRITERS
 from tests.generated.neutral.run import Run
 from tests.generated.neutral.text import NUMBER
+from tests.generated.neutral.traits import RAPID
+from tests.generated.neutral.tree import counters
 
 LANGUAGES = ("rapid", "krl")
 SEEDS = range(400, 416)
@@ -91,10 +92,9 @@ def test_every_construct_is_drawn(told_cell, language):
     ]
     missing = [w for w in WRITTEN[language] if not any(re.search(w, t) for t in texts)]
     assert not missing
-    drawn = Counter(
-        name for seed in range(60) for name in Draw(seed, language).features
-    )
-    assert set(drawn) == set(FEATURES)
+    traits = WRITERS[language].traits
+    drawn = {name for seed in range(60) for name in Draw(seed, traits).features}
+    assert drawn == {*FEATURES, FOREIGN} - traits.lacks
 
 
 @pytest.mark.parametrize("seed", [0, 100, 5801, 5984])
@@ -164,13 +164,13 @@ def test_a_run_that_is_not_predicted_is_found(told_cell, job_model, language):
     one = case(100, language, told_cell)
     done = compensated(one.text.files, told_cell, job_model)
     steps = one.steps(one.text.files, 0)
-    assert follow(done.visits, steps, one.text, one.rapid)
+    assert follow(done.visits, steps, one.text, one.language)
     with pytest.raises(AssertionError, match="otherwise"):
-        follow(done.visits, steps[::-1], one.text, one.rapid)
+        follow(done.visits, steps[::-1], one.text, one.language)
     for pose in (*one.made.tools, *one.made.bases):
         pose[2, 3] += 0.01
     with pytest.raises(AssertionError, match="otherwise"):
-        follow(done.visits, one.steps(one.text.files, 0), one.text, one.rapid)
+        follow(done.visits, one.steps(one.text.files, 0), one.text, one.language)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -185,11 +185,11 @@ def test_a_run_is_the_same_for_the_same_inputs(told_cell, language):
 def test_inputs_decide_which_way_is_run(told_cell):
     ways = set()
     for seed in range(1, 30, 2):
-        made = Draw(seed, "rapid").program()
+        made = Draw(seed, RAPID).program()
         literals = {
             k: p.q if p.in_joints else np.eye(4) for k, p in enumerate(made.places)
         }
-        runs = [Run(made, literals, {}, run, rapid=True).run() for run in range(3)]
+        runs = [Run(made, literals, {}, run, RAPID).run() for run in range(3)]
         ways.add(len({tuple(s.move.mark for s in steps) for steps in runs}))
     assert max(ways) > 1
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -21,6 +19,7 @@ from tests.generated.neutral.tree import (
     Element,
     Expr,
     For,
+    Foreign,
     If,
     Inline,
     Less,
@@ -56,6 +55,7 @@ from tests.generated.neutral.tree import (
     Switch,
     Var,
     Wait,
+    counters,
 )
 from tests.language.neutral_job import (
     OUTSIDE,
@@ -299,6 +299,8 @@ class Writer:
                 emit(f"SetDO do{number},1;")
             case MayFail(own):
                 emit("look;" if own else "WaitDI di7,1\\MaxTime:=2;")
+            case Foreign():
+                emit("elsewhere;")
             case Note(way):
                 emit(NOTES[way])
             case Call(name, _, True):
@@ -420,25 +422,3 @@ def cond(test: Cond) -> str:
             return f"NOT ({cond(inner)})"
         case Both(a, b):
             return f"({cond(a)}) AND ({cond(b)})"
-
-
-def counters(body: Sequence[Statement]) -> list[str]:
-    """Return the counters of loops, in all blocks."""
-    found: list[str] = []
-    for one in body:
-        match one:
-            case Count(name, _, inner, _):
-                found += [name, *counters(inner)]
-            case Loop(name, before, _, after):
-                found += [name, *counters(before), *counters(after)]
-            case If(branches, otherwise):
-                for _, inner in branches:
-                    found += counters(inner)
-                found += counters(otherwise)
-            case Switch(_, cases, otherwise):
-                for _, inner in cases:
-                    found += counters(inner)
-                found += counters(otherwise)
-            case For(_, _, _, _, inner) | Skip(_, _, inner) | Poll(_, inner):
-                found += counters(inner)
-    return found

@@ -274,6 +274,13 @@ class MayFail:
 
 
 @dataclass(frozen=True)
+class Foreign:
+    """Calls a routine that no file holds; `to`: the literal where it may move to."""
+
+    to: int
+
+
+@dataclass(frozen=True)
 class If:
     """Branches with a condition each, and what else is done."""
 
@@ -360,8 +367,8 @@ class Return:
 
 Statement = (
     Move | SetTool | SetBase | Displace | SetLoad | SetSpeed | SetZone | Assign
-    | SetPoint | SetElement | SetPart | Lift | Wait | Output | Note | MayFail | If
-    | Switch | For | Count | Poll | Loop | Skip | Call | Return
+    | SetPoint | SetElement | SetPart | Lift | Wait | Output | Note | MayFail | Foreign
+    | If | Switch | For | Count | Poll | Loop | Skip | Call | Return
 )  # fmt: skip
 Body = tuple[Statement, ...]
 
@@ -485,3 +492,23 @@ def own_points(body: Body) -> list[str]:
         for inner in bodies_of(one):
             found += own_points(inner)
     return [*dict.fromkeys(found)]
+
+
+def counters(body: Body) -> list[str]:
+    """Return the counters of loops, in all blocks."""
+    found: list[str] = []
+    for one in body:
+        found += [one.name] if isinstance(one, Count | Loop) else []
+        for inner in bodies_of(one):
+            found += counters(inner)
+    return found
+
+
+def loops(body: Body) -> list[str]:
+    """Return the variables of FOR loops, in all blocks."""
+    found: list[str] = []
+    for one in body:
+        found += [one.name] if isinstance(one, For) else []
+        for inner in bodies_of(one):
+            found += loops(inner)
+    return found
