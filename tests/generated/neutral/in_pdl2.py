@@ -70,7 +70,7 @@ JOB, PART = "job", "part"
 
 
 def pdl2(made: Program, cell: Cell) -> Printed:
-    """Write a program, what it has in a program of its own, and lists of variables."""
+    """Write a program, another one that it uses, and its list of variables."""
     return Writer(made, cell).written()
 
 
@@ -97,7 +97,7 @@ class Writer:
     """Writes the statements of a program.
 
     Points of the program have their values in its list of variables where its array
-    never changes, else they are assigned; those of the other program stand in its list.
+    never changes, else they are assigned. The other program assigns its own.
     """
 
     def __init__(self, made: Program, cell: Cell) -> None:
@@ -111,12 +111,11 @@ class Writer:
         pages = [self.page]
         self._job()
         if self.made.fixed:
-            pages.append(self._listed(JOB, 0))
+            pages.append(self._listed())
         if any(routine.file for routine in self.made.routines):
             self.page, self.file = Page(f"{PART}.pdl"), 1
             pages.append(self.page)
             self._part()
-            pages.append(self._listed(PART, 1))
         return printed(pages)
 
     # Data.
@@ -157,13 +156,13 @@ class Writer:
         job = NeutralJob(self.cell, tool, base)
         return record(job.pose(where.q)).split(", "), configuration(job, where.q)
 
-    def _listed(self, name: str, file: int) -> Page:
-        """Write the values of a program's points as its list of variables."""
-        page, made = Page(f"{name}.lsv", self.page.end), self.made
-        scope = "Xport" if made.shared and not file else "Priv"
+    def _listed(self) -> Page:
+        """Write the values of the program's points as its list of variables."""
+        page, made = Page(f"{JOB}.lsv", self.page.end), self.made
+        scope = "Xport" if made.shared else "Priv"
         page.emit("--$$  ARM: 1 AXES: 6 AUX: 0 MASK: 63")
-        for point, (number, own) in made.points.items():
-            if own != file:
+        for point, (number, file) in made.points.items():
+            if file:
                 continue
             if made.places[number].in_joints:
                 page.emit(f"{point} JNTP Arm: 1 Ax: 6 {scope}")
@@ -173,7 +172,7 @@ class Writer:
             else:
                 page.emit(f"{point} POS {scope}")
                 self._list_position(page, number)
-        for row, numbers in made.arrays.items() if not file else ():
+        for row, numbers in made.arrays.items():
             page.emit(f"{row} APOS[{len(numbers)}] {scope}")
             for k, number in enumerate(numbers):
                 page.emit(f" [{k + 1}]:")
@@ -235,6 +234,9 @@ class Writer:
             else:
                 emit(f"{self._head(routine)} EXPORTED FROM {JOB}")
         emit("BEGIN")
+        self.depth += 1
+        self._assign_points(1)
+        self.depth -= 1
         emit(f"END {PART}")
 
     def _begin(self) -> None:
@@ -243,10 +245,10 @@ class Writer:
         poses = [*made.tools, *made.bases]
         for name, pose in zip(self._frames(), poses, strict=True):
             emit(f"{name} := {frame(pose)}")
+        if any(routine.file for routine in made.routines):
+            emit(f"CALL {PART}")
         if not made.fixed:
-            for name, (number, file) in made.points.items():
-                if not file:
-                    emit(f"{name} := {self._literal(number)}")
+            self._assign_points(0)
             for name, numbers in made.arrays.items():
                 for k, number in enumerate(numbers):
                     emit(f"{name}[{k + 1}] := {self._literal(number)}")
@@ -261,6 +263,11 @@ class Writer:
             emit("ENABLE CONDITION[5]")
         if not made.ends:
             emit("CYCLE")
+
+    def _assign_points(self, own: int) -> None:
+        for name, (number, file) in self.made.points.items():
+            if file == own:
+                self._emit(f"{name} := {self._literal(number)}")
 
     def _condition(self, number: int, event: str, action: str) -> None:
         self._emit(f"CONDITION[{number}] :")

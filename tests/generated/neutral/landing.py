@@ -163,13 +163,16 @@ def count(
         size = np.linalg.norm(d.std_error[mine], axis=1).max() / MM
         if not safe:
             found.error_mm[ALONG].append(pair)
-            if old.target.parted:
+            parted = old.target.parted and not one.language.traits.parts_move
+            if parted:
                 text = "moves along, though a number of it is set by itself"
                 found.wrong.append((seed, line, text))
             elif not old.target.computed:
                 why = {d.reasons[d.why[row]].text for row in mine}
                 text = f"went to new numbers, though: {' / '.join(why)}"
                 found.wrong.append((seed, line, text))
+            elif not unsure and now[k] > before[k] + MOST_MM:
+                found.wrong.append((seed, line, WORSE))
         elif (visits.frame.tool[mine] < 0).any() or (
             not old.in_joints and (visits.frame.uframe[mine] < 0).any()
         ):

@@ -16,6 +16,7 @@ class Traits:
             behind it: wait, output or input.
         zone_stays: The zone of a move holds for the moves behind it.
         grips: The arm carries its tool and what it grips.
+        parts_move: The rest of a target whose number is set by itself may be corrected.
     """
 
     name: str
@@ -23,6 +24,7 @@ class Traits:
     stops: tuple[tuple[str, float], ...] = ()
     zone_stays: bool = False
     grips: bool = False
+    parts_move: bool = False
 
     def stops_for(self, kind: str) -> float:
         """Return in which part of runs the arm stops for a kind of statement."""
@@ -47,7 +49,7 @@ PDL2 = Traits(
     "pdl2",
     frozenset({"displace", "early", "fail", "handler", "late", "load", "modal",
                "plain forms", "repair", "splines"}),
-    stops=(("wait", 0.5),),  # which may take long or not
+    stops=(("wait", 0.5),), parts_move=True,  # a wait may take long or not
 )  # fmt: skip
 ALL = Traits(
     "all",
