@@ -138,7 +138,7 @@ class Writer:
             emit(f"PERS tooldata t{k + 1}:={self._tool(k)};")
         emit(f"PERS tooldata tVar:={self._tool(0)};")
         for k in range(len(made.bases)):
-            emit(f"PERS wobjdata w{k + 1}:={self._base(k)};")
+            emit(f"PERS wobjdata wobj{k + 1}:={self._base(k)};")
         emit(f"PERS wobjdata wVar:={self._base(0)};")
         for k, (mass, centre) in enumerate(made.loads):
             at = ",".join(f"{x:g}" for x in centre)
@@ -264,7 +264,7 @@ class Writer:
             case SetTool(number, _):
                 emit(f"tVar:=t{number};")
             case SetBase(number, shift, _):
-                emit(f"wVar:=w{number};")
+                emit(f"wVar:=wobj{number};")
                 if any(shift):
                     at = ",".join(map(str, shift))
                     emit(f"wVar.oframe:=[[{at}],[1,0,0,0]];")
@@ -367,7 +367,7 @@ class Writer:
         word = {"joint": "MoveJ", "line": "MoveL", "arc": "MoveC", "axes": "MoveAbsJ"}
         name = "TriggL" if one.trigger else word[one.kind]
         tool = f"t{one.tool}" if one.tool else "tVar"
-        base = f"w{one.base}" if one.base else "wVar"
+        base = f"wobj{one.base}" if one.base else "wVar"
         speed = f"v_{one.speed}" if one.speed else "vVar"
         zone = {0: "fine", -1: "zVar"}.get(one.zone, f"z_{one.zone}")
         places = [self._point(p) for p in (one.via, one.to) if p is not None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -481,6 +482,14 @@ def bodies_of(one: Statement) -> list[Body]:
         case Switch(_, cases, otherwise):
             return [*(inner for _, inner in cases), otherwise]
     return []
+
+
+def statements(body: Body) -> Iterator[Statement]:
+    """Yield all statements of a block, those in blocks of it too."""
+    for one in body:
+        yield one
+        for inner in bodies_of(one):
+            yield from statements(inner)
 
 
 def own_points(body: Body) -> list[str]:
