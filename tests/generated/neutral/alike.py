@@ -132,10 +132,11 @@ def differences(a: Arrivals, b: Arrivals) -> Iterator[tuple[int, str]]:
     """Yield in what two languages differ, with the line in the first one.
 
     These may differ: whether KRL stops at a fly point, where a statement behind it
-    waits for the arm; codes of points that more than moves read, or that the program
-    sets in several ways (each language has rules of its own for them), and of moves at
-    such points; corrections at fly points, where sides differ, and of one correction
-    for several arrivals.
+    waits for the arm; the origin of the end of an arc, which in PDL2 is unknown if the
+    arc begins at several places; codes at fly points, whose corners are blended
+    otherwise, and at points that more than moves read, or that the program sets in
+    several ways (each language has rules of its own for them); corrections at fly
+    points, where sides differ, and where one is for several arrivals.
     """
     moves, read = moves_of(a.case.made), read_elsewhere(a.case.made)
     for key in sorted({*a.rows} ^ {*b.rows}):
@@ -144,9 +145,14 @@ def differences(a: Arrivals, b: Arrivals) -> Iterator[tuple[int, str]]:
     for key in sorted({*a.rows} & {*b.rows}):
         one, two = a.rows[key], b.rows[key]
         move = moves[key[0]]
+        states = a.state(one), b.state(two)
         exempt = {"fly"} if b.case.language.traits.name == "krl" else set()
-        exempt |= {"code"} if (names_in(move.via) | names_in(move.to)) & read else set()
-        found = [*states_differ(a.state(one), b.state(two), exempt)]
+        named = names_in(move.via) | names_in(move.to)
+        if named & read or any(state["fly"] for state in states):
+            exempt.add("code")
+        if move.kind == "arc":
+            exempt.add("origin")
+        found = [*states_differ(*states, exempt)]
         found += poses_differ(a.poses(one), b.poses(two))
         found += corrections_differ(a, b, one, two)
         for what in found:

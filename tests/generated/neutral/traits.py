@@ -51,16 +51,17 @@ PDL2 = Traits(
                "plain forms", "repair", "splines"}),
     stops=(("wait", 0.5),), parts_move=True,  # a wait may take long or not
 )  # fmt: skip
-# Left out, as one of the languages follows it and another one does not: shifts that are
-# computed ("computed shifts": KRL puts them into a frame first), what numbers of the
-# program decide ("counts": PDL2 alone knows which way), frames that are set in a branch
-# or a routine (RAPID does not join equal values), what functions return (PDL2), shifts
-# along the tool (PDL2 keeps their points, KRL loses S and T), values that other
-# programs may change (PDL2), and what is behind a routine that no file holds.
+# Left out, as one language follows it and another one does not: shifts that are computed
+# (KRL puts them into a frame first), what numbers of the program decide ("counts": PDL2
+# alone knows which way), frames that are set in a branch or a routine (RAPID does not
+# join equal values), what functions return (PDL2), points that are arguments ("given":
+# KRL), shifted points (in KRL they have no S and T, in PDL2 no numbers of their own),
+# values that other programs may change ("modules", "shared": PDL2), and what is behind
+# a routine that no file holds.
 ALL = Traits(
     "all",
     frozenset({"computed shifts", "counts", "early", "first", "foreign",
-               "frames in blocks", "functions", "interrupt", "loop", "made", "modules",
-               "plain forms", "shared", "tool", "zone"})
+               "frames in blocks", "functions", "given", "interrupt", "loop", "made",
+               "modules", "offset", "plain forms", "shared", "tool", "zone"})
     | (RAPID.lacks | KRL.lacks | PDL2.lacks) - {"forms", "splines"},
 )  # fmt: skip
