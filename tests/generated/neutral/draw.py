@@ -369,9 +369,8 @@ class Draw:
             literal = Inline(self._literal())
             return SetPart(point, axis, literal, mark=SHIFTS + self.shifts)
         of = rng.choice([point, point, self._fixed()])
-        by = (
-            Var(rng.choice(self._names())) if rng.random() < 0.3 else rng.randint(-9, 9)
-        )
+        computed = rng.random() < 0.3 and self.can("computed shifts")
+        by = Var(rng.choice(self._names())) if computed else rng.randint(-9, 9)
         return SetPart(point, axis, of, by)
 
     def _row_index(self) -> Expr:

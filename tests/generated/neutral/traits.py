@@ -51,8 +51,8 @@ PDL2 = Traits(
                "plain forms", "repair", "splines"}),
     stops=(("wait", 0.5),), parts_move=True,  # a wait may take long or not
 )  # fmt: skip
-# Left out, as one language follows it and another one does not: shifts that are computed
-# (KRL puts them into a frame first), what numbers of the program decide ("counts": PDL2
+# Left out, as one language follows it and another one does not: computed shifts (KRL
+# puts them into a frame first), what numbers of the program decide ("counts": PDL2
 # alone knows which way), frames that are set in a branch or a routine (RAPID does not
 # join equal values), what functions return (PDL2), points that are arguments ("given":
 # KRL), shifted points (in KRL they have no S and T, in PDL2 no numbers of their own),
