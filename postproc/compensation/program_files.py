@@ -280,11 +280,19 @@ def name_files(
     variables: bytes | None,
     pages: Mapping[str, bytes] = NO_PAGES,
 ) -> dict[str, bytes]:
-    """Name a program, its pages and its variable file, the program first."""
+    """Name a program, its pages and its variable file, in this order.
+
+    Raises:
+        ProgramError: There are two variable files.
+    """
     files = {name: source, **pages}
+    lists = {page: files.pop(page) for page in pages if file_named(page).is_variables}
     if variables is not None:
-        files[file_named(name).variables] = variables
-    return files
+        lists[file_named(name).variables] = variables
+    if len(lists) > 1:
+        problem = "a program has one variable file, and there are two"
+        raise ProgramError([*lists][1], problem, "Leave one of them out")
+    return files | lists
 
 
 def program_name(program: str, lsv: Path | None) -> str:

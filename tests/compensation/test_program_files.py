@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from postproc.compensation.compensate import compensate
 from postproc.compensation.pages import is_output
 from postproc.compensation.program import read_program
 from postproc.compensation.program_files import find_pages
@@ -143,3 +144,25 @@ def test_the_programs_that_a_text_names():
     text = b"IMPORT 'a'\rIMPORT 'x'\r\nCALL b\ncall b -- call c\nMOVE recall\n CALL d"
     found = file_named("m.pdl").find_named(text, is_output)
     assert found == ({"a": 1, "b": 2, "d": 5}, {})
+
+
+def test_a_variable_file_among_the_pages_counts_as_the_last_file(job_cell, job_model):
+    line = "  MOVE JOINT TO {{{}, 5, -90, 10, 50, 10}}\n"
+    a, b = line.format(5).encode(), line.format(9).encode()
+    main = b"PROGRAM job\nIMPORT 'part'\nVAR p : POSITION\nBEGIN\n" + a
+    main += b"  CALL part\n  MOVE LINEAR TO p\nEND job\n"
+    part = b"PROGRAM part\nBEGIN\n" + b + b"END part\n"
+    values = b"p POS Priv\n X: 150.0 Y: 200.0 Z: 250.0 A: 0.0 E: 168.0 R: 0.0\n"
+    values += b" CNFG: ''\n"
+    first = {"job.lsv": values, "part.pdl": part}
+    last = {name: first[name] for name in reversed(first)}
+    found = [
+        compensate(main, job_cell, job_model, name="job.pdl", pages=pages)
+        for pages in (first, last)
+    ]
+    assert found[0].outputs == found[1].outputs and set(found[0].outputs) >= set(first)
+    with pytest.raises(ProgramError, match="one variable file"):
+        compensate(
+            main, job_cell, job_model, name="job.pdl",
+            pages={**first, "part.lsv": values},
+        )  # fmt: skip

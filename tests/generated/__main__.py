@@ -2,8 +2,9 @@
 
 python -m tests.generated --count 1000 --language pdl2        (or: make generated)
 
-PDL2 has a generator of its own. Programs of RAPID and KRL are drawn in no language, and
-run by a small walk of what was drawn.
+Programs are drawn in no language, written, and run by a small walk of what was drawn.
+PDL2 has a generator of its own, too: `own` draws with it. Of `all`, every program is
+written in all languages, which must see the same in it.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ from tests.conftest import CELL, make_job
 from tests.generated.flows import flows
 from tests.generated.found import Found, lines
 from tests.generated.landing import lands
+from tests.generated.neutral.alike import alike
 from tests.generated.neutral.landing import lands as neutral_lands
 
-LANGUAGES = ("pdl2", "rapid", "krl")
+LANGUAGES = ("own", "pdl2", "rapid", "krl", "all")
 _SETUP: list[tuple[Cell, Model]] = []
 
 
@@ -37,7 +39,9 @@ def begin(folder: str) -> None:
 def check(language: str, seed: int) -> Found:
     """Check one program."""
     try:
-        if language != "pdl2":
+        if language == "all":
+            return alike(seed, *_SETUP[0])
+        if language != "own":
             return neutral_lands(seed, language, *_SETUP[0])
         flows(seed)
         return lands(seed, *_SETUP[0])

@@ -75,7 +75,7 @@ def pdl2(job: NeutralJob) -> bytes:
         f"    {m.name} : POSITION" for m in job.moves if m.name and not m.in_joints
     ]
     given = [
-        f"    {m.name} := POS({record(job.pose(m.q))}, '{_string(job, m.q)}')"
+        f"    {m.name} := POS({record(job.pose(m.q))}, '{configuration(job, m.q)}')"
         for m in job.moves
         if m.name and not m.in_joints
     ]
@@ -90,7 +90,8 @@ def pdl2(job: NeutralJob) -> bytes:
     return "\n".join(line for line in lines if line != "VAR" or points).encode() + b"\n"
 
 
-def _string(job: NeutralJob, q: np.ndarray) -> str:
+def configuration(job: NeutralJob, q: np.ndarray) -> str:
+    """Write the configuration of joint angles as PDL2 has it."""
     slot = int(job.cell.arm.branch(q[None])[0])
     flags = [name for name, bit in (("S", 2), ("E", 1), ("W", 4)) if slot & bit]
     turns = np.floor((q[[3, 5]] + np.pi) / (2 * np.pi)).astype(int)
@@ -112,7 +113,7 @@ def _pdl2_move(job: NeutralJob, move: NeutralMove) -> str:
 def _pdl2_point(job: NeutralJob, q: np.ndarray, in_joints: bool, name: str) -> str:
     if in_joints:
         return "{" + ", ".join(f"{v:.5f}" for v in np.rad2deg(q)) + "}"
-    return name or f"POS({record(job.pose(q))}, '{_string(job, q)}')"
+    return name or f"POS({record(job.pose(q))}, '{configuration(job, q)}')"
 
 
 def quaternion(pose: np.ndarray, digits: int = 12) -> str:

@@ -117,7 +117,8 @@ BUILT_IN_FUNCTIONS = frozenset(
     offs reltool distance dotprod normalize posemult poseinv posevect orientzyx eulerzyx
     defframe defdframe mirpos crobt cjointt cpos ctool cwobj calcrobt
     calcjointt numtostr strlen strpart valtostr ctime cdate clkread gettime
-    doutput dinput goutput testdi valid present ispers isvar opmode runmode execlevel
+    ainput aoutput dinput doutput ginput ginputdnum goutput goutputdnum testdi
+    valid present ispers isvar opmode runmode execlevel
     isstopmoveact isstopstateevent ismechunitactive bitand bitor bitxor bitneg bitcheck
     stringmatch strfind strmap strmatch strorder gettaskname robos
     """.split()

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tests.generated.neutral.text import SHIFTS
+from tests.generated.neutral.traits import Traits
 from tests.generated.neutral.tree import (
     Ask,
     Assign,
@@ -21,6 +22,7 @@ from tests.generated.neutral.tree import (
     Element,
     Expr,
     For,
+    Foreign,
     Function,
     If,
     Inline,
@@ -69,22 +71,25 @@ FEATURES = (
     "modal", "modules", "note", "offset", "parts", "poll", "repair", "rows", "shared",
     "shift", "step", "tool", "trigger", "variable", "zone",
 )  # fmt: skip
+FOREIGN = "foreign"  # in every fifth program: little is known behind it
 TOOLS, BASES, LOADS = 2, 3, 2
 ROW = 3  # points of a variable array
 ENTRY = "job"
 
 
 class Draw:
-    """Draws one program for a language."""
+    """Draws one program for a language, or for all of them."""
 
-    def __init__(self, seed: int, language: str) -> None:
-        self.rng = random.Random(f"{language}:{seed}")
-        self.rapid = language == "rapid"
+    def __init__(self, seed: int, language: Traits) -> None:
+        self.rng = random.Random(f"{language.name}:{seed}")
+        self.language = language
         self.made = Program()
-        self.features = {name for name in FEATURES if self.rng.random() < 0.5}
+        drawn = {name for name in FEATURES if self.rng.random() < 0.5}
+        drawn |= {FOREIGN} if seed % 5 == 4 else set()
+        self.features = drawn - language.lacks
         self.marks = 0
         self.shifts = 0
-        self.inputs = seed % 2 == 1  # every other program has no inputs
+        self.inputs = seed % 2 == 1 or not self.can("counts")  # else every other one
         self.own: tuple[str, ...] = ()
         self.given: tuple[str, ...] = ()  # points that are arguments
         self.file = 0
@@ -94,6 +99,10 @@ class Draw:
     def has(self, name: str) -> bool:
         """Tell whether something is drawn in this program."""
         return name in self.features
+
+    def can(self, name: str) -> bool:
+        """Tell whether the language has words for something."""
+        return name not in self.language.lacks
 
     def program(self) -> Program:
         """Draw a program."""
@@ -107,7 +116,7 @@ class Draw:
         body = (*self._opening(), *self._body(rng.randint(6, 14), 0))
         main = Routine(ENTRY, (), body, ("m1",), handler, self._repair(handler))
         made.routines = [main, *reversed(self.callable)]
-        made.ends = not self.rapid or rng.random() < 0.6
+        made.ends = not self.can("again") or rng.random() < 0.6
         made.interrupts = self.has("interrupt")
         if self.inputs and made.interrupts and self.has("meddle"):
             made.interrupt = (self._change(),)
@@ -118,7 +127,9 @@ class Draw:
 
     def _data(self) -> None:
         made, rng = self.made, self.rng
-        made.plain = not self.rapid and rng.random() < 0.5
+        made.plain = self.can("splines") and rng.random() < 0.5
+        if made.plain and not self.can("plain forms"):
+            self.features.discard("forms")
         middle = Rotation.from_euler("ZYZ", [170.0, 60.0, -179.0], True).as_matrix()
         for k in range(TOOLS):
             tool = np.eye(4)
@@ -135,6 +146,8 @@ class Draw:
             made.bases.append(base)
         made.fixed = rng.random() < 0.5
         made.tool_loads = [rng.choice([0.001, 0.001, 12.0]) for _ in range(TOOLS)]
+        if not self.can("load"):
+            made.tool_loads = [0.001] * TOOLS
         for _ in range(LOADS):
             centre = (0.0, float(rng.randint(-50, 50)), float(rng.randint(50, 250)))
             made.loads.append((float(rng.randint(5, 60)), centre))
@@ -184,7 +197,7 @@ class Draw:
         )  # fmt: skip
 
     def _handler(self) -> tuple[str, int]:
-        if not self.rapid or not self.has("handler") or self.rng.random() < 0.4:
+        if not self.has("handler") or self.rng.random() < 0.4:
             return "", 0
         words = ["RETRY", "TRYNEXT", "TRYNEXT", "RETURN", "RAISE"]
         return self.rng.choice(words), self.rng.randint(0, 2)
@@ -198,8 +211,8 @@ class Draw:
     def _change(self) -> Statement:
         """Change something that other statements build on."""
         rng = self.rng
-        kinds = ["number", "number", "point", "load", "base"]
-        match rng.choice([*kinds, *["displace"] * self.rapid]):
+        kinds = ["number", "number", "point", *["load"] * self.can("load"), "base"]
+        match rng.choice([*kinds, *["displace"] * self.can("displace")]):
             case "point":
                 value = Named(f"p{rng.randint(1, 3)}")
                 return SetPoint(rng.choice(self.made.variables[:2]), value)
@@ -223,19 +236,22 @@ class Draw:
             return Read()
         if kind == "sum" and depth < 1:
             return Sum(self._expr(1), rng.randint(1, 2))
-        if kind == "ask" and depth < 1:
+        if kind == "ask" and depth < 1 and self.can("functions"):
             return Ask(rng.choice(["plus", "choice"]), self._expr(1))
         return Var(rng.choice(self._names())) if kind == "name" else rng.randint(0, 3)
 
     def _cond(self, depth: int = 0) -> Cond:
         rng = self.rng
-        kind = rng.choice(["less", "less", "equal", "signal", "signal", "not", "both"])
+        kinds = ["less", "less", "equal"] if self.can("counts") else ["signal"]
+        kind = rng.choice([*kinds, "signal", "signal", "not", "both"])
         if kind == "signal" and self.inputs:
             return Signal(rng.randint(1, 3))
         if kind == "not" and depth < 1:
             return Not(self._cond(1))
         if kind == "both" and depth < 1:
             return Both(self._cond(1), self._cond(1))
+        if not self.can("counts"):
+            return Signal(rng.randint(1, 3))
         return Less(Var(rng.choice(self._names())), rng.randint(0, 3), kind == "equal")
 
     # Places.
@@ -290,7 +306,7 @@ class Draw:
     def _offset(self) -> tuple[Expr, Expr, Expr]:
         rng = self.rng
         z: Expr = rng.randint(-20, 20)
-        if rng.random() < 0.3:
+        if rng.random() < 0.3 and self.can("computed shifts"):
             z = Var(rng.choice(self._names()))
         return rng.randint(-10, 10), 0, z
 
@@ -304,13 +320,18 @@ class Draw:
         frames: list[Statement] = [SetTool(1, 1), SetBase(1, way=1), SetSpeed(200)]
         given = [SetPoint(name, self._fixed()) for name in self.made.variables[:2]]
         counts = [Assign("m1", 0)]
+        if not self.can("first"):
+            counts += [Assign(name, value) for name, value in self.made.numbers.items()]
         return (*frames, *given, *counts, *first, *self._fill())
 
     def _body(self, count: int, depth: int) -> Body:
         found: list[Statement] = []
         for _ in range(count):
             found.append(one := self._statement(depth))
-            if isinstance(one, SetPoint) and self.rng.random() < 0.7:
+            if isinstance(one, Foreign):
+                found += [SetTool(1, 1), SetBase(1, way=1), SetSpeed(200)]
+                found.append(self._move("axes", Inline(self._literal(True)), 0))
+            elif isinstance(one, SetPoint) and self.rng.random() < 0.7:
                 found += self._parts(Named(one.name), 0.3)
                 found.append(self._move("line", Named(one.name), 0))
             elif isinstance(one, SetElement) and self.rng.random() < 0.7:
@@ -348,9 +369,8 @@ class Draw:
             literal = Inline(self._literal())
             return SetPart(point, axis, literal, mark=SHIFTS + self.shifts)
         of = rng.choice([point, point, self._fixed()])
-        by = (
-            Var(rng.choice(self._names())) if rng.random() < 0.3 else rng.randint(-9, 9)
-        )
+        computed = rng.random() < 0.3 and self.can("computed shifts")
+        by = Var(rng.choice(self._names())) if computed else rng.randint(-9, 9)
         return SetPart(point, axis, of, by)
 
     def _row_index(self) -> Expr:
@@ -366,7 +386,7 @@ class Draw:
         self.loops += 1
         i = Var(f"i{self.loops}")
         value: Point = self._fixed()
-        if self.rng.random() < 0.5:
+        if self.can("computed shifts") and self.rng.random() < 0.5:
             value = Shifted(value, (0, self.rng.randint(-9, 9), i))
         to = Element("s", i)
         fill: Body = (SetElement("s", i, value), *self._parts(to, 0.5))
@@ -382,6 +402,8 @@ class Draw:
                 "block": 5,
                 "call": 3 * (bool(self.callable) and self.has("call")),
             }
+        if not self.can("frames in blocks") and (depth or self.own):
+            del kinds["frames"]
         kind = self.rng.choices(list(kinds), list(kinds.values()))[0]
         if kind == "block":
             return self._block(depth)
@@ -395,7 +417,7 @@ class Draw:
         rng = self.rng
         kinds = ["line"] * 6 + ["joint"] * 3 + ["axes"]
         kinds += ["arc"] * (self.has("arc") and not self.made.plain)
-        kinds += ["step"] * (self.has("step") and not self.rapid)
+        kinds += ["step"] * self.has("step")
         kind = rng.choice(kinds)
         zone = rng.choice([0, 0, 0, 5, 10, -1 if self.has("zone") else 0])
         if kind == "axes":
@@ -430,18 +452,23 @@ class Draw:
     def _move(self, kind: str, to: Point, zone: int, via: Point | None = None) -> Move:
         self.marks += 1
         rng = self.rng
-        named = not self.has("modal") or rng.random() < 0.7
-        if not self.rapid:
-            form = self.has("forms") and kind in ("line", "joint") and zone >= 0
-            named = form and rng.random() < 0.6
+        formed = False
+        if self.can("modal"):
+            named = not self.has("modal") or rng.random() < 0.7
+        else:
+            simple = kind in ("line", "joint") and zone >= 0
+            any_move = self.can("clauses") and kind != "step"
+            formed = self.has("forms") and (simple or any_move)
+            named = formed = formed and rng.random() < 0.6
         tool = rng.choice([1, 1, 1, 2]) if named else 0
         base = rng.choice([1, 1, 1, 2, 3]) if named else 0
-        formed = named and not self.rapid
         trigger = (
             kind == "line" and not formed and self.has("trigger") and rng.random() < 0.2
         )
         speed = rng.choice([100, 200] if formed else [0, 100, 200])
-        early = kind == "joint" and (formed or rng.random() < 0.5)
+        speed *= formed or self.can("speeds")
+        early = kind == "joint" and self.can("early")
+        early = early and (formed or rng.random() < 0.5)
         return Move(self.marks, kind, to, via, zone, tool, base, speed, trigger, early)
 
     def _assignment(self) -> Statement:
@@ -466,7 +493,7 @@ class Draw:
         rng = self.rng
         kinds = ["speed", *["tool", "base", "base"] * self.has("frames")]
         kinds += [name for name in ("shift", "load", "zone") if self.has(name)]
-        kinds += ["displace"] * 2 * (self.rapid and self.has("displace"))
+        kinds += ["displace"] * 2 * self.has("displace")
         match rng.choice(kinds):
             case "tool":
                 return SetTool(rng.randint(1, TOOLS), rng.randint(0, 2))
@@ -485,12 +512,14 @@ class Draw:
     def _other(self) -> Statement:
         rng = self.rng
         kinds = ["wait", "output", "output", *["note"] * 3 * self.has("note")]
-        kinds += ["fail"] * 3 * (self.rapid and self.has("fail"))
+        kinds += ["fail"] * 3 * self.has("fail") + ["foreign"] * 2 * self.has(FOREIGN)
         match rng.choice(kinds):
             case "wait":
                 return Wait(rng.randint(0, 1))
             case "note":
                 return Note(rng.randint(0, 4))
+            case "foreign":
+                return Foreign(self._literal(in_joints=True))
             case "fail":
                 return MayFail(rng.random() < 0.3)
         return Output(rng.randint(1, 3), rng.random() < 0.5)
@@ -507,15 +536,17 @@ class Draw:
                 arguments.append(Var(rng.choice(self._names())))
             else:
                 arguments.append(self._expr())
-        late = self.rapid and self.has("late") and not arguments and rng.random() < 0.5
+        late = self.has("late") and not arguments and rng.random() < 0.5
         return Call(called.name, tuple(arguments), late)
 
     def _block(self, depth: int) -> Statement:
         rng = self.rng
-        kinds = ["if", "if", "switch", "for", "for", "while", "label", "skip"]
-        kinds += [name for name in ("loop",) if self.has(name)]
+        kinds = ["if", "if", "switch", "for", "for", "skip"]
+        if self.can("counts"):
+            kinds[5:5] = ["while", "label"]
+            kinds += ["loop"] * self.has("loop")
         kinds += ["poll"] * (self.inputs and self.has("poll"))
-        kinds += ["return"] * (self.own != ()) + ["repeat"] * (not self.rapid)
+        kinds += ["return"] * (self.own != ()) + ["repeat"] * self.can("repeat")
         kind = rng.choice(kinds)
         if kind == "return":
             return Return(self._cond())
@@ -539,7 +570,8 @@ class Draw:
             cases = tuple(
                 (values, self._inner(depth)) for values in ((0,), (1, 2), (3,))
             )
-            return Switch(self._expr(), cases, self._inner(depth))
+            value = self._expr() if self.can("counts") else Read()
+            return Switch(value, cases, self._inner(depth))
         branches = tuple(
             (self._cond(), self._inner(depth)) for _ in range(rng.randint(1, 2))
         )

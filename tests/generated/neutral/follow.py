@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.language.visits import ELSEWHERE, START, Meaning, Visits
-from tests.generated.neutral.in_krl import poses as krl_poses
-from tests.generated.neutral.in_rapid import poses as rapid_poses
+from tests.generated.neutral.languages import Language
 from tests.generated.neutral.run import Step
 from tests.generated.neutral.text import Printed
 from tests.generated.neutral.tree import Place, Program, Shifted
@@ -21,7 +20,7 @@ ANYTHING = re.compile(r"(interrupt|TRAP|handler) .*may (move|be called)|at any t
 
 
 def follow(
-    visits: Visits, steps: Sequence[Step], where: Printed, rapid: bool
+    visits: Visits, steps: Sequence[Step], where: Printed, language: Language
 ) -> list[set[int]]:
     """Return the visits that each step of a run may be, along predecessors.
 
@@ -40,13 +39,15 @@ def follow(
             continue
         place = where.moves[step.move.mark]
         here = by_line.get(place, [])
-        alike = [v for v in here if not misfit(visits, v, step, rapid)]
+        alike = [v for v in here if not misfit(visits, v, step, language)]
         now = {
             v for v in alike
             if {ELSEWHERE, *before} & {*visits.graph.predecessors(v).tolist()}
         }  # fmt: skip
         if not now:
-            why = {misfit(visits, v, step, rapid) or "its predecessors" for v in here}
+            why = {
+                misfit(visits, v, step, language) or "its predecessors" for v in here
+            }
             text = " / ".join(sorted(why)) or "no visit"
             raise AssertionError(
                 f"{place[0]}, line {place[1]} is run otherwise: {text}"
@@ -56,7 +57,7 @@ def follow(
     return found
 
 
-def misfit(visits: Visits, visit: int, step: Step, rapid: bool) -> str:
+def misfit(visits: Visits, visit: int, step: Step, language: Language) -> str:
     """Say in what a visit differs from a step of a run, "" in nothing."""
     if bool(visits.motion.via[visit]) != step.via:
         return "another point of an arc"
@@ -73,7 +74,7 @@ def misfit(visits: Visits, visit: int, step: Step, rapid: bool) -> str:
     known = visits.reason[visit] == 0 and tool >= 0
     if known and not same_load(visits, visit, step):
         return "the load"
-    return "" if same_goal(visits, visit, step, rapid) else "the target"
+    return "" if same_goal(visits, visit, step, language) else "the target"
 
 
 def same_load(visits: Visits, visit: int, step: Step) -> bool:
@@ -86,7 +87,7 @@ def same_load(visits: Visits, visit: int, step: Step) -> bool:
     return np.allclose(stated, wanted, rtol=0.0, atol=HEAVY)
 
 
-def same_goal(visits: Visits, visit: int, step: Step, rapid: bool) -> bool:
+def same_goal(visits: Visits, visit: int, step: Step, language: Language) -> bool:
     """Compare the kind of a target, and its numbers."""
     numbers, meaning = (
         visits.target.values[visit].tolist(),
@@ -97,14 +98,13 @@ def same_goal(visits: Visits, visit: int, step: Step, rapid: bool) -> bool:
         return step.move.kind == "step" and np.allclose(numbers[:3], by)
     if step.in_joints != (meaning == Meaning.JOINTS):
         return False
-    return same(said(numbers, step.in_joints, rapid), step.target.value)
+    return same(said(numbers, step.in_joints, language), step.target.value)
 
 
-def said(numbers: Sequence[float], in_joints: bool, rapid: bool) -> np.ndarray:
+def said(numbers: Sequence[float], in_joints: bool, language: Language) -> np.ndarray:
     """Return what the numbers of a visit say."""
     made = Program(places=[Place(np.zeros(6), in_joints, 1, 1)])
-    read = rapid_poses if rapid else krl_poses
-    return read({0: list(numbers)}, made)[0]
+    return language.poses({0: list(numbers)}, made)[0]
 
 
 def same(a: np.ndarray, b: np.ndarray) -> bool:

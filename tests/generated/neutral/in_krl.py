@@ -8,7 +8,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from postproc.robot.cell import Cell
-from tests.generated.neutral.in_rapid import counters
 from tests.generated.neutral.run import HEAVY, moved
 from tests.generated.neutral.text import Page, Printed, bare_numbers, literal, printed
 from tests.generated.neutral.tree import (
@@ -22,6 +21,7 @@ from tests.generated.neutral.tree import (
     Element,
     Expr,
     For,
+    Foreign,
     If,
     Inline,
     Less,
@@ -56,7 +56,8 @@ from tests.generated.neutral.tree import (
     Switch,
     Var,
     Wait,
-    bodies_of,
+    counters,
+    loops,
     own_points,
 )
 from tests.language.neutral_job import NeutralJob, status
@@ -338,6 +339,8 @@ class Writer:
                 if ahead:
                     emit("CONTINUE")
                 emit(f"$OUT[{number}]=TRUE")
+            case Foreign():
+                emit("ELSEWHERE ( )")
             case Note(way):
                 emit(NOTES[way])
             case Call(name, arguments):
@@ -533,13 +536,3 @@ def cond(test: Cond) -> str:
             return f"NOT ({cond(inner)})"
         case Both(a, b):
             return f"({cond(a)}) AND ({cond(b)})"
-
-
-def loops(body: Sequence[Statement]) -> list[str]:
-    """Return the variables of FOR loops, in all blocks."""
-    found: list[str] = []
-    for one in body:
-        found += [one.name] if isinstance(one, For) else []
-        for inner in bodies_of(one):
-            found += loops(inner)
-    return found

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -21,6 +19,7 @@ from tests.generated.neutral.tree import (
     Element,
     Expr,
     For,
+    Foreign,
     If,
     Inline,
     Less,
@@ -56,6 +55,7 @@ from tests.generated.neutral.tree import (
     Switch,
     Var,
     Wait,
+    counters,
 )
 from tests.language.neutral_job import (
     OUTSIDE,
@@ -138,7 +138,7 @@ class Writer:
             emit(f"PERS tooldata t{k + 1}:={self._tool(k)};")
         emit(f"PERS tooldata tVar:={self._tool(0)};")
         for k in range(len(made.bases)):
-            emit(f"PERS wobjdata w{k + 1}:={self._base(k)};")
+            emit(f"PERS wobjdata wobj{k + 1}:={self._base(k)};")
         emit(f"PERS wobjdata wVar:={self._base(0)};")
         for k, (mass, centre) in enumerate(made.loads):
             at = ",".join(f"{x:g}" for x in centre)
@@ -264,7 +264,7 @@ class Writer:
             case SetTool(number, _):
                 emit(f"tVar:=t{number};")
             case SetBase(number, shift, _):
-                emit(f"wVar:=w{number};")
+                emit(f"wVar:=wobj{number};")
                 if any(shift):
                     at = ",".join(map(str, shift))
                     emit(f"wVar.oframe:=[[{at}],[1,0,0,0]];")
@@ -299,6 +299,8 @@ class Writer:
                 emit(f"SetDO do{number},1;")
             case MayFail(own):
                 emit("look;" if own else "WaitDI di7,1\\MaxTime:=2;")
+            case Foreign():
+                emit("elsewhere;")
             case Note(way):
                 emit(NOTES[way])
             case Call(name, _, True):
@@ -365,7 +367,7 @@ class Writer:
         word = {"joint": "MoveJ", "line": "MoveL", "arc": "MoveC", "axes": "MoveAbsJ"}
         name = "TriggL" if one.trigger else word[one.kind]
         tool = f"t{one.tool}" if one.tool else "tVar"
-        base = f"w{one.base}" if one.base else "wVar"
+        base = f"wobj{one.base}" if one.base else "wVar"
         speed = f"v_{one.speed}" if one.speed else "vVar"
         zone = {0: "fine", -1: "zVar"}.get(one.zone, f"z_{one.zone}")
         places = [self._point(p) for p in (one.via, one.to) if p is not None]
@@ -420,25 +422,3 @@ def cond(test: Cond) -> str:
             return f"NOT ({cond(inner)})"
         case Both(a, b):
             return f"({cond(a)}) AND ({cond(b)})"
-
-
-def counters(body: Sequence[Statement]) -> list[str]:
-    """Return the counters of loops, in all blocks."""
-    found: list[str] = []
-    for one in body:
-        match one:
-            case Count(name, _, inner, _):
-                found += [name, *counters(inner)]
-            case Loop(name, before, _, after):
-                found += [name, *counters(before), *counters(after)]
-            case If(branches, otherwise):
-                for _, inner in branches:
-                    found += counters(inner)
-                found += counters(otherwise)
-            case Switch(_, cases, otherwise):
-                for _, inner in cases:
-                    found += counters(inner)
-                found += counters(otherwise)
-            case For(_, _, _, _, inner) | Skip(_, _, inner) | Poll(_, inner):
-                found += counters(inner)
-    return found

@@ -1,4 +1,4 @@
-"""Generated programs of RAPID and KRL, compensated, and run on the virtual arm."""
+"""Drawn programs, compensated, and run on the virtual arm."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ from tests.generated.found import (
     is_averaged,
 )
 from tests.generated.landing import WORSE
-from tests.generated.neutral import in_krl, in_rapid
 from tests.generated.neutral.draw import Draw
 from tests.generated.neutral.follow import follow
+from tests.generated.neutral.languages import LANGUAGES, Language
 from tests.generated.neutral.run import Run, Step
 from tests.generated.neutral.text import SHIFTS, Printed
 from tests.generated.neutral.tree import Program
@@ -62,22 +62,23 @@ class Case:
 
     made: Program
     text: Printed
-    rapid: bool
+    language: Language
 
     def steps(self, outputs: Mapping[str, bytes], seed: int) -> list[Step]:
         """Run it with the numbers that stand in a text of it."""
-        read = in_rapid.poses if self.rapid else in_krl.poses
         numbers = self.text.numbers(outputs)
         shifts = {k: own[:3] for k, own in numbers.items() if k > SHIFTS}
         points = {k: own for k, own in numbers.items() if k <= SHIFTS}
-        literals = read(points, self.made)
-        return Run(self.made, literals, shifts, seed, self.rapid).run()
+        literals = self.language.poses(points, self.made)
+        traits = self.language.traits
+        return Run(self.made, literals, shifts, seed, traits).run()
 
 
 def case(seed: int, language: str, cell: Cell) -> Case:
     """Draw a program and write it."""
-    made, rapid = Draw(seed, language).program(), language == "rapid"
-    return Case(made, (in_rapid.rapid if rapid else in_krl.krl)(made, cell), rapid)
+    own = LANGUAGES[language]
+    made = Draw(seed, own.traits).program()
+    return Case(made, own.write(made, cell), own)
 
 
 def lands(seed: int, language: str, cell: Cell, model: Model) -> Found:
@@ -101,7 +102,7 @@ def lands(seed: int, language: str, cell: Cell, model: Model) -> Found:
     for run in range(RUNS if seed % 2 else 1):
         asked, ran = (one.steps(files, run) for files in (one.text.files, outputs))
         assert [step.move.mark for step in asked] == [step.move.mark for step in ran]
-        rows = follow(done.visits, asked, one.text, one.rapid)
+        rows = follow(done.visits, asked, one.text, one.language)
         count(found, seed, one, done, (asked, ran), rows, cell)
     return found
 
@@ -162,13 +163,16 @@ def count(
         size = np.linalg.norm(d.std_error[mine], axis=1).max() / MM
         if not safe:
             found.error_mm[ALONG].append(pair)
-            if old.target.parted:
+            parted = old.target.parted and not one.language.traits.parts_move
+            if parted:
                 text = "moves along, though a number of it is set by itself"
                 found.wrong.append((seed, line, text))
             elif not old.target.computed:
                 why = {d.reasons[d.why[row]].text for row in mine}
                 text = f"went to new numbers, though: {' / '.join(why)}"
                 found.wrong.append((seed, line, text))
+            elif not unsure and now[k] > before[k] + MOST_MM:
+                found.wrong.append((seed, line, WORSE))
         elif (visits.frame.tool[mine] < 0).any() or (
             not old.in_joints and (visits.frame.uframe[mine] < 0).any()
         ):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tests.generated.neutral.traits import Traits
 from tests.generated.neutral.tree import (
     Ask,
     Assign,
@@ -20,6 +21,7 @@ from tests.generated.neutral.tree import (
     Element,
     Expr,
     For,
+    Foreign,
     If,
     Inline,
     Less,
@@ -61,6 +63,7 @@ MOST = 80  # moves
 ROUNDS = 2  # of a program that begins again
 STEPS = 3_000  # statements
 FAILS = 0.25  # of instructions that may fail
+MOVES = 0.5  # of calls of what no file holds
 COMES = 0.04  # interrupts between two statements
 HEAVY = 0.01  # [kg] a lighter tool states nothing
 Load = tuple[float, tuple[float, float, float]]
@@ -94,7 +97,8 @@ class Step:
         fly: It is passed without a stop, in a zone of `zone` [mm].
         speed: Along paths [mm/s].
         plain: It is no spline.
-        beside: A call by a name in a text led to it, which nobody follows.
+        beside: A call by a name in a text led to it, or of what no file holds: nobody
+            follows it.
     """
 
     move: Move
@@ -165,7 +169,7 @@ class Run:
         literals: What the numbers in its text say.
         shifts: The numbers of its shifts that stand in the text [mm], by mark.
         seed: Of the inputs.
-        rapid: Whether it is run as RAPID or as KRL.
+        language: Whose rules hold.
     """
 
     def __init__(
@@ -174,9 +178,9 @@ class Run:
         literals: Mapping[int, np.ndarray],
         shifts: Mapping[int, Sequence[float]],
         seed: int,
-        rapid: bool,
+        language: Traits,
     ) -> None:
-        self.made, self.literals, self.rapid = made, literals, rapid
+        self.made, self.literals, self.language = made, literals, language
         self.shifts = shifts
         self.rng = random.Random(f"inputs:{seed}")
         self.steps: list[Step] = []
@@ -193,7 +197,7 @@ class Run:
         try:
             for _ in range(ROUNDS):
                 left = self._routine(self.made.routines[0], {})
-                if self.made.ends and not (left and self.rapid):
+                if self.made.ends and not left:
                     break
         except (FailError, EndError):
             pass
@@ -270,13 +274,15 @@ class Run:
                 lifted = replace(old, value=value, computed=True, parted=True)
                 self.all[name] = Box(lifted)
             case Wait():
-                self._stop()
+                self._stop("wait")
             case Output(_, ahead):
                 if not ahead:
-                    self._stop()
+                    self._stop("output")
             case MayFail(own):
                 if self.rng.random() < FAILS:
                     raise FailError(own)
+            case Foreign():
+                self._foreign(one)
             case Call(name, arguments, late):
                 self.beside += late
                 try:
@@ -288,6 +294,13 @@ class Run:
                     raise LeaveError
             case _:
                 self._block(one)
+
+    def _foreign(self, one: Foreign) -> None:
+        """Run a routine that no file holds: it may move the arm."""
+        if self.rng.random() < MOVES:
+            self.beside += 1
+            self._move(Move(0, "axes", Inline(one.to)))
+            self.beside -= 1
 
     def _set_part(self, one: SetPart) -> None:
         """Set one number of the place of a point."""
@@ -374,7 +387,7 @@ class Run:
                 assert isinstance(value, int)
                 return value
             case Read():
-                self._asks()
+                self._stop("input")
                 return self.rng.randint(0, 3)
             case Sum(a, b):
                 return self._number(a) + self._number(b)
@@ -391,7 +404,7 @@ class Run:
                 one, two = self._number(a), self._number(b)
                 return one == two if equal else one < two
             case Signal():
-                self._asks()
+                self._stop("input")
                 return self.rng.random() < 0.5
             case Not(inner):
                 return not self._holds(inner)
@@ -399,12 +412,11 @@ class Run:
                 one, two = self._holds(a), self._holds(b)
                 return one and two
 
-    def _asks(self) -> None:
-        """In KRL the program waits for the arm where it reads an input."""
-        self._stop()
-
-    def _stop(self) -> None:
-        if not self.rapid and self.steps:
+    def _stop(self, kind: str) -> None:
+        """Stop at the last point, where the program waits for the arm."""
+        part = self.language.stops_for(kind)
+        stops = part == 1.0 or (part > 0.0 and self.rng.random() < part)
+        if stops and self.steps:
             self.steps[-1] = replace(self.steps[-1], fly=False)
 
     # Places.
@@ -417,7 +429,10 @@ class Run:
         return box.value
 
     def _literal(self, number: int) -> Target:
-        return Target(self.literals[number], frozenset([number]))
+        value = self.literals.get(number)
+        if value is None:  # it stands in no text
+            value = self.made.places[number].q
+        return Target(value, frozenset([number]))
 
     def _place(self, point: Point) -> Target:
         match point:
@@ -475,16 +490,14 @@ class Run:
 
     def _move(self, one: Move) -> None:
         modes, made = self.modes, self.made
-        if one.tool and not self.rapid and made.plain:
+        if one.tool and made.plain:
             self._form(one)
         tool = one.tool or modes.tool
         base = made.bases[one.base - 1] if one.base else modes.base
-        if self.rapid and modes.shown is not None:
+        if modes.shown is not None:
             base = base @ modes.shown
-        speed = (one.speed if self.rapid or one.tool else 0) or modes.speed
-        load = self._load(tool)
-        if one.tool and not self.rapid:
-            load = self._of_tool(one.tool)
+        speed = one.speed or modes.speed
+        load = self._load(tool, bool(one.tool))
         places = [] if one.via is None else [(True, self._place(one.via))]
         if one.kind == "step":
             assert isinstance(one.to, Shifted)
@@ -494,7 +507,7 @@ class Run:
         for via, target in places:
             fly = bool(one.zone) and not via
             zone = modes.zone if one.zone < 0 else one.zone
-            if not self.rapid and one.zone and not one.tool:
+            if self.language.zone_stays and one.zone and not one.tool:
                 modes.zone = zone
             pose = made.tools[tool - 1]
             beside, plain = self.beside > 0, made.plain
@@ -516,10 +529,10 @@ class Run:
         mass = self.made.tool_loads[tool - 1]
         return (mass, (0.0, 0.0, 100.0)) if mass > HEAVY else NOTHING
 
-    def _load(self, tool: int) -> Load:
-        """Return what the arm carries: in RAPID the tool and what it grips."""
-        if not self.rapid:
-            return self.modes.load
+    def _load(self, tool: int, named: bool) -> Load:
+        """Return what the arm carries: maybe its tool and what it grips."""
+        if not self.language.grips:
+            return self._of_tool(tool) if named else self.modes.load
         mass, grip = self.made.tool_loads[tool - 1], self.modes.grip
         parts = [(mass, np.array([0.0, 0.0, 100.0]))] if mass > HEAVY else []
         if grip:

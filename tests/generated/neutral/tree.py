@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -274,6 +275,13 @@ class MayFail:
 
 
 @dataclass(frozen=True)
+class Foreign:
+    """Calls a routine that no file holds; `to`: the literal where it may move to."""
+
+    to: int
+
+
+@dataclass(frozen=True)
 class If:
     """Branches with a condition each, and what else is done."""
 
@@ -360,8 +368,8 @@ class Return:
 
 Statement = (
     Move | SetTool | SetBase | Displace | SetLoad | SetSpeed | SetZone | Assign
-    | SetPoint | SetElement | SetPart | Lift | Wait | Output | Note | MayFail | If
-    | Switch | For | Count | Poll | Loop | Skip | Call | Return
+    | SetPoint | SetElement | SetPart | Lift | Wait | Output | Note | MayFail | Foreign
+    | If | Switch | For | Count | Poll | Loop | Skip | Call | Return
 )  # fmt: skip
 Body = tuple[Statement, ...]
 
@@ -476,6 +484,14 @@ def bodies_of(one: Statement) -> list[Body]:
     return []
 
 
+def statements(body: Body) -> Iterator[Statement]:
+    """Yield all statements of a block, those in blocks of it too."""
+    for one in body:
+        yield one
+        for inner in bodies_of(one):
+            yield from statements(inner)
+
+
 def own_points(body: Body) -> list[str]:
     """Return the variable points that a routine sets and uses alone."""
     found: list[str] = []
@@ -485,3 +501,23 @@ def own_points(body: Body) -> list[str]:
         for inner in bodies_of(one):
             found += own_points(inner)
     return [*dict.fromkeys(found)]
+
+
+def counters(body: Body) -> list[str]:
+    """Return the counters of loops, in all blocks."""
+    found: list[str] = []
+    for one in body:
+        found += [one.name] if isinstance(one, Count | Loop) else []
+        for inner in bodies_of(one):
+            found += counters(inner)
+    return found
+
+
+def loops(body: Body) -> list[str]:
+    """Return the variables of FOR loops, in all blocks."""
+    found: list[str] = []
+    for one in body:
+        found += [one.name] if isinstance(one, For) else []
+        for inner in bodies_of(one):
+            found += loops(inner)
+    return found

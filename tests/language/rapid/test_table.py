@@ -171,3 +171,11 @@ def test_every_instruction_is_in_a_list():
 
 def test_no_instruction_is_in_two_lists():
     assert not {*MOTIONS} & {*read_known_instructions()}
+
+
+@pytest.mark.parametrize(
+    "name", ["AInput", "DInput", "GInput", "GInputDnum", "GOutput"]
+)
+def test_a_function_that_reads_a_signal_leaves_place_and_settings(name):
+    unknown, why, *_ = after(f"n:={name}(signal);")
+    assert not unknown and not why

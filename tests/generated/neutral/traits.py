@@ -1,0 +1,67 @@
+"""What the languages of drawn programs cannot say, and how they run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What differs between languages where a program is drawn and run.
+
+    Attributes:
+        name: Of the language; "all": what is drawn has words in all of them.
+        lacks: Features of programs that it has no words for.
+        stops: Parts of runs in which the arm stops at a fly point for a statement
+            behind it: wait, output or input.
+        zone_stays: The zone of a move holds for the moves behind it.
+        grips: The arm carries its tool and what it grips.
+        parts_move: The rest of a target whose number is set by itself may be corrected.
+    """
+
+    name: str
+    lacks: frozenset[str]
+    stops: tuple[tuple[str, float], ...] = ()
+    zone_stays: bool = False
+    grips: bool = False
+    parts_move: bool = False
+
+    def stops_for(self, kind: str) -> float:
+        """Return in which part of runs the arm stops for a kind of statement."""
+        return dict(self.stops).get(kind, 0.0)
+
+
+# Beside the features of `draw`: "again", a program that begins again; "clauses", any
+# move may name its frames; "early", corners blended by joints; "first", numbers that
+# have a value before the program sets one; "functions" and "made", what a function of
+# the program returns; "plain forms", frames of a move that hold behind it; "repeat", a
+# loop with its test at the end; "speeds", any move may have its own; "splines".
+RAPID = Traits(
+    "rapid", frozenset({"clauses", "forms", "repeat", "splines", "step"}), grips=True
+)
+KRL = Traits(
+    "krl",
+    frozenset({"again", "clauses", "displace", "fail", "handler", "late", "modal",
+               "repair", "speeds"}),
+    stops=(("wait", 1.0), ("output", 1.0), ("input", 1.0)), zone_stays=True,
+)  # fmt: skip
+PDL2 = Traits(
+    "pdl2",
+    frozenset({"displace", "early", "fail", "handler", "late", "load", "modal",
+               "plain forms", "repair", "splines"}),
+    stops=(("wait", 0.5),), parts_move=True,  # a wait may take long or not
+)  # fmt: skip
+# Left out, as one language follows it and another one does not: computed shifts (KRL
+# puts them into a frame first), what numbers of the program decide ("counts": PDL2
+# alone knows which way), frames that are set in a branch or a routine (RAPID does not
+# join equal values), what functions return (PDL2), points that are arguments ("given":
+# KRL), shifted points (in KRL they have no S and T, in PDL2 no numbers of their own),
+# values that other programs may change ("modules", "shared": PDL2), and what is behind
+# a routine that no file holds.
+ALL = Traits(
+    "all",
+    frozenset({"computed shifts", "counts", "early", "first", "foreign",
+               "frames in blocks", "functions", "given", "interrupt", "loop", "made",
+               "modules", "offset", "plain forms", "shared", "tool", "zone"})
+    | (RAPID.lacks | KRL.lacks | PDL2.lacks) - {"forms", "splines"},
+)  # fmt: skip
