@@ -89,7 +89,7 @@ class Arrivals:
     def poses(self, row: int) -> dict[str, np.ndarray | None]:
         """Return frames and target of a visit, None where they are not known."""
         visits = self.done.visits
-        frame, target = visits.frame, visits.target.meaning
+        frame, target = visits.frame, visits.target
         tool, uframe = int(frame.tool[row]), int(frame.uframe[row])
         meaning = target.meaning[row]
         joints = meaning == Meaning.JOINTS
