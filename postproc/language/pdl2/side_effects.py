@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -165,9 +165,13 @@ def _reach(
 
     def enter(name: str) -> list[str]:
         body = program.routines.get(name)
-        rows = (0, 0) if body is None else (body.first, body.last)
-        inside = [_direct(program.statements[s]) for s in _shapes(program, *rows)]
-        found.extend(inside)
+        if body is None:
+            return []
+        shapes = _shapes(program, body.first, body.last)
+        inside = [_direct(program.statements[s]) for s in shapes]
+        # What goes in by reference is named where it is called.
+        own = body.own_names
+        found.extend(replace(e, assigned=e.assigned - own) for e in inside)
         return _names_in(inside)
 
     done = {*reach(_names_in(found), enter, str)}

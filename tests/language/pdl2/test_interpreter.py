@@ -195,6 +195,22 @@ def test_a_loop_too_long_to_unroll_is_reported() -> None:
     assert "loop-not-unrolled" in {d.code for d in found.diagnostics}
 
 
+@pytest.mark.parametrize(
+    ("routine", "rounds"),
+    [("ROUTINE r\nVAR i : INTEGER\nBEGIN\ni := 7\nEND r", 3),  # one of its own
+     ("ROUTINE r\nBEGIN\ni := 7\nEND r", 1),
+     ("ROUTINE r(n : INTEGER)\nBEGIN\nn := 7\nEND r", 1)],  # by reference
+)  # fmt: skip
+def test_a_loop_is_unrolled_unless_a_called_routine_changes_its_variable(
+    routine: str, rounds: int
+) -> None:
+    call = "r(i)" if "(" in routine else "r"
+    move = "MOVE LINEAR TO POS(1,2,3,4,5,6,'')"
+    text = f"FOR i := 1 TO 3 DO\n{move}\n{call}\nENDFOR"
+    found = body(text, declared=f"VAR i : INTEGER\n{routine}")
+    assert len(found.visits) == rounds
+
+
 def test_a_move_in_a_call_inside_of_an_expression_is_reported() -> None:
     text = (
         "PROGRAM a\nROUTINE f : INTEGER\nBEGIN\nMOVE JOINT TO {1,2,3,4,5,6}\n"
