@@ -93,7 +93,7 @@ def compensate(
     variables_out: Annotated[
         Path | None,
         typer.Option(
-            "--variables-out", help="Where to write the variable file, even unchanged."
+            "--variables-out", help="Where to write it, even unchanged."
         ),
     ] = None,
     report: PageOption = None,
@@ -112,8 +112,8 @@ def compensate(
         typer.Option(
             "--tolerance",
             metavar="MM",
-            help="Exit 0 only if every target is expected within it. Default: the "
-            "cell's, job.tolerance_mm.",
+            help="Exit 0 only if every target is expected within it. "
+            "Default: job.tolerance_mm.",
         ),
     ] = None,
     changes: SetOption = None,

@@ -32,7 +32,7 @@ TableOption = Annotated[
     typer.Option(
         "--table",
         metavar="FILE",
-        help="Write every table of the page: FILE.csv or FILE.xlsx.",
+        help="Write its tables: FILE.csv or .xlsx.",
     ),
 ]
 PlotOption = Annotated[list[Path] | None, _option(".html, .json, .svg or .png")]

@@ -7,6 +7,7 @@ import pytest
 
 from postproc.calibration.effect_selection import model_of
 from postproc.calibration.extrapolation import widening
+from postproc.calibration.joint_scatter import split_by_joint
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
@@ -39,8 +40,10 @@ def test_a_function_of_three_joints_makes_a_fit_less_sure_elsewhere() -> None:
     fit, survey = fitted(0, MOVED)
     factor = widening(fit)
     assert factor > 2.0
+    by_joint = split_by_joint(fit)
+    assert widening(by_joint) > 2.0
     model = model_of(fit, survey)
-    assert np.allclose(model.covariance, factor * fit.stated)
+    assert np.allclose(model.covariance, widening(by_joint) * by_joint.stated)
 
 
 def test_of_few_rows_nothing_is_asked() -> None:

@@ -310,7 +310,7 @@ def test_poses_that_tell_nothing_apart_are_not_proposed(
     monkeypatch.setattr(diagnose, "poses_that_separate", lambda *_: (nats, poses))
     monkeypatch.setattr(diagnose, "poses_that_sharpen", lambda *_: ("a_2", poses + 1))
     why, proposed = diagnose._next(Mock(standings=[Mock(confusable=[Mock()])]), 0)
-    assert ("nats" in why) == (nats > diagnose.TELLING)
+    assert ("rounds of these poses" in why) == (nats > diagnose.TELLING)
     assert (proposed == 0.0).all() == (nats > diagnose.TELLING)
 
 
