@@ -92,9 +92,7 @@ def compensate(
     variables: VariablesOption = None,
     variables_out: Annotated[
         Path | None,
-        typer.Option(
-            "--variables-out", help="Where to write it, even unchanged."
-        ),
+        typer.Option("--variables-out", help="Where to write it, even unchanged."),
     ] = None,
     report: PageOption = None,
     table: TableOption = None,

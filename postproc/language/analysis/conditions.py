@@ -94,7 +94,7 @@ class Conditions:
 
 
 @dataclass(frozen=True)
-class Placed:
+class VisitMotion:
     """What a visit itself says of the motion: see `MotionColumns`, (n,) each."""
 
     kind: Indices
@@ -127,7 +127,7 @@ class ConditionColumns:
             tool_remote=self._each(lambda c: c.remote, bool),
         )
 
-    def motion(self, own: Placed) -> MotionColumns:
+    def motion(self, own: VisitMotion) -> MotionColumns:
         """Return how the arm moves."""
         loads = Interned[tuple[float, ...]]([NO_LOAD])
         care = np.array([c.care for c in self._held], np.int64).reshape(-1, 3)

@@ -23,7 +23,7 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis.conditions import (
     ConditionColumns,
     Conditions,
-    Placed,
+    VisitMotion,
 )
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
@@ -127,7 +127,7 @@ def to_visits(
     """
     c = columns
     conditions = ConditionColumns(c.conditions, c.condition)
-    own = Placed(c.motion, c.via, c.fly, c.arc_angle, c.block, c.curved)
+    own = VisitMotion(c.motion, c.via, c.fly, c.arc_angle, c.block, c.curved)
     return Visits(
         files=tuple(files),
         place=PlaceColumns(slim(c.file), slim(c.line), texts_of(len(c), c.measured)),
