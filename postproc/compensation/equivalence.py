@@ -124,10 +124,10 @@ def _other_column(v: Visits, w: Visits) -> str:
     if v.files != w.files or v.dialect != w.dialect:
         return "the output has other files"
     for part in (*v.parts, "graph"):
-        before, after = vars(getattr(v, part)), vars(getattr(w, part))
-        for name in (f.name for f in fields(getattr(v, part))
-                     if f.name not in _OTHERWISE):  # fmt: skip
-            a, b = before[name], after[name]
+        before, after = getattr(v, part), getattr(w, part)
+        names = (f.name for f in fields(before))
+        for name in (n for n in names if n not in _OTHERWISE):
+            a, b = getattr(before, name), getattr(after, name)
             if not (_same(a, b) if isinstance(a, np.ndarray) else a == b):
                 return f"the output has another {part}: {name}"
     return ""

@@ -68,14 +68,20 @@ def _join_part(name: str, programs: Sequence[Visits]) -> Any:
         if column == "aux":
             columns[column] = _join_axes(found)
             continue
-        if isinstance(found[0], Sequence):
-            columns[column] = tuple(chain.from_iterable(found))
-            continue
         if column in TABLES:
             rows = [len(getattr(part, TABLES[column])) for part in own]
             found = _shift_indices(found, rows, column in NOTHING_FIRST)
-        columns[column] = np.concatenate(found)
+        columns[column] = _join(found)
     return replace(own[0], **columns)
+
+
+def _join(parts: Sequence[Any]) -> Any:
+    """Join a column of all programs: an array, texts, or places of numbers."""
+    if isinstance(parts[0], NumberPlaces):
+        return NumberPlaces.join(parts)
+    if isinstance(parts[0], Sequence):
+        return tuple(chain.from_iterable(parts))
+    return np.concatenate(parts)
 
 
 def _shift_indices(
@@ -139,15 +145,9 @@ def _literals(programs: Sequence[Visits]) -> Literals:
     columns: dict[str, Any] = {}
     for name in (f.name for f in fields(Literals)):
         parts = [getattr(literals, name) for literals in own]
-        if isinstance(parts[0], Sequence):
-            columns[name] = tuple(chain.from_iterable(parts))
-            continue
-        if name == "places":
-            columns[name] = NumberPlaces.join(parts)
-            continue
         if name == "file":
             parts = _shift_indices(parts, [len(program.files) for program in programs])
-        columns[name] = np.concatenate(parts)
+        columns[name] = _join(parts)
     return Literals(**columns)
 
 

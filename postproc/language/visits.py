@@ -23,11 +23,12 @@ from postproc.arrays import (
     chunks,
     narrow,
     read_only,
-    slim,
+    take_rows,
 )
 from postproc.diagnostics import Code, Reason
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import ANGLES, Shift, Shifts
+from postproc.language.text.symbol_column import NameColumn
 
 START = -1  # predecessor: wherever the arm stands when the program starts
 ELSEWHERE = -2  # predecessor: a place that the program text does not tell
@@ -169,6 +170,19 @@ class NumberPlaces:
         return np.where(self.length > 0, behind, -1)
 
 
+def _take(column: Any, rows: Ints | slice) -> Any:
+    """Take rows of a column, which is an array, texts, or places of numbers."""
+    if isinstance(rows, slice):
+        return column[rows]
+    if isinstance(column, np.ndarray):
+        return take_rows(column, rows)
+    if isinstance(column, NameColumn):
+        return column.take(rows)
+    if isinstance(column, Sequence):
+        return tuple(column[k] for k in rows.tolist())
+    return column[rows]
+
+
 @dataclass(frozen=True)
 class Literals:
     """m places in the text that hold the numbers of a target.
@@ -197,6 +211,12 @@ class Literals:
     def __len__(self) -> int:
         """Return the number of literals."""
         return len(self.file)
+
+    def take(self, rows: Ints) -> Literals:
+        """Take some literals, (k,)."""
+        return Literals(
+            **{f.name: _take(getattr(self, f.name), rows) for f in fields(self)}
+        )
 
     @cached_property
     def pins(self) -> dict[str, Ints]:
@@ -232,15 +252,6 @@ class VisitPart:
         """Take some visits, (k,); tables stay whole."""
         taken = {name: _take(getattr(self, name), rows) for name in self.column_names()}
         return replace(self, **taken)
-
-
-def _take(column: Any, rows: Ints | slice) -> Any:
-    """Take rows of a column; texts are no array."""
-    if isinstance(rows, slice):
-        return column[rows]
-    if isinstance(column, np.ndarray):
-        return slim(column[rows])
-    return tuple(column[k] for k in rows.tolist())
 
 
 @dataclass(frozen=True)

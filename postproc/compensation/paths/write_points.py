@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -24,8 +24,7 @@ from postproc.compensation.rewrite import VerificationError
 from postproc.language.language import Splitter
 from postproc.language.languages import language_of
 from postproc.language.text.source import Edit, Source, apply, compose
-from postproc.language.text.symbol_column import NameColumn
-from postproc.language.visits import Graph, Literals, Visits
+from postproc.language.visits import Graph, Visits
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, lengths, rotation_from_vector, rotation_vector
 from postproc.robot.trajectory import Motion
@@ -341,7 +340,7 @@ def without(visits: Visits, rows: Bools) -> Visits:
     graph = Graph(start, np.where(pred >= 0, number[pred], pred))
     left, fewer = visits.take(own, graph), np.cumsum(gone)
     columns = {"literal": left.target.literal, "follows": left.target.follows}
-    literals = _take_literals(visits.literals, np.flatnonzero(~gone[:-1]))
+    literals = visits.literals.take(np.flatnonzero(~gone[:-1]))
     return replace(
         left.with_columns(
             **{k: own - fewer[own] * (own >= 0) for k, own in columns.items()}
@@ -365,19 +364,5 @@ def renumber_literals(before: Visits, after: Visits) -> Visits:
     own = after.with_columns(
         literal=number[after.target.literal], follows=number[after.target.follows]
     )
-    literals = _take_literals(after.literals, np.argsort(number[:-1]))
+    literals = after.literals.take(np.argsort(number[:-1]))
     return replace(own, literals=literals)
-
-
-def _take_literals(literals: Literals, rows: Ints) -> Literals:
-    own = {f.name: _some(getattr(literals, f.name), rows) for f in fields(Literals)}
-    return Literals(**own)
-
-
-def _some(column: Any, rows: Ints) -> Any:
-    """Take some rows of a column, which is an array, or a sequence of names."""
-    if isinstance(column, NameColumn):
-        return column.take(rows)
-    if isinstance(column, Sequence):
-        return tuple(column[k] for k in rows.tolist())
-    return column[rows]
