@@ -14,13 +14,13 @@ use crate::rows::{array, each, flat, rows, same_length, Lanes, Three, SIDE};
 use crate::walk::{Base, Walk};
 
 /// Three components of each.
-type Column = [Lanes; 3];
+pub type Column = [Lanes; 3];
 /// The covariance of three components of each: the diagonal, then xy, xz and yz.
-type Products = [Lanes; 6];
+pub type Products = [Lanes; 6];
 /// Which components are off the diagonal, in that order.
 const OFF: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
-const NOTHING: Column = [[0.0; SIDE]; 3];
+pub const NOTHING: Column = [[0.0; SIDE]; 3];
 
 fn add(sum: &mut Lanes, factor: f64, of: &Lanes) {
     for k in 0..SIDE {
@@ -46,7 +46,7 @@ fn add_column(total: &mut Products, sums: &Column, column: &Column) {
     }
 }
 
-fn put(columns: &mut [Column], lane: usize, values: impl Iterator<Item = Three>) {
+pub fn put(columns: &mut [Column], lane: usize, values: impl Iterator<Item = Three>) {
     for (column, value) in columns.iter_mut().zip(values) {
         for k in 0..3 {
             column[k][lane] = value[k];
@@ -55,20 +55,20 @@ fn put(columns: &mut [Column], lane: usize, values: impl Iterator<Item = Three>)
 }
 
 /// Parameters of the geometry, in the order of their columns.
-struct Geometry {
-    base: bool,
+pub struct Geometry {
+    pub base: bool,
     /// Joint, and which of a, d, alpha, theta, beta.
-    links: Vec<(usize, usize)>,
-    tool: bool,
+    pub links: Vec<(usize, usize)>,
+    pub tool: bool,
 }
 
 impl Geometry {
-    fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         6 * usize::from(self.base) + self.links.len() + 3 * usize::from(self.tool)
     }
 
     /// Derivatives of the TCP, as in `geometry.Geometry.columns`.
-    fn columns(&self, w: &Walk, base: &Base) -> impl Iterator<Item = Three> {
+    pub fn columns(&self, w: &Walk, base: &Base) -> impl Iterator<Item = Three> {
         let mut out = Vec::with_capacity(self.len());
         if self.base {
             out.extend([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
@@ -89,14 +89,14 @@ impl Geometry {
 }
 
 /// What the form is taken of.
-struct Block {
-    fixed: Vec<Column>,
-    jacobian: [Column; 6],
-    basis: Vec<Lanes>,
+pub struct Block {
+    pub fixed: Vec<Column>,
+    pub jacobian: [Column; 6],
+    pub basis: Vec<Lanes>,
 }
 
 /// A quadratic form of columns of the geometry, then of joints.
-struct Form {
+pub struct Form {
     /// Lower half of the covariance, with what is off the diagonal twice.
     lower: Vec<f64>,
     size: usize,
@@ -107,11 +107,36 @@ struct Form {
 }
 
 impl Form {
+    /// Take a covariance (p, p) of the geometry's parameters, then of the joints'.
+    pub fn new(covariance: &[f64], fixed: usize, count: [usize; 6]) -> PyResult<Form> {
+        let size = fixed + count.iter().sum::<usize>();
+        if covariance.len() != size * size {
+            return Err(PyValueError::new_err("a covariance of other parameters"));
+        }
+        let mut end = 0;
+        let joints = count.map(|n| {
+            end += n;
+            end - n..end
+        });
+        let doubled = |(at, c): (usize, &f64)| if at / size == at % size { *c } else { 2.0 * c };
+        let lower = covariance.iter().enumerate().map(doubled).collect();
+        Ok(Form { lower, size, fixed, joints })
+    }
+
+    /// Make room for the columns of some states.
+    pub fn block(&self) -> Block {
+        Block {
+            fixed: vec![NOTHING; self.fixed],
+            jacobian: [NOTHING; 6],
+            basis: vec![[0.0; SIDE]; self.size - self.fixed],
+        }
+    }
+
     fn row(&self, k: usize) -> &[f64] {
         &self.lower[k * self.size..(k + 1) * self.size]
     }
 
-    fn value(&self, block: &Block) -> Products {
+    pub fn value(&self, block: &Block) -> Products {
         let mut total = [[0.0; SIDE]; 6];
         for (u, column) in block.fixed.iter().enumerate() {
             let mut sums = NOTHING;
@@ -178,26 +203,13 @@ pub fn covariance<'py>(
     let ((basis, count), fixed) = (basis, geometry.len());
     let (own, shape) = (count.iter().sum::<usize>(), basis.shape().to_vec());
     same_length(&[q.len(), tool.len(), shape[0]])?;
-    let size = fixed + own;
     let odd = geometry.links.iter().any(|(j, kind)| *j >= 6 || *kind >= 5);
-    if odd || shape[1] != own || of_parameters.shape() != [size, size] {
+    if odd || shape[1] != own {
         return Err(PyValueError::new_err("a covariance of other parameters"));
     }
-    let (basis, of_parameters) = (flat(&basis)?, flat(&of_parameters)?);
-    let mut end = 0;
-    let joints = count.map(|n| {
-        end += n;
-        end - n..end
-    });
-    let lower = (of_parameters.iter().enumerate())
-        .map(|(at, c)| if at / size == at % size { *c } else { 2.0 * c })
-        .collect();
-    let form = Form { lower, size, fixed, joints };
-    let mut block = Block {
-        fixed: vec![NOTHING; fixed],
-        jacobian: [NOTHING; 6],
-        basis: vec![[0.0; SIDE]; own],
-    };
+    let basis = flat(&basis)?;
+    let form = Form::new(flat(&of_parameters)?, fixed, count)?;
+    let mut block = form.block();
     let mut out = Vec::with_capacity(q.len());
     each(py, q.len().div_ceil(SIDE), |at| {
         let first = SIDE * at;
@@ -217,7 +229,7 @@ pub fn covariance<'py>(
     Ok(array(py, out))
 }
 
-fn base_of(rows: &[Three]) -> PyResult<Base> {
+pub fn base_of(rows: &[Three]) -> PyResult<Base> {
     match rows {
         [x, y, z, a, b, c, point] => {
             Ok(Base { axes: [*x, *y, *z], about: [*a, *b, *c], point: *point })

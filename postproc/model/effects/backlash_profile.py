@@ -25,6 +25,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, TermLaw, Terms, angle, side, turn_joint
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -90,6 +91,18 @@ class BacklashProfile(JointEffect):
         flat = waves.reshape(len(joint), len(batch))
         turned: Floats = batch.states.direction.T[joint] * flat
         return turned.T
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint by its waves, times its direction."""
+        sizes = p.reshape(len(self.joints), self.constant + 2 * len(self.orders))
+        first, out = int(self.constant), []
+        for j, own in zip(self.joints, sizes, strict=True):
+            waves = np.zeros((max(self.orders, default=0), 2))
+            waves[np.array(self.orders, dtype=int) - 1] = own[first:].reshape(-1, 2)
+            ends = self.lower[j - 1], self.upper[j - 1], own[0] if first else 0.0
+            law = TermLaw("waves", (*map(float, ends), *waves.ravel().tolist()))
+            out.append(Term(turn_joint(j), law, (angle(j),), (side(j),)))
+        return out
 
     def angles(self, batch: ArmStates, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad], summed joint by joint."""
