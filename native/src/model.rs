@@ -11,6 +11,7 @@ use crate::chain::{Chain, Frame, Parameters};
 use crate::lines::rotation_vector;
 use crate::rows::{array, dot, flat, in_parts, minus, rows, same_length, Six, Three, SIDE};
 use crate::terms::{faded, swept, Moves, State, Term, Written};
+use crate::trig::sin_cos;
 use crate::variance::{base_of, put, Form, Geometry};
 use crate::walk::{cross, Base, Walk};
 
@@ -289,7 +290,8 @@ impl Core {
         work: impl FnOnce(&State<'_>) -> T,
     ) -> T {
         let frames: Option<[Frame; 7]> = self.weighs.then(|| self.nominal.frames(q));
-        work(&State { q, side, load, given, frames: frames.as_ref() })
+        let trig = sin_cos(q);
+        work(&State { q, side, load, given, trig: &trig, frames: frames.as_ref() })
     }
 
     /// What joints are off by [rad].

@@ -8,7 +8,6 @@ use pyo3::prelude::*;
 
 use crate::chain::Frame;
 use crate::rows::{dot, minus, Six, Three};
-use crate::trig::sin_cos;
 use crate::walk::cross;
 
 /// A name, and the numbers that belong to it.
@@ -24,6 +23,8 @@ pub struct State<'a> {
     pub load: &'a [f64; 4],
     /// Values of the covariates that do not follow from these.
     pub given: &'a [f64],
+    /// Sines and cosines of the joint angles.
+    pub trig: &'a (Six, Six),
     /// Nominal frames 0 to 6, where weight drives something.
     pub frames: Option<&'a [Frame; 7]>,
 }
@@ -183,9 +184,9 @@ struct Waves {
 }
 
 impl Waves {
-    fn value(&self, x: f64) -> f64 {
+    #[inline(always)]
+    fn value(&self, x: f64, (sin, cos): (f64, f64)) -> f64 {
         let within = faded_turns(x, self.low, self.high);
-        let ([sin], [cos]) = sin_cos(&[x]);
         let (mut total, mut s, mut c) = (self.mean, 0.0, 1.0);
         for [of_sin, of_cos] in &self.sizes {
             (s, c) = (s * cos + c * sin, c * cos - s * sin);
@@ -459,7 +460,7 @@ impl Law {
                 let (s, c) = (order * x).sin_cos();
                 sin * s + cos * c
             }
-            Law::Waves(waves) => waves.value(x),
+            Law::Waves(waves) => waves.value(x, x.sin_cos()),
             Law::Friction { k, way } => k * (1.0 - 2.0 * (-x / way).exp()),
             Law::Dahl { k, way } => {
                 let share = 1.0 - (-by[1] / way).exp();
@@ -544,11 +545,18 @@ impl Term {
 
     /// Evaluate it: an angle [rad], or a shift [m].
     pub fn value(&self, s: &State<'_>) -> f64 {
-        let mut by = [0.0; 2];
-        for (value, driver) in by.iter_mut().zip(&self.by) {
-            *value = driver.value(s);
-        }
-        let law = self.law.value(&by[..self.by.len()]);
+        let law = match (&self.law, self.by.first()) {
+            (Law::Waves(waves), Some(Driver::Angle(j))) => {
+                waves.value(s.q[*j], (s.trig.0[*j], s.trig.1[*j]))
+            }
+            _ => {
+                let mut by = [0.0; 2];
+                for (value, driver) in by.iter_mut().zip(&self.by) {
+                    *value = driver.value(s);
+                }
+                self.law.value(&by[..self.by.len()])
+            }
+        };
         self.times.iter().fold(law, |value, factor| value * known(factor.value(s)))
     }
 

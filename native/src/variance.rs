@@ -22,12 +22,14 @@ const OFF: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
 pub const NOTHING: Column = [[0.0; SIDE]; 3];
 
+#[inline(always)]
 fn add(sum: &mut Lanes, factor: f64, of: &Lanes) {
     for k in 0..SIDE {
         sum[k] += factor * of[k];
     }
 }
 
+#[inline(always)]
 fn add_product(sum: &mut Lanes, a: &Lanes, b: &Lanes) {
     for k in 0..SIDE {
         sum[k] += a[k] * b[k];
@@ -35,6 +37,7 @@ fn add_product(sum: &mut Lanes, a: &Lanes, b: &Lanes) {
 }
 
 /// Add what a column gives, with half the form's sums over it and those before.
+#[inline(always)]
 fn add_column(total: &mut Products, sums: &Column, column: &Column) {
     for k in 0..3 {
         add_product(&mut total[k], &sums[k], &column[k]);
@@ -132,11 +135,29 @@ impl Form {
         }
     }
 
+    #[inline(always)]
     fn row(&self, k: usize) -> &[f64] {
         &self.lower[k * self.size..(k + 1) * self.size]
     }
 
+    /// Evaluate it with the widest registers of this machine; the numbers are the same.
     pub fn value(&self, block: &Block) -> Products {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: this machine has what the function is compiled for.
+            return unsafe { self.value_wide(block) };
+        }
+        self.value_of(block)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    unsafe fn value_wide(&self, block: &Block) -> Products {
+        self.value_of(block)
+    }
+
+    #[inline(always)]
+    fn value_of(&self, block: &Block) -> Products {
         let mut total = [[0.0; SIDE]; 6];
         for (u, column) in block.fixed.iter().enumerate() {
             let mut sums = NOTHING;
