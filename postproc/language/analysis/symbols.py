@@ -30,11 +30,13 @@ from postproc.language.analysis.values import (
     Layout,
     Value,
     WrittenNumber,
+    is_written,
     number_in,
     put_together,
     spell_components,
     step_into,
     take_apart,
+    without_places,
 )
 from postproc.language.text.comment_directives import Comments
 
@@ -54,11 +56,13 @@ class TaskSymbols(ABC, Generic[F]):
         comments: How the language writes them.
         layouts: Components of data by type.
         followed: Types of data whose assignments are followed.
+        targets: Those of them whose numbers a move may have written anew.
         constants: Names that the language gives values to.
         functions: Kinds of routines that return values.
         by_name: Records hold their components by name, not by their order.
         divides: ``a / b`` is known, whatever kind of numbers they are.
         apart: Data may be declared in one place and get their first value elsewhere.
+        volatile: Names of data that may change at any time, by what runs beside.
     """
 
     files: Sequence[F]
@@ -66,11 +70,13 @@ class TaskSymbols(ABC, Generic[F]):
     comments: ClassVar[Comments]
     layouts: ClassVar[Mapping[str, Layout]]
     followed: ClassVar[Collection[str]]
+    targets: ClassVar[Collection[str]]
     constants: ClassVar[Mapping[str, float]] = {}
     functions: ClassVar[str]
     by_name: ClassVar[bool] = False
     divides: ClassVar[bool] = True
     apart: ClassVar[bool] = False
+    volatile: frozenset[str] = field(default=frozenset(), init=False)
     _own: dict[Place, dict[tuple[int, ...], tuple[int, Datum]]] = field(
         default_factory=lambda: defaultdict(dict), init=False
     )
@@ -123,8 +129,8 @@ class TaskSymbols(ABC, Generic[F]):
         """Return True if what data are given is there when the task runs again."""
 
     def is_followed(self, name: str, datum: Datum, here: Scope) -> bool:
-        """Return True if nothing but assignments changes data."""
-        return name not in self.uses.changed
+        """Return True if nothing but assignments on the way changes data."""
+        return not (name in self.uses.changed or name in self.volatile)
 
     def fits(self, type_: str, component: str, value: float) -> bool:
         """Return True if data, or a component, hold a number as it is given."""
@@ -542,6 +548,23 @@ class TaskSymbols(ABC, Generic[F]):
             )
             return KnownRecord(tuple(fields.items()), known)
         return put_together(fields, layout) if len(fields) >= len(names) else None
+
+    def are_alike(self, one: AssignedPoint, other: AssignedPoint) -> bool:
+        """Tell whether two assignments gave the same to data.
+
+        To points they give the same numbers of the text: those may be written anew.
+        """
+        if self.type_of(one.place) not in self.targets:
+            mine, theirs = map(without_places, map(self.evaluate_held, (one, other)))
+            return mine is not None and mine == theirs
+        if one.copied != other.copied or (one.operand is None) != (other.operand is None):
+            return False
+        parts = [[(c.name, c.value) for c in p.components] for p in (one, other)]
+        if parts[0] != parts[1] or any(value is None for _, value in parts[0]):
+            return False
+        bases = (self.evaluate_held(replace(p, components=())) for p in (one, other))
+        mine, theirs = bases
+        return mine == theirs and (mine is None or is_written(mine))
 
     def names_of(self, operand: ir.Operand) -> frozenset[str]:
         """Return the names of all data and functions in an operand."""

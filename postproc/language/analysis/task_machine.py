@@ -97,7 +97,7 @@ class Arrived:
 
     def forget(self) -> Arrived:
         """Forget where the arm is, what moves are carried out with, and points."""
-        return Arrived(NOWHERE, self.modes.forget())
+        return Arrived(NOWHERE, self.modes.forget(), self.points.forget_all())
 
     def with_points(self, points: Points) -> Arrived:
         """Return it where points hold something else."""
@@ -551,21 +551,26 @@ class TaskMachine(Interpreter[Arrived]):
         points = self.task.assign(here.points, one, row, context.place.scope)
         return here.with_points(points)
 
+    def begin(self, origins: frozenset[int], modes: Any) -> Arrived:
+        """Return how the arm comes to where the task begins: no point is assigned."""
+        return Arrived(origins, modes, Points(alike=self.task.are_alike))
+
     def settle_points(self) -> None:
         """Forget what moves take of data that hold other values on other ways."""
-        given = [visit for visit in self.visits if visit.goal.given or visit.taken]
-        if not given:
-            return
+        for visit in self.visits:
+            if not visit.agreed:
+                visit.goal = visit.goal.lost
+            if not visit.kept:
+                visit.forget_conditions()
+
+    def list_changed_beside(self) -> frozenset[str]:
+        """List names of data that change in ways that are not followed."""
         rows = self._rows_of({*self.beside, *self._list_beside()})
-        lost = {
+        changed = {
             data.name for at, row in rows
             for data in self.task.list_changes(self.texts[at].statement(row))
         }  # fmt: skip
-        for visit in given:
-            if not visit.agreed or any(lost & one.names for one in visit.goal.given):
-                visit.goal = visit.goal.lost
-            if not visit.kept or any(lost & one.names for one in visit.taken):
-                visit.forget_conditions()
+        return self.task.uses.add_passed(changed)
 
     def pause(self, here: Arrived) -> None:
         """Note that the arm may stop where it stands, although a zone is written."""
@@ -722,14 +727,22 @@ class TaskMachine(Interpreter[Arrived]):
 def follow(make: Callable[[], M]) -> M:
     """Make a machine and run it.
 
+    It runs again where data turn out to change in ways that are not followed.
     Where anything runs beside the program another one reads each move by itself: what
     runs beside may be one of several that were read at once.
     """
     machine = make()
+    machine.task.volatile = machine.list_changed_beside()
     machine.run()
-    if machine.beside and any(v.count > 1 for v in machine.visits):
+    while True:
+        task, changed = machine.task, machine.list_changed_beside()
+        runs = bool(machine.beside) and any(v.count > 1 for v in machine.visits)
+        if changed <= task.volatile and not runs:
+            break
+        task.volatile |= changed
+        at_once = machine.at_once and not machine.beside
         machine = make()
-        machine.at_once = False
+        machine.at_once = at_once
         machine.run()
     machine.settle_points()
     return machine

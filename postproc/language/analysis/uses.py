@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 
 from postproc.language import ir
@@ -186,6 +186,17 @@ class NamesUsed:
                 self.take_in(step)
 
     # What follows from that.
+
+    def add_passed(self, changed: Set[str]) -> frozenset[str]:
+        """Add data to names that change, which routines change by their parameters."""
+        found, before = frozenset(changed), -1
+        while before != len(found):
+            before = len(found)
+            found |= {
+                name for name, parameter, by_reference in self.passed
+                if by_reference and parameter in found
+            }  # fmt: skip
+        return found
 
     def pass_on(self) -> None:
         """Note of data what is noted of what is made from them, or of parameters.

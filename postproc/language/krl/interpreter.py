@@ -114,7 +114,7 @@ class KrlMachine(TaskMachine):
         modes = KrlModes(tool=_frame(self.start.tool), base=_frame(self.start.uframe))
         modes = modes.beside(self.task)
         first = self.task.files[0]
-        here = Arrived(frozenset([START]), modes)
+        here = self.begin(frozenset([START]), modes)
         main = TaskRoutine(0, first.name, first.routines[0])
         self.call_routine(main, self.root, -1, here)
         self.follow()

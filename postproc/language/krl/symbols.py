@@ -100,6 +100,7 @@ class KrlTask(TaskSymbols[KrlFile]):
     comments = COMMENTS
     layouts = FIELDS
     followed = (*FIELDS, "int", "real")
+    targets = (*FIELDS,)
     functions = "deffct"
     by_name = True
     divides = False  # whole numbers divide otherwise than others

@@ -112,7 +112,7 @@ class RapidMachine(TaskMachine):
         """Follow every way from the main routine."""
         mains = self.task.routines.get("main", [])
         found = mains if len(mains) == 1 else self._procedures()
-        here = Arrived(frozenset([START]), AT_START)
+        here = self.begin(frozenset([START]), AT_START)
         if len(mains) != 1:
             here = here.forget()
             self.say(
@@ -144,7 +144,7 @@ class RapidMachine(TaskMachine):
             modes = modes.continue_cycle(end.modes, modes.names(), own)
         found = [here.origins, *(end.origins for end in self.ends)]
         found += [NOWHERE] if self.restarts else []
-        return Arrived(frozenset().union(*found), modes)
+        return self.begin(frozenset().union(*found), modes)
 
     def _own_modes(self) -> set[str]:
         """Return the modes that the task sets to other values than it begins with."""

@@ -75,6 +75,7 @@ class RapidTask(TaskSymbols[RapidFile]):
     comments = COMMENTS
     layouts = RECORDS
     followed = (*RECORDS, "num")
+    targets = ("robtarget", "jointtarget")
     constants: ClassVar = {"true": 1.0, "false": 0.0, "pi": math.pi}
     functions = "func"
     others: Sequence[RapidTask] = ()
