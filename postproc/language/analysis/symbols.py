@@ -376,6 +376,35 @@ class TaskSymbols(ABC, Generic[F]):
         """Evaluate a number, NaN where it is not known before the program runs."""
         return number_in(self.value(operand, row, here))
 
+    def decide(
+        self, operand: ir.Operand | None, row: int, here: Scope
+    ) -> float | str | None:
+        """Evaluate what decides a way, None where more than the program decides it.
+
+        It is written as a number, or the program has given its data values on the way.
+        """
+        names = frozenset() if operand is None else self.names_of(operand)
+        given = [self._is_given(name, row, here) for name in names]
+        if names and (None in given or not any(given)):
+            return None
+        found = self.value(operand, row, here)
+        if isinstance(found, WrittenNumber):
+            return found.value
+        return found if isinstance(found, str) else None
+
+    def _is_given(self, name: str, row: int, here: Scope) -> bool | None:
+        """Tell whether a program gives data a value on the way; None: more than it."""
+        if name in dict(here.loops):
+            return True
+        if self.find_held(ir.DataObject(name), row, here) is not None:
+            return True
+        place = self.place(name, here)
+        found = self.datum(name, here)
+        if found is None:
+            fixed = name in ALIKE or name in self.constants
+            return False if place is None and fixed else None
+        return False if found[1].kind == "const" else None
+
     def value(
         self, operand: ir.Operand | None, row: int, here: Scope, depth: int = 0
     ) -> Value | None:

@@ -31,7 +31,6 @@ from postproc.language.analysis.control_flow import (
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.interpreter import (
     NOT_UNROLLED,
-    Counting,
     Interpreter,
     calls_around,
 )
@@ -327,28 +326,27 @@ class TaskMachine(Interpreter[Arrived]):
         file = context.place.scope.file
         self.say(file, row, Code.LOOP_NOT_UNROLLED, NOT_UNROLLED.format(rounds))
 
-    def truth(
-        self, context: Context, row: int, condition: ir.Operand, state: Arrived
-    ) -> bool | None:
-        """Tell that ``WHILE TRUE`` goes on for ever; all else only the run tells.
+    def evaluate(
+        self, context: Context, row: int, operand: ir.Operand | None, state: Arrived
+    ) -> float | str | None:
+        """Return what the program itself has decided before, and ``WHILE TRUE``.
 
-        What is switched off by a condition that never holds stays in the program as
-        if it ran: somebody may switch it on.
+        What is switched off by data that somebody may set, or by FALSE, stays in the
+        program as if it ran.
         """
         one = context.place.statement(row)
         endless = isinstance(one, ir.Branch) and one.word == "while"
-        return True if endless and condition == ir.DataObject("true") else None
+        if endless and operand == ir.DataObject("true"):
+            return True
+        here = replace(context.place.scope, points=state.points)
+        return self.task.decide(operand, row, here)
 
-    def count(
-        self, context: Context, row: int, loop: ir.ForLoop, state: Arrived
-    ) -> Counting | None:
-        """Return the rounds of a loop, None where they are not known."""
-        scope = context.place.scope
-        first, last = (self.task.number(x, row, scope) for x in (loop.first, loop.last))
-        step = self.usual_step(first, last)
-        if loop.step is not None:
-            step = self.task.number(loop.step, row, scope)
-        return Counting.of(first, last, step)
+    def bound(
+        self, context: Context, row: int, operand: ir.Operand | None, state: Arrived
+    ) -> float:
+        """Return a bound of a loop, NaN where it is not known."""
+        here = replace(context.place.scope, points=state.points)
+        return self.task.number(operand, row, here)
 
     def begin_round(
         self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: Arrived
@@ -382,11 +380,6 @@ class TaskMachine(Interpreter[Arrived]):
                 text, place.flow, apart, self.places_of, self.is_plain
             )
         return self._runs[key]
-
-    @staticmethod
-    def usual_step(first: float, last: float) -> float:
-        """Return what a loop counts by where it does not say so."""
-        return 1.0 if last >= first else -1.0
 
     # Calls and moves.
 

@@ -194,11 +194,6 @@ class KrlMachine(TaskMachine):
         said_ones = (one for text in self.texts for one in text.said)
         return any(isinstance(one, kinds) for one in said_ones)
 
-    @staticmethod
-    def usual_step(first: float, last: float) -> float:
-        """Count by 1: a loop downwards needs STEP."""
-        return 1.0
-
     # What it does.
 
     def carry_out(

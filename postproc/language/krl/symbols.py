@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -99,8 +100,9 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     comments = COMMENTS
     layouts = FIELDS
-    followed = (*FIELDS, "int", "real")
+    followed = (*FIELDS, "int", "real", "bool")
     targets = (*FIELDS,)
+    constants: ClassVar = {"true": 1.0, "false": 0.0}
     functions = "deffct"
     by_name = True
     divides = False  # whole numbers divide otherwise than others

@@ -59,7 +59,7 @@ from postproc.language.rapid.moves import (
     pose_of,
 )
 from postproc.language.rapid.program import RapidFile, inside, is_move
-from postproc.language.rapid.symbols import RapidTask, functions_in
+from postproc.language.rapid.symbols import RapidTask, as_assignment, functions_in
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
@@ -183,6 +183,11 @@ class RapidMachine(TaskMachine):
         return own_numbers(one)
 
     is_plain = staticmethod(are_targets)
+
+    @staticmethod
+    def usual_step(first: float, last: float) -> float:
+        """Count up or down."""
+        return 1.0 if last >= first else -1.0
 
     def apart(self, context: Context) -> set[int] | None:
         """Return all (None) where an error may lead to any statement."""
@@ -335,7 +340,12 @@ class RapidMachine(TaskMachine):
     ) -> Arrived | None:
         """Go on behind ``IF condition statement;``."""
         if isinstance(one, said.CompactIf):
+            holds = self.truth(context, row, one.condition, here)
+            if holds is False:
+                return here
             after = self._compact(context, row, one.statement, here)
+            if holds:
+                return after
             return here if after is None else here.join(after)
         self._bind_late(one)
         return super().part_otherwise(context, row, one, here)
@@ -435,6 +445,8 @@ class RapidMachine(TaskMachine):
         """Run an instruction; None where it goes on in a routine."""
         here = self.after_functions(context, row, one, here)
         name, scope = one.name, context.place.scope
+        if (given := as_assignment(one, self.task.routines)) is not None:
+            return self.assign_point(context, row, given, here)
         if name in MOTIONS and name not in self.task.routines:
             return self._move(context, row, one, here)
         if name in self.task.routines:
