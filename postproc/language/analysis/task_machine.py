@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Iterator,
+    Mapping,
+    Sequence,
+)
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -155,6 +163,7 @@ class TaskMachine(Interpreter[Arrived]):
     )
     _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
     _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
+    _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
 
     # What a language says.
 
@@ -226,18 +235,9 @@ class TaskMachine(Interpreter[Arrived]):
         """Return rows that are read by themselves, None where all are."""
         return set()
 
-    def bind_arguments(
-        self, scope: Scope, routine: HeadedRows, caller: Context, row: int
-    ) -> Scope:
-        """Add what a routine is called with, as far as that is known.
-
-        Args:
-            scope: Where its statements stand.
-            routine: The routine.
-            caller: Where the call stands.
-            row: .. and its row.
-        """
-        return scope
+    def acting(self, one: ir.SourceStatement) -> ir.SourceStatement:
+        """Return what a statement does: what stands behind its condition, or itself."""
+        return one
 
     def part_otherwise(
         self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
@@ -263,7 +263,34 @@ class TaskMachine(Interpreter[Arrived]):
 
     def scopes_of(self, routine: TaskRoutine) -> Iterable[Scope]:
         """Yield where the statements of a routine stand, by all calls of it."""
+        return self._scopes_of(routine, frozenset())
+
+    def _scopes_of(
+        self, routine: TaskRoutine, seen: frozenset[tuple[int, int]]
+    ) -> Iterator[Scope]:
         yield self.task.scope_of(*routine)
+        head = routine.rows.head
+        if not head.parameters or routine.key in seen:
+            return
+        seen = seen | {routine.key}
+        for caller, row, call in self._calls_by_name[head.name]:
+            for there in self._scopes_of(caller, seen):
+                bound = self.task.bind(routine, call, row, there)
+                if bound is not None:
+                    yield bound
+
+    @cached_property
+    def _calls_by_name(
+        self,
+    ) -> Mapping[str, list[tuple[TaskRoutine, int, ir.Instruction]]]:
+        """Return all calls of routines of the task, and where they stand."""
+        found = defaultdict[str, list[tuple[TaskRoutine, int, ir.Instruction]]](list)
+        for routine in (one for own in self.task.routines.values() for one in own):
+            for row in routine.inside:
+                one = self.acting(self.texts[routine.file].statement(row))
+                if isinstance(one, ir.Instruction):
+                    found[one.name].append((routine, row, one))
+        return found
 
     def is_beside(self, one: Any) -> bool:
         """Return True if a statement runs otherwise than it is followed."""
@@ -446,6 +473,8 @@ class TaskMachine(Interpreter[Arrived]):
         What holds behind such a call is not known.
         """
         file, _, routine = found
+        if self._is_recursive(found):
+            self.run_beside(file, routine)
         running = self._find_running(context, routine)
         if running is not None:
             first = running.place.flow.first
@@ -483,7 +512,11 @@ class TaskMachine(Interpreter[Arrived]):
         if context is None:
             context = caller.within(at, CALLED, self._place_of(found, caller, row))
         own = self.task.unit(file), module, context.place.scope.routine
-        here = here.with_points(here.points.leave(own))  # declared anew
+        points = here.points.leave(own)  # declared anew
+        if (call := self._call_of(found, caller, row)) is not None:
+            there = replace(caller.place.scope, points=here.points)
+            points = self.task.hand_over(points, found, call, row, there)
+        here = here.with_points(points)
         self.enter(context, context.place.flow.first, self.at_call(context, here))
 
     def _place_of(self, found: TaskRoutine, caller: Context, row: int) -> TaskPlace:
@@ -494,10 +527,34 @@ class TaskMachine(Interpreter[Arrived]):
             rows = text.where(is_structural, routine.first + 1, routine.last)
             handlers = text.where(self.handles, routine.first + 1, routine.last)
             self._flows[key] = flow_of(text.statement, rows, routine, handlers)
-        scope = self.task.scope_of(file, module, routine)
-        if caller is not self.root:
-            scope = self.bind_arguments(scope, routine, caller, row)
+        scope, call = None, self._call_of(found, caller, row)
+        if call is not None:
+            scope = self.task.bind(found, call, row, caller.place.scope)
+        scope = scope or self.task.scope_of(file, module, routine)
         return TaskPlace(scope, routine, self._flows[key], text, self.offsets[file])
+
+    def _call_of(
+        self, found: TaskRoutine, caller: Context, row: int
+    ) -> ir.Instruction | None:
+        """Return a call whose arguments are followed; None where it has none.
+
+        A routine that calls itself has other values the next time.
+        """
+        if caller is self.root or not found.rows.head.parameters:
+            return None
+        call = self.acting(self.texts[caller.place.scope.file].statement(row))
+        if not isinstance(call, ir.Instruction) or call.name != found.rows.head.name:
+            return None
+        return None if self._is_recursive(found) else call
+
+    def _is_recursive(self, routine: TaskRoutine) -> bool:
+        """Return True if a routine has parameters and may come to call itself."""
+        if routine.key not in self._recursive:
+            own = routine.file, routine.rows.first, routine.rows.last
+            called = reach(self._list_calls(own), self._list_calls, tuple)
+            found = bool(routine.rows.head.parameters) and own in called
+            self._recursive[routine.key] = found
+        return self._recursive[routine.key]
 
     @cached_property
     def offsets(self) -> Sequence[int]:

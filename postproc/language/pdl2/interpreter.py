@@ -141,7 +141,7 @@ class Pdl2Machine(Machine):
 
     def tested(self, head: ir.SourceStatement) -> ir.Operand | None:
         """Return what SELECT names."""
-        return super().tested(ast.action(head))
+        return super().tested(ast.action(head) or head)
 
     def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
         """Tell whether nothing but a loop itself changes its variable."""

@@ -47,8 +47,10 @@ def _data(c: Children) -> ir.Declaration:
 
 
 def _parameter(c: Children) -> ir.RoutineParameter:
-    name = [low(x) for x in c if isinstance(x, Word)][-1]
-    return ir.RoutineParameter(name, any(x is BY_REFERENCE for x in c))
+    type_, name = [low(x) for x in c if isinstance(x, Word)]
+    array = None in c
+    by_reference = any(x is BY_REFERENCE for x in c)
+    return ir.RoutineParameter(name, by_reference, type="" if array else type_)
 
 
 def _optional(c: Children) -> ir.RoutineParameter:
