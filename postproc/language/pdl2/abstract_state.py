@@ -18,6 +18,7 @@ from postproc.language.pdl2.values import (
 from postproc.language.visits import ELSEWHERE
 
 Settings = Mapping[str, Value]
+FRAMES = ("tool", "base", "uframe")  # those of the settings that are frames
 
 Log = tuple[str, "Log | None"]
 """A key that was given a value, and those before it: copies share what they share."""
@@ -176,6 +177,15 @@ class Store:
     def set(self, **settings: Value) -> None:
         """Change frames or motion variables (names without ``$``)."""
         self.settings = {**self.settings, **settings}
+
+    def forget_frames(self, why: str) -> None:
+        """Which frames hold is no longer known."""
+        self.set(**dict.fromkeys(FRAMES, Nothing(why)))
+
+    def forget_surroundings(self, why: str) -> None:
+        """Forget where the arm is, its frames, and all motion settings."""
+        self.set(**dict.fromkeys((*FRAMES, *self.settings), Nothing(why)))
+        self.lose_place()
 
     def join(self, other: Store) -> Store:
         """Return what may hold on either way; itself where the other adds nothing."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from postproc.diagnostics import Code
 from postproc.language import ir
-from postproc.language.pdl2.abstract_state import Store
+from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.job import Place, World, base_variable
 from postproc.language.pdl2.values import (
     COMPONENTS,
@@ -28,9 +29,6 @@ from postproc.language.pdl2.values import (
     unary,
 )
 
-# Evaluate expressions as far as the program text tells.
-
-FRAME_NAMES = ("tool", "base", "uframe")
 _DEFAULT_ARM = ("prog_arm", "dft_arm")  # the arm of all that names none
 _TRUTH = {"true": True, "on": True, "false": False, "off": False}
 _WORDS = frozenset(
@@ -51,6 +49,10 @@ class ProgramPoint:
     row: int
     store: Store
     volatile: frozenset[str] = frozenset()
+
+    def report_once(self, code: Code, what: str, text: str) -> None:
+        """Report something of a thing, at the row where it comes up first."""
+        self.world.report_once(self.place.program, self.row, code, what, text)
 
     # ---- arms -----------------------------------------------------------------------
     def is_ours(self, arm: ir.Operand | None) -> bool | None:
@@ -226,7 +228,7 @@ class ProgramPoint:
             case _:
                 return None
         frame = self.setting_name(whole)
-        known = frame in FRAME_NAMES and part in COMPONENTS
+        known = frame in FRAMES and part in COMPONENTS
         return (frame, COMPONENTS[part]) if frame and known else None
 
     def setting_name(self, reference: ir.DataObject) -> str | None:

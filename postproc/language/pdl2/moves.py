@@ -200,16 +200,10 @@ def _system(here: Execution, reference: ir.DataObject) -> Goal:
 
 
 def _check_declared(here: Execution, name: str) -> None:
-    if here.world.type_of(here.place, name) is None:
-        if here.world.find_declaration(here.place, name) is not None:
-            return
-        here.world.report_once(
-            here.place.program,
-            here.row,
-            Code.UNDECLARED_VARIABLE,
-            name,
-            f"{name} is used and not declared",
-        )
+    declared = here.world.find_declaration(here.place, name)
+    if declared is None and here.world.type_of(here.place, name) is None:
+        text = f"{name} is used and not declared"
+        here.report_once(Code.UNDECLARED_VARIABLE, name, text)
 
 
 def from_value(value: Value, system: bool = False) -> Goal:
@@ -352,13 +346,10 @@ def motion_of(
     if with_:
         said = settings.get("move_type")
     if said is None:
-        here.world.report_once(
-            here.place.program,
-            here.row,
-            Code.ASSUMED_JOINT,
-            "move_type",
-            "the move names no trajectory and $MOVE_TYPE is not set: JOINT is assumed",
+        text = (
+            "the move names no trajectory and $MOVE_TYPE is not set: JOINT is assumed"
         )
+        here.report_once(Code.ASSUMED_JOINT, "move_type", text)
         return Motion.JOINT, NO_REASON
     motion = _MOTIONS.get(said) if isinstance(said, str) else None
     if motion is None:
