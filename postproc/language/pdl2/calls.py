@@ -130,7 +130,12 @@ def call_statement(machine: Machine, here: Execution, call: ir.Instruction) -> b
     running = machine.calls_to(inside.body, here.context)
     if running:
         machine.recursive |= {id(body) for body in running}
-        _refuse_recursion(machine, here, inside)
+        name = inside.body.name or inside.program.name
+        _say(here, Code.RECURSION, name, "calls itself and is not followed: the next "
+             "move is assumed to start at an unknown place. Write it as a "
+             "loop")  # fmt: skip
+        summarise_call(machine, here, name, call_graph_of(here.world, inside))
+        here.store.lose_place()
         return False
     _bind(here, inside, call.values)
     machine.call(here.context, here.row, inside, here.store)
@@ -145,31 +150,13 @@ def calls_in_expressions(
         inside = here.world.find_routine(here.place.program, call.name)
         if inside is None:
             opaque_call(here, call.name, call.values)
-        else:
-            _apply_summary(machine, here, inside, call.values)
-
-
-def _apply_summary(
-    machine: Machine,
-    here: Execution,
-    inside: Place,
-    arguments: tuple[ir.Operand | None, ...],
-) -> None:
-    """Take a function's effects from its text instead of running it."""
-    name, reach = inside.body.name, call_graph_of(here.world, inside)
-    summarise_call(machine, here, name, reach, arguments)
-    if reach.moves:
-        _say(here, Code.CALL_NOT_FOLLOWED, name, "is called in an expression and may "
-             "move the arm: the next move is assumed to start at an unknown place. "
-             "Call it as a statement")  # fmt: skip
-
-
-def _refuse_recursion(machine: Machine, here: Execution, inside: Place) -> None:
-    name = inside.body.name or inside.program.name
-    _say(here, Code.RECURSION, name, "calls itself and is not followed: the next move "
-         "is assumed to start at an unknown place. Write it as a loop")  # fmt: skip
-    summarise_call(machine, here, name, call_graph_of(here.world, inside))
-    here.store.lose_place()
+            continue
+        name, reach = inside.body.name, call_graph_of(here.world, inside)
+        summarise_call(machine, here, name, reach, call.values)
+        if reach.moves:
+            _say(here, Code.CALL_NOT_FOLLOWED, name, "is called in an expression and "
+                 "may move the arm: the next move is assumed to start at an unknown "
+                 "place. Call it as a statement")  # fmt: skip
 
 
 def _bind(

@@ -180,15 +180,6 @@ def code_of(program: Program, line: int) -> str:
     return text if comment < 0 else text[:comment]
 
 
-def _means(program: Program, row: int, named: CloneTarget) -> bool:
-    """Tell whether a name in a row means the variable, and no other of its name."""
-    body, name = body_at(program, row), named.variable.name.lower()
-    if named.scope:
-        return body.name == named.scope
-    hidden = name in body.variables or any(p.name == name for p in body.parameters)
-    return not hidden
-
-
 def _declare_clone(program: Program, line: int, old: str, name: str) -> Edit:
     """Declare the new name in a line behind the old one's."""
     code = code_of(program, line).rstrip()
@@ -213,7 +204,11 @@ def _assign_clone(
         and statement.target == ir.DataObject(old.lower())
         and isinstance(statement.value, ir.Composite | ir.FunctionCall)
     )
-    if not own or not _means(program, row, named):
+    body = body_at(program, row)  # a name there may mean another variable
+    meant = body.name == named.scope
+    if not named.scope:
+        meant = old.lower() not in body.own_names
+    if not (own and meant):
         raise CloneError(f"line {line} is no plain assignment of its value")
     code = code_of(program, line).rstrip()
     begin = int(program.lines.source.line_starts[line - 1])

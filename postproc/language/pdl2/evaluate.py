@@ -168,8 +168,12 @@ class ProgramPoint:
                 for frame in values if sign == ":" else ():
                     self.world.pin(frame, "the program composes it with a frame (`:`)")
                 return binary(sign, *values)
+            case ir.Composite(items) if len(items) < 6:
+                return Nothing("it has fewer than six joint values")
             case ir.Composite(items):
-                return self._joints(items)
+                own = enumerate(items[6:], start=1)
+                aux = tuple((axis, self.real(item)) for axis, item in own)
+                return replace(self._components(items[:6]), joints=True, aux=aux)
             case ir.FunctionCall(name):
                 return self._invoke(name, expression.values)
         return RUN_TIME
@@ -243,12 +247,6 @@ class ProgramPoint:
                 ours = setting in _DEFAULT_ARM or not self.other_default()
                 return setting if ours else None
         return None
-
-    def _joints(self, items: tuple[ir.Operand, ...]) -> Value:
-        if len(items) < 6:
-            return Nothing("it has fewer than six joint values")
-        aux = tuple((i, self.real(item)) for i, item in enumerate(items[6:], start=1))
-        return replace(self._components(items[:6]), joints=True, aux=aux)
 
     def _components(self, items: tuple[ir.Operand | None, ...]) -> Position:
         parts = [self.read_number(item) for item in items]

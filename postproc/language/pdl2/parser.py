@@ -77,14 +77,6 @@ def _node_fields(c: Children) -> ast.NodeFields:
     return ast.NodeFields(tuple(name for name in names if name.startswith("$")))
 
 
-def _parameters(c: Children) -> list[ast.FormalParameter]:
-    return [p for group in c for p in group]
-
-
-def _motion(c: Children) -> ast.Move:
-    return _move(c[0].kind == "MOVEFLY", c[1:])
-
-
 def _move(fly: bool, c: Children) -> ast.Move:
     ((how, where, via, frame),) = parts(c, "destination")
     return ast.Move(
@@ -189,7 +181,7 @@ RULES: Mapping[str, Rule] = {
     "begin": lambda c: ast.Begin(),
     "end": lambda c: ast.End(low(c[0]) if c else ""),
     "routine": _routine,
-    "parameters": _parameters,
+    "parameters": lambda c: [p for group in c for p in group],
     "parameter": lambda c: [ast.FormalParameter(n.lower(), c[1]) for n in c[0]],
     "variables": _variables,
     "constant": lambda c: ast.Constant(low(c[0]), c[1]),
@@ -211,7 +203,7 @@ RULES: Mapping[str, Rule] = {
     "exit_cycle": lambda c: ir.Leave("exitcycle"),
     "condition": lambda c: ir.Branch("condition"),
     "when": lambda c: ast.When(_statement(c[1:]), c[0].terms),
-    "motion": _motion,
+    "motion": lambda c: _move(c[0].kind == "MOVEFLY", c[1:]),
     "arm": lambda c: RulePart("arm", c[0].subscripts[0]),
     "absolute": _absolute,
     "destination": _destination,

@@ -156,7 +156,8 @@ def _direct(statement: ir.SourceStatement) -> Effects:
     calls = {i.name for i in invocations(statement)}
     moves = False
     action = ast.action(statement)
-    cancels = frozenset([action] if action and _cancels(action) else [])
+    ends = isinstance(action, ast.CancelMove) or action == ir.Leave("exitcycle")
+    cancels = frozenset([action] if action and ends else [])
     if then := ast.behind(statement):
         inner = _direct(then)
         moves, assigned = inner.moves, set(inner.assigned)
@@ -187,11 +188,6 @@ def _direct(statement: ir.SourceStatement) -> Effects:
     read = frozenset(reference.name for reference in references(statement))
     called = frozenset(calls - PURE - CHANGING)
     return Effects(moves, frozenset(assigned), read, called, cancels)
-
-
-def _cancels(one: ir.SourceStatement) -> bool:
-    """Tell whether a statement ends moves on their way."""
-    return isinstance(one, ast.CancelMove) or one == ir.Leave("exitcycle")
 
 
 def _name_assigned(reference: ir.DataObject) -> str:
@@ -293,12 +289,16 @@ def _outside(world: World, part: LiveRows) -> Iterator[RoutineEffect]:
 
 def _list_called(world: World, place: Place, first: int, last: int) -> Iterator[Place]:
     """Yield the bodies that rows name, as calls or in expressions."""
-    for one in _list_statements(place.program, first, last):
-        for name, whole in _names(one):
-            find = world.find_program if whole else world.find_routine
-            found = find(place.program, name)
-            if found is not None:
-                yield found
+    for part in ir.walk(*_list_statements(place.program, first, last)):
+        found = None
+        if isinstance(part, ast.ProgramCall):
+            found = world.find_program(place.program, part.name)
+        elif isinstance(part, ir.Instruction | ir.FunctionCall):
+            found = world.find_routine(place.program, part.name)
+        elif isinstance(part, ir.DataObject) and not part.steps:
+            found = world.find_routine(place.program, part.name)
+        if found is not None:
+            yield found
 
 
 def circles(world: World) -> frozenset[int]:
@@ -311,15 +311,6 @@ def circles(world: World) -> frozenset[int]:
             )
             calls[id(body)] = {id(one.body) for one in called}
     return find_recursive(calls)
-
-
-def _names(statement: ir.SourceStatement) -> Iterator[tuple[str, bool]]:
-    """Yield names that may be called, and whether each is that of a program."""
-    for part in ir.walk(statement):
-        if isinstance(part, ir.Instruction | ir.FunctionCall):
-            yield part.name, isinstance(part, ast.ProgramCall)
-        elif isinstance(part, ir.DataObject) and not part.steps:
-            yield part.name, False
 
 
 # Moves that a program never comes to: their targets keep their values.
