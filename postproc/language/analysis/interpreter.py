@@ -134,23 +134,68 @@ class Interpreter(ABC, Generic[S]):
         """Allow for what a statement does besides leading elsewhere."""
         return state
 
+    @abstractmethod
+    def evaluate(
+        self, context: Context, row: int, operand: ir.Operand | None, state: S
+    ) -> float | str | None:
+        """Return what decides a way, None where only the run tells; truth is 0 or 1."""
+
     def truth(
         self, context: Context, row: int, condition: ir.Operand, state: S
     ) -> bool | None:
         """Tell whether a condition holds, None where only the run tells."""
-        return None
+        found = self.evaluate(context, row, condition, state)
+        return bool(found) if isinstance(found, float | bool) else None
 
     def fits(
         self, context: Context, row: int, case: ir.Branch, head: int, state: S
     ) -> bool | None:
         """Tell whether a case means what its block tests, None where it may."""
-        return None
+        tested = self.tested(context.place.statement(head))
+        value = self.evaluate(context, head, tested, state)
+        found: bool | None = not case.values and None
+        for choice in case.values:
+            low, high = choice, choice
+            if isinstance(choice, ir.Interval):
+                low, high = choice.low, choice.high
+            a, b = (self.evaluate(context, row, one, state) for one in (low, high))
+            known = type(a) is type(b) is type(value) and isinstance(value, float | str)
+            if not known:
+                found = None
+            elif a <= value <= b:  # type: ignore[operator]
+                return True
+        return found
 
-    @abstractmethod
+    def tested(self, head: ir.SourceStatement) -> ir.Operand | None:
+        """Return what a block of cases tests."""
+        return head.values[0] if isinstance(head, ir.Branch) and head.values else None
+
+    def bound(
+        self, context: Context, row: int, operand: ir.Operand | None, state: S
+    ) -> float | str | None:
+        """Return a bound of a loop, None where it is not known."""
+        return self.evaluate(context, row, operand, state)
+
     def count(
         self, context: Context, row: int, loop: ir.ForLoop, state: S
     ) -> Counting | None:
         """Return the rounds of a loop, None where they are not known."""
+        first, last, step = (
+            self.bound(context, row, one, state)
+            for one in (loop.first, loop.last, loop.step)
+        )
+        if not (isinstance(first, float) and isinstance(last, float)):
+            return None
+        if loop.step is None:
+            step = self.usual_step(first, last)
+        if not isinstance(step, float):
+            return None
+        return Counting.of(first, last, -step if loop.down and step > 0 else step)
+
+    @staticmethod
+    def usual_step(first: float, last: float) -> float:
+        """Return what a loop counts by where it does not say so."""
+        return 1.0
 
     def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
         """Tell whether nothing but a loop itself changes its variable."""

@@ -114,7 +114,7 @@ class KrlMachine(TaskMachine):
         modes = KrlModes(tool=_frame(self.start.tool), base=_frame(self.start.uframe))
         modes = modes.beside(self.task)
         first = self.task.files[0]
-        here = Arrived(frozenset([START]), modes)
+        here = self.begin(frozenset([START]), modes)
         main = TaskRoutine(0, first.name, first.routines[0])
         self.call_routine(main, self.root, -1, here)
         self.follow()
@@ -193,11 +193,6 @@ class KrlMachine(TaskMachine):
         kinds = said.InterruptDeclared | said.PathTrigger
         said_ones = (one for text in self.texts for one in text.said)
         return any(isinstance(one, kinds) for one in said_ones)
-
-    @staticmethod
-    def usual_step(first: float, last: float) -> float:
-        """Count by 1: a loop downwards needs STEP."""
-        return 1.0
 
     # What it does.
 

@@ -98,6 +98,10 @@ def _field(c: Children) -> said.NamedField:
     return said.NamedField(low(c[0]), c[-1])
 
 
+def _parameter(name: str, way: str = "out") -> ir.RoutineParameter:
+    return ir.RoutineParameter(name, way != "in")
+
+
 RULES: Mapping[str, Callable[[Children], Any]] = {
     **COMMON,
     "header": lambda c: said.AccessHeader(),
@@ -105,7 +109,7 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "function": _routine("deffct"),
     "data_list": lambda c: said.DataList(low(c[0]), bool(_tokens(c, "PUBLIC"))),
     "type": part("type"),
-    "parameter": lambda c: ir.RoutineParameter(_tokens(c, "NAME")[0], True),
+    "parameter": lambda c: _parameter(*_tokens(c, "NAME")),
     "empty_dimensions": lambda c: None,
     "declared": _build_declaration,
     "built_in": _build_builtin,

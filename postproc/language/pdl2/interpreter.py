@@ -11,7 +11,7 @@ import numpy as np
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, Context
-from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED, Counting
+from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store, root_of
@@ -131,35 +131,16 @@ class Pdl2Machine(Machine):
                 _forget_by_text(here, _why_unknown(here))
         return state
 
-    def truth(
-        self, context: Context, row: int, condition: ir.Operand, state: Store
-    ) -> bool | None:
-        """Tell whether a condition holds, None where only the run tells."""
-        found = self.at(context, row, state).value(condition)
-        return found if isinstance(found, bool) else None
+    def evaluate(
+        self, context: Context, row: int, operand: ir.Operand | None, state: Store
+    ) -> float | str | None:
+        """Return a number, a text or a truth, None where only the run tells."""
+        found = self.at(context, row, state).value(operand)
+        return found if isinstance(found, float | bool | str) else None
 
-    def fits(
-        self, context: Context, row: int, case: ir.Branch, head: int, state: Store
-    ) -> bool | None:
-        """Tell whether a CASE means the value that SELECT names."""
-        select = ast.action(context.place.statement(head))
-        tested = select.values if isinstance(select, ir.Branch) else ()
-        value = self.at(context, head, state).value(tested[0] if tested else None)
-        return _fits(self.at(context, row, state), case, value)
-
-    def count(
-        self, context: Context, row: int, loop: ir.ForLoop, state: Store
-    ) -> Counting | None:
-        """Return the rounds of a loop, None where they are not known."""
-        here = self.at(context, row, state)
-        first, last = here.value(loop.first), here.value(loop.last)
-        by = here.value(loop.step) if loop.step is not None else 1.0
-        if not (
-            isinstance(first, float) and isinstance(last, float)
-            and isinstance(by, float)
-        ):  # fmt: skip
-            return None
-        return Counting.of(first, last, -by if loop.down and by > 0 else by)
+    def tested(self, head: ir.SourceStatement) -> ir.Operand | None:
+        """Return what SELECT names."""
+        return super().tested(ast.action(head) or head)
 
     def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
         """Tell whether nothing but a loop itself changes its variable."""
@@ -288,22 +269,6 @@ def _cancel(here: Execution) -> None:
     if any(_RUNNING.search(one.lines.source.data) for one in programs):
         here.store.lost |= here.store.last
         here.store.last |= {ELSEWHERE}
-
-
-def _fits(at: Execution, case: ir.Branch, value: Value) -> bool | None:
-    """Tell whether a CASE means a value, None where it is not known."""
-    found: bool | None = not case.values and None
-    for choice in case.values:
-        low, high = choice, choice
-        if isinstance(choice, ir.Interval):
-            low, high = choice.low, choice.high
-        a, b = at.value(low), at.value(high)
-        known = type(a) is type(value) and type(b) is type(value)
-        if not known or not isinstance(value, float | str):
-            found = None
-        elif a <= value <= b:  # type: ignore[operator]
-            return True
-    return found
 
 
 def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> None:

@@ -454,7 +454,7 @@ class _Arguments:
     def is_built_in(self, name: str) -> bool:
         """Tell whether a name is the controller's: no data, no parameter has it."""
         hidden = name in self.task.declared or name in self.scope.parameters
-        return not hidden
+        return not (hidden or self.task.place(name, self.scope))
 
     def _stops(self) -> bool:
         operand, _ = self._find_argument("zonedata")

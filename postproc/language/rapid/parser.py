@@ -39,7 +39,9 @@ def _data(c: Children) -> ir.Declaration:
 
 
 def _parameter(c: Children) -> ir.RoutineParameter:
-    return ir.RoutineParameter(_words(c)[-1], bool(parts(c, "mode")))
+    type_, name = _words(c)
+    array, by_reference = None in c, bool(parts(c, "mode"))
+    return ir.RoutineParameter(name, by_reference, type="" if array else type_)
 
 
 def _optional(c: Children) -> ir.RoutineParameter:

@@ -88,9 +88,9 @@ def one(text):
 X = ir.DataObject("x")
 
 
-def given_as(name):
+def given_as(name, way="in"):
     """Return a parameter, which a routine may change."""
-    return ir.RoutineParameter(name, True)
+    return ir.RoutineParameter(name, way == "out")
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def given_as(name):
     [
         ("&ACCESS RVP", said.AccessHeader()),
         ("GLOBAL DEF Weld1(a :IN, b[] :OUT)",
-         ir.RoutineHead("def", "weld1", (given_as("a"), given_as("b")))),
+         ir.RoutineHead("def", "weld1", (given_as("a"), given_as("b", "out")))),
         ("deffct real f ( )", ir.RoutineHead("deffct", "f", (), True)),
         ("DEFDAT $CONFIG", said.DataList("$config")),
         ("DEFDAT m PUBLIC", said.DataList("m", True)),
