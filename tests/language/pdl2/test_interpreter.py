@@ -211,6 +211,34 @@ def test_a_loop_is_unrolled_unless_a_called_routine_changes_its_variable(
     assert len(found.visits) == rounds
 
 
+@pytest.mark.parametrize(
+    ("own", "shared", "rounds"),
+    [("VAR i : INTEGER\n", "", 3),  # the other file changes its own
+     ("VAR i : INTEGER EXPORTED FROM page\n", " EXPORTED FROM page", 1)],
+)  # fmt: skip
+def test_a_routine_of_another_file_may_change_the_variable_of_a_loop(
+    own: str, shared: str, rounds: int
+) -> None:
+    main = program(
+        f"PROGRAM a\n{own}ROUTINE r EXPORTED FROM page\nBEGIN\n"
+        "FOR i := 1 TO 3 DO\nMOVE LINEAR TO POS(1,2,3,4,5,6,'')\nr\nENDFOR\nEND a"
+    )
+    page = program(
+        f"PROGRAM page\nVAR i : INTEGER{shared}\n"
+        "ROUTINE r\nBEGIN\ni := 7\nEND r\nBEGIN\nEND page", "page"
+    )  # fmt: skip
+    assert len(resolve(main, others={"page": page}).visits) == rounds
+
+
+def test_a_loop_counts_its_own_variable_whatever_that_of_the_program_is() -> None:
+    routines = (
+        "VAR i : INTEGER\nROUTINE r\nBEGIN\ni := 7\nEND r\n"
+        "ROUTINE s\nVAR i : INTEGER\nBEGIN\n"
+        "FOR i := 1 TO 3 DO\nMOVE LINEAR TO POS(1,2,3,4,5,6,'')\nr\nENDFOR\nEND s"
+    )
+    assert len(body("s", declared=routines).visits) == 3
+
+
 def test_a_move_in_a_call_inside_of_an_expression_is_reported() -> None:
     text = (
         "PROGRAM a\nROUTINE f : INTEGER\nBEGIN\nMOVE JOINT TO {1,2,3,4,5,6}\n"
