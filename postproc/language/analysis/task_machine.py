@@ -368,7 +368,7 @@ class TaskMachine(Interpreter[Arrived]):
         here = replace(context.place.scope, points=state.points)
         return self.task.decide(operand, row, here)
 
-    def bound(
+    def loop_limit(
         self, context: Context, row: int, operand: ir.Operand | None, state: Arrived
     ) -> float:
         """Return a bound of a loop, NaN where it is not known."""

@@ -39,6 +39,8 @@ ROUNDED = 1e-5  # of poses [m], whose numbers are rounded differently
 CORRECTED = "corrected"
 TOGETHER = {CORRECTED, "arrivals-differ", "arc-distorted", "dependant-worse"}
 """Codes that what other arrivals need decides."""
+UNFLAGGED = ("configuration-unknown", "unknown-position-before")
+"""Codes of KRL behind a place that is not known: its lines have no S and T."""
 Key = tuple[int, bool, int]  # mark of a move, whether it is a VIA point, which arrival
 PLACES = {START: (START, False, 0), ELSEWHERE: (ELSEWHERE, False, 0)}
 
@@ -148,8 +150,9 @@ def differences(a: Arrivals, b: Arrivals) -> Iterator[tuple[int, str]]:
     These may differ: whether KRL stops at a fly point, where a statement behind it
     waits for the arm; codes at fly points, whose corners are blended otherwise, and at
     points that more than moves read, that the program sets in several ways, or that
-    KRL keeps in a data list (each language has rules of its own for them), and what
-    follows from that for other arrivals there and on arcs; corrections at fly points,
+    KRL keeps in a data list (each language has rules of its own for them), of lines of
+    KRL behind a place that is not known, and what follows from that for other arrivals
+    there and on arcs; corrections at fly points,
     where sides differ, and where one is for several arrivals.
     """
     unlike = codes_unlike(a, b)
@@ -176,11 +179,13 @@ def codes_unlike(a: Arrivals, b: Arrivals) -> set[Key]:
     """
     made, both = a.case.made, {*a.rows} & {*b.rows}
     moves, read = moves_of(made), read_elsewhere(made)
-    if b.case.language.traits.name == "krl":
+    krl = b.case.language.traits.name == "krl"
+    if krl:
         read |= {name for name in made.variables if not name.startswith("w")}
     found = {
         key for key in both
-        if (names_in(moves[key[0]].via) | names_in(moves[key[0]].to)) & read
+        if (krl and b.code(b.rows[key]) in UNFLAGGED)
+        or (names_in(moves[key[0]].via) | names_in(moves[key[0]].to)) & read
         or any(one.done.visits.motion.fly[one.rows[key]] for one in (a, b))
     }  # fmt: skip
     told = {k for k in both if {one.code(one.rows[k]) for one in (a, b)} <= TOGETHER}
