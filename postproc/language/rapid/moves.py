@@ -223,7 +223,11 @@ class Goals:
         zone = np.nan if one.name in AT_A_STOP else arguments.zone()
         operand = arguments.option("wobj")
         wobj = WORLD if operand is None else self._frame("wobj", operand, arguments)
-        found = self._tool(arguments), wobj, zone, arguments.speed()
+        operand = arguments.of_type("tooldata")
+        tool = FrameOfMove((), True, _NO_TOOL)
+        if operand is not None:
+            tool = self._frame("tool", operand, arguments)
+        found = tool, wobj, zone, arguments.speed()
         if named:
             self._known[key] = one, found  # it keeps its id from being used again
         return found
@@ -233,12 +237,6 @@ class Goals:
     def _is_assigned(self, operand: ir.Operand | None) -> bool:
         """Return True if the program may give data another value on its way."""
         return isinstance(operand, ir.DataObject) and operand.name in self.task.written
-
-    def _tool(self, arguments: _Arguments) -> FrameOfMove:
-        operand = arguments.of_type("tooldata")
-        if operand is None:
-            return FrameOfMove((), True, _NO_TOOL)
-        return self._frame("tool", operand, arguments)
 
     def _frame(
         self, kind: str, operand: ir.Operand, arguments: _Arguments
