@@ -281,7 +281,7 @@ class Interpreter(ABC, Generic[S]):
                 if row != start:
                     self.go_on(context, row, state)
                     return
-                one = _then(one)
+                one = getattr(one, "then", None) or ir.SourceStatement()
             after = self.run_one(context, row, one, state)
             if after is None:
                 return
@@ -355,21 +355,16 @@ class Interpreter(ABC, Generic[S]):
         for at in flow.divisions_behind(row):
             one = place.statement(at)
             state = self.before(context, at, one, state)
-            fits = self._fits(context, at, one, row, state)
+            fits: bool | None = True
+            if isinstance(one, ir.Branch) and one.word == "elseif":
+                fits = self.truth(context, at, one.values[0], state)
+            elif isinstance(one, ir.Branch) and one.word != "default":
+                fits = self.fits(context, at, one, row, state)
             if fits is not False:
                 self.enter(context, at, state)
             if fits is True:
                 return
         self.enter(context, flow.end.get(row, flow.last), state)
-
-    def _fits(
-        self, context: Context, row: int, one: ir.SourceStatement, head: int, state: S
-    ) -> bool | None:
-        if not isinstance(one, ir.Branch) or one.word == "default":
-            return True
-        if one.word == "elseif":
-            return self.truth(context, row, one.values[0], state)
-        return self.fits(context, row, one, head, state)
 
     def _jump(
         self, context: Context, row: int, to: int | None, one: ir.SourceStatement,
@@ -439,7 +434,9 @@ class Interpreter(ABC, Generic[S]):
         """Go into the next round, out of the loop, or both where that is not known."""
         place = context.place
         head = place.flow.head[row]
-        loop = _loop_at(place.statement(head))
+        loop = place.statement(head)
+        loop = loop.then if isinstance(loop, ir.LabelMark) else loop
+        assert isinstance(loop, ir.ForLoop)
         if context.is_round and context.at == place.offset + head:
             outer, number = context.outer, context.kind + 1
             if number < self.counted[outer, head].rounds:
@@ -489,16 +486,3 @@ def _rounds_of(context: Context, row: int) -> Context:
             break
         context = context.outer
     return context
-
-
-def _then(one: ir.SourceStatement) -> ir.SourceStatement:
-    """Return what follows a division of a block on its line."""
-    return getattr(one, "then", None) or ir.SourceStatement()
-
-
-def _loop_at(one: ir.SourceStatement) -> ir.ForLoop:
-    """Return the loop that begins at a row."""
-    if isinstance(one, ir.LabelMark):
-        one = one.then or one
-    assert isinstance(one, ir.ForLoop)
-    return one

@@ -475,7 +475,8 @@ class TaskMachine(Interpreter[Arrived]):
         file, _, routine = found
         if self._is_recursive(found):
             self.run_beside(file, routine)
-        running = self._find_running(context, routine)
+        calls = (one for one in calls_around(context) if one.place is not None)
+        running = next((one for one in calls if one.place.routine is routine), None)
         if running is not None:
             first = running.place.flow.first
             self.enter(running, first, self.at_call(running, here))
@@ -484,13 +485,6 @@ class TaskMachine(Interpreter[Arrived]):
             self.run_beside(file, routine)
             return self.unknown(context, row, here, RECURSIVE)
         self.call_routine(found, context, row, here)
-        return None
-
-    def _find_running(self, context: Context, routine: HeadedRows) -> Context | None:
-        """Return the call of a routine that is being run here, None without one."""
-        for one in calls_around(context):
-            if one.place is not None and one.place.routine is routine:
-                return one
         return None
 
     def call_routine(

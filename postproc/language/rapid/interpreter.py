@@ -27,6 +27,7 @@ from postproc.language.rapid.errors import (
     EXIT_CYCLE,
     PATH_ERRORS,
     Numbers,
+    begins_handler,
     clauses_of,
     common,
     key_of,
@@ -59,7 +60,6 @@ from postproc.language.rapid.program import RapidFile, inside, is_move
 from postproc.language.rapid.symbols import RapidTask, as_assignment, functions_in
 from postproc.language.visits import START
 
-HANDLERS = ("undo", "backward")
 SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
 BY_NAME = "callbyvar"
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
@@ -192,9 +192,7 @@ class RapidMachine(TaskMachine):
 
     def handles(self, one: ir.SourceStatement) -> bool:
         """Tell whether a handler begins, see `TaskMachine.handles`."""
-        return isinstance(one, said.ErrorHandler) or (
-            isinstance(one, ir.BlockWord) and one.word in HANDLERS
-        )
+        return begins_handler(one)
 
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""

@@ -165,15 +165,10 @@ class RapidTask(TaskSymbols[RapidFile]):
         """Return True if a persistent may come to hold another value by this task."""
         if name in self.changes:
             return True
-        found = (self._first_value(*one) for one in self._list_shared(name))
-        return any(one is None or one != value for one in found)
-
-    def _list_shared(self, name: str) -> Iterator[tuple[int, Datum]]:
-        """Yield the declarations of a persistent of several tasks."""
-        for number, file in enumerate(self.files):
-            for datum in file.data:
-                if datum.name == name and _is_shared(datum):
-                    yield number, datum
+        data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
+        own = (one for one in data if one[1].name == name and _is_shared(one[1]))
+        first = (self._first_value(*one) for one in own)
+        return any(one is None or one != value for one in first)
 
     def _first_value(self, file: int, datum: Datum) -> Value | None:
         """Return what data hold at first, without where it is written."""

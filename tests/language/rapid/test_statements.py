@@ -10,7 +10,7 @@ from postproc.exceptions import ProgramError
 from postproc.language import ir
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.parser import parse_statement
-from postproc.language.rapid.statements import read_statements
+from postproc.language.rapid.program import read_statements
 from postproc.language.text.source import Source
 from tests.reference.statements import BEGINNING, statements
 
