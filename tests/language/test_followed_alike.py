@@ -22,6 +22,7 @@ CONST robtarget p2:=[[2,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
 VAR robtarget v;
 VAR num n;
 VAR num k;
+VAR num m;
 PROC main()
 %s
 EXIT;
@@ -42,11 +43,12 @@ END
 DATA = """DEFDAT job PUBLIC
 DECL E6POS p1={X 1,Y 0,Z 0,A 0,B 0,C 0,S 2,T 2}
 DECL E6POS p2={X 2,Y 0,Z 0,A 0,B 0,C 0,S 2,T 2}
+DECL INT m
 ENDDAT
 """
 PDL2 = """PROGRAM job
 VAR
-  n, k : INTEGER
+  n, k, m : INTEGER
   p1, p2, v : POSITION
 %s
 BEGIN
@@ -79,10 +81,70 @@ WORDS = {
 }  # fmt: skip
 LANGUAGES = [*WORDS]
 FRAME_Y = {"1": "0", "2": "0", "3": "9"}
-NEXT = {
-    "rapid": "PROC next(INOUT num a)\na:=a+1;\nENDPROC",
-    "krl": "DEF next(a:OUT)\nDECL INT a\na=a+1\nEND",
-    "pdl2": "ROUTINE next(a : INTEGER)\nBEGIN\n  a := a + 1\nEND next",
+ROUTINES = {
+    "rapid": """
+PROC next(INOUT num a)
+a:=a+1;
+ENDPROC
+FUNC num plus(num a)
+RETURN a+1;
+ENDFUNC
+FUNC num sets(num a)
+m:=a;
+RETURN a;
+ENDFUNC
+FUNC robtarget up(num a)
+VAR robtarget r;
+r:=p1;
+r.trans.x:=r.trans.x+a;
+RETURN r;
+ENDFUNC
+""",
+    "krl": """
+DEF next(a:OUT)
+DECL INT a
+a=a+1
+END
+DEFFCT INT plus(a:IN)
+DECL INT a
+RETURN (a+1)
+ENDFCT
+DEFFCT INT sets(a:IN)
+DECL INT a
+m=a
+RETURN (a)
+ENDFCT
+DEFFCT E6POS up(a:IN)
+DECL INT a
+DECL E6POS r
+r=p1
+r.X=r.X+a
+RETURN (r)
+ENDFCT
+""",
+    "pdl2": """
+ROUTINE next(a : INTEGER)
+BEGIN
+  a := a + 1
+END next
+ROUTINE plus(a : INTEGER) : INTEGER
+BEGIN
+  RETURN(a + 1)
+END plus
+ROUTINE sets(a : INTEGER) : INTEGER
+BEGIN
+  m := a
+  RETURN(a)
+END sets
+ROUTINE up(a : INTEGER) : POSITION
+VAR
+  r : POSITION
+BEGIN
+  r := p1
+  r.X := r.X + a
+  RETURN(r)
+END up
+""",
 }
 
 
@@ -91,11 +153,11 @@ def visits(cell: Cell, language: str, *lines: str) -> Visits:
     body = "\n".join(_say(language, line) for line in lines)
     match language:
         case "rapid":
-            files = {"job.mod": RAPID % (body, NEXT[language])}
+            files = {"job.mod": RAPID % (body, ROUTINES[language])}
         case "krl":
-            files = {"job.src": KRL % (body, NEXT[language]), "job.dat": DATA}
+            files = {"job.src": KRL % (body, ROUTINES[language]), "job.dat": DATA}
         case _:
-            files = {"job.pdl": PDL2 % (NEXT[language], body)}
+            files = {"job.pdl": PDL2 % (ROUTINES[language], body)}
     given = {name: text.encode() for name, text in files.items()}
     return read_program(given, cell).visits
 
@@ -183,3 +245,30 @@ def test_an_arc_from_two_places_ends_behind_its_middle(
     found = visits(bench_cell, language, *lines)
     before = [found.graph.predecessors(k).tolist() for k in range(len(found))]
     assert before == [[START], [0], [0, 1], [2], [3]]
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_numbers_that_functions_return(language: str, bench_cell: Cell) -> None:
+    lines = ("set n := 2", "set k := plus(plus(n))", "if k < 4", "go p1", "end")
+    found = visits(bench_cell, language, *lines, "if n < 3", "go p2", "end")
+    assert found.target.values[:, 0].tolist() == [2.0]
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_functions_that_do_more_are_not_followed(
+    language: str, bench_cell: Cell
+) -> None:
+    lines = ("set n := sets(2)", "if n < 3", "go p1", "end", "go p2")
+    found = visits(bench_cell, language, *lines)
+    assert found.target.values[:, 0].tolist() == [1.0, 2.0]
+    assert found.graph.predecessors(1).tolist() == [START, 0]
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_points_that_functions_return_are_not_corrected(
+    language: str, bench_cell: Cell
+) -> None:
+    found = visits(bench_cell, language, "set n := 5", "go up(n)", "go p1")
+    assert found.target.values[:, 0].tolist() == [6.0, 1.0]
+    assert codes(found) == [Code.COMPUTED_TARGET, ""]
+    assert found.target.literal.tolist() == [-1, 0] and found.literals.pinned[0]

@@ -453,12 +453,25 @@ class TaskSymbols(ABC, Generic[F]):
         for _, operand, at, there in self.find_given(ir.DataObject(name), here):
             inner = [self._is_given(one, at, there) for one in self.names_of(operand)]
             return None if None in inner else True
+        if name in self.routines:
+            return True if self._is_closed(name, here) else None
         place = self.place(name, here)
         found = self.datum(name, here)
         if found is None:
             fixed = name in ALIKE or name in self.constants
             return False if place is None and fixed else None
         return False if found[1].kind == "const" else None
+
+    def _is_closed(self, name: str, here: Scope) -> bool:
+        """Return True if a function names nothing but data of its own."""
+        found = self.routine(name, here)
+        if found is None:
+            return False
+        scope, text = self.scope_of(*found), self.files[found.file].text
+        said = [text.statement(row) for row in found.inside]
+        parts = [one for one in ir.walk(*said) if isinstance(one, ir.DataObject)]
+        places = (self.place(one.name, scope) for one in parts)
+        return all(place is not None and place[2] for place in places)
 
     def value(
         self, operand: ir.Operand | None, row: int, here: Scope, depth: int = 0

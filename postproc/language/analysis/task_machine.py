@@ -617,13 +617,23 @@ class TaskMachine(Interpreter[Arrived]):
                 visit.goal = visit.goal.lost
 
     def list_changed_beside(self) -> frozenset[str]:
-        """List names of data that change in ways that are not followed."""
+        """List names of data that change in ways that are not followed.
+
+        What a routine declares changes for nothing else.
+        """
         rows = self._rows_of({*self.beside, *self._list_beside()})
         changed = {
             data.name for at, row in rows
             for data in self.task.list_changes(self.texts[at].statement(row))
+            if not self._is_own(data.name, at, row)
         }  # fmt: skip
         return self.task.uses.add_passed(changed)
+
+    def _is_own(self, name: str, file: int, row: int) -> bool:
+        """Return True for data that the routine around a statement declares anew."""
+        routine = self.task.routine_around(file, row)
+        found = routine and self.task.datum(name, self.task.scope_of(*routine))
+        return bool(found and found[1].routine and found[1].kind != "pers")
 
     def pause(self, here: Arrived) -> None:
         """Note that the arm may stop where it stands, although a zone is written."""

@@ -143,7 +143,13 @@ class NamesUsed:
 
     def note_call(self, name: str, arguments: Sequence[ir.Argument]) -> None:
         """Note arguments: what is called may change them, unless it is known not to."""
-        changed = arguments if name in self.own else self.list_changed(name, arguments)
+        changed = self.list_changed(name, arguments)
+        if name in self.own:
+            pairs = self._pair(name, arguments)
+            by_reference = [
+                one for parameter, one in pairs or () if parameter.by_reference
+            ]
+            changed = arguments if pairs is None else by_reference
         for argument in changed:
             if isinstance(argument.value, ir.DataObject):
                 self.changed.add(argument.value.name)
@@ -155,13 +161,21 @@ class NamesUsed:
             else:
                 self.take(argument.value)
 
+    def _pair(
+        self, name: str, arguments: Sequence[ir.Argument]
+    ) -> list[tuple[ir.RoutineParameter, ir.Argument]] | None:
+        """Pair arguments with parameters, None where it is not sure what is called."""
+        found = self.own.get(name, ())
+        if len(found) != 1 or not self.is_passed(found[0]):
+            return None
+        if any(one.passed_on for one in arguments):
+            return None
+        return match_arguments(found[0].rows.head.parameters, arguments)
+
     def _note_instruction(self, name: str, arguments: Sequence[ir.Argument]) -> None:
         """Note what an instruction, or a routine of the task, is given."""
-        found = self.own.get(name, ())
-        pairs = None
-        if len(found) == 1 and self.is_passed(found[0]):
-            pairs = match_arguments(found[0].rows.head.parameters, arguments)
-        if pairs is None or any(one.passed_on for one in arguments):
+        pairs = self._pair(name, arguments)
+        if pairs is None:
             self.note_call(name, arguments)
             return
         for parameter, argument in pairs:

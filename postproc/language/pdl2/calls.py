@@ -70,11 +70,15 @@ def summarise_call(
     name: str,
     reach: CallGraph,
     arguments: tuple[ir.Operand | None, ...] = (),
+    parameters: Sequence[ast.FormalParameter] = (),
 ) -> None:
     """Take in what a call may do without following it; list the moves it may make."""
-    for argument in list_changed_arguments(arguments):
-        here.world.pin(here.value(argument), f"{name} may move to it")
-        invalidate(here, argument, f"{name} may change it")
+    still = {one.name for one in parameters} - reach.may_change
+    for at, argument in enumerate(arguments):
+        if isinstance(argument, ir.DataObject):
+            here.world.pin(here.value(argument), f"{name} may move to it")
+            if at >= len(parameters) or parameters[at].name not in still:
+                invalidate(here, argument, f"{name} may change it")
     take_effects(
         here, reach.parts, f"{name} may compute with it", f"{name} may change it"
     )
@@ -152,11 +156,43 @@ def calls_in_expressions(
             opaque_call(here, call.name, call.values)
             continue
         name, reach = inside.body.name, call_graph_of(here.world, inside)
-        summarise_call(machine, here, name, reach, call.values)
+        answer, key = _run_function(machine, here, inside, call), here.answer_key(call)
+        here.store.drop(key)
+        if answer is not None:
+            here.store.write(key, answer)
+        summarise_call(machine, here, name, reach, call.values, inside.body.parameters)
         if reach.moves:
             _say(here, Code.CALL_NOT_FOLLOWED, name, "is called in an expression and "
                  "may move the arm: the next move is assumed to start at an unknown "
                  "place. Call it as a statement")  # fmt: skip
+
+
+def _run_function(
+    machine: Machine, here: Execution, inside: Place, call: ir.FunctionCall
+) -> Value | None:
+    """Return what a function returns that only sets variables of its own.
+
+    None for one that does more than that.
+    """
+    store, body = here.store.copy(), inside.body
+    _bind(replace(here, store=store), inside, call.values)
+    given = {parameter.name for parameter in body.parameters}
+    for row in range(body.flow.first, body.flow.last):
+        at = Execution(here.world, inside, row, store, here.volatile, here.context)
+        one = inside.statement(row)
+        if machine.find_calls(inside, one):
+            return None
+        match one:
+            case ir.Leave("return", ir.Operand() as value):
+                found = at.value(value)
+                if isinstance(found, Position):
+                    found = replace(found, derived=f"{body.name} returns it")
+                return found
+            case ir.Assignment(target) if target.name in body.own_names - given:
+                assign(at, one, False)
+            case _ if type(one) is not ir.SourceStatement:
+                return None
+    return None
 
 
 def _bind(

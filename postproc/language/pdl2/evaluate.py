@@ -175,8 +175,13 @@ class ProgramPoint:
                 aux = tuple((axis, self.real(item)) for axis, item in own)
                 return replace(self._components(items[:6]), joints=True, aux=aux)
             case ir.FunctionCall(name):
-                return self._invoke(name, expression.values)
+                answer = self.store.get_assigned(self.answer_key(expression))
+                return answer or self._invoke(name, expression.values)
         return RUN_TIME
+
+    def answer_key(self, call: ir.FunctionCall) -> str:
+        """Return where it is kept what a function of the job has returned."""
+        return f"{self.place.program.name}:{self.place.body.name}/{hash(call)}"
 
     def read(self, reference: ir.DataObject) -> Value:
         """Return what a variable holds."""
@@ -189,7 +194,7 @@ class ProgramPoint:
             if name in _WORDS:
                 return name
         if self.world.is_function(self.place, name):
-            return Nothing(f"it comes from {name.upper()}, known only at run time")
+            return self.value(ir.FunctionCall(name, ()))
         target = self.locate(reference)
         if not target.exact:
             for key in target.keys:

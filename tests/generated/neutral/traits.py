@@ -51,14 +51,14 @@ PDL2 = Traits(
                "plain forms", "repair", "splines"}),
     stops=(("wait", 0.5),), parts_move=True,  # a wait may take long or not
 )  # fmt: skip
-# Left out, as one language follows it and another one does not: what functions return
-# (PDL2), points that are shifted in their own frame ("tool": in KRL they have no S and
-# T), values that other programs may change ("modules", "shared": PDL2), or that stand
-# in a program before it sets them ("first": PDL2 decides by them), what an interrupt
-# changes ("meddle": KRL leaves all), and what is behind a routine that no file holds.
+# Left out, as one language follows it and another one does not: points that are shifted
+# in their own frame ("tool": in KRL they have no S and T), values that other programs
+# may change ("modules", "shared": PDL2), or that stand in a program before it sets them
+# ("first": PDL2 decides by them), what an interrupt changes ("meddle": KRL leaves all),
+# and what is behind a routine that no file holds.
 ALL = Traits(
     "all",
-    frozenset({"first", "foreign", "functions", "made", "meddle", "modules",
-               "plain forms", "shared", "tool"})
+    frozenset({"first", "foreign", "meddle", "modules", "plain forms", "shared",
+               "tool"})
     | (RAPID.lacks | KRL.lacks | PDL2.lacks) - {"early", "forms", "splines"},
 )  # fmt: skip
