@@ -243,7 +243,10 @@ class GoalReader(ABC):
         goal = self.unknown(AT_RUN_TIME)
         if held.operand is not None:
             goal = there.goal(held.operand)
-        why = [self._explain_chain(place, goal) for place in held.chain]
+        why = []
+        for place in held.chain:
+            where = self.at(self.row, Scope(*place[:3]))
+            why.append(where.explain_pinned(place[-1], goal.file))
         why += self.explain_kept(held)
         pins = next(filter(None, (goal.pins, *why)), "")
         if held.components:
@@ -254,9 +257,6 @@ class GoalReader(ABC):
         if shift is not None:
             shift = replace(shift, pins=shift.pins or pins)
         return replace(goal, name=name, pins=pins, shift=shift)
-
-    def _explain_chain(self, place: tuple[int, str, str, str], goal: FoundGoal) -> str:
-        return self.at(self.row, Scope(*place[:3])).explain_pinned(place[-1], goal.file)
 
     def _set_components(
         self, held: AssignedPoint, base: FoundGoal, name: str, pins: str

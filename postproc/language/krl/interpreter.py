@@ -114,7 +114,7 @@ class KrlMachine(TaskMachine):
         modes = KrlModes(tool=_frame(self.start.tool), base=_frame(self.start.uframe))
         modes = modes.beside(self.task)
         first = self.task.files[0]
-        here = Arrived(frozenset([START]), modes)
+        here = self.begin(frozenset([START]), modes)
         main = TaskRoutine(0, first.name, first.routines[0])
         self.call_routine(main, self.root, -1, here)
         self.follow()
@@ -164,7 +164,11 @@ class KrlMachine(TaskMachine):
         rows = range(row + 1, context.place.flow.loops.get(row, row))
         text = self.texts[context.place.scope.file]
         inside = [text.statement(k) for k in rows]
-        if any(one.name in self._sets(other) for other in inside):
+        changed = {
+            data.name for other in inside for data in self.task.list_changes(other)
+        }
+        changed |= {other.name for other in inside if isinstance(other, ir.ForLoop)}
+        if one.name in changed:
             return False
         if one.name in self.task.odd_words:
             return False
@@ -175,17 +179,9 @@ class KrlMachine(TaskMachine):
         if one.name in self.task.beside:
             return False
         others = self.task.counted[one.name] > 1 or one.name in self.task.assigned
-        return not (others and (self._has_interrupts or self._calls_own(inside)))
-
-    def _sets(self, one: ir.SourceStatement) -> set[str]:
-        """Return the names of data that a statement sets, also as a loop."""
-        named = {one.name} if isinstance(one, ir.ForLoop) else set()
-        return named | {data.name for data in self.task.list_changes(one)}
-
-    def _calls_own(self, statements: Sequence[ir.SourceStatement]) -> bool:
-        """Return True if a statement calls a routine of the files."""
-        called = set[str]().union(*map(list_calls, statements))
-        return not called.isdisjoint(self.task.routines)
+        called = set[str]().union(*map(list_calls, inside))
+        calls_own = not called.isdisjoint(self.task.routines)
+        return not (others and (self._has_interrupts or calls_own))
 
     @cached_property
     def _has_interrupts(self) -> bool:
@@ -193,11 +189,6 @@ class KrlMachine(TaskMachine):
         kinds = said.InterruptDeclared | said.PathTrigger
         said_ones = (one for text in self.texts for one in text.said)
         return any(isinstance(one, kinds) for one in said_ones)
-
-    @staticmethod
-    def usual_step(first: float, last: float) -> float:
-        """Count by 1: a loop downwards needs STEP."""
-        return 1.0
 
     # What it does.
 

@@ -158,7 +158,7 @@ class KrlGoals:
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
         reader = self._reader(move, row, replace(here, points=points))
-        angle = self._angle(move, row, here)
+        angle = math.radians(self.task.number(move.angle, row, here))
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
         if move.via is not None:
@@ -195,15 +195,6 @@ class KrlGoals:
             move = replace(move, words=(*move.words, *end.words))
         shared = {"block": (here, rows.start), "begin": rows.start, "inner": inner}
         return move, shared
-
-    def _angle(self, move: said.KrlMove, row: int, here: Scope) -> float:
-        """Return the angle [rad] at which an arc ends, NaN where it is not known."""
-        if move.angle is None:
-            return math.nan
-        found = self.task.value(move.angle, row, here)
-        return (
-            math.radians(found.value) if isinstance(found, WrittenNumber) else math.nan
-        )
 
 
 def motion_of(word: str) -> Motion:
@@ -413,7 +404,10 @@ class KrlGoal(GoalReader):
 
         What is on the right tells what comes out: a frame has no S and T.
         """
-        behind = isinstance(first, ir.DataObject) and self._is_point(first)
+        behind = False
+        if isinstance(first, ir.DataObject):
+            found = self.task.datum(first.name, self.here)
+            behind = found is not None and found[1].type in POSITIONS
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, ir.DataObject):
             return self.unknown(AT_RUN_TIME)
@@ -475,11 +469,6 @@ class KrlGoal(GoalReader):
         file, slots = locate_numbers(written or (), WIDTH)
         own = file == self.here.file
         return shift, file, slots if own else (-1,) * WIDTH
-
-    def _is_point(self, operand: ir.DataObject) -> bool:
-        """Tell whether data is a position, and no frame."""
-        found = self.task.datum(operand.name, self.here)
-        return found is not None and found[1].type in POSITIONS
 
     # Steps.
 

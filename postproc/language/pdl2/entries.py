@@ -279,23 +279,17 @@ def last_head(lines: Lines, said: ParsedShapes[EntryPart | None]) -> Ints:
     rows = np.flatnonzero(said.which(_is_head)[lines.shape])
     shapes = lines.shape[rows]
     nested = said.which(is_nested)[shapes]
-    heads = _heads(rows, said.which(_may_be_field)[shapes], nested)
+    if nested.any():
+        fields, heads, within = said.which(_may_be_field)[shapes], [], False
+        columns = (rows.tolist(), fields.tolist(), nested.tolist())
+        for row, is_field, has_fields in zip(*columns, strict=True):
+            if not (within and is_field):
+                heads.append(row)
+                within = has_fields
+        rows = np.array(heads, dtype=np.int64)
     last = np.full(len(lines), -1, dtype=np.int64)
-    last[heads] = heads
+    last[rows] = rows
     return np.asarray(np.maximum.accumulate(last))
-
-
-def _heads(rows: Ints, fields: Bools, nested: Bools) -> Ints:
-    """Return which rows of heads are those of variables."""
-    if not nested.any():
-        return rows
-    heads, within = [], False
-    columns = (rows.tolist(), fields.tolist(), nested.tolist())
-    for row, is_field, has_fields in zip(*columns, strict=True):
-        if not (within and is_field):
-            heads.append(row)
-            within = has_fields
-    return np.array(heads, dtype=np.int64)
 
 
 def is_nested(entered: EntryPart | None) -> bool:

@@ -11,17 +11,17 @@ import numpy as np
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, Context
-from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED, Counting
+from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.abstract_state import Store, root_of
+from postproc.language.pdl2.abstract_state import FRAMES, Store, root_of
 from postproc.language.pdl2.calls import (
     assign,
     call_statement,
     calls_in_expressions,
-    forget_surroundings,
     frame_value,
     list_moves,
+    take_effects,
 )
 from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
 from postproc.language.pdl2.evaluate import ProgramPoint
@@ -38,7 +38,6 @@ from postproc.language.pdl2.machine import (
     Goal,
     Machine,
     MoveForm,
-    escape_names,
     invalidate,
     invalidate_names,
     let_others_run,
@@ -51,8 +50,8 @@ from postproc.language.pdl2.side_effects import (
     CallGraph,
     is_harmless,
     list_changed_arguments,
+    list_live,
     live_rows,
-    rows_effects,
     words_in,
 )
 from postproc.language.pdl2.to_visits import collect
@@ -132,41 +131,26 @@ class Pdl2Machine(Machine):
                 _forget_by_text(here, _why_unknown(here))
         return state
 
-    def truth(
-        self, context: Context, row: int, condition: ir.Operand, state: Store
-    ) -> bool | None:
-        """Tell whether a condition holds, None where only the run tells."""
-        found = self.at(context, row, state).value(condition)
-        return found if isinstance(found, bool) else None
+    def evaluate(
+        self, context: Context, row: int, operand: ir.Operand | None, state: Store
+    ) -> float | str | None:
+        """Return a number, a text or a truth, None where only the run tells."""
+        found = self.at(context, row, state).value(operand)
+        return found if isinstance(found, float | bool | str) else None
 
-    def fits(
-        self, context: Context, row: int, case: ir.Branch, head: int, state: Store
-    ) -> bool | None:
-        """Tell whether a CASE means the value that SELECT names."""
-        select = ast.action(context.place.statement(head))
-        tested = select.values if isinstance(select, ir.Branch) else ()
-        value = self.at(context, head, state).value(tested[0] if tested else None)
-        return _fits(self.at(context, row, state), case, value)
-
-    def count(
-        self, context: Context, row: int, loop: ir.ForLoop, state: Store
-    ) -> Counting | None:
-        """Return the rounds of a loop, None where they are not known."""
-        here = self.at(context, row, state)
-        first, last = here.value(loop.first), here.value(loop.last)
-        by = here.value(loop.step) if loop.step is not None else 1.0
-        if not (
-            isinstance(first, float) and isinstance(last, float)
-            and isinstance(by, float)
-        ):  # fmt: skip
-            return None
-        return Counting.of(first, last, -by if loop.down and by > 0 else by)
+    def selector(self, head: ir.SourceStatement) -> ir.Operand | None:
+        """Return what SELECT names."""
+        return super().selector(ast.action(head) or head)
 
     def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
         """Tell whether nothing but a loop itself changes its variable."""
-        program, end = context.place.program, context.place.flow.end[row]
-        changed = rows_effects(program, row + 1, end).assigned | self.volatile
-        return loop.name not in changed
+        place, key = context.place, self.world.root(context.place, loop.name)
+        inside = list_live(self.world, place, row + 1, place.flow.end[row])
+        return loop.name not in self.volatile and not any(
+            loop.name in part.effects.assigned
+            and self.world.root(part.place, loop.name) == key
+            for part in inside
+        )
 
     def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
         """Say that a loop runs too often to be followed round by round."""
@@ -287,22 +271,6 @@ def _cancel(here: Execution) -> None:
         here.store.last |= {ELSEWHERE}
 
 
-def _fits(at: Execution, case: ir.Branch, value: Value) -> bool | None:
-    """Tell whether a CASE means a value, None where it is not known."""
-    found: bool | None = not case.values and None
-    for choice in case.values:
-        low, high = choice, choice
-        if isinstance(choice, ir.Interval):
-            low, high = choice.low, choice.high
-        a, b = at.value(low), at.value(high)
-        known = type(a) is type(value) and type(b) is type(value)
-        if not known or not isinstance(value, float | str):
-            found = None
-        elif a <= value <= b:  # type: ignore[operator]
-            return True
-    return found
-
-
 def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> None:
     """Forget all that unknown text could influence."""
     why = _why_unknown(here)
@@ -332,15 +300,13 @@ def _is_harmless(here: Execution, text: str) -> bool:
 
 def _forget_by_text(here: Execution, why: str) -> None:
     """Forget what only a statement that may move the arm could change."""
-    forget_surroundings(here, why)
-    here.world.report(
-        here.place.program,
-        here.row,
-        Code.MOTION_UNKNOWN,
+    here.store.forget_surroundings(why)
+    text = (
         "this statement is not understood: the position of the arm, its frames and "
         "its motion settings are not known after it, and targets are not corrected "
-        "until these are set again",
+        "until these are set again"
     )
+    here.world.report(here.place.program, here.row, Code.MOTION_UNKNOWN, text)
 
 
 def run_broken(machine: Machine, here: Execution) -> None:
@@ -355,10 +321,9 @@ def run_broken(machine: Machine, here: Execution) -> None:
             here.row = row
             here.store.last = frozenset({ELSEWHERE})
             move(machine, here, said)
-    effects = rows_effects(program, body.first, body.last)
-    escape_names(here, effects.read, f"{why}: it may be used in a computation")
-    invalidate_names(here, effects.assigned, why)
-    here.store.set(tool=Nothing(why), base=Nothing(why), uframe=Nothing(why))
+    inside = list_live(here.world, here.place, body.first, body.last)
+    take_effects(here, inside, f"{why}: it may be used in a computation", why)
+    here.store.forget_frames(why)
     here.store.last = frozenset({ELSEWHERE})
 
 
@@ -595,11 +560,7 @@ def _start(machine: Machine) -> None:
     program, start = world.main, world.start
     store = Store(world.initial.find, last=frozenset({START}), changing=world.changing)
     why = "the cell file does not say what it is"
-    store.set(
-        tool=frame_value(start.tool, why),
-        base=frame_value(start.base, why),
-        uframe=frame_value(start.uframe, why),
-    )
+    store.set(**{name: frame_value(getattr(start, name), why) for name in FRAMES})
     if start.linear_speed is not None:
         store.set(lin_spd=start.linear_speed)
     if start.override is not None:
@@ -618,7 +579,7 @@ def _handlers(machine: Machine, store: Store) -> None:
     unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
     unknown.changing = world.changing
     unknown.given, unknown.lost = store.given, store.lost
-    unknown.set(tool=nothing, base=nothing, uframe=nothing)
+    unknown.forget_frames(nothing.why)
     for program in world.programs():
         for body in (program.main, *program.routines.values()):
             for first, last in body.flow.conditions if body else ():
@@ -662,28 +623,20 @@ def _cancelling_handler(
         return
     machine.interrupted = True
     machine.cycle_left |= cycles
-    machine.world.report_once(
-        place.program,
-        row,
-        Code.HANDLER_CANCELS,
-        str(row),
+    text = (
         "this condition handler may end any move early (CANCEL, EXIT CYCLE): the start "
-        "of every move is uncertain",
+        "of every move is uncertain"
     )
+    code, program = Code.HANDLER_CANCELS, place.program
+    machine.world.report_once(program, row, code, str(row), text)
 
 
 def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> None:
     line = int(place.program.lines.line[row])
     machine.interrupted = True
-    text = f"a condition handler (line {line}) may move the arm at any time"
-    machine.handler = Reason(Code.HANDLER_MOVES, text)
-    machine.world.report_once(
-        place.program,
-        row,
-        Code.HANDLER_MOVES,
-        str(row),
-        "this condition handler may move the arm at any time: the start of every move "
-        "is uncertain",
-    )
+    code, moves = Code.HANDLER_MOVES, "may move the arm at any time"
+    machine.handler = Reason(code, f"a condition handler (line {line}) {moves}")
+    text = f"this condition handler {moves}: the start of every move is uncertain"
+    machine.world.report_once(place.program, row, code, str(row), text)
     context = machine.root.within(place.offset + row, HANDLED, place)
     machine.enter(context, row + 1, store)

@@ -275,7 +275,8 @@ def find_fields(
     nested = np.flatnonzero(said.which(is_nested)[lines.shape[own]])
     if not len(nested):
         return Fields()
-    names = [_name(lines, said, row) for row in own.tolist()]
+    heads = [said[shape] for shape in lines.shape[own].tolist()]
+    names = ["" if head is None else head.name.lower() for head in heads]
     count, ends = Counter(names), np.append(own[1:], len(head))
     each: list[Field] = []
     findings: list[Finding] = []
@@ -328,11 +329,6 @@ def _finding(
     assert entered is not None
     line = int(lines.line[at])
     return Diagnostic(lines.source.name, line, code, f"{entered.name} {text}")
-
-
-def _name(lines: Lines, said: ParsedShapes[EntryPart | None], row: int) -> str:
-    entered = said[int(lines.shape[row])]
-    return entered.name.lower() if entered is not None else ""
 
 
 def with_fields(records: Records, fields: Fields) -> Records:

@@ -35,6 +35,7 @@ _UNKNOWN_OPENERS: tuple[tuple[str, ir.SourceStatement], ...] = (
     (r"CASE\b", ir.Branch("case")),
     (r"CONDITION\b(?!.*\bENDCONDITION\b)", ir.Branch("condition")),
 )
+_SPELT = {"test": "SELECT", "endtest": "ENDSELECT"}
 _STRING = re.compile(r"'[^']*'")
 _JUMP = re.compile(r"\b(?:GOTO|RETURN|EXIT)\b", re.I)
 _LEADS = (
@@ -68,7 +69,9 @@ def read_flow(
         first: The first row of the body.
         last: The row of its end.
     """
-    reader = FlowReader(lambda row: int(lines.line[row]), _spell)
+    reader = FlowReader(
+        lambda row: int(lines.line[row]), lambda word: _SPELT.get(word, word.upper())
+    )
     for row in rows.tolist():
         written = statements[int(lines.shape[row])]
         odd = ast.action(written)
@@ -77,11 +80,6 @@ def read_flow(
             reader.problems.append((row, _LEADS))
         reader.take(row, recover_block(written))
     return reader.flow(first, last)
-
-
-def _spell(word: str) -> str:
-    """Write the words of blocks as the language does."""
-    return {"test": "SELECT", "endtest": "ENDSELECT"}.get(word, word.upper())
 
 
 # Declared variables: a list of names is one declaration, whatever its length.

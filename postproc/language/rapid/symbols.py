@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
@@ -74,7 +74,8 @@ class RapidTask(TaskSymbols[RapidFile]):
 
     comments = COMMENTS
     layouts = RECORDS
-    followed = (*RECORDS, "num")
+    followed = (*RECORDS, "num", "bool")
+    targets = ("robtarget", "jointtarget")
     constants: ClassVar = {"true": 1.0, "false": 0.0, "pi": math.pi}
     functions = "func"
     others: Sequence[RapidTask] = ()
@@ -164,15 +165,10 @@ class RapidTask(TaskSymbols[RapidFile]):
         """Return True if a persistent may come to hold another value by this task."""
         if name in self.changes:
             return True
-        found = (self._first_value(*one) for one in self._list_shared(name))
-        return any(one is None or one != value for one in found)
-
-    def _list_shared(self, name: str) -> Iterator[tuple[int, Datum]]:
-        """Yield the declarations of a persistent of several tasks."""
-        for number, file in enumerate(self.files):
-            for datum in file.data:
-                if datum.name == name and _is_shared(datum):
-                    yield number, datum
+        data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
+        own = (one for one in data if one[1].name == name and _is_shared(one[1]))
+        first = (self._first_value(*one) for one in own)
+        return any(one is None or one != value for one in first)
 
     def _first_value(self, file: int, datum: Datum) -> Value | None:
         """Return what data hold at first, without where it is written."""
@@ -282,13 +278,13 @@ class _RapidUses(NamesUsed):
 
     def note(self, one: ir.SourceStatement) -> None:
         """Note what is connected, and what an unknown procedure gets, as changed."""
-        match one:
+        match as_assignment(one, self.own) or one:
             case said.ConnectTrap(interrupt=interrupt):
                 self.changed.add(interrupt.name)
             case said.LateCall(arguments=arguments):
                 self.note_call("", arguments)
-            case _:
-                super().note(one)
+            case plain:
+                super().note(plain)
 
     def list_changed(
         self, name: str, arguments: Sequence[ir.Argument]
@@ -321,6 +317,25 @@ class _RapidUses(NamesUsed):
     def is_passed(self, routine: TaskRoutine) -> bool:
         """Return True but for a local one, which need not be what is called."""
         return not routine.rows.head.local
+
+
+def as_assignment(
+    one: ir.SourceStatement, routines: Container[str]
+) -> ir.Assignment | None:
+    """Return what Incr, Decr, Add and Clear say as an assignment, None for all else.
+
+    Args:
+        one: The statement.
+        routines: Names of routines of the task, which hide them.
+    """
+    if not isinstance(one, ir.Instruction) or one.name in routines:
+        return None
+    match one.name, one.values:
+        case "incr" | "decr" | "clear" as name, (ir.DataObject() as target,):
+            return ir.Assignment(target, ir.Operation(name.upper(), (target,)))
+        case "add", (ir.DataObject() as target, ir.Operand() as by):
+            return ir.Assignment(target, ir.Operation("+", (target, by)))
+    return None
 
 
 def functions_in(one: ir.SourceStatement) -> Iterator[str]:

@@ -552,7 +552,7 @@ def test_work_objects_and_tools_that_the_program_assigns_are_known():
         ["WHILE di1=1 DO", "{}", "wv.oframe.trans.z:=5;", "ENDWHILE"],
         ["wv.oframe.trans.z:=ReadNum(d);", "{}"],
         ["wv.oframe:=DefFrame(p1,p2,p3);", "{}"],
-        ["change wv;", "{}"],
+        ["IF di1=1 THEN", "change wv;", "ENDIF", "{}"],
         ["unknown_one;", "{}"],
     ],
 )
