@@ -151,7 +151,7 @@ class Interpreter(ABC, Generic[S]):
         self, context: Context, row: int, case: ir.Branch, head: int, state: S
     ) -> bool | None:
         """Tell whether a case means what its block tests, None where it may."""
-        tested = self.tested(context.place.statement(head))
+        tested = self.selector(context.place.statement(head))
         value = self.evaluate(context, head, tested, state)
         found: bool | None = not case.values and None
         for choice in case.values:
@@ -166,11 +166,11 @@ class Interpreter(ABC, Generic[S]):
                 return True
         return found
 
-    def tested(self, head: ir.SourceStatement) -> ir.Operand | None:
+    def selector(self, head: ir.SourceStatement) -> ir.Operand | None:
         """Return what a block of cases tests."""
         return head.values[0] if isinstance(head, ir.Branch) and head.values else None
 
-    def bound(
+    def loop_limit(
         self, context: Context, row: int, operand: ir.Operand | None, state: S
     ) -> float | str | None:
         """Return a bound of a loop, None where it is not known."""
@@ -181,7 +181,7 @@ class Interpreter(ABC, Generic[S]):
     ) -> Counting | None:
         """Return the rounds of a loop, None where they are not known."""
         first, last, step = (
-            self.bound(context, row, one, state)
+            self.loop_limit(context, row, one, state)
             for one in (loop.first, loop.last, loop.step)
         )
         if not (isinstance(first, float) and isinstance(last, float)):

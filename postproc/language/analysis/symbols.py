@@ -430,6 +430,11 @@ class TaskSymbols(ABC, Generic[F]):
 
         It is written as a number, or the program has given its data values on the way.
         """
+        if isinstance(operand, ir.Operation) and operand.operator in ("AND", "OR"):
+            parts = [self.decide(one, row, here) for one in operand.operands]
+            numbers = [one if isinstance(one, float) else math.nan for one in parts]
+            truth = apply_operator(operand.operator, numbers)
+            return None if math.isnan(truth) else truth
         names = frozenset() if operand is None else self.names_of(operand)
         given = [self._is_given(name, row, here) for name in names]
         if names and (None in given or not any(given)):
@@ -700,7 +705,7 @@ class TaskSymbols(ABC, Generic[F]):
         plain = replace(here, points=NO_POINTS)
         known = self.find_held(value, row, here)
         if known is not None and not part.component:
-            copied = known.copied | {known.place}
+            copied = (known.copied | {known.place}) - {place}
             return replace(
                 known, place=place, index=index, copied=copied, names=known.names | own
             )
@@ -721,7 +726,7 @@ class TaskSymbols(ABC, Generic[F]):
         if base is None:
             point = AssignedPoint(place, source, row, plain, index)
         else:
-            copied = base.copied | {base.place}
+            copied = (base.copied | {base.place}) - {place}
             point = replace(base, place=place, index=index, copied=copied)
         return point.with_components(numbers, names)
 

@@ -368,7 +368,7 @@ class TaskMachine(Interpreter[Arrived]):
         here = replace(context.place.scope, points=state.points)
         return self.task.decide(operand, row, here)
 
-    def bound(
+    def loop_limit(
         self, context: Context, row: int, operand: ir.Operand | None, state: Arrived
     ) -> float:
         """Return a bound of a loop, NaN where it is not known."""
@@ -577,14 +577,25 @@ class TaskMachine(Interpreter[Arrived]):
             self.keys += [(context, at, k) for k in range(len(found))]
             for before, after in zip(known, found[1:], strict=False):
                 after.origins = frozenset([before])
+        self._take_again(context, row, one, here, known)
         for number in known:
             visit = self.visits[number]
             if visit.modes != here.modes:
                 visit.modes = visit.modes.join(here.modes)
             visit.agreed = visit.agreed and here.points.agree(visit.goal.given)
-            visit.kept = visit.kept and here.points.agree(visit.taken)
         self.visits[known[0]].origins |= here.origins
         return replace(here, origins=frozenset([known[-1]]))
+
+    def _take_again(
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived,
+        known: Sequence[int],
+    ) -> None:  # fmt: skip
+        """Forget what visits are carried out with that differs where data do."""
+        visits = [self.visits[number] for number in known]
+        if not all(here.points.agree(visit.taken) for visit in visits):
+            again = self.read_visits(one, row, context.place.scope, here)
+            for visit, other in zip(visits, again, strict=True):
+                visit.meet(other)
 
     def assign_point(
         self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
@@ -604,8 +615,6 @@ class TaskMachine(Interpreter[Arrived]):
         for visit in self.visits:
             if not visit.agreed:
                 visit.goal = visit.goal.lost
-            if not visit.kept:
-                visit.forget_conditions()
 
     def list_changed_beside(self) -> frozenset[str]:
         """List names of data that change in ways that are not followed."""

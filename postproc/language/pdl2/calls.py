@@ -349,6 +349,8 @@ def _setting(here: Execution, reference: ir.DataObject, value: Value) -> None:
             here.store.set(**{field: Nothing("it is set for an arm known at run time")})
         return
     here.world.pin(value, f"${name.upper()} is set to it")
+    if isinstance(value, Position) and name in FRAMES:
+        value = replace(value, slots=(-1,) * 6, along=frozenset())
     if f"${name}" in here.volatile:
         value = Nothing("a condition handler changes it")
     here.store.set(**{name: value})

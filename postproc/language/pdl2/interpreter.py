@@ -138,9 +138,9 @@ class Pdl2Machine(Machine):
         found = self.at(context, row, state).value(operand)
         return found if isinstance(found, float | bool | str) else None
 
-    def tested(self, head: ir.SourceStatement) -> ir.Operand | None:
+    def selector(self, head: ir.SourceStatement) -> ir.Operand | None:
         """Return what SELECT names."""
-        return super().tested(ast.action(head) or head)
+        return super().selector(ast.action(head) or head)
 
     def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
         """Tell whether nothing but a loop itself changes its variable."""

@@ -270,8 +270,6 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
         form = MoveForm(motion, reason, fly=True, via=True)
         via = single(here, form, predecessors, settings, goal)
         predecessors = frozenset({machine.record(here, _VIA, via)})
-        if several or machine.interrupted:  # the arc depends on where it starts
-            predecessors |= {ELSEWHERE}
     goal = goal_of(here, statement, motion)
     form = MoveForm(motion, reason, fly=statement.fly)
     end = single(here, form, predecessors, settings, goal)

@@ -418,7 +418,7 @@ class RapidMachine(TaskMachine):
         self._interrupt(context, row, one, here)
         after = self.arrive(context, row, one, here)
         (last,) = after.origins
-        if self.visits[last].kept and math.isnan(self.visits[last].zone_mm):
+        if math.isnan(self.visits[last].zone_mm):
             after = replace(after, modes=after.modes.settle())
         if one.name in SYNCHRONOUS:
             return self._synchronous(context, row, one, after)

@@ -122,11 +122,16 @@ class RapidVisit(FoundVisit):
     speed: float = field(kw_only=True)
     total: tuple[float, ...] = field(kw_only=True, default=())
 
-    def forget_conditions(self) -> None:
-        """Forget tool, work object, zone and speed."""
+    def meet(self, other: RapidVisit) -> None:
+        """Forget tool, work object, zone, speed or load."""
         why = explain_disagreement(Code.FRAME_UNKNOWN, self.taken)
-        self.tool, self.wobj = FrameOfMove((), True, why), FrameOfMove((), False, why)
-        self.zone_mm, self.speed, self.total = UNKNOWN_ZONE, np.nan, ()
+        for name, lost in (
+            ("tool", FrameOfMove((), True, why)), ("wobj", FrameOfMove((), False, why)),
+            ("zone_mm", UNKNOWN_ZONE), ("speed", np.nan), ("total", ()),
+        ):  # fmt: skip
+            mine, new = getattr(self, name), getattr(other, name)
+            if mine != new and (mine == mine or new == new):  # NaN is NaN
+                setattr(self, name, lost)
 
 
 @dataclass
@@ -266,6 +271,8 @@ class Goals:
                 self.task, arguments.row, arguments.scope, False, self._slots
             )
             why = there.explain_unknown(name)
+            if why.code is Code.RUNTIME_VALUE:
+                why = replace(why, code=Code.FRAME_UNKNOWN)
             return FrameOfMove((), kind == "tool", why)
         return replace(read, taught=self.task.is_taught(name, found))
 

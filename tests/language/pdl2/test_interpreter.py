@@ -366,3 +366,17 @@ def test_calls_are_looked_for_in_statements_of_the_program_alone(
     ))  # fmt: skip
     assert len(asked) > 5
     assert sorted(found.visits.graph.predecessors(2).tolist()) == [ELSEWHERE, 1]
+
+
+def test_numbers_that_points_share_are_no_literal_of_any() -> None:
+    """Two targets take X from one assignment, and the rest from two points."""
+    found = body(
+        "set\nsub(p1)\nsub(p2)\nMOVE LINEAR TO p2",
+        declared="VAR p1, p2 : POSITION\n"
+        "ROUTINE sub(v : POSITION)\nVAR w : POSITION\nBEGIN\n"
+        "w := v\nw.X := 7\nMOVE LINEAR TO w\nEND sub\n"
+        "ROUTINE set\nBEGIN\np1 := POS(1, 2, 3, 4, 5, 6, '')\n"
+        "p2 := POS(2, 2, 3, 4, 5, 6, '')\nEND set",
+    )
+    assert found.visits.target.values[:, 0].tolist() == [7.0, 7.0, 2.0]
+    assert found.visits.target.literal.tolist() == [-1, -1, -1]

@@ -1,0 +1,185 @@
+"""What a program decides and gives on its ways is followed alike in all languages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+
+from postproc.compensation.program import read_program
+from postproc.diagnostics import Code
+from postproc.language.visits import START, Visits
+from postproc.robot.cell import Cell
+
+RAPID = """MODULE job
+PERS wobjdata w1:=[FALSE,TRUE,"",[[600,0,800],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
+PERS wobjdata w2:=[FALSE,TRUE,"",[[600,0,800],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
+PERS wobjdata w3:=[FALSE,TRUE,"",[[600,9,800],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
+PERS wobjdata w:=[FALSE,TRUE,"",[[600,0,800],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
+PERS tooldata t:=[TRUE,[[0,0,300],[1,0,0,0]],[80,[0,0,100],[1,0,0,0],0,0,0]];
+CONST robtarget p1:=[[1,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+CONST robtarget p2:=[[2,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+VAR robtarget v;
+VAR num n;
+VAR num k;
+PROC main()
+%s
+EXIT;
+ENDPROC
+%s
+ENDMODULE
+"""
+KRL = """DEF job( )
+DECL INT n
+DECL INT k
+DECL E6POS v
+$TOOL={X 0,Y 0,Z 300,A 0,B 0,C 0}
+$BASE={X 600,Y 0,Z 800,A 0,B 0,C 0}
+%s
+END
+%s
+"""
+DATA = """DEFDAT job PUBLIC
+DECL E6POS p1={X 1,Y 0,Z 0,A 0,B 0,C 0,S 2,T 2}
+DECL E6POS p2={X 2,Y 0,Z 0,A 0,B 0,C 0,S 2,T 2}
+ENDDAT
+"""
+PDL2 = """PROGRAM job
+VAR
+  n, k : INTEGER
+  p1, p2, v : POSITION
+%s
+BEGIN
+  $TOOL := POS(0, 0, 300, 0, 0, 0, '')
+  $UFRAME := POS(600, 0, 800, 0, 0, 0, '')
+  p1 := POS(1, 0, 0, 0, 0, 0, '')
+  p2 := POS(2, 0, 0, 0, 0, 0, '')
+  %s
+END job
+"""
+WORDS = {
+    "rapid": {
+        "set {} := {}": "{}:={};", "if {}": "IF {} THEN", "input": "di1=1",
+        "else": "ELSE", "end": "ENDIF", "go {}": "MoveL {},v200,fine,t\\WObj:=w;",
+        "frame {}": "w:=w{};", "call {}": "next {};", "arc": "MoveC p1,p2,v200,fine,"
+        "t\\WObj:=w;",
+    },
+    "krl": {
+        "set {} := {}": "{}={}", "if {}": "IF {} THEN", "input": "$IN[1]",
+        "else": "ELSE", "end": "ENDIF", "go {}": "LIN {}",
+        "frame {}": "$BASE={{X 600,Y {},Z 800,A 0,B 0,C 0}}", "call {}": "next({})",
+        "arc": "CIRC p1,p2",
+    },
+    "pdl2": {
+        "set {} := {}": "{} := {}", "if {}": "IF {} THEN", "input": "$DIN[1]",
+        "else": "ELSE", "end": "ENDIF", "go {}": "MOVE LINEAR TO {}",
+        "frame {}": "$UFRAME := POS(600, {}, 800, 0, 0, 0, '')", "call {}": "next({})",
+        "arc": "MOVE CIRCULAR TO p2 VIA p1",
+    },
+}  # fmt: skip
+LANGUAGES = [*WORDS]
+FRAME_Y = {"1": "0", "2": "0", "3": "9"}
+NEXT = {
+    "rapid": "PROC next(INOUT num a)\na:=a+1;\nENDPROC",
+    "krl": "DEF next(a:OUT)\nDECL INT a\na=a+1\nEND",
+    "pdl2": "ROUTINE next(a : INTEGER)\nBEGIN\n  a := a + 1\nEND next",
+}
+
+
+def visits(cell: Cell, language: str, *lines: str) -> Visits:
+    """Write a program in a language and follow it."""
+    body = "\n".join(_say(language, line) for line in lines)
+    match language:
+        case "rapid":
+            files = {"job.mod": RAPID % (body, NEXT[language])}
+        case "krl":
+            files = {"job.src": KRL % (body, NEXT[language]), "job.dat": DATA}
+        case _:
+            files = {"job.pdl": PDL2 % (NEXT[language], body)}
+    given = {name: text.encode() for name, text in files.items()}
+    return read_program(given, cell).visits
+
+
+def _say(language: str, line: str) -> str:
+    """Write one line: its words, and what they are about."""
+    words = WORDS[language]
+    for form, text in words.items():
+        begin, *rest = form.split(" ")
+        if not line.startswith(begin):
+            continue
+        parts = line.split(" ", 1)[1:]
+        if len(rest) == 3:
+            parts = line.split(" ", 1)[1].split(" := ")
+        parts = [part.replace("input", words["input"]) for part in parts]
+        if begin == "frame" and language != "rapid":
+            parts = [FRAME_Y[parts[0]]]
+        return text.format(*parts)
+    raise ValueError(line)
+
+
+def codes(found: Visits) -> Sequence[str]:
+    """Return the codes of what keeps visits from being corrected."""
+    return [found.reasons[k].code or "" for k in found.reason.tolist()]
+
+
+def branch(*lines: str, other: Sequence[str] = ()) -> tuple[str, ...]:
+    """Run lines where an input is on, others where it is not."""
+    return ("if input", *lines, *(("else", *other) if other else ()), "end")
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_equal_frames_on_two_ways(language: str, bench_cell: Cell) -> None:
+    lines = branch("frame 2", other=("frame 1",))
+    assert codes(visits(bench_cell, language, *lines, "go p1")) == [""]
+    lines = branch("frame 3", other=("frame 1",))
+    wanted = [Code.FRAME_UNKNOWN]
+    assert codes(visits(bench_cell, language, *lines, "go p1")) == wanted
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_points_that_are_copied_on_two_ways(language: str, bench_cell: Cell) -> None:
+    same = branch("set v := p1", other=("set v := p2", "set v := p1"))
+    found = visits(bench_cell, language, *same, "go v", "go p1")
+    assert codes(found) == ["", ""]
+    assert found.target.literal[0] == found.target.literal[1] >= 0
+    other = branch("set v := p1", other=("set v := p2",))
+    found = visits(bench_cell, language, *other, "go v", "go p1")
+    assert codes(found)[0] == Code.RUNTIME_VALUE
+    assert found.literals.pinned[found.target.literal[1]]
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        (("set n := 2",), [1.0]),
+        (("set n := 4",), [2.0]),
+        (branch("set n := 2", other=("set n := 1",)), [1.0, 2.0]),
+        (branch("set n := 2", other=("set k := 2", "set n := k")), [1.0]),
+        (("set n := 2", "call n"), [2.0]),
+        (("set n := 2", *branch("call n")), [1.0, 2.0]),
+    ],
+)
+def test_conditions_of_known_numbers(
+    language: str, given: Sequence[str], wanted: list[float], bench_cell: Cell
+) -> None:
+    lines = (*given, "if n < 3", "go p1", "else", "go p2", "end")
+    found = visits(bench_cell, language, *lines)
+    assert found.target.values[:, 0].tolist() == wanted
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_one_side_decides_a_condition(language: str, bench_cell: Cell) -> None:
+    lines = ("set n := 2", "if (input) AND (n > 3)", "go p1", "end", "go p2")
+    found = visits(bench_cell, language, *lines)
+    assert found.target.values[:, 0].tolist() == [2.0]
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_an_arc_from_two_places_ends_behind_its_middle(
+    language: str, bench_cell: Cell
+) -> None:
+    lines = ("go p1", *branch("go p2"), "arc", "go p1")
+    found = visits(bench_cell, language, *lines)
+    before = [found.graph.predecessors(k).tolist() for k in range(len(found))]
+    assert before == [[START], [0], [0, 1], [2], [3]]
