@@ -340,6 +340,7 @@ def _cures(now: PathPrediction) -> dict[int, str]:
 def _promises(now: PathPrediction) -> dict[int, float]:
     """Return what 95 % of every move stays within by all open hypotheses [m]."""
     task = now.task
+    now = task.predict(now.plan)
     moves = {halves(task.visits, v) for v in now.sizes}
     return {
         v: compare((now.part_of(v).paths,), rows, task.tolerance).choose()[1]

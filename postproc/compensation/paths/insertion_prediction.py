@@ -56,6 +56,7 @@ from postproc.model.flank_hypotheses import FlankOfJoint, flanks_of
 from postproc.robot.pose import MM
 
 AIM = 0.4  # of the tolerance: what points are to reach
+AGREE = 1e-6  # [m] by which two predictions of a move may differ
 KEPT = 4  # predictions that are kept: plans return to what was tried
 
 
@@ -378,6 +379,16 @@ class PathPrediction:
     def whole(self) -> PathPrediction:
         """Return the same, written and predicted as a whole."""
         return self if self.written else self.task.predict_whole(self.plan)
+
+    def agrees_with(self, other: PathPrediction) -> bool:
+        """Return True if all moves and points come out as another one predicts them."""
+        mine, others = self.sizes, other.sizes
+        return (
+            mine.keys() == others.keys()
+            and all(abs(mine[v] - others[v]) <= AGREE for v in mine)
+            and self.refusals == other.refusals
+            and self.flat.keys() == other.flat.keys()
+        )
 
     def part_of(self, v: int) -> Part:
         """Return what tells of a visit of the source."""
