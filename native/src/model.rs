@@ -413,6 +413,13 @@ impl Core {
     }
 }
 
+/// The kinematics of the real arm in a state.
+struct At<'a> {
+    walk: &'a Walk,
+    jacobian: [Three; 6],
+    tool: &'a Three,
+}
+
 /// An axis of the frame before a link, base frame; of the flange for the tool.
 fn axis_of(w: &Walk, link: usize, axis: usize) -> Three {
     if link == 7 {
@@ -431,7 +438,7 @@ fn axis_of(w: &Walk, link: usize, axis: usize) -> Three {
 
 impl Core {
     /// The covariance of what sides are not known.
-    fn add_sides(&self, sum: &mut Products, s: &State<'_>, walk: &Walk, tool: &Three) {
+    fn add_sides(&self, sum: &mut Products, s: &State<'_>, at: &At<'_>) {
         let unknown = s.side.map(|side| 1.0 - side.clamp(-1.0, 1.0).powi(2));
         if !unknown.iter().any(|u| *u > 0.0) {
             return;
@@ -439,15 +446,14 @@ impl Core {
         let (ahead, behind) = ([1.0; 6], [-1.0; 6]);
         let [there, back] = [&ahead, &behind].map(|side| State { side, ..*s });
         let (forward, backward) = (self.shift(&there), self.shift(&back));
-        let jacobian = walk.jacobian(&self.nominal);
         let mut slopes: [Three; 6] =
-            std::array::from_fn(|j| jacobian[j].map(|x| x * (forward[j] - backward[j]) / 2.0));
+            std::array::from_fn(|j| at.jacobian[j].map(|x| x * (forward[j] - backward[j]) / 2.0));
         for term in &self.terms {
             let (Some(j), false) = (term.side(), matches!(term.moves, Moves::Joint(_))) else {
                 continue;
             };
             let half = (term.value(&there) - term.value(&back)) / 2.0;
-            add_scaled(&mut slopes[j], half, &self.motion(&term.moves, walk, tool));
+            add_scaled(&mut slopes[j], half, &self.motion(&term.moves, at.walk, at.tool));
         }
         for (slope, unknown) in slopes.iter().zip(unknown) {
             add_outer(sum, &slope.map(|x| x * unknown.max(0.0).sqrt()));
@@ -465,10 +471,9 @@ impl Core {
     }
 
     /// What is unsure of an error but for the parameters, and the scatter of an arrival.
-    fn unsure(&self, s: &State<'_>, walk: &Walk, tool: &Three) -> [Products; 2] {
-        let jacobian = walk.jacobian(&self.nominal);
-        let (mut known, mut scatter) = ([0.0; 6], [0.0; 6]);
-        self.add_sides(&mut known, s, walk, tool);
+    fn unsure(&self, s: &State<'_>, at: &At<'_>) -> [Products; 2] {
+        let (jacobian, mut known, mut scatter) = (&at.jacobian, [0.0; 6], [0.0; 6]);
+        self.add_sides(&mut known, s, at);
         for (term, variance) in self.terms.iter().zip(&self.ended) {
             if let Some((j, share)) = term.ended(s).filter(|_| *variance > 0.0) {
                 for k in 0..3 {
@@ -479,8 +484,8 @@ impl Core {
         for k in 0..3 {
             known[k] += self.unknown[k] * self.unknown[k];
         }
-        Core::add_scatter(&mut known, &jacobian, &self.pose);
-        Core::add_scatter(&mut scatter, &jacobian, &self.arrival);
+        Core::add_scatter(&mut known, jacobian, &self.pose);
+        Core::add_scatter(&mut scatter, jacobian, &self.arrival);
         [known, scatter]
     }
 
@@ -495,10 +500,12 @@ impl Core {
                 self.with_state((&s.q[i], &s.side[i]), s.load(i), s.given(i), |state| {
                     let (q, point) = self.deviated(state, tool);
                     let walk = Walk::new(&self.real, &self.base, &q, &point);
-                    let [known, scatter] = self.unsure(state, &walk, tool);
+                    let jacobian = walk.jacobian(&self.nominal);
+                    let at = At { walk: &walk, jacobian, tool };
+                    let [known, scatter] = self.unsure(state, &at);
                     out.push((self.error(state, tool), known, scatter));
                     if let (Some(spread), Some(block)) = (&self.spread, &mut block) {
-                        spread.fill(self, block, i - first, state, (&walk, tool));
+                        spread.fill(self, block, i - first, state, &at);
                     }
                 });
             }
@@ -529,24 +536,24 @@ impl Spread {
         block: &mut crate::variance::Block,
         lane: usize,
         s: &State<'_>,
-        (walk, tool): (&Walk, &Three),
+        at: &At<'_>,
     ) {
         let layers: Vec<Vec<f64>> = self.nets.iter().map(|net| net.layer(s)).collect();
         let (placing, moving) = block.fixed.split_at_mut(self.geometry.len());
-        put(placing, lane, self.geometry.columns(walk, &core.base));
+        put(placing, lane, self.geometry.columns(at.walk, &core.base));
         let column = |unit: &Unit| match unit {
             Unit::Neuron { net, at, axis } => AT_ORIGIN.axes[*axis].map(|x| x * layers[*net][*at]),
             Unit::Terms(terms) => {
                 let mut out = [0.0; 3];
                 for term in terms {
-                    let moved = core.motion(&term.moves, walk, tool);
+                    let moved = core.motion(&term.moves, at.walk, at.tool);
                     add_scaled(&mut out, term.value(s), &moved);
                 }
                 out
             }
         };
         put(moving, lane, self.free.iter().map(column));
-        put(&mut block.jacobian, lane, walk.jacobian(&core.nominal).into_iter());
+        put(&mut block.jacobian, lane, at.jacobian.into_iter());
         for (phi, unit) in block.basis.iter_mut().zip(&self.joints) {
             phi[lane] = match unit {
                 Unit::Neuron { net, at, .. } => layers[*net][*at],
