@@ -174,15 +174,8 @@ def fastest(
     acceleration: Floats,
 ) -> Floats: ...
 
-# profile.rs: backlash along the gear (`postproc.model.effects.backlash_profile`)
-def profile(
-    states: tuple[Floats, ...],
-    joints: Sequence[int],
-    orders: Sequence[int],
-    constant: bool,
-    sizes: Floats,
-    range: tuple[Sequence[float], Sequence[float]],
-) -> Floats: ...
+# terms.rs: laws of effects (`postproc.model.terms`)
+def turned(terms: Sequence[Any], q: Floats, side: Floats) -> Floats: ...
 
 # variance.rs: uncertain parameters of geometry and joints (`postproc.model.variance`)
 def covariance(

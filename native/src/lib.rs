@@ -25,7 +25,6 @@ mod number;
 mod numeric;
 mod play;
 mod pose;
-mod profile;
 mod pull;
 mod rescan;
 mod rounding;
@@ -83,7 +82,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(pose::pose_from_record, module)?)?;
     module.add_function(wrap_pyfunction!(pose::rotation_vector, module)?)?;
     module.add_function(wrap_pyfunction!(pose::times, module)?)?;
-    module.add_function(wrap_pyfunction!(profile::profile, module)?)?;
+    module.add_function(wrap_pyfunction!(terms::turned, module)?)?;
     module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;
     module.add_function(wrap_pyfunction!(deviation::departure, module)?)?;
     module.add_function(wrap_pyfunction!(design::gram, module)?)?;

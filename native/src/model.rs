@@ -481,8 +481,8 @@ impl Core {
                 }
             }
         }
-        for k in 0..3 {
-            known[k] += self.unknown[k] * self.unknown[k];
+        for (known, unknown) in known.iter_mut().zip(self.unknown) {
+            *known += unknown * unknown;
         }
         Core::add_scatter(&mut known, jacobian, &self.pose);
         Core::add_scatter(&mut scatter, jacobian, &self.arrival);

@@ -108,7 +108,7 @@ impl Numeric {
     /// Solve for the joint angles nearest to given ones: the solution that no singularity
     /// parts from them, else that of a branch on the nearest turn.
     pub fn nearest(&self, pose: &Pose, near: &Six, slot: usize) -> Six {
-        if let Some(q) = self.from_nearby(pose, near).filter(|q| self.is_regular(near, q)) {
+        if let Some(q) = self.reach(pose, near).filter(|q| self.is_regular(near, q)) {
             return q;
         }
         let unknown = pose.iter().any(|x| x.is_nan());
@@ -118,7 +118,7 @@ impl Numeric {
 
     /// Go to a pose by Newton's method. An arm without a closed form can have 16 solutions,
     /// more than there are branches: the one that is near is found by going there.
-    fn from_nearby(&self, pose: &Pose, near: &Six) -> Option<Six> {
+    fn reach(&self, pose: &Pose, near: &Six) -> Option<Six> {
         let mut q = *near;
         for _ in 0..NEARBY_ROUNDS {
             let frames = self.chain.frames(&q);

@@ -19,7 +19,7 @@ struct Mixed {
 
 enum Form {
     Closed(Box<Mixed>),
-    Numeric(Numeric),
+    Numeric(Box<Numeric>),
 }
 
 /// Solves for the joint angles nearest to given ones.
@@ -58,7 +58,7 @@ impl Solver {
     /// Solve any chain.
     #[staticmethod]
     fn of_chain(chain: Parameters<'_>) -> PyResult<Solver> {
-        Ok(Solver(Form::Numeric(Numeric::new(&chain)?)))
+        Ok(Solver(Form::Numeric(Box::new(Numeric::new(&chain)?))))
     }
 
     /// Take the parameters of a closed form, and how its angles mix the controller's and

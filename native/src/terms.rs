@@ -3,11 +3,13 @@
 
 use std::f64::consts::{PI, TAU};
 
+use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::chain::Frame;
-use crate::rows::{dot, minus, Six, Three};
+use crate::rows::{array, dot, in_parts, minus, rows, same_length, Six, Three};
+use crate::trig::sin_cos;
 use crate::walk::cross;
 
 /// A name, and the numbers that belong to it.
@@ -581,6 +583,32 @@ impl Term {
         let x = spline.place(self.by[0].value(s));
         Some((joint, 1.0 - spline.within(x).powi(2)))
     }
+}
+
+/// Turn joints by terms of their angles and sides, (n, 6) [rad].
+#[pyfunction]
+pub fn turned<'py>(
+    py: Python<'py>,
+    terms: Vec<Written>,
+    q: PyReadonlyArray2<'py, f64>,
+    side: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (q, side) = (rows::<6>(&q)?, rows::<6>(&side)?);
+    let n = same_length(&[q.len(), side.len()])?;
+    let terms = terms.iter().map(|t| Term::new(t, 0)).collect::<PyResult<Vec<_>>>()?;
+    let row = |i: usize| -> Six {
+        let trig = sin_cos(&q[i]);
+        let (load, frames) = (&[0.0; 4], None);
+        let s = State { q: &q[i], side: &side[i], load, given: &[], trig: &trig, frames };
+        let mut out = [0.0; 6];
+        for term in &terms {
+            if let Moves::Joint(j) = term.moves {
+                out[j] += term.value(&s);
+            }
+        }
+        out
+    };
+    Ok(array(py, in_parts(py, n, |some| some.map(row).collect())?))
 }
 
 /// The motion of the TCP by a turn about an axis through a point.

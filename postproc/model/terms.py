@@ -14,9 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc import _native
+from postproc.arrays import Floats, floats
 from postproc.model.carrier import Carrier
 from postproc.robot.arm import Arm
+from postproc.robot.state import States
 
 Numbers = tuple[float, ...]
 Named = tuple[str, Numbers]
@@ -114,6 +116,17 @@ class Neighbours:
 
 
 Terms = Sequence[Term | Neurons | Neighbours]
+
+
+def turned(terms: Terms, states: States) -> Floats:
+    """Return what joints turn by, (n, 6) [rad], by terms of angles and directions."""
+    written = [
+        (t.moves, t.law, [d[:2] for d in t.by], [d[:2] for d in t.times])
+        for t in terms
+        if isinstance(t, Term)
+    ]
+    return _native.turned(written, floats(states.q), floats(states.direction))
+
 
 # What moves.
 

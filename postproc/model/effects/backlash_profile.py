@@ -8,7 +8,6 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc import _native
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
@@ -25,7 +24,15 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
-from postproc.model.terms import Term, TermLaw, Terms, angle, side, turn_joint
+from postproc.model.terms import (
+    Term,
+    TermLaw,
+    Terms,
+    angle,
+    side,
+    turn_joint,
+    turned,
+)
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -105,13 +112,8 @@ class BacklashProfile(JointEffect):
         return out
 
     def angles(self, batch: ArmStates, p: Floats) -> Floats:
-        """Return the joint errors (n, 6) [rad], summed joint by joint."""
-        sizes = p.reshape(len(self.joints), self.constant + 2 * len(self.orders))
-        states = batch.states.q, batch.states.direction
-        return _native.profile(
-            tuple(map(np.ascontiguousarray, states)), self._profile_joints.tolist(),
-            self.orders, self.constant, sizes, (self.lower, self.upper),
-        )  # fmt: skip
+        """Return the joint errors (n, 6) [rad], as in the base class but in one go."""
+        return turned(self.terms(batch.arm, p), batch.states)
 
     @property
     def _profile_joints(self) -> NDArray[np.int64]:
