@@ -177,16 +177,6 @@ def fastest(
 # terms.rs: laws of effects (`postproc.model.terms`)
 def turned(terms: Sequence[Any], q: Floats, side: Floats) -> Floats: ...
 
-# variance.rs: uncertain parameters of geometry and joints (`postproc.model.variance`)
-def covariance(
-    parameters: Floats,
-    base: Floats,
-    states: tuple[Floats, Floats],
-    geometry: tuple[bool, Sequence[tuple[int, int]], bool],
-    basis: tuple[Floats, Sequence[int]],
-    of_parameters: Floats,
-) -> Floats: ...
-
 # design.rs: sums over the rows of a fit (`postproc.calibration.design_matrix`)
 def gram(
     moving: tuple[Floats, Floats],

@@ -91,7 +91,6 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evidence::of_blocks, module)?)?;
     module.add_function(wrap_pyfunction!(evidence::scaled, module)?)?;
     module.add_function(wrap_pyfunction!(heap::give_back, module)?)?;
-    module.add_function(wrap_pyfunction!(variance::covariance, module)?)?;
     module.add_function(wrap_pyfunction!(aligned::aligned, module)?)?;
     module.add_function(wrap_pyfunction!(compare::compare_lines, module)?)?;
     module.add_function(wrap_pyfunction!(table::table, module)?)?;

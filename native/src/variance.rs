@@ -1,16 +1,14 @@
-//! What uncertain parameters of geometry and joints give: `postproc.model.variance`.
+//! What uncertain parameters of geometry and joints give: `postproc.model.evaluator`.
 //!
 //! The columns of all parameters that turn one joint are its column of the Jacobian, by
 //! a number each: their part of the covariance shrinks to one row per joint.
 
 use std::ops::Range;
 
-use numpy::{PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::chain::{Chain, Parameters};
-use crate::rows::{array, each, flat, rows, same_length, Lanes, Three, SIDE};
+use crate::rows::{Lanes, Three, SIDE};
 use crate::walk::{Base, Walk};
 
 /// Three components of each.
@@ -200,54 +198,6 @@ impl Form {
         }
         total
     }
-}
-
-/// Covariance of the TCP, (n, 6) [m^2]: its diagonal, then xy, xz and yz.
-///
-/// Base: its axes, those of its rotations, its point, (7, 3). States: joint angles [rad]
-/// and tools [m], both with the deviations. Geometry: whether it has the base, its links
-/// and whether it has the tool. Basis: of the joints' parameters, (n, k), joint by joint,
-/// with the number of each. Of parameters: (p, p), the geometry's parameters first.
-#[pyfunction]
-pub fn covariance<'py>(
-    py: Python<'py>,
-    parameters: Parameters<'py>,
-    base: PyReadonlyArray2<'py, f64>,
-    states: (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>),
-    geometry: (bool, Vec<(usize, usize)>, bool),
-    basis: (PyReadonlyArray2<'py, f64>, [usize; 6]),
-    of_parameters: PyReadonlyArray2<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (chain, base) = (Chain::new(&parameters)?, base_of(rows::<3>(&base)?)?);
-    let (q, tool) = (rows::<6>(&states.0)?, rows::<3>(&states.1)?);
-    let geometry = Geometry { base: geometry.0, links: geometry.1, tool: geometry.2 };
-    let ((basis, count), fixed) = (basis, geometry.len());
-    let (own, shape) = (count.iter().sum::<usize>(), basis.shape().to_vec());
-    same_length(&[q.len(), tool.len(), shape[0]])?;
-    let odd = geometry.links.iter().any(|(j, kind)| *j >= 6 || *kind >= 5);
-    if odd || shape[1] != own {
-        return Err(PyValueError::new_err("a covariance of other parameters"));
-    }
-    let basis = flat(&basis)?;
-    let form = Form::new(flat(&of_parameters)?, fixed, count)?;
-    let mut block = form.block();
-    let mut out = Vec::with_capacity(q.len());
-    each(py, q.len().div_ceil(SIDE), |at| {
-        let first = SIDE * at;
-        let count = SIDE.min(q.len() - first);
-        for lane in 0..count {
-            let row = first + lane;
-            let walk = Walk::new(&chain, &base, &q[row], &tool[row]);
-            put(&mut block.fixed, lane, geometry.columns(&walk, &base));
-            put(&mut block.jacobian, lane, walk.jacobian(&chain).into_iter());
-            for (phi, value) in block.basis.iter_mut().zip(&basis[row * own..]) {
-                phi[lane] = *value;
-            }
-        }
-        let value = form.value(&block);
-        out.extend((0..count).map(|lane| value.map(|component| component[lane])));
-    })?;
-    Ok(array(py, out))
 }
 
 pub fn base_of(rows: &[Three]) -> PyResult<Base> {

@@ -9,9 +9,12 @@ from postproc.arrays import Floats
 from postproc.model.carrier import every_carrier
 from postproc.model.covariate import JOINTS
 from postproc.model.effect_sum import Combination
+from postproc.model.effects.backlash import Backlash
+from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.curve import Curve
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.elm import ElmMap, HiddenLayer
+from postproc.model.effects.geometry import Geometry
 from postproc.model.effects.part_motion import PartMotion
 from postproc.model.evaluator import Evaluator, Scatter, Spread, make_evaluator
 from postproc.model.kinematics import ArmStates
@@ -91,7 +94,7 @@ def assert_alike(arm: Arm, effects: Combination, states: States, seed: int = 1) 
     turned = core.core.turns(core.states(states))
     turn = effects.turn(ArmStates(arm, states), values)
     for got, want in zip((*found, turned), (*wanted, turn), strict=True):
-        size = float(np.abs(want).max())  # differences of torques round more
+        size = float(np.nanmax(np.abs(want)))  # differences of torques round more
         np.testing.assert_allclose(got, want, rtol=1e-9, atol=1e-9 * size)
     np.testing.assert_array_equal(core.errors(states), found[0])
 
@@ -131,3 +134,17 @@ def test_what_is_not_known_of_states_counts_as_in_columns() -> None:
     )  # fmt: skip
     for effect in compensable():
         assert_alike(arm_of(effect), Combination((effect,)), lost)
+
+
+@pytest.mark.parametrize("base", [True, False])
+def test_joint_angles_that_are_not_known_have_no_error(base: bool) -> None:
+    q = np.array(STATES.q)
+    q[5, 1] = np.nan
+    effects = Combination((Backlash(), Geometry((2, 6), base), Compliance()))
+    states = STATES.with_(q=q)
+    assert_alike(NJ, effects, states)
+    values, covariance = drawn(effects, 1)
+    core = evaluate(NJ, effects, values, Spread(effects, covariance))
+    for found in core.predict(states):
+        lost = np.isnan(found).any(axis=1)
+        assert np.flatnonzero(lost).tolist() == [5]
