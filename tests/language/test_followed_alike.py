@@ -272,3 +272,26 @@ def test_points_that_functions_return_are_not_corrected(
     assert found.target.values[:, 0].tolist() == [6.0, 1.0]
     assert codes(found) == [Code.COMPUTED_TARGET, ""]
     assert found.target.literal.tolist() == [-1, 0] and found.literals.pinned[0]
+
+
+# Who may call a routine that nothing in the job calls.
+
+ALONE = {
+    "rapid": ("LOCAL PROC own()\nv:=Offs(p2,0,0,5);\nk:=v.trans.x;\nENDPROC", "LOCAL "),
+    "krl": ("GLOBAL DEF own( )\nDECL E6POS w\nw=p2\nw.X=w.X+5\nEND", "GLOBAL "),
+    "pdl2": ("ROUTINE own EXPORTED FROM job\nBEGIN\n  v := p2\n  v.X := v.X + 5\n"
+             "END own\n", " EXPORTED FROM job"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_routine_that_nothing_calls_counts_where_others_may_call_it(
+    language: str, alone: bool, bench_cell: Cell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, word = ALONE[language]
+    if alone != (language == "rapid"):
+        text = text.replace(word, "")
+    monkeypatch.setitem(ROUTINES, language, ROUTINES[language] + text)
+    found = visits(bench_cell, language, "go p1", "go p2")
+    assert bool(found.literals.pinned[found.target.literal[1]]) != alone

@@ -742,6 +742,8 @@ class TaskMachine(Interpreter[Arrived]):
         """
         for file, text in enumerate(self.texts):
             for routine in self.task.routines_by_file.get(file, ()):
+                if routine.key in self.task.dead:
+                    continue
                 if routine.rows.head.kind not in self.procedures:
                     yield file, routine.inside.start, routine.inside.stop
                 yield from self.list_handlers(routine)

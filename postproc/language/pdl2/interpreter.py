@@ -48,6 +48,7 @@ from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.program import Program, Variable, Variables
 from postproc.language.pdl2.side_effects import (
     CallGraph,
+    computed_names,
     is_harmless,
     list_changed_arguments,
     list_live,
@@ -532,9 +533,22 @@ def resolve(
             "in it is compensated",
         )  # fmt: skip
         machine = _list_moves(world)
+    _keep_exported(world, machine)
     world.pin_loose()
     world.settle()
     return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
+
+
+def _keep_exported(world: World, machine: Machine) -> None:
+    """Keep the numbers of what routines use that other programs alone may call."""
+    run = {id(context.place.body) for context, _ in machine.entries}
+    for program in world.programs():
+        for body in program.routines.values():
+            if body.exported and id(body) not in run:
+                place = world.place(program, body)
+                why = f"{body.name} uses it, which another program may call"
+                for name in computed_names(program, body.first, body.last):
+                    world.loosen(world.root(place, name), why)
 
 
 def _follow(world: World) -> Machine:

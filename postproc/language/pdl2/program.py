@@ -244,6 +244,7 @@ class Body:
         flow: Where its jumps lead.
         broken: First line whose block structure is wrong, 0 where all is well.
         arms: ``FOR ARM[n]`` of its parameters, by name, where it is said.
+        exported: Other programs may call it.
     """
 
     name: str
@@ -254,6 +255,7 @@ class Body:
     flow: ControlFlow
     broken: int = 0
     arms: Mapping[str, int] = field(default_factory=dict)
+    exported: bool = False
 
     @cached_property
     def own_names(self) -> frozenset[str]:
@@ -445,7 +447,10 @@ class _Reader:
         own = scope.variables if routine else Variables()
         given = {p.name: self._arm(scope.row, p.type.arm) for p in parameters}
         arms = {name: arm for name, arm in given.items() if arm}
-        body = Body(name, scope.begin, last, parameters, own, flow, broken, arms)
+        exported = bool(routine and routine.exported)
+        body = Body(
+            name, scope.begin, last, parameters, own, flow, broken, arms, exported
+        )
         if routine:
             self.routines[name] = body
             self.scopes.pop()

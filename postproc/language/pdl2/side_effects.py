@@ -142,6 +142,16 @@ def rows_effects(program: Program, first: int, last: int) -> Effects:
     )
 
 
+def computed_names(program: Program, first: int, last: int) -> frozenset[str]:
+    """Return the names in rows first to last - 1 but for destinations of moves."""
+    found = set[str]()
+    for one in _list_statements(program, first, last):
+        move = ast.action(one)
+        ends = [*move.where, move.via] if isinstance(move, ast.Move) else []
+        found |= {r.name for r in references(one) if all(r is not e for e in ends)}
+    return frozenset(found)
+
+
 def _list_statements(
     program: Program, first: int, last: int
 ) -> Iterator[ir.SourceStatement]:
