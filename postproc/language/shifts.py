@@ -15,6 +15,7 @@ from postproc.robot.pose import MM, inverse, rotation_vector
 ANGLES = slice(3, 6)  # of the six numbers of a shift
 NUMBERS = 6
 NO_TURN = 1e-12  # of a matrix: rotations that differ less are the same
+LEAST_DEG = 1e-10  # angles that are computed, and less, turn nothing
 TURNED = 1e-7  # [rad] and more are written into the angles of a shift
 Pose = tuple[float, ...]
 STILL: Pose = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)
@@ -48,6 +49,11 @@ class Shift:
     right: Pose = STILL
     flagged: bool = True
 
+    @property
+    def turns(self) -> bool:
+        """Whether it turns the point, too."""
+        return any(abs(angle) > LEAST_DEG for angle in self.numbers[ANGLES])
+
     def around(self, inner: Shift, dialect: Dialect) -> Shift:
         """Shift what another shift has shifted, which stays.
 
@@ -70,6 +76,13 @@ class Shift:
             self, origin=inner.origin, left=_flat(left), right=_flat(right),
             flagged=self.flagged and inner.flagged,
         )  # fmt: skip
+
+    def apply(self, dialect: Dialect) -> tuple[float, ...]:
+        """Return the numbers of the target, w; flags that it has not are -1."""
+        row, none = np.zeros(1, dtype=np.int64), np.full(1, -1)
+        flags = np.full((1, dialect.width), -1.0)
+        own = Shifts.of(row, [self], none, none, flags, row > 0, dialect)
+        return tuple(own.carry(own.origin, own.numbers)[0].tolist())
 
 
 def _matrix(pose: Pose) -> Floats:

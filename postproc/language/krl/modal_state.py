@@ -542,19 +542,19 @@ class ModeReader:
         modes = replace(modes, store=store)
         reader = self.frames(modes)
 
-        def given(name: str) -> float:
+        def number(name: str) -> float:
             return self._number(ir.DataObject(name))
 
-        advance = given("def_advance")
+        advance = number("def_advance")
         return replace(
             modes,
             tool=reader.entry("tool_data", 1),
             base=reader.read_numbered("$base", 0),
             interpolation="#base",
             speed=UNKNOWN,
-            share=_share(given("def_vel_ptp")),
-            distance=number_or_unknown(given("def_apo_cdis")),
-            overlap=number_or_unknown(given("def_apo_cptp")),
+            share=_share(number("def_vel_ptp")),
+            distance=number_or_unknown(number("def_apo_cdis")),
+            overlap=number_or_unknown(number("def_apo_cptp")),
             orientation="#var",
             circle=self._default_circle,
             through=False,

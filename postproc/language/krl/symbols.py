@@ -29,9 +29,10 @@ from postproc.language.krl.external_routines import package_routines
 from postproc.language.krl.pose_encoding import (
     COMMENTS,
     COMPONENTS,
-    compose_numbers,
+    KRL_DIALECT,
 )
 from postproc.language.krl.program import KrlFile
+from postproc.language.shifts import Shift, ShiftKind
 
 CONFIG = "$config"
 ANY = -1  # an entry of a table whose number is not known
@@ -352,7 +353,9 @@ def _link(parts: Sequence[Value | None]) -> KnownRecord | None:
     numbers = [[one.number(name) for name in COMPONENTS[:6]] for one in records]
     if len(records) != 2 or np.isnan(numbers).any():
         return None
-    place = zip(COMPONENTS[:6], compose_numbers(*numbers), strict=True)
+    first, second = numbers
+    both = Shift(ShiftKind.OWN, tuple(second), (*first, 0.0, 0.0)).apply(KRL_DIALECT)
+    place = zip(COMPONENTS[:6], both, strict=False)
     fields = dict(records[1].fields) | {key: WrittenNumber(one) for key, one in place}
     return KnownRecord(tuple(fields.items()))
 

@@ -38,10 +38,9 @@ from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
 from postproc.language.rapid.pose_encoding import (
     RAPID_DIALECT,
     WIDTH,
-    shift_point,
 )
 from postproc.language.rapid.symbols import SHIFTS, RapidTask
-from postproc.language.shifts import Shift, ShiftKind
+from postproc.language.shifts import Shift
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
@@ -349,7 +348,7 @@ class RapidGoal(GoalReader):
         by = self.task.read_shift(arguments, self.row, self.here)
         if by is None:
             return self.unknown(AT_RUN_TIME)
-        (shift, angles), turns = by, {one.name: one.value for one in arguments}
+        turns = {one.name: one.value for one in arguments}
         placed = [one.value for one in arguments if not one.name]
         base = replace(self, joints=False).goal(placed[0])
         written = [*placed[1:], *(turns.get(axis) for axis in ("rx", "ry", "rz"))]
@@ -357,17 +356,15 @@ class RapidGoal(GoalReader):
         slots = [first + n.slot if isinstance(n, ir.Num) else -1 for n in written]
         own = frozenset([(self.here.file, slots[0])] if slots[0] >= 0 else [])
         shifts, turned = f"{name} shifts it by what", f"{name} turns it"
-        if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
+        if base.target != Meaning.POSE or np.isnan(by).any():
             return self.apply_shift(base, ReadShift(own=own, shifts=shifts))
-        kind = ShiftKind.AXES if name == "offs" else ShiftKind.OWN
+        shift = Shift(SHIFTS[name], by, base.values)
         # x, y, z, and all angles that are there, must be written as numbers.
         given = [*written[:3], *(one for one in written[3:] if one is not None)]
         if not all(isinstance(one, ir.Num) for one in given):
             slots = [-1] * len(slots)
         return self.apply_shift(base, ReadShift(
-            Shift(kind, (*shift, *angles), base.values),
-            shift_point(np.array(base.values), name, shift, angles), any(angles),
-            self.here.file, (*slots, *(-1,) * (WIDTH - len(slots))), own,
+            shift, self.here.file, (*slots, *(-1,) * (WIDTH - len(slots))), own,
             shifts=shifts, turned=turned,
         ))  # fmt: skip
 

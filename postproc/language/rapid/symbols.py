@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 
-import numpy as np
-
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.declarations import Datum, TaskRoutine
@@ -33,10 +31,12 @@ from postproc.language.rapid.instructions import (
     READING,
     SYNCHRONOUS,
 )
-from postproc.language.rapid.pose_encoding import COMMENTS, shift_point
+from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, inside
+from postproc.language.shifts import Shift, ShiftKind
 
-SHIFTS = ("offs", "reltool")  # functions whose first argument is a target
+SHIFTS = {"offs": ShiftKind.AXES, "reltool": ShiftKind.OWN}
+"""Functions whose first argument is a target."""
 
 
 def _values(names: str) -> Layout:
@@ -236,20 +236,21 @@ class RapidTask(TaskSymbols[RapidFile]):
         if call.name not in SHIFTS:
             return super().apply(call, row, here, depth)
         by = self.read_shift(call.arguments, row, here)
-        if by is None or depth > DEEPEST or any(map(math.isnan, [*by[0], *by[1]])):
+        if by is None or depth > DEEPEST or any(map(math.isnan, by)):
             return None
         base = self.value(call.arguments[0].value, row, here, depth + 1)
         own = [one.value for one in list_leaves(base) if isinstance(one, WrittenNumber)]
         if not isinstance(base, tuple) or len(base) != 4 or len(own) != 17:
             return None
-        new = shift_point(np.array(own[:11]), call.name, *by)
+        shift = Shift(SHIFTS[call.name], by, tuple(own[:11]))
+        new = shift.apply(RAPID_DIALECT)
         place, turn = (tuple(map(WrittenNumber, new[k])) for k in _PLACE_AND_TURN)
         return (place, turn, *base[2:])
 
     def read_shift(
         self, arguments: Sequence[ir.Argument], row: int, here: Scope
-    ) -> tuple[list[float], list[float]] | None:
-        """Return how far Offs or RelTool shift [mm], and turn about x, y, z [deg].
+    ) -> tuple[float, ...] | None:
+        """Return how far Offs or RelTool shift [mm], then turn about x, y, z [deg].
 
         None where the arguments are others; NaN where numbers are not known.
         """
@@ -261,7 +262,7 @@ class RapidTask(TaskSymbols[RapidFile]):
             self.number(turns[axis], row, here) if axis in turns else 0.0
             for axis in ("rx", "ry", "rz")
         ]
-        return [self.number(one, row, here) for one in placed[1:]], angles
+        return (*(self.number(one, row, here) for one in placed[1:]), *angles)
 
 
 _PLACE_AND_TURN = slice(3), slice(3, 7)
