@@ -48,11 +48,11 @@ from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.program import Program, Variable, Variables
 from postproc.language.pdl2.side_effects import (
     CallGraph,
-    computed_names,
     is_harmless,
     list_changed_arguments,
     list_live,
     live_rows,
+    names_but_ends,
     words_in,
 )
 from postproc.language.pdl2.to_visits import collect
@@ -547,7 +547,7 @@ def _keep_exported(world: World, machine: Machine) -> None:
             if body.exported and id(body) not in run:
                 place = world.place(program, body)
                 why = f"{body.name} uses it, which another program may call"
-                for name in computed_names(program, body.first, body.last):
+                for name in names_but_ends(program, body.first, body.last):
                     world.loosen(world.root(place, name), why)
 
 

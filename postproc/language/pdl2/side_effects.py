@@ -142,7 +142,7 @@ def rows_effects(program: Program, first: int, last: int) -> Effects:
     )
 
 
-def computed_names(program: Program, first: int, last: int) -> frozenset[str]:
+def names_but_ends(program: Program, first: int, last: int) -> frozenset[str]:
     """Return the names in rows first to last - 1 but for destinations of moves."""
     found = set[str]()
     for one in _list_statements(program, first, last):
