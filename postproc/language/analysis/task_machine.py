@@ -103,8 +103,8 @@ class Arrived:
         return self if both == self else both
 
     def forget(self) -> Arrived:
-        """Forget where the arm is, what moves are carried out with, and points."""
-        return Arrived(NOWHERE, self.modes.forget(), self.points.forget_all())
+        """Forget where the arm is, what moves are made with, and all shared data."""
+        return Arrived(NOWHERE, self.modes.forget(), self.points.forget_shared())
 
     def with_points(self, points: Points) -> Arrived:
         """Return it where points hold something else."""
