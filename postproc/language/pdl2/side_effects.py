@@ -157,7 +157,7 @@ def _list_statements(
 ) -> Iterator[ir.SourceStatement]:
     """Yield the distinct statements of rows."""
     shapes = np.unique(program.lines.shape[first:last])
-    return (program.statements[shape] for shape in shapes.tolist())
+    return (program.lines.said[shape] for shape in shapes.tolist())
 
 
 @lru_cache(maxsize=8192)
@@ -336,8 +336,7 @@ def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
     found = {}
     for program in programs:
         name = program.lines.source.name
-        moves = program.statements.which(_has_target)
-        lines = program.lines.line[moves[program.lines.shape]]
+        lines = program.lines.begin_line[program.lines.which(_has_target)]
         own = visits.place.file == visits.files.index(name)
         missed = lines[~np.isin(lines, visits.place.line[own])]
         if len(missed):
