@@ -8,7 +8,7 @@ import pytest
 
 from postproc.compensation.program import read_program
 from postproc.diagnostics import Code
-from postproc.language.visits import START, Visits
+from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.robot.cell import Cell
 
 RAPID = """MODULE job
@@ -64,22 +64,30 @@ WORDS = {
         "set {} := {}": "{}:={};", "if {}": "IF {} THEN", "input": "di1=1",
         "else": "ELSE", "end": "ENDIF", "go {}": "MoveL {},v200,fine,t\\WObj:=w;",
         "frame {}": "w:=w{};", "call {}": "next {};", "arc": "MoveC p1,p2,v200,fine,"
-        "t\\WObj:=w;",
+        "t\\WObj:=w;", "inner": "inner;",
     },
     "krl": {
         "set {} := {}": "{}={}", "if {}": "IF {} THEN", "input": "$IN[1]",
         "else": "ELSE", "end": "ENDIF", "go {}": "LIN {}",
         "frame {}": "$BASE={{X 600,Y {},Z 800,A 0,B 0,C 0}}", "call {}": "next({})",
-        "arc": "CIRC p1,p2",
+        "arc": "CIRC p1,p2", "inner": "inner( )",
     },
     "pdl2": {
         "set {} := {}": "{} := {}", "if {}": "IF {} THEN", "input": "$DIN[1]",
         "else": "ELSE", "end": "ENDIF", "go {}": "MOVE LINEAR TO {}",
         "frame {}": "$UFRAME := POS(600, {}, 800, 0, 0, 0, '')", "call {}": "next({})",
-        "arc": "MOVE CIRCULAR TO p2 VIA p1",
+        "arc": "MOVE CIRCULAR TO p2 VIA p1", "inner": "inner",
     },
 }  # fmt: skip
 LANGUAGES = [*WORDS]
+ROUTINES_WITH_LOCALS = {
+    "rapid": "PROC inner()\nLINES\nIF l<3 THEN\nMoveL p1,v200,fine,t\\WObj:=w;\nELSE"
+    "\nMoveL p2,v200,fine,t\\WObj:=w;\nENDIF\nENDPROC\n",
+    "krl": "DEF inner( )\nDECL INT l\nLINES\nIF l<3 THEN\nLIN p1\nELSE\nLIN p2\n"
+    "ENDIF\nEND\n",
+    "pdl2": "ROUTINE inner\nVAR\n  l : INTEGER\nBEGIN\n  LINES\n  IF l < 3 THEN\n"
+    "    MOVE LINEAR TO p1\n  ELSE\n    MOVE LINEAR TO p2\n  ENDIF\nEND inner\n",
+}
 FRAME_Y = {"1": "0", "2": "0", "3": "9"}
 ROUTINES = {
     "rapid": """
@@ -272,3 +280,40 @@ def test_points_that_functions_return_are_not_corrected(
     assert found.target.values[:, 0].tolist() == [6.0, 1.0]
     assert codes(found) == [Code.COMPUTED_TARGET, ""]
     assert found.target.literal.tolist() == [-1, 0] and found.literals.pinned[0]
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_call_that_is_not_followed_changes_no_data_of_a_routine(
+    language: str, bench_cell: Cell
+) -> None:
+    unknown = {"rapid": "VAR num l;\nl:=2;\nelsewhere;", "krl": "l=2\nelsewhere( )",
+               "pdl2": "l := 2\n  elsewhere"}  # fmt: skip
+    text = ROUTINES_WITH_LOCALS[language].replace("LINES", unknown[language])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(ROUTINES, language, ROUTINES[language] + text)
+        found = visits(bench_cell, language, "inner")
+    assert [found.target.names[k] for k in found.target.name.tolist()] == ["p1"]
+    assert found.graph.predecessors(0).tolist() == [ELSEWHERE]
+
+
+# Who may call a routine that nothing in the job calls.
+
+ALONE = {
+    "rapid": ("LOCAL PROC own()\nv:=Offs(p2,0,0,5);\nk:=v.trans.x;\nENDPROC", "LOCAL "),
+    "krl": ("GLOBAL DEF own( )\nDECL E6POS w\nw=p2\nw.X=w.X+5\nEND", "GLOBAL "),
+    "pdl2": ("ROUTINE own EXPORTED FROM job\nBEGIN\n  v := p2\n  v.X := v.X + 5\n"
+             "END own\n", " EXPORTED FROM job"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_routine_that_nothing_calls_counts_where_others_may_call_it(
+    language: str, alone: bool, bench_cell: Cell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, word = ALONE[language]
+    if alone != (language == "rapid"):
+        text = text.replace(word, "")
+    monkeypatch.setitem(ROUTINES, language, ROUTINES[language] + text)
+    found = visits(bench_cell, language, "go p1", "go p2")
+    assert bool(found.literals.pinned[found.target.literal[1]]) != alone

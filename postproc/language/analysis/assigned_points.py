@@ -136,9 +136,9 @@ class Points:
             routines |= {point.place[:3]}
         return Points(held, self.used, places, routines, self.alike)
 
-    def forget_all(self) -> Points:
-        """Return it where nothing is known."""
-        return Points(alike=self.alike)
+    def forget_shared(self) -> Points:
+        """Return it with what routines declare alone: nothing else knows that."""
+        return self._without(lambda key: not key[0][2])
 
     def forget(self, place: Place) -> Points:
         """Return it without any element of an array, or without a point."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, Generic, TypeVar
+
+import numpy as np
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import (
@@ -184,6 +186,11 @@ class TaskSymbols(ABC, Generic[F]):
         uses.changed |= self.odd_words
         uses.read |= self.odd_words
 
+    @property
+    def calls_by_text(self) -> bool:
+        """Whether routines are called whose names only the run tells."""
+        return False
+
     # Names.
 
     @cached_property
@@ -279,8 +286,8 @@ class TaskSymbols(ABC, Generic[F]):
     def uses(self) -> NamesUsed:
         """The names that statements change and take."""
         uses = self.new_uses()
-        for file in (one for one in self.files if not one.is_submit):
-            for one in file.text.said:
+        for number, file in enumerate(self.files):
+            for one in () if file.is_submit else self._list_live(number):
                 self.note_in(uses, file, one)
         self.note_odd(uses)
         data = [datum for file in self.files for datum in file.data]
@@ -291,6 +298,37 @@ class TaskSymbols(ABC, Generic[F]):
         uses.read |= {one for target, one in uses.copies if target not in alone}
         uses.pass_on()
         return uses
+
+    def _list_live(self, number: int) -> Iterable[ir.SourceStatement]:
+        """Return what the statements of a file say, but for routines that are dead."""
+        text, live = self.files[number].text, None
+        for routine in self.routines_by_file[number] if self.dead else ():
+            if routine.key in self.dead:
+                live = np.ones(len(text), bool) if live is None else live
+                live[routine.inside.start : routine.inside.stop] = False
+        if live is None:
+            return text.said
+        return [text.said[k] for k in np.unique(text.shape[live]).tolist()]
+
+    @cached_property
+    def dead(self) -> frozenset[tuple[int, int]]:
+        """Keys of routines that nothing calls, and that nothing else may call.
+
+        One that other files know counts as if it were called: by a program that is not
+        at hand, or by the operator.
+        """
+        every = (one for own in self.routines.values() for one in own)
+        local = [one for one in every if one.rows.head.local]
+        if not local or self.calls_by_text:
+            return frozenset()
+        calls, found = ir.Instruction | ir.FunctionCall, set(self.odd_words)
+        for file in self.files:
+            parts = ir.walk(*file.text.said)
+            found |= {one.name for one in parts if isinstance(one, calls)}
+        return frozenset(
+            one.key for one in local
+            if one.rows.head.name not in found and one.rows.head.kind != "trap"
+        )  # fmt: skip
 
     @cached_property
     def written(self) -> frozenset[str]:

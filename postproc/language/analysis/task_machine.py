@@ -103,8 +103,8 @@ class Arrived:
         return self if both == self else both
 
     def forget(self) -> Arrived:
-        """Forget where the arm is, what moves are carried out with, and points."""
-        return Arrived(NOWHERE, self.modes.forget(), self.points.forget_all())
+        """Forget where the arm is, what moves are made with, and all shared data."""
+        return Arrived(NOWHERE, self.modes.forget(), self.points.forget_shared())
 
     def with_points(self, points: Points) -> Arrived:
         """Return it where points hold something else."""
@@ -742,6 +742,8 @@ class TaskMachine(Interpreter[Arrived]):
         """
         for file, text in enumerate(self.texts):
             for routine in self.task.routines_by_file.get(file, ()):
+                if routine.key in self.task.dead:
+                    continue
                 if routine.rows.head.kind not in self.procedures:
                     yield file, routine.inside.start, routine.inside.stop
                 yield from self.list_handlers(routine)

@@ -40,7 +40,6 @@ from postproc.language.analysis.visit_columns import (
 )
 from postproc.language.pose_encoding import Dialect
 from postproc.language.text.comment_directives import MEASURE
-from postproc.language.text.source import NumberSpans
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import (
     Blend,
@@ -114,9 +113,7 @@ def visits_of(
     order = in_program_order(machine.keys)
     found: list[FoundVisit] = [machine.visits[k] for k in order]
     runs = _Runs.of(found)
-    numbering = Numbering.of(
-        [(text.source, NumberSpans.of(text.start, text.stop)) for text in machine.texts]
-    )
+    numbering = Numbering.of([(text.source, text.numbers) for text in machine.texts])
     written = _Written.of(found)
     followed = _find_followed(found, written)
     columns = _fill(found, runs, numbering, machine, dialect.width)
@@ -488,7 +485,7 @@ def _on_line(
     """Return the targets, by their first numbers, with numbers on a line."""
     starts = text.source.line_starts
     begin, end = (*starts[line - 1 : line + 1].tolist(), len(text.source.data))[:2]
-    first, last = np.searchsorted(text.start, [begin, end]).tolist()
+    first, last = np.searchsorted(text.numbers.start, [begin, end]).tolist()
     found = set[int]()
     for slot in range(first, last):
         at = bisect_right(own, slot) - 1

@@ -12,7 +12,7 @@ import numpy as np
 from postproc.language import ir
 from postproc.language.language import Cloner, NamedPoint
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.entries import is_nested, last_head
+from postproc.language.pdl2.entries import EntryLines, is_nested, last_head
 from postproc.language.pdl2.parser import parse_value_form
 from postproc.language.pdl2.program import Body, Program, Variable
 from postproc.language.text.lexer import scan_lines
@@ -26,7 +26,6 @@ from postproc.language.text.source import (
     find_free_name,
     insert_after,
 )
-from postproc.language.text.templates import parse_shapes
 from postproc.language.visits import Literals
 
 LONGEST_NAME = 32  # characters of an identifier (likely)
@@ -83,8 +82,8 @@ class Pdl2Cloner(Cloner):
     def target(self, file: int, line: int, via: bool, name: str) -> CloneTarget:
         """Find the variable that a move goes to, as far as it can be cloned."""
         program = self.programs[file]
-        row = int(np.searchsorted(program.lines.line, line))
-        move = ast.action(program.statement(row))
+        row = int(np.searchsorted(program.lines.begin_line, line))
+        move = ast.action(program.lines.statement(row))
         where = None
         if isinstance(move, ast.Move) and move.how == "TO":
             where = move.via if via else move.where[0]
@@ -112,7 +111,7 @@ class Pdl2Cloner(Cloner):
     def find_declaration(self, named: NamedPoint) -> int:
         """Return the 1-based line that declares a variable."""
         target = cast(CloneTarget, named)
-        return int(self.programs[target.file].lines.line[target.variable.row])
+        return int(self.programs[target.file].lines.begin_line[target.variable.row])
 
     def clone(
         self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
@@ -155,9 +154,9 @@ def body_at(program: Program, row: int) -> Body:
 def _destination(program: Program, row: int, word: str, name: str) -> Span:
     """Find the name after TO or VIA in a statement."""
     lines = program.lines
-    first = int(lines.line[row])
+    first = lines.line(row)
     after = len(lines.source.line_starts) + 1
-    last = int(lines.line[row + 1]) if row + 1 < len(lines) else after
+    last = lines.line(row + 1) if row + 1 < len(lines) else after
     pattern = re.compile(rf"\b{word}\s+({re.escape(name)})\b(?!\s*[\[.(:])", re.I)
     found = []
     for line in range(first, last):
@@ -196,8 +195,8 @@ def _assign_clone(
     program: Program, named: CloneTarget, line: int, name: str, starts: list[int]
 ) -> Edit:
     """Assign a value to the new name behind the line that gives it to the old one."""
-    row = int(np.searchsorted(program.lines.line, line))
-    statement = program.statement(row)
+    row = int(np.searchsorted(program.lines.begin_line, line))
+    statement = program.lines.statement(row)
     old = named.variable.name
     own = (
         isinstance(statement, ir.Assignment)
@@ -240,18 +239,17 @@ def copy_entry(
     Raises:
         CloneError: The entry is not one of this variable alone.
     """
-    lines = read_lines(values)
-    said = parse_shapes(lines.shapes, parse_value_form)
-    heads = last_head(lines, said)
-    row = int(np.searchsorted(lines.line, line, side="right")) - 1
+    lines: EntryLines = read_lines(values, parse_value_form)
+    heads = last_head(lines)
+    row = int(np.searchsorted(lines.begin_line, line, side="right")) - 1
     at = int(heads[row]) if row >= 0 else -1
-    head = said[int(lines.shape[at])] if at >= 0 else None
+    head = lines.statement(at) if at >= 0 else None
     if head is None or head.name.lower() != old.lower() or head.element:
         raise CloneError(f"line {line} of {values.name} is no entry of {old}")
     if is_nested(head):
         raise CloneError(f"{old} is a record or a path: its parts are not cloned")
     after = int(np.searchsorted(heads, at, side="right"))
-    first, last = int(lines.line[at]), int(lines.line[after - 1])
+    first, last = lines.line(at), lines.line(after - 1)
     end = [*values.line_starts.tolist(), len(values.data)][last]
     begin = int(values.line_starts[first - 1])
     if not all(begin <= start < end for start in starts):

@@ -138,7 +138,7 @@ class Collector:
         """Enter where moves stand, and what their forms say."""
         c, visit, lines = self.columns, moves.visit, moves.program.lines
         c.file[visit] = self.machine.world.files.index(lines.source.name)
-        c.line[visit] = lines.line[moves.row]
+        c.line[visit] = lines.begin_line[moves.row]
         c.motion[visit] = moves.of_forms(lambda form: form.motion)
         c.fly[visit] = moves.of_forms(lambda form: form.fly)
         c.via[visit] = moves.of_forms(lambda form: form.via)
@@ -381,11 +381,10 @@ def _find_measured(program: Program) -> tuple[Ints, list[str]]:
     marks = [*COMMENTS.marks(lines.source, MEASURE)]
     if not marks:
         return np.empty(0, dtype=np.int64), []
-    moves = program.statements.which(lambda said: isinstance(said, ast.Move))
-    rows = np.flatnonzero(moves[lines.shape])
+    rows = np.flatnonzero(lines.which(lambda said: isinstance(said, ast.Move)))
     found: dict[int, str] = {}
     for line, mark in marks:
-        at = int(np.searchsorted(lines.line[rows], line))
+        at = int(np.searchsorted(lines.begin_line[rows], line))
         if at < len(rows):
             found.setdefault(int(rows[at]), mark)
     return np.array([*found], dtype=np.int64), [*found.values()]

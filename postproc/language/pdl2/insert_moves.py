@@ -48,9 +48,9 @@ class Pdl2Splitter(LayoutSplitter):
         if self._events:
             return self._events
         program = self.programs[file]
-        row = int(np.searchsorted(program.lines.line, line))
-        move = program.statement(row)
-        if not isinstance(move, ast.Move) or int(program.lines.line[row]) != line:
+        row = int(np.searchsorted(program.lines.begin_line, line))
+        move = program.lines.statement(row)
+        if not isinstance(move, ast.Move) or program.lines.line(row) != line:
             return "it does not stand alone on its line"
         for problem, hinders in (
             ("it ends on a condition (TIL)", move.til is not None),
@@ -75,8 +75,8 @@ class Pdl2Splitter(LayoutSplitter):
     def stops(self, file: int, line: int) -> bool:
         """Return True if the arm may stop once more, see `Splitter.stops`."""
         program = self.programs[file]
-        row = int(np.searchsorted(program.lines.line, line)) - 1
-        for one in map(program.statement, range(row, -1, -1)):
+        row = int(np.searchsorted(program.lines.begin_line, line)) - 1
+        for one in map(program.lines.statement, range(row, -1, -1)):
             if not isinstance(one, ir.Assignment) or one.target.name not in _MOTION:
                 return isinstance(one, ast.Move)
         return False
@@ -128,7 +128,7 @@ class Pdl2Layout(MoveLayout):
 def _in_its_text(program: Program, row: int) -> str:
     """Say what in the text of a move hinders, "" where nothing does."""
     lines = program.lines
-    line = int(lines.line[row])
+    line = lines.line(row)
     code = code_of(program, line)
     if _HEAD.match(code) is None or code.rstrip().endswith(","):
         return "it stands on several lines"
@@ -136,7 +136,7 @@ def _in_its_text(program: Program, row: int) -> str:
     if settings and "(" in settings[0]:
         return "a routine may be called for its settings (WITH)"
     if _ADVANCE.search(code):
-        after = program.statement(row + 1) if row + 1 < len(lines) else None
+        after = program.lines.statement(row + 1) if row + 1 < len(lines) else None
         if not isinstance(after, ast.Move):
             return "the program goes on while it moves (ADVANCE)"
     return ""
@@ -145,8 +145,8 @@ def _in_its_text(program: Program, row: int) -> str:
 def _code(program: Program, rows: range) -> str:
     """Return the text of rows, without comments."""
     lines = program.lines
-    first = int(lines.line[rows.start])
-    after = int(lines.line[rows.stop]) if rows.stop < len(lines) else None
+    first = lines.line(rows.start)
+    after = lines.line(rows.stop) if rows.stop < len(lines) else None
     last = len(lines.source.line_starts) + 1 if after is None else after
     return "\n".join(code_of(program, line) for line in range(first, last))
 

@@ -52,6 +52,7 @@ from postproc.language.pdl2.side_effects import (
     list_changed_arguments,
     list_live,
     live_rows,
+    names_but_ends,
     words_in,
 )
 from postproc.language.pdl2.to_visits import collect
@@ -122,7 +123,7 @@ class Pdl2Machine(Machine):
     ) -> Store:
         """Allow for what a line does besides leading elsewhere."""
         here = self.at(context, row, state)
-        written = here.place.program.statement(row)
+        written = here.place.program.lines.statement(row)
         text = written.text if isinstance(written, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
         if text:
@@ -234,7 +235,7 @@ def step(machine: Machine, here: Execution, statement: ir.SourceStatement) -> bo
         case ir.Assignment():
             lines = here.place.program.lines
             taught = here.world.taught_lines[lines.source.name]
-            assign(here, statement, int(lines.line[here.row]) in taught)
+            assign(here, statement, lines.line(here.row) in taught)
         case ir.Instruction():
             return not call_statement(machine, here, statement)
         case ast.Transfer("WRITE", operands):
@@ -288,7 +289,7 @@ def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> 
 
 
 def _why_unknown(here: Execution) -> str:
-    line = int(here.place.program.lines.line[here.row])
+    line = here.place.program.lines.line(here.row)
     return f"line {line}, which is not understood, may change it"
 
 
@@ -316,7 +317,7 @@ def run_broken(machine: Machine, here: Execution) -> None:
     why = f"the block structure is broken (line {body.broken})"
     here.reason = Reason(Code.BLOCK_STRUCTURE, why)
     for row in range(body.first + 1, body.last):
-        said = ast.action(program.statement(row))
+        said = ast.action(program.lines.statement(row))
         if isinstance(said, ast.Move):
             here.row = row
             here.store.last = frozenset({ELSEWHERE})
@@ -351,7 +352,7 @@ def _report_drift(world: World, place: Place, file: ValueFile) -> None:
     if entries.parts:
         bases = {base_variable(name): name.partition(".")[0] for name in written}
         names, written = NameColumn(bases), [*bases.values()]
-    used = place.program.statements.tell(names)
+    used = place.program.lines.said.tell(names)
     declared = place.program.variables.names.find(names) >= 0
     if used.all() and declared.all():  # as nearly always
         return
@@ -532,9 +533,22 @@ def resolve(
             "in it is compensated",
         )  # fmt: skip
         machine = _list_moves(world)
+    _keep_exported(world, machine)
     world.pin_loose()
     world.settle()
     return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
+
+
+def _keep_exported(world: World, machine: Machine) -> None:
+    """Keep the numbers of what routines use that other programs alone may call."""
+    run = {id(context.place.body) for context, _ in machine.entries}
+    for program in world.programs():
+        for body in program.routines.values():
+            if body.exported and id(body) not in run:
+                place = world.place(program, body)
+                why = f"{body.name} uses it, which another program may call"
+                for name in names_but_ends(program, body.first, body.last):
+                    world.loosen(world.root(place, name), why)
 
 
 def _follow(world: World) -> Machine:
@@ -605,7 +619,7 @@ def _ends_ours(world: World, place: Place, first: int, reach: CallGraph) -> bool
     if any(part.effects.cancels for part in reach.parts[1:]):
         return True
     for row in range(first, place.flow.end[first]):
-        action = ast.action(place.program.statement(row))
+        action = ast.action(place.program.lines.statement(row))
         if isinstance(action, ast.CancelMove):
             at = Execution(world, place, row, Store(lambda key: None))
             ours = [at.is_ours(arm) is not False for arm in action.arms]
@@ -632,7 +646,7 @@ def _cancelling_handler(
 
 
 def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> None:
-    line = int(place.program.lines.line[row])
+    line = place.program.lines.line(row)
     machine.interrupted = True
     code, moves = Code.HANDLER_MOVES, "may move the arm at any time"
     machine.handler = Reason(code, f"a condition handler (line {line}) {moves}")

@@ -206,7 +206,7 @@ class Place:
 
     def statement(self, row: int) -> ir.SourceStatement:
         """Return what a row says; of what is not understood, which block it opens."""
-        return recover_block(self.program.statement(row))
+        return recover_block(self.program.lines.statement(row))
 
 
 @dataclass
@@ -295,7 +295,7 @@ class World:
     def report(self, program: Program, row: int, code: Code, message: str) -> None:
         """Collect a finding at a logical line."""
         lines = program.lines
-        line = int(lines.line[row]) if 0 <= row < len(lines) else 1
+        line = lines.line(row) if 0 <= row < len(lines) else 1
         self.diagnostics[Diagnostic(lines.source.name, line, code, message)] = None
 
     def report_once(

@@ -142,12 +142,22 @@ def rows_effects(program: Program, first: int, last: int) -> Effects:
     )
 
 
+def names_but_ends(program: Program, first: int, last: int) -> frozenset[str]:
+    """Return the names in rows first to last - 1 but for destinations of moves."""
+    found = set[str]()
+    for one in _list_statements(program, first, last):
+        move = ast.action(one)
+        ends = [*move.where, move.via] if isinstance(move, ast.Move) else []
+        found |= {r.name for r in references(one) if all(r is not e for e in ends)}
+    return frozenset(found)
+
+
 def _list_statements(
     program: Program, first: int, last: int
 ) -> Iterator[ir.SourceStatement]:
     """Yield the distinct statements of rows."""
     shapes = np.unique(program.lines.shape[first:last])
-    return (program.statements[shape] for shape in shapes.tolist())
+    return (program.lines.said[shape] for shape in shapes.tolist())
 
 
 @lru_cache(maxsize=8192)
@@ -326,8 +336,7 @@ def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
     found = {}
     for program in programs:
         name = program.lines.source.name
-        moves = program.statements.which(_has_target)
-        lines = program.lines.line[moves[program.lines.shape]]
+        lines = program.lines.begin_line[program.lines.which(_has_target)]
         own = visits.place.file == visits.files.index(name)
         missed = lines[~np.isin(lines, visits.place.line[own])]
         if len(missed):

@@ -104,9 +104,10 @@ def collect(machine: Machine) -> Visits:
     runs, world = [run for _, run in ordered], machine.world
     offsets = np.concatenate([[0], np.cumsum([len(run) for run in runs])])
     offsets = offsets.astype(np.int64)
-    texts = [program.lines for program in world.programs()]
-    texts += [] if world.variables is None else [world.variables.lines]
-    numbering = Numbering.of([(text.source, text.numbers) for text in texts])
+    texts = [(one.lines.source, one.lines.numbers) for one in world.programs()]
+    if (values := world.variables) is not None:
+        texts.append((values.source, values.lines.numbers))
+    numbering = Numbering.of(texts)
     collector = _collect_visits(machine, runs, offsets, len(numbering))
     c = collector.columns
     release_memory(len(c))

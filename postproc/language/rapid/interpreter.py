@@ -36,8 +36,10 @@ from postproc.language.rapid.errors import (
     numbers_of,
 )
 from postproc.language.rapid.instructions import (
+    BY_NAME,
     MOTIONS,
     STILL_FUNCTIONS,
+    SYNCHRONOUS,
     WAITING,
     read_known_instructions,
 )
@@ -60,8 +62,6 @@ from postproc.language.rapid.program import RapidFile, inside, is_move
 from postproc.language.rapid.symbols import RapidTask, as_assignment, functions_in
 from postproc.language.visits import START
 
-SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
-BY_NAME = "callbyvar"
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (

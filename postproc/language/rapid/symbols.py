@@ -25,9 +25,11 @@ from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import (
     ANSWERS,
     BUILT_IN_FUNCTIONS,
+    BY_NAME,
     BY_STRING,
     MOTIONS,
     READING,
+    SYNCHRONOUS,
 )
 from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, inside
@@ -199,6 +201,13 @@ class RapidTask(TaskSymbols[RapidFile]):
     def sets_by_string(self) -> bool:
         """Whether an instruction sets data that it is given the names of in texts."""
         return bool(BY_STRING & self.find_calls)
+
+    @cached_property
+    def calls_by_text(self) -> bool:
+        """Whether a procedure is called by a name in a text."""
+        found = (inside(one) for file in self.files for one in file.text.said.said)
+        late = any(isinstance(one, said.LateCall) for one in found)
+        return late or bool({BY_NAME, *SYNCHRONOUS} & self.find_calls)
 
     @cached_property
     def find_calls(self) -> frozenset[str]:

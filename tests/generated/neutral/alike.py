@@ -39,6 +39,7 @@ ROUNDED = 1e-5  # of poses [m], whose numbers are rounded differently
 CORRECTED = "corrected"
 TOGETHER = {CORRECTED, "arrivals-differ", "arc-distorted", "dependant-worse"}
 """Codes that what other arrivals need decides."""
+PINNED = "numbers-used-elsewhere"
 UNFLAGGED = ("configuration-unknown", "unknown-position-before")
 """Codes of KRL behind a place that is not known: its lines have no S and T."""
 Key = tuple[int, bool, int]  # mark of a move, whether it is a VIA point, which arrival
@@ -149,10 +150,11 @@ def differences(a: Arrivals, b: Arrivals) -> Iterator[tuple[int, str]]:
 
     These may differ: whether KRL stops at a fly point, where a statement behind it
     waits for the arm; codes at fly points, whose corners are blended otherwise, and at
-    points that more than moves read, that the program sets in several ways, or that
-    KRL keeps in a data list (each language has rules of its own for them), of lines of
-    KRL behind a place that is not known, and what follows from that for other arrivals
-    there and on arcs; corrections at fly points,
+    points that more than moves read, or that the program sets in several ways (each
+    language has rules of its own for them); numbers that variables hold and that serve
+    something else (what is never gone to counts in RAPID and KRL, a data list of KRL
+    outlives the run); codes of lines of KRL behind a place that is not known; what
+    follows from that for other arrivals there and on arcs; corrections at fly points,
     where sides differ, and where one is for several arrivals.
     """
     unlike = codes_unlike(a, b)
@@ -177,17 +179,17 @@ def codes_unlike(a: Arrivals, b: Arrivals) -> set[Key]:
     Others at one of their points, or on one of their arcs, may have other codes that
     say so.
     """
-    made, both = a.case.made, {*a.rows} & {*b.rows}
-    moves, read = moves_of(made), read_elsewhere(made)
-    krl = b.case.language.traits.name == "krl"
-    if krl:
-        read |= {name for name in made.variables if not name.startswith("w")}
-    found = {
-        key for key in both
-        if (krl and b.code(b.rows[key]) in UNFLAGGED)
-        or (names_in(moves[key[0]].via) | names_in(moves[key[0]].to)) & read
-        or any(one.done.visits.motion.fly[one.rows[key]] for one in (a, b))
-    }  # fmt: skip
+    both, krl = {*a.rows} & {*b.rows}, b.case.language.traits.name == "krl"
+    moves, read = moves_of(a.case.made), read_elsewhere(a.case.made)
+    kept = {name for name in a.case.made.variables if not name.startswith("w")}
+    found = set[Key]()
+    for key in both:
+        named = names_in(moves[key[0]].via) | names_in(moves[key[0]].to)
+        said = {one.code(one.rows[key]) for one in (a, b)}
+        flies = any(one.done.visits.motion.fly[one.rows[key]] for one in (a, b))
+        lost = krl and not said.isdisjoint(UNFLAGGED)
+        if flies or lost or named & read or (named & kept and PINNED in said):
+            found.add(key)
     told = {k for k in both if {one.code(one.rows[k]) for one in (a, b)} <= TOGETHER}
     before = -1
     while before != len(found):

@@ -351,7 +351,7 @@ def test_calls_are_looked_for_in_statements_of_the_program_alone(
 
     def note(self, place, statement):
         asked.append(statement)
-        own = place.program.statements
+        own = place.program.lines.said
         lines = [own[k] for k in range(len(own))]
         parts = [ast.behind(one) for one in lines]
         assert any(statement is one for one in (*lines, *parts))

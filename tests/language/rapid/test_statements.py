@@ -188,7 +188,9 @@ def test_what_does_not_end_is_refused(data, said_of_it):
 def test_numbers_are_where_they_stand_and_what_they_are_worth():
     text = "MoveAbsJ [[-1.50,+2,9E+09,- 3,.5,0x10],[1,1,1,1,1,1]],v5,z1,t;"
     found = read_statements(Source("x.mod", text.encode()))
-    cut = [text[a:b] for a, b in zip(found.start, found.stop, strict=True)]
+    cut = [
+        text[a:b] for a, b in zip(found.numbers.start, found.numbers.end, strict=True)
+    ]
     assert cut == ["-1.50", "+2", "9E+09", "- 3", ".5", "0x10", *"111111"]
     np.testing.assert_array_equal(
         found.value, [-1.5, 2.0, 9e9, -3.0, 0.5, 16.0] + [1.0] * 6
