@@ -216,7 +216,9 @@ class KrlMachine(TaskMachine):
         here = self._forget(context, row, one, here)
         match one:
             case said.KrlMove():
-                return self._move(context, row, one, here)
+                here = self.arrive(context, row, one, here)
+                modes = replace(here.modes, halted=False, goes_on=False)
+                return replace(here, modes=modes)
             case ir.Assignment():
                 return self._assign(context, row, one, here)
             case ir.Instruction():
@@ -253,13 +255,6 @@ class KrlMachine(TaskMachine):
         if store == here.modes.store:
             return here
         return replace(here, modes=here.modes.with_(store=store))
-
-    def _move(
-        self, context: Context, row: int, one: said.KrlMove, here: Arrived
-    ) -> Arrived:
-        """Record the visits of a move."""
-        after = self.arrive(context, row, one, here)
-        return replace(after, modes=replace(after.modes, halted=False, goes_on=False))
 
     def _modes(self, context: Context, row: int) -> ModeReader:
         return ModeReader(self.task, row, context.place.scope)
