@@ -118,7 +118,7 @@ class Neighbours:
 Terms = Sequence[Term | Neurons | Neighbours]
 
 
-def turned(terms: Terms, states: States) -> Floats:
+def joint_angles(terms: Terms, states: States) -> Floats:
     """Return what joints turn by, (n, 6) [rad], by terms of angles and directions."""
     written = [
         (t.moves, t.law, [d[:2] for d in t.by], [d[:2] for d in t.times])

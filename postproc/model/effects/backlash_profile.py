@@ -29,9 +29,9 @@ from postproc.model.terms import (
     TermLaw,
     Terms,
     angle,
+    joint_angles,
     side,
     turn_joint,
-    turned,
 )
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -113,7 +113,7 @@ class BacklashProfile(JointEffect):
 
     def angles(self, batch: ArmStates, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad], as in the base class but in one go."""
-        return turned(self.terms(batch.arm, p), batch.states)
+        return joint_angles(self.terms(batch.arm, p), batch.states)
 
     @property
     def _profile_joints(self) -> NDArray[np.int64]:

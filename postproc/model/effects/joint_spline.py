@@ -19,7 +19,7 @@ from postproc.model.effects.policies import FitPolicy
 from postproc.model.effects.smooth import smooth, smooth_count, smooth_mix
 from postproc.model.kinematics import ArmStates
 from postproc.model.splines import Splines
-from postproc.model.terms import Term, TermLaw, Terms, angle, turn_joint, turned
+from postproc.model.terms import Term, TermLaw, Terms, angle, joint_angles, turn_joint
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -161,7 +161,7 @@ class JointSpline(JointEffect):
 
     def angles(self, batch: ArmStates, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad]: one function for every joint."""
-        return turned(self.terms(batch.arm, p), batch.states)
+        return joint_angles(self.terms(batch.arm, p), batch.states)
 
     def beyond(self, batch: ArmStates, prior_std: Floats) -> Floats:
         """Give back the prior's variance as far as the functions have faded, (n, 6)."""
