@@ -17,8 +17,9 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.inverse_model import base_in_uframe
 from postproc.compensation.paths.arcs import Chords, CutArc, is_arc
-from postproc.compensation.paths.backlash_preload import BacklashPreload, MeantSides
+from postproc.compensation.paths.backlash_preload import BacklashPreload
 from postproc.compensation.paths.insertion_report import Points
+from postproc.compensation.paths.meant_sides import MeantSides
 from postproc.compensation.program import ParsedProgram, read_program
 from postproc.compensation.rewrite import VerificationError
 from postproc.language.language import Splitter

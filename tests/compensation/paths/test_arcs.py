@@ -17,7 +17,7 @@ from postproc.compensation.paths.arcs import (
     hindrances_of_arcs,
     measure_passing,
 )
-from postproc.compensation.paths.backlash_preload import MeantSides
+from postproc.compensation.paths.meant_sides import MeantSides
 from postproc.compensation.paths.split_constraints import CLOSEST, shortest_pieces
 from postproc.compensation.paths.write_points import are_near, insert
 from postproc.compensation.program import ParsedProgram, plan_visits, read_program
