@@ -34,7 +34,11 @@ from postproc.compensation.paths.split_constraints import (
     speeds_of_pieces,
     unwritable,
 )
-from postproc.compensation.paths.write_points import insert, lines_in_files
+from postproc.compensation.paths.write_points import (
+    PathPoints,
+    insert,
+    lines_in_files,
+)
 from postproc.compensation.pipeline import (
     BY_VISIT,
     EXPLAINING,
@@ -261,11 +265,11 @@ class InsertionTask:
     def _insert(self, plan: InsertionPlan) -> tuple[ParsedProgram, Ints]:
         """Put the points of a plan into the program, see `insert`."""
         with self.setting.clock("insert"):
-            return insert(
-                self.source.reading, plan.points, plan.preloads, self.splitter,
-                self.setting.cell, plan.chords, plan.approaches,
+            put = PathPoints(
+                plan.points, plan.preloads, plan.chords, plan.approaches,
                 self.sides.of_plan(plan), self._joints_along,
             )  # fmt: skip
+            return insert(self.source.reading, put, self.splitter, self.setting.cell)
 
     def _correct(self, reading: ParsedProgram) -> tuple[ParsedProgram, WindowResult]:
         options = self.setting.options.without_clones()
