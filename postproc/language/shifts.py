@@ -18,7 +18,8 @@ NO_TURN = 1e-12  # of a matrix: rotations that differ less are the same
 LEAST_DEG = 1e-10  # angles that are computed, and less, turn nothing
 TURNED = 1e-7  # [rad] and more are written into the angles of a shift
 Pose = tuple[float, ...]
-STILL: Pose = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)
+"""The rows of a pose (4, 4) [m] one after the other, empty where it is not known."""
+IDENTITY: Pose = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)
 
 
 class ShiftKind(IntEnum):
@@ -45,8 +46,8 @@ class Shift:
     kind: ShiftKind
     numbers: tuple[float, ...]
     origin: tuple[float, ...]
-    left: Pose = STILL
-    right: Pose = STILL
+    left: Pose = IDENTITY
+    right: Pose = IDENTITY
     flagged: bool = True
 
     @property
@@ -73,7 +74,7 @@ class Shift:
             case ShiftKind.FRAME:
                 left = by @ left
         return replace(
-            self, origin=inner.origin, left=_flat(left), right=_flat(right),
+            self, origin=inner.origin, left=flat(left), right=flat(right),
             flagged=self.flagged and inner.flagged,
         )  # fmt: skip
 
@@ -89,7 +90,8 @@ def _matrix(pose: Pose) -> Floats:
     return np.array(pose).reshape(4, 4)
 
 
-def _flat(pose: Floats) -> Pose:
+def flat(pose: Floats) -> Pose:
+    """Write the rows of a pose, (4, 4) [m], one after the other."""
     return tuple(pose.ravel().tolist())
 
 

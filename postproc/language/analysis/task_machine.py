@@ -13,7 +13,6 @@ from collections.abc import (
     Sequence,
 )
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import accumulate
 from typing import Any, ClassVar, TypeVar
@@ -412,14 +411,11 @@ class TaskMachine(Interpreter[Arrived]):
 
     def declares_motionless(self, name: str) -> bool:
         """Tell whether the cell says that a routine neither moves nor sets frames."""
-        start = self.start
-        if start.routines.get(name) == "motionless":
-            return True
-        return any(fnmatchcase(name, pattern) for pattern in start.motionless)
+        return self.start.effect_of(name) == "motionless"
 
     def outside(self, context: Context, row: int, name: str, here: Arrived) -> Arrived:
         """Call a routine that is not at hand: the cell may say what it does."""
-        said_of_it = self.start.routines.get(name)
+        said_of_it = self.start.effect_of(name)
         if said_of_it in ("moves", "sets-frames"):
             self.lost |= here.origins
         if said_of_it == "moves":

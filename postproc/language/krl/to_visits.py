@@ -11,7 +11,6 @@ from postproc.language.analysis import to_visits
 from postproc.language.analysis.conditions import (
     NO_LOAD,
     Conditions,
-    Pose,
     Zone,
     cell_pose,
 )
@@ -29,6 +28,7 @@ from postproc.language.krl.modal_state import (
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.syntax import SplineBlock
+from postproc.language.shifts import Pose
 from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
 from postproc.robot.trajectory import Motion
 

@@ -145,8 +145,8 @@ def body_at(program: Program, row: int) -> Body:
     Raises:
         CloneError: It stands in none.
     """
-    for body in (program.main, *program.routines.values()):
-        if body is not None and body.first < row < body.last:
+    for body in program.bodies:
+        if body.first < row < body.last:
             return body
     raise CloneError("the move stands outside of any body")
 

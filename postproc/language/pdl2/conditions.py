@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.arrays import Indices, Interned, Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.analysis.conditions import Conditions, Pose, Zone, cell_pose
+from postproc.language.analysis.conditions import Conditions, Zone, cell_pose
 from postproc.language.pdl2.abstract_state import FRAMES, Settings
 from postproc.language.pdl2.untracked_settings import (
     disturbance,
@@ -18,6 +18,7 @@ from postproc.language.pdl2.untracked_settings import (
     weaves,
 )
 from postproc.language.pdl2.values import Nothing, Position, Value
+from postproc.language.shifts import Pose
 from postproc.language.visits import Blend, Meaning, OrientationLaw, Switch, ZoneRule
 
 _OVERRIDES = ("arm_spd_ovr", "prog_spd_ovr", "gen_ovr")

@@ -65,11 +65,14 @@ class Pdl2Splitter(LayoutSplitter):
     @cached_property
     def _events(self) -> str:
         """Why no move may be split: what may count the segments of a motion."""
-        handled = any(_has_events(program) for program in self.programs)
-        if handled:
-            return "a condition on events along a move may be enabled"
-        if any(_enables_others(program) for program in self.programs):
-            return "a condition that these files do not define may be enabled"
+        for program in self.programs:
+            spans = (range(*rows) for rows in program.handlers)
+            if any(_EVENT.search(_code(program, rows)) for rows in spans):
+                return "a condition on events along a move may be enabled"
+        for program in self.programs:
+            code = _code(program, range(len(program.lines)))
+            if _ENABLE.search(code) or (_ENABLED.search(code) and not program.handlers):
+                return "a condition that these files do not define may be enabled"
         return ""
 
     def stops(self, file: int, line: int) -> bool:
@@ -145,28 +148,9 @@ def _in_its_text(program: Program, row: int) -> str:
 def _code(program: Program, rows: range) -> str:
     """Return the text of rows, without comments."""
     lines = program.lines
+    if not rows:
+        return ""
     first = lines.line(rows.start)
     after = lines.line(rows.stop) if rows.stop < len(lines) else None
     last = len(lines.source.line_starts) + 1 if after is None else after
     return "\n".join(code_of(program, line) for line in range(first, last))
-
-
-def _has_events(program: Program) -> bool:
-    """Tell whether a condition handler of a program may look at segments."""
-    bodies = (program.main, *program.routines.values())
-    return any(
-        _EVENT.search(_code(program, range(opener, end)))
-        for body in bodies
-        if body is not None
-        for opener, end in body.flow.conditions
-    )
-
-
-def _enables_others(program: Program) -> bool:
-    """Tell whether a program enables conditions that it does not define itself."""
-    bodies = [b for b in (program.main, *program.routines.values()) if b is not None]
-    if not len(program.lines):
-        return False
-    code = _code(program, range(len(program.lines)))
-    own = any(body.flow.conditions for body in bodies)
-    return bool(_ENABLE.search(code)) or bool(_ENABLED.search(code) and not own)

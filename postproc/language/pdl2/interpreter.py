@@ -594,21 +594,18 @@ def _handlers(machine: Machine, store: Store) -> None:
     unknown.changing = world.changing
     unknown.given, unknown.lost = store.given, store.lost
     unknown.forget_frames(nothing.why)
-    for program in world.programs():
-        for body in (program.main, *program.routines.values()):
-            for first, last in body.flow.conditions if body else ():
-                assert body is not None
-                place = world.place(program, body)
-                reach = live_rows(world, place, first, last)
-                machine.volatile |= reach.may_change
-                for part in reach.parts:
-                    for name in part.effects.read:
-                        root = world.root(part.place, name)
-                        world.loosen(root, "a condition handler may use it")
-                if reach.moves:
-                    _moving_handler(machine, place, first, unknown)
-                elif reach.cancels:
-                    _cancelling_handler(machine, place, first, reach)
+    for place in world.places():
+        for first, last in place.flow.conditions:
+            reach = live_rows(world, place, first, last)
+            machine.volatile |= reach.may_change
+            for part in reach.parts:
+                for name in part.effects.read:
+                    root = world.root(part.place, name)
+                    world.loosen(root, "a condition handler may use it")
+            if reach.moves:
+                _moving_handler(machine, place, first, unknown)
+            elif reach.cancels:
+                _cancelling_handler(machine, place, first, reach)
     for name in machine.volatile:
         if name.startswith("$"):
             store.set(**{name[1:]: Nothing("a condition handler changes it")})

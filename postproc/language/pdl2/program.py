@@ -284,6 +284,16 @@ class Program:
     diagnostics: tuple[Diagnostic, ...]
     nodes: Mapping[str, frozenset[str]]
 
+    @cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        """Its main part, if it has one, and its routines."""
+        return tuple(one for one in (self.main, *self.routines.values()) if one)
+
+    @property
+    def handlers(self) -> list[tuple[int, int]]:
+        """Rows at which its condition handlers begin and end."""
+        return [rows for body in self.bodies for rows in body.flow.conditions]
+
     @property
     def head(self) -> int:
         """Return the line that names the program, 1 where there is none."""

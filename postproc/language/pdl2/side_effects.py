@@ -314,12 +314,10 @@ def _list_called(world: World, place: Place, first: int, last: int) -> Iterator[
 def circles(world: World) -> frozenset[int]:
     """Return the bodies (by id) that may call themselves, and those between such."""
     calls: dict[int, set[int]] = {}
-    for program in world.programs():
-        for body in filter(None, (program.main, *program.routines.values())):
-            called = _list_called(
-                world, world.place(program, body), body.first, body.last
-            )
-            calls[id(body)] = {id(one.body) for one in called}
+    for place in world.places():
+        body = place.body
+        called = _list_called(world, place, body.first, body.last)
+        calls[id(body)] = {id(one.body) for one in called}
     return find_recursive(calls)
 
 

@@ -306,7 +306,11 @@ class RapidMachine(TaskMachine):
             if holds:
                 return after
             return here if after is None else here.join(after)
-        self._bind_late(one)
+        if isinstance(one, said.LateCall):  # of which procedures, a text may say
+            if _is_text(one.procedure):
+                self.run_named_beside(_name_procedure(one.procedure))
+            else:
+                self._run_all_beside()
         return super().part_otherwise(context, row, one, here)
 
     def may_jump(self, context: Context, row: int, here: Arrived) -> None:
@@ -314,15 +318,6 @@ class RapidMachine(TaskMachine):
         super().may_jump(context, row, here)
         if EXIT_CYCLE in self.texts[context.place.scope.file].words([row]):
             self.restarts.append(here)
-
-    def _bind_late(self, one: ir.SourceStatement) -> None:
-        """Note the procedures that ``%name%`` may call."""
-        if not isinstance(one, said.LateCall):
-            return
-        if _is_text(one.procedure):
-            self.run_named_beside(_name_procedure(one.procedure))
-        else:
-            self._run_all_beside()
 
     def _run_all_beside(self) -> None:
         """Note that every procedure may be called."""

@@ -17,7 +17,7 @@ from postproc.language.analysis.assigned_points import (
     Points,
     Scope,
 )
-from postproc.language.analysis.conditions import IDENTITY, Pose, compose_poses, flat
+from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.found_visits import (
     FoundGoal,
     FoundVisit,
@@ -40,7 +40,7 @@ from postproc.language.rapid.pose_encoding import (
     WIDTH,
 )
 from postproc.language.rapid.symbols import SHIFTS, RapidTask
-from postproc.language.shifts import Shift
+from postproc.language.shifts import IDENTITY, Pose, Shift, flat
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 

@@ -9,7 +9,6 @@ from postproc.language.analysis import to_visits
 from postproc.language.analysis.conditions import (
     NO_LOAD,
     Conditions,
-    Pose,
     cell_pose,
     compose_poses,
 )
@@ -23,6 +22,7 @@ from postproc.language.rapid.moves import (
     pose_of_numbers,
 )
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
+from postproc.language.shifts import Pose
 from postproc.language.visits import Meaning, Visits
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion

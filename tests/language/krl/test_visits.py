@@ -572,7 +572,7 @@ def test_what_may_move_forgets_where_the_arm_is():
         "LIN XP1", "grip( )", "LIN XP2", start=Start(routines={"Grip": "motionless"})
     )
     assert origins(found) == [[START], [0]] and codes(found) == set()
-    moves = Start(routines={"grip": "moves"})
+    moves = Start(routines={"grip": "moves"}, motionless=("g*",))  # the name counts
     found = job("LIN XP1", "grip( )", "LIN XP2", start=moves)
     assert origins(found)[1] == [ELSEWHERE] and reasons(found) == ["", ""]
 

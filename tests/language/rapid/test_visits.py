@@ -294,7 +294,7 @@ def test_what_may_move_forgets_where_the_arm_is():
     still = Start(routines={"Grip": "motionless"})
     found = once(L.format("p1"), "grip;", L.format("p2"), start=still)
     assert origins(found) == [[START], [0]] and codes(found) == set()
-    moves = Start(routines={"grip": "moves"})
+    moves = Start(routines={"grip": "moves"}, motionless=("g*",))  # the name counts
     found = once(L.format("p1"), "grip;", L.format("p2"), start=moves)
     assert origins(found)[1] == [ELSEWHERE] and reasons(found) == ["", ""]
 
