@@ -270,6 +270,8 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
         form = MoveForm(motion, reason, fly=True, via=True)
         via = single(here, form, predecessors, settings, goal)
         predecessors = frozenset({machine.record(here, _VIA, via)})
+        if machine.interrupted:  # the arm may have been moved off the way
+            predecessors |= {ELSEWHERE}
     goal = goal_of(here, statement, motion)
     form = MoveForm(motion, reason, fly=statement.fly)
     end = single(here, form, predecessors, settings, goal)

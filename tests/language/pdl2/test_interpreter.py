@@ -341,6 +341,20 @@ def test_a_handler_calls_a_routine_where_there_is_no_main_body() -> None:
     assert {d.code for d in found.diagnostics} == {"handler-moves"}
 
 
+def test_a_handler_that_moves_may_lead_the_arm_off_an_arc() -> None:
+    arc = "MOVE CIRCULAR TO POS(3,2,3,4,5,6,'') VIA POS(2,3,3,4,5,6,'')\n"
+    handler = (
+        "CONDITION[1] :\nWHEN $DIN[1]+ DO\nMOVE JOINT TO {1,2,3,4,5,6}\nENDCONDITION\n"
+        "ENABLE CONDITION[1]\n"
+    )
+    for text, elsewhere in ((arc, False), (handler + arc, True)):
+        found = body("MOVE LINEAR TO POS(1,2,3,4,5,6,'')\n" + text)
+        (via,) = np.flatnonzero(found.visits.motion.via)
+        graph = found.visits.graph
+        before = graph.pred[graph.pred_start[via + 1] : graph.pred_start[via + 2]]
+        assert (ELSEWHERE in before.tolist()) == elsewhere
+
+
 def test_calls_are_looked_for_in_statements_of_the_program_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
