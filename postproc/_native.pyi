@@ -138,6 +138,16 @@ def to_move(
     rounds: int,
 ) -> Floats: ...
 
+# commands.rs: what to command (`postproc.compensation.inverse_model`)
+def commands(
+    core: Core,
+    solver: Solver,
+    wanted: Floats,
+    tool: Floats,
+    states: _States,
+    turns: bool,
+) -> tuple[Floats, Floats, Floats]: ...
+
 # corner.rs, rounding.rs: rounded fly points (`postproc.motion.blending`)
 def passed(
     parameters: Floats,
@@ -164,25 +174,8 @@ def fastest(
     acceleration: Floats,
 ) -> Floats: ...
 
-# profile.rs: backlash along the gear (`postproc.model.effects.backlash_profile`)
-def profile(
-    states: tuple[Floats, ...],
-    joints: Sequence[int],
-    orders: Sequence[int],
-    constant: bool,
-    sizes: Floats,
-    range: tuple[Sequence[float], Sequence[float]],
-) -> Floats: ...
-
-# variance.rs: uncertain parameters of geometry and joints (`postproc.model.variance`)
-def covariance(
-    parameters: Floats,
-    base: Floats,
-    states: tuple[Floats, Floats],
-    geometry: tuple[bool, Sequence[tuple[int, int]], bool],
-    basis: tuple[Floats, Sequence[int]],
-    of_parameters: Floats,
-) -> Floats: ...
+# terms.rs: laws of effects (`postproc.model.terms`)
+def turned(terms: Sequence[Any], q: Floats, side: Floats) -> Floats: ...
 
 # design.rs: sums over the rows of a fit (`postproc.calibration.design_matrix`)
 def gram(
@@ -203,6 +196,41 @@ def by_groups(lower: Floats, z: Floats, group: Ints, count: int) -> Floats: ...
 def of_blocks(gain: Floats, share: Floats, signals: Floats, rows: float) -> Floats: ...
 
 # names.rs: names by the million (`postproc.language.symbol_column`)
+class _States(Protocol):
+    @property
+    def q(self) -> Floats: ...
+    @property
+    def side(self) -> Floats: ...
+    @property
+    def tool(self) -> Floats: ...
+    @property
+    def load(self) -> Floats: ...
+    @property
+    def given(self) -> Floats: ...
+
+class Core:
+    def __init__(
+        self,
+        chains: tuple[Floats, Floats],
+        base: Floats,
+        tool: tuple[float, ...],
+        given: int,
+        terms: tuple[list[Any], list[float]],
+        fields: tuple[list[Any], list[Any]],
+        spread: tuple[Any, ...] | None,
+        scatter: tuple[Any, ...],
+    ) -> None: ...
+    def errors(self, states: _States) -> Floats: ...
+    def turns(self, states: _States) -> Floats: ...
+    def predict(self, states: _States) -> tuple[Floats, Floats, Floats]: ...
+
+class Solver:
+    @staticmethod
+    def of_chain(chain: Floats) -> Solver: ...
+    @staticmethod
+    def of_closed_form(closed: Floats, mixes: tuple[Floats, Floats]) -> Solver: ...
+    def nearest(self, flange: Floats, near: Floats, slot: Ints) -> Floats: ...
+
 class NameColumn(Sequence[str]):
     def __init__(self, names: Iterable[str] = ...) -> None: ...
     def extend(self, names: Iterable[str]) -> None: ...

@@ -67,7 +67,6 @@ KNOWING = {
     # The others move along the chain that it deviates.
     "model.effect_sum": {"geometry"},
     # The native kernel makes its columns and those of the joints itself.
-    "model.variance": {"geometry"},
     # Any survey must determine it, or be refused.
     "calibration.survey_checks": {"base_shift", "geometry"},
     # What the frame of the rows explains is no mistake of them.

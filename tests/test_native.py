@@ -17,13 +17,8 @@ import pytest
 from postproc import _native
 from postproc.arrays import few_rows, floats
 from postproc.compensation.compensate import compensate
-from postproc.model.effect_sum import Combination
-from postproc.model.effects.backlash import Backlash
 from postproc.model.effects.backlash_profile import BacklashProfile
-from postproc.model.effects.compliance import Compliance
-from postproc.model.effects.geometry import Geometry
 from postproc.model.kinematics import ArmStates
-from postproc.model.variance import COLUMNS, ROWS, parameter_covariance
 from postproc.motion import blending
 from postproc.motion import path as cartesian
 from postproc.motion.branches import OTHER_TURN, on_other_turns, on_written_turns
@@ -350,28 +345,6 @@ def test_backlash_along_the_gear(effect, bench_cell, random):
     found = effect.angles(batch, p)
     assert np.allclose(found[:, joints], meant[:, joints], **CLOSE)
     assert not np.delete(found, joints, axis=1).any()
-
-
-@pytest.mark.parametrize("base", [True, False])
-@pytest.mark.parametrize(
-    "more", [(), (Backlash(), BacklashProfile(joints=(5, 2, 3)), Compliance())]
-)
-def test_uncertain_parameters(base, more, bench_cell, random):
-    effects = Combination((*more[:1], Geometry((2, 6), base), *more[1:]))
-    values = effects.scales * random.normal(size=len(effects.scales))
-    root = effects.scales[:, None] * random.normal(size=(len(values), len(values)))
-    q, direction = random.uniform(-3, 3, (43, 6)), random.uniform(-1, 1, (43, 6))
-    q[5, 1] = np.nan
-    states = make_states(q, direction, random.uniform(-0.3, 0.3, (43, 3)))
-    at, covariance = (
-        effects.at(ArmStates(bench_cell.arm, states), values),
-        root @ root.T,
-    )
-    found, columns = parameter_covariance(effects, at, covariance), effects.columns(at)
-    meant = np.einsum("nip,pq,njq->nij", columns, covariance, columns)[:, ROWS, COLUMNS]
-    size = np.sqrt(meant[:, ROWS] * meant[:, COLUMNS])
-    assert np.allclose(found / size, meant / size, rtol=0, atol=1e-9, equal_nan=True)
-    assert np.isnan(meant).any(axis=1).tolist() == np.isnan(q).any(axis=1).tolist()
 
 
 def test_corners_of_a_program(bench_cell, bench_model, monkeypatch):

@@ -30,7 +30,7 @@ pub struct Arm {
 
 impl Arm {
     /// Take a1, b, c1, upper, forearm, c4, bent, then offsets and signs of the joints.
-    fn new(p: &[f64]) -> PyResult<Arm> {
+    pub fn new(p: &[f64]) -> PyResult<Arm> {
         if p.len() != 19 {
             return Err(PyValueError::new_err("an arm has 19 parameters"));
         }
@@ -48,7 +48,7 @@ impl Arm {
     }
 
     /// Solve for one branch; NaN where there is none.
-    fn branch(&self, pose: &Pose, slot: i64) -> Six {
+    pub fn branch(&self, pose: &Pose, slot: i64) -> Six {
         let angles = self.wrist_up(pose, slot);
         self.to_joints(if slot & WRIST > 0 { flipped(angles) } else { angles })
     }
@@ -60,6 +60,16 @@ impl Arm {
             let angles = up[slot % 4];
             self.to_joints(if slot >= 4 { flipped(angles) } else { angles })
         })
+    }
+
+    /// Name the branch of geometric joint angles.
+    pub fn slot(&self, theta: &Six) -> i64 {
+        let t: Six = std::array::from_fn(|j| theta[j] * self.sign[j] - self.offset[j]);
+        let elbow = t[2] + self.bent;
+        let ahead = self.upper * t[1].sin() + self.forearm * (t[1] + elbow).sin();
+        WRIST * i64::from(t[4].sin() < 0.0)
+            + SHOULDER * i64::from(self.a1 + ahead < 0.0)
+            + ELBOW * i64::from(elbow.sin() < 0.0)
     }
 
     /// Convert the formulas' angles to the arm's geometric ones.

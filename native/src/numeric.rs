@@ -19,13 +19,13 @@ const SAME: f64 = 1e-6; // [rad] between two solutions that are one
 const UNSOLVED: Six = [f64::NAN; 6];
 
 /// A chain, and places of it to start from.
-struct Numeric {
+pub struct Numeric {
     chain: Chain,
     starts: Vec<Six>,
 }
 
 impl Numeric {
-    fn new(parameters: &Parameters<'_>) -> PyResult<Numeric> {
+    pub fn new(parameters: &Parameters<'_>) -> PyResult<Numeric> {
         // A Kronecker sequence fills the six angles evenly: powers of the root of
         // x^7 = x + 1.
         let root: f64 = 1.112_775_684_278_705_5;
@@ -85,7 +85,7 @@ impl Numeric {
     /// Name a branch by what vanishes at its singularities: 4 where the sine of axis 5 is
     /// negative, 1 where the wrist comes nearer to axis 2 as axis 3 turns on, 2 by the sign
     /// of what is left of the determinant.
-    fn slot(&self, q: &Six) -> usize {
+    pub fn slot(&self, q: &Six) -> usize {
         let frames = self.chain.frames(q);
         let wrist = self.chain.0[4].angle(q).sin();
         let (second, third) = (frames[1].axes[2], frames[2].axes[2]);
@@ -97,6 +97,103 @@ impl Numeric {
         let rest = determinant(self.columns(&frames)) * wrist.signum() * elbow.signum();
         4 * usize::from(wrist < 0.0) + 2 * usize::from(rest < 0.0) + usize::from(elbow < 0.0)
     }
+}
+
+const NEARBY: f64 = 0.5; // [rad] that Newton's method goes from one solution to the next
+const NEARBY_ROUNDS: usize = 8;
+const SINGULAR: f64 = 1e-6;
+const LOOKED_AT: usize = 5; // places between two solutions
+
+impl Numeric {
+    /// Solve for the joint angles nearest to given ones: the solution that no singularity
+    /// parts from them, else that of a branch on the nearest turn.
+    pub fn nearest(&self, pose: &Pose, near: &Six, slot: usize) -> Six {
+        if let Some(q) = self.reach(pose, near).filter(|q| self.is_regular(near, q)) {
+            return q;
+        }
+        let unknown = pose.iter().any(|x| x.is_nan());
+        let found = if unknown { UNSOLVED } else { self.branches(pose, &[UNSOLVED; 8])[slot] };
+        std::array::from_fn(|j| near[j] + wrapped(found[j] - near[j]))
+    }
+
+    /// Go to a pose by Newton's method. An arm without a closed form can have 16 solutions,
+    /// more than there are branches: the one that is near is found by going there.
+    fn reach(&self, pose: &Pose, near: &Six) -> Option<Six> {
+        let mut q = *near;
+        for _ in 0..NEARBY_ROUNDS {
+            let frames = self.chain.frames(&q);
+            let off = twist(&frames[6], pose);
+            if off.iter().all(|x| x.abs() < CLOSE) {
+                return Some(q);
+            }
+            let columns = self.columns(&frames);
+            if least_singular(columns) <= SINGULAR {
+                return None;
+            }
+            let step = solve(columns, off)?;
+            q = std::array::from_fn(|j| q[j] + step[j]);
+            if !q.iter().zip(near).all(|(q, near)| (q - near).abs() < NEARBY) {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// Tell whether no singularity lies between joint angles: branches meet there alone.
+    fn is_regular(&self, start: &Six, end: &Six) -> bool {
+        let sign = |k: usize| {
+            let share = k as f64 / (LOOKED_AT - 1) as f64;
+            let q: Six = std::array::from_fn(|j| start[j] + share * (end[j] - start[j]));
+            determinant(self.columns(&self.chain.frames(&q))).partial_cmp(&0.0)
+        };
+        let first = sign(0);
+        let one_sided = first.is_some_and(|side| side.is_ne());
+        one_sided && (1..LOOKED_AT).all(|k| sign(k) == first)
+    }
+}
+
+/// Shift [m] and turn [rad] from a frame to a pose.
+fn twist(from: &crate::chain::Frame, to: &Pose) -> Six {
+    let wanted = |i: usize, j: usize| to[4 * i + j];
+    let turned: [Three; 3] = std::array::from_fn(|i| {
+        std::array::from_fn(|j| (0..3).map(|k| wanted(i, k) * from.axes[k][j]).sum())
+    });
+    let [x, y, z] = crate::lines::rotation_vector(&turned);
+    let shift = |i: usize| to[4 * i + 3] - from.origin[i];
+    [shift(0), shift(1), shift(2), x, y, z]
+}
+
+/// Return the smallest singular value, by turning pairs of columns until all are at right
+/// angles to each other (Hestenes 1958).
+fn least_singular(mut columns: [Six; 6]) -> f64 {
+    let product = |a: &Six, b: &Six| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    for _ in 0..30 {
+        let mut askew = 0.0_f64;
+        for i in 0..5 {
+            for j in i + 1..6 {
+                let (a, b) = (columns[i], columns[j]);
+                let (aa, bb, ab) = (product(&a, &a), product(&b, &b), product(&a, &b));
+                askew = askew.max(ab.abs() / (aa * bb).sqrt().max(f64::MIN_POSITIVE));
+                if ab == 0.0 {
+                    continue;
+                }
+                let half = (bb - aa) / (2.0 * ab);
+                let tan = half.signum() / (half.abs() + (1.0 + half * half).sqrt());
+                let cos = 1.0 / (1.0 + tan * tan).sqrt();
+                columns[i] = std::array::from_fn(|k| cos * (a[k] - tan * b[k]));
+                columns[j] = std::array::from_fn(|k| cos * (b[k] + tan * a[k]));
+            }
+        }
+        if askew < 1e-12 {
+            break;
+        }
+    }
+    columns.iter().map(|c| product(c, c).sqrt()).fold(f64::INFINITY, f64::min)
+}
+
+/// Wrap an angle into [-pi, pi).
+pub fn wrapped(angle: f64) -> f64 {
+    (angle + PI).rem_euclid(TAU) - PI
 }
 
 fn same(a: &Six, b: &Six) -> bool {

@@ -15,7 +15,7 @@ fn to_python(py: Python<'_>, poses: Vec<Pose>) -> Bound<'_, PyArray3<f64>> {
     blocks(py, poses.len(), (4, 4), poses.into_flattened())
 }
 
-fn inverted(t: &Pose) -> Pose {
+pub fn inverted(t: &Pose) -> Pose {
     let mut out = [0.0; 16];
     for i in 0..3 {
         let (x, y, z) = (t[i], t[4 + i], t[8 + i]);
@@ -50,7 +50,7 @@ fn from_record(record: &Six) -> Pose {
     ]
 }
 
-fn product(a: &Pose, b: &Pose) -> Pose {
+pub fn product(a: &Pose, b: &Pose) -> Pose {
     std::array::from_fn(|at| {
         let (i, j) = (at / 4 * 4, at % 4);
         a[i] * b[j] + a[i + 1] * b[4 + j] + a[i + 2] * b[8 + j] + a[i + 3] * b[12 + j]

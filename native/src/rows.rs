@@ -123,6 +123,28 @@ pub fn on_cores<T: Send>(
     in_threads(parts.len(), |part| work(parts[part].clone()))
 }
 
+/// Rows that are worth a thread, and those between two looks at signals.
+const LEAST: usize = 512;
+const BLOCKS: usize = 1 << 16;
+
+/// Work on parts of the rows on every core, without the interpreter's lock; signals are
+/// heard as in `each`.
+pub fn in_parts<T: Send>(
+    py: Python<'_>,
+    n: usize,
+    part: impl Fn(Range<usize>) -> Vec<T> + Sync,
+) -> PyResult<Vec<T>> {
+    let mut out = Vec::with_capacity(n);
+    for first in (0..n).step_by(BLOCKS) {
+        py.check_signals()?;
+        let rows = first..n.min(first + BLOCKS);
+        for mut found in detached(py, || on_cores(rows, LEAST, &part))? {
+            out.append(&mut found);
+        }
+    }
+    Ok(out)
+}
+
 /// Give rows to Python as an array (n, K).
 pub fn array<const K: usize>(py: Python<'_>, rows: Vec<[f64; K]>) -> Bound<'_, PyArray2<f64>> {
     let shape = (rows.len(), K);

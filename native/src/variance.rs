@@ -1,33 +1,33 @@
-//! What uncertain parameters of geometry and joints give: `postproc.model.variance`.
+//! What uncertain parameters of geometry and joints give: `postproc.model.evaluator`.
 //!
 //! The columns of all parameters that turn one joint are its column of the Jacobian, by
 //! a number each: their part of the covariance shrinks to one row per joint.
 
 use std::ops::Range;
 
-use numpy::{PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::chain::{Chain, Parameters};
-use crate::rows::{array, each, flat, rows, same_length, Lanes, Three, SIDE};
+use crate::rows::{Lanes, Three, SIDE};
 use crate::walk::{Base, Walk};
 
 /// Three components of each.
-type Column = [Lanes; 3];
+pub type Column = [Lanes; 3];
 /// The covariance of three components of each: the diagonal, then xy, xz and yz.
-type Products = [Lanes; 6];
+pub type Products = [Lanes; 6];
 /// Which components are off the diagonal, in that order.
 const OFF: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
-const NOTHING: Column = [[0.0; SIDE]; 3];
+pub const NOTHING: Column = [[0.0; SIDE]; 3];
 
+#[inline(always)]
 fn add(sum: &mut Lanes, factor: f64, of: &Lanes) {
     for k in 0..SIDE {
         sum[k] += factor * of[k];
     }
 }
 
+#[inline(always)]
 fn add_product(sum: &mut Lanes, a: &Lanes, b: &Lanes) {
     for k in 0..SIDE {
         sum[k] += a[k] * b[k];
@@ -35,6 +35,7 @@ fn add_product(sum: &mut Lanes, a: &Lanes, b: &Lanes) {
 }
 
 /// Add what a column gives, with half the form's sums over it and those before.
+#[inline(always)]
 fn add_column(total: &mut Products, sums: &Column, column: &Column) {
     for k in 0..3 {
         add_product(&mut total[k], &sums[k], &column[k]);
@@ -46,7 +47,7 @@ fn add_column(total: &mut Products, sums: &Column, column: &Column) {
     }
 }
 
-fn put(columns: &mut [Column], lane: usize, values: impl Iterator<Item = Three>) {
+pub fn put(columns: &mut [Column], lane: usize, values: impl Iterator<Item = Three>) {
     for (column, value) in columns.iter_mut().zip(values) {
         for k in 0..3 {
             column[k][lane] = value[k];
@@ -55,20 +56,20 @@ fn put(columns: &mut [Column], lane: usize, values: impl Iterator<Item = Three>)
 }
 
 /// Parameters of the geometry, in the order of their columns.
-struct Geometry {
-    base: bool,
+pub struct Geometry {
+    pub base: bool,
     /// Joint, and which of a, d, alpha, theta, beta.
-    links: Vec<(usize, usize)>,
-    tool: bool,
+    pub links: Vec<(usize, usize)>,
+    pub tool: bool,
 }
 
 impl Geometry {
-    fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         6 * usize::from(self.base) + self.links.len() + 3 * usize::from(self.tool)
     }
 
     /// Derivatives of the TCP, as in `geometry.Geometry.columns`.
-    fn columns(&self, w: &Walk, base: &Base) -> impl Iterator<Item = Three> {
+    pub fn columns(&self, w: &Walk, base: &Base) -> impl Iterator<Item = Three> {
         let mut out = Vec::with_capacity(self.len());
         if self.base {
             out.extend([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
@@ -89,14 +90,14 @@ impl Geometry {
 }
 
 /// What the form is taken of.
-struct Block {
-    fixed: Vec<Column>,
-    jacobian: [Column; 6],
-    basis: Vec<Lanes>,
+pub struct Block {
+    pub fixed: Vec<Column>,
+    pub jacobian: [Column; 6],
+    pub basis: Vec<Lanes>,
 }
 
 /// A quadratic form of columns of the geometry, then of joints.
-struct Form {
+pub struct Form {
     /// Lower half of the covariance, with what is off the diagonal twice.
     lower: Vec<f64>,
     size: usize,
@@ -107,11 +108,54 @@ struct Form {
 }
 
 impl Form {
+    /// Take a covariance (p, p) of the geometry's parameters, then of the joints'.
+    pub fn new(covariance: &[f64], fixed: usize, count: [usize; 6]) -> PyResult<Form> {
+        let size = fixed + count.iter().sum::<usize>();
+        if covariance.len() != size * size {
+            return Err(PyValueError::new_err("a covariance of other parameters"));
+        }
+        let mut end = 0;
+        let joints = count.map(|n| {
+            end += n;
+            end - n..end
+        });
+        let doubled = |(at, c): (usize, &f64)| if at / size == at % size { *c } else { 2.0 * c };
+        let lower = covariance.iter().enumerate().map(doubled).collect();
+        Ok(Form { lower, size, fixed, joints })
+    }
+
+    /// Make room for the columns of some states.
+    pub fn block(&self) -> Block {
+        Block {
+            fixed: vec![NOTHING; self.fixed],
+            jacobian: [NOTHING; 6],
+            basis: vec![[0.0; SIDE]; self.size - self.fixed],
+        }
+    }
+
+    #[inline(always)]
     fn row(&self, k: usize) -> &[f64] {
         &self.lower[k * self.size..(k + 1) * self.size]
     }
 
-    fn value(&self, block: &Block) -> Products {
+    /// Evaluate it with the widest registers of this machine; the numbers are the same.
+    pub fn value(&self, block: &Block) -> Products {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: this machine has what the function is compiled for.
+            return unsafe { self.value_wide(block) };
+        }
+        self.value_of(block)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    unsafe fn value_wide(&self, block: &Block) -> Products {
+        self.value_of(block)
+    }
+
+    #[inline(always)]
+    fn value_of(&self, block: &Block) -> Products {
         let mut total = [[0.0; SIDE]; 6];
         for (u, column) in block.fixed.iter().enumerate() {
             let mut sums = NOTHING;
@@ -156,68 +200,7 @@ impl Form {
     }
 }
 
-/// Covariance of the TCP, (n, 6) [m^2]: its diagonal, then xy, xz and yz.
-///
-/// Base: its axes, those of its rotations, its point, (7, 3). States: joint angles [rad]
-/// and tools [m], both with the deviations. Geometry: whether it has the base, its links
-/// and whether it has the tool. Basis: of the joints' parameters, (n, k), joint by joint,
-/// with the number of each. Of parameters: (p, p), the geometry's parameters first.
-#[pyfunction]
-pub fn covariance<'py>(
-    py: Python<'py>,
-    parameters: Parameters<'py>,
-    base: PyReadonlyArray2<'py, f64>,
-    states: (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>),
-    geometry: (bool, Vec<(usize, usize)>, bool),
-    basis: (PyReadonlyArray2<'py, f64>, [usize; 6]),
-    of_parameters: PyReadonlyArray2<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (chain, base) = (Chain::new(&parameters)?, base_of(rows::<3>(&base)?)?);
-    let (q, tool) = (rows::<6>(&states.0)?, rows::<3>(&states.1)?);
-    let geometry = Geometry { base: geometry.0, links: geometry.1, tool: geometry.2 };
-    let ((basis, count), fixed) = (basis, geometry.len());
-    let (own, shape) = (count.iter().sum::<usize>(), basis.shape().to_vec());
-    same_length(&[q.len(), tool.len(), shape[0]])?;
-    let size = fixed + own;
-    let odd = geometry.links.iter().any(|(j, kind)| *j >= 6 || *kind >= 5);
-    if odd || shape[1] != own || of_parameters.shape() != [size, size] {
-        return Err(PyValueError::new_err("a covariance of other parameters"));
-    }
-    let (basis, of_parameters) = (flat(&basis)?, flat(&of_parameters)?);
-    let mut end = 0;
-    let joints = count.map(|n| {
-        end += n;
-        end - n..end
-    });
-    let lower = (of_parameters.iter().enumerate())
-        .map(|(at, c)| if at / size == at % size { *c } else { 2.0 * c })
-        .collect();
-    let form = Form { lower, size, fixed, joints };
-    let mut block = Block {
-        fixed: vec![NOTHING; fixed],
-        jacobian: [NOTHING; 6],
-        basis: vec![[0.0; SIDE]; own],
-    };
-    let mut out = Vec::with_capacity(q.len());
-    each(py, q.len().div_ceil(SIDE), |at| {
-        let first = SIDE * at;
-        let count = SIDE.min(q.len() - first);
-        for lane in 0..count {
-            let row = first + lane;
-            let walk = Walk::new(&chain, &base, &q[row], &tool[row]);
-            put(&mut block.fixed, lane, geometry.columns(&walk, &base));
-            put(&mut block.jacobian, lane, walk.jacobian(&chain).into_iter());
-            for (phi, value) in block.basis.iter_mut().zip(&basis[row * own..]) {
-                phi[lane] = *value;
-            }
-        }
-        let value = form.value(&block);
-        out.extend((0..count).map(|lane| value.map(|component| component[lane])));
-    })?;
-    Ok(array(py, out))
-}
-
-fn base_of(rows: &[Three]) -> PyResult<Base> {
+pub fn base_of(rows: &[Three]) -> PyResult<Base> {
     match rows {
         [x, y, z, a, b, c, point] => {
             Ok(Base { axes: [*x, *y, *z], about: [*a, *b, *c], point: *point })

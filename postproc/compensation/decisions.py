@@ -760,7 +760,8 @@ class Round:
         """Give arrivals that do not agree one correction, where it helps all of them.
 
         The args are those of `agree`. Fly points and points of arcs and curves are not
-        averaged, nor points reached in several frames, or shifted.
+        averaged, nor points reached in several frames, or shifted. Joint angles hold
+        in every base and user frame.
         """
         limit, job = self.setting.cell.limits.conflict_mm, self.setting
         apart = found.usable & found.find_apart(limit)
@@ -773,12 +774,14 @@ class Round:
         )
         other |= (visits.motion.block >= 0) | (visits.target.shift >= 0)
         apart[found.group[other & (found.group >= 0)]] = False
-        for frame in (visits.frame.uframe, visits.frame.base, visits.frame.tool):
+        own = visits.target.meaning != Meaning.JOINTS
+        held = (visits.frame.uframe, own), (visits.frame.base, own)
+        for frame, counts in (*held, (visits.frame.tool, True)):
             low, high = np.full(len(apart), 2**31), np.full(len(apart), -1)
-            rows = found.group >= 0
+            rows = (found.group >= 0) & counts
             np.minimum.at(low, found.group[rows], frame[rows])
             np.maximum.at(high, found.group[rows], frame[rows])
-            apart &= low == high
+            apart &= low >= high
         mine = np.flatnonzero((found.group >= 0) & apart[found.group])
         given = job.model, job.cell, self.states, self.solved, mine
         std_mm = np.full(len(visits), np.nan)

@@ -10,15 +10,16 @@ of the same mean, variance and skewness (Pearson; Imhof 1961): its 95 % bound is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import gammaincinv, ndtr, ndtri
 
-from postproc.arrays import Bools, Floats
+from postproc.arrays import Bools, Floats, Indices, chunks
 from postproc.compensation.arrivals import ArrivalStates
+from postproc.model.model import CHUNK
 
 BOUND = 0.95  # of the length of an error
 SIDED = float(ndtri(BOUND))  # standard deviations that hold it on one side
@@ -70,6 +71,20 @@ class LengthLaw:
         least = np.maximum(size - SIDED * np.sqrt(along) / size, 0.0)
         return cls(scale, first - 2.0 * half * scale, half, least)
 
+    @classmethod
+    def unknown(cls, n: int) -> LengthLaw:
+        """Make room for n distributions, NaN as yet."""
+        return cls(*np.full((4, n), np.nan))
+
+    def put(self, rows: Indices, law: LengthLaw) -> None:
+        """Enter some distributions, in place."""
+        for f in fields(self):
+            getattr(self, f.name)[rows] = getattr(law, f.name)
+
+    def __getitem__(self, rows: Bools | slice) -> LengthLaw:
+        """Return some of the distributions."""
+        return LengthLaw(*(getattr(self, f.name)[rows] for f in fields(self)))
+
     @property
     def bound(self) -> Floats:
         """The lengths that 95 % of the errors are within, (n,) [m]."""
@@ -116,8 +131,7 @@ class ExpectedErrors:
 
     Attributes:
         judged: Whether a visit has a target that it can miss, (n,).
-        mean: Its error with the correction that was made, (n, 3).
-        covariance: Of the error of an arrival, (n, 6): xx, yy, zz, then xy, xz, yz.
+        law: Distributions of the lengths of errors with the correction that was made.
         outside: Whether the state is outside of what was surveyed, (n,).
         before: Expected length of the error without any correction, (n,).
         after: .. with the correction, (n,).
@@ -127,19 +141,13 @@ class ExpectedErrors:
     """
 
     judged: Bools
-    mean: Floats
-    covariance: Floats
+    law: LengthLaw
     outside: Bools
     before: Floats
     after: Floats
     high: Floats
     below: float
     below_before: float
-
-    @cached_property
-    def law(self) -> LengthLaw:
-        """Return the distributions of the lengths with the correction."""
-        return LengthLaw.of_normal(self.mean, self.covariance)
 
     @property
     def known(self) -> Bools:
@@ -164,19 +172,33 @@ def expect_errors(
         judged: Whether visits have a target that they can miss, (n,).
     """
     n = len(arrivals.visits)
-    found = arrivals.predict(np.arange(n))
-    error, covariance = found[:, 0], found[:, 1:3].reshape(n, 6)
-    known = judged & ~np.isnan(found[:, 0] + found[:, 1] + correction).any(axis=1)
-    mean = np.where(known[:, None], error + correction, np.nan)
-    rows = np.flatnonzero(known)
-    first = LengthLaw.of_normal(error[rows], covariance[rows])
-    last = LengthLaw.of_normal(mean[rows], covariance[rows])
-    before, after, high = np.full((3, n), np.nan)
-    before[rows], after[rows], high[rows] = first.mean, last.mean, last.bound
+    first, last = LengthLaw.unknown(n), LengthLaw.unknown(n)
+    outside, (before, after, high) = np.zeros(n, dtype=bool), np.full((3, n), np.nan)
+    for some in chunks(
+        n, CHUNK
+    ):  # what is made of a row takes a hundred times its room
+        found = arrivals.predict(np.arange(some.start, some.stop))
+        error, covariance = found[:, 0], found[:, 1:3].reshape(-1, 6)
+        unsure = np.isnan(found[:, 0] + found[:, 1] + correction[some]).any(axis=1)
+        own = np.flatnonzero(judged[some] & ~unsure)
+        rows = some.start + own
+        laws = [
+            LengthLaw.of_normal(mean[own], covariance[own])
+            for mean in (error, error + correction[some])
+        ]
+        first.put(rows, laws[0])
+        last.put(rows, laws[1])
+        outside[some] = found[:, 3, 0] > 0.0
+        before[rows], after[rows], high[rows] = (
+            laws[0].mean, laws[1].mean, laws[1].bound
+        )  # fmt: skip
+    known = ~np.isnan(high)
     return ExpectedErrors(
-        judged, mean, covariance, np.asarray(found[:, 3, 0] > 0.0), before, after, high,
-        below=pool_bound(last, np.max(high[rows], initial=0.0)),
-        below_before=pool_bound(first, WIDE * np.max(before[rows], initial=0.0)),
+        judged, last, outside, before, after, high,
+        below=pool_bound(last[known], np.max(high[known], initial=0.0)),
+        below_before=pool_bound(
+            first[known], WIDE * np.max(before[known], initial=0.0)
+        ),
     )  # fmt: skip
 
 
@@ -187,10 +209,12 @@ def pool_bound(law: LengthLaw, widest: float) -> float:
         law: Of every visit.
         widest: A length that it is not beyond, such as the largest bound [m].
     """
-    if not len(law.half):
+    n = len(law.half)
+    if not n:
         return np.nan
 
     def more(length: float) -> float:
-        return float(law.beyond(length).mean()) - (1.0 - BOUND)
+        beyond = sum(float(law[some].beyond(length).sum()) for some in chunks(n))
+        return beyond / n - (1.0 - BOUND)
 
     return widest if more(widest) >= 0.0 else float(brentq(more, 0.0, widest))

@@ -15,7 +15,6 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, take_rows
 from postproc.compensation.inverse_model import (
     Commands,
-    nearest_joints,
     solve,
     turns_between,
 )
@@ -69,7 +68,7 @@ def joints_written(
     new[:, :3, 3] = solved.command[some, :3, 3] - aside[some]
     for out, written in ((q, new), (before, pose)):
         near = out[off]
-        out[off] = nearest_joints(arm, written @ from_tcp, near, arm.branch(near))
+        out[off] = arm.nearest(written @ from_tcp, near, arm.branch(near))
     return q, before
 
 

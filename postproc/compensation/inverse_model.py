@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints, take_rows
 from postproc.compensation.arc_angles import ArcAngles, points_to_write
@@ -35,7 +34,6 @@ from postproc.robot.pose import (
     products,
     rotation_from_vector,
     rotation_vector,
-    times,
 )
 from postproc.robot.state import States
 
@@ -51,8 +49,7 @@ def turn(model: Model, arm: Arm, states: States) -> Floats:
     Returns:
         Rotation vectors in the base frame, (n, 3) [rad].
     """
-    effects, values, _ = model.compensable()
-    return effects.turn(ArmStates(arm, states), values)
+    return model.evaluator(arm).turns(states)
 
 
 def turn_std(model: Model, arm: Arm, states: States) -> Floats:
@@ -86,10 +83,6 @@ def refuse_unknown_rotations(model: Model) -> None:
 
 # Which command lands on the wanted pose.
 
-CLOSE = 2e-7  # [m] where iterating stops
-CLOSE_TURN = 2e-7  # [rad] likewise
-MOST = 5  # iterations
-
 
 @dataclass(frozen=True)
 class Solution:
@@ -99,13 +92,11 @@ class Solution:
         q: Joint angles of the command, (n, 6) [rad], NaN where it cannot be reached.
         command: TCP pose to command, base frame, (n, 4, 4).
         residual: Distance of the predicted landing from the wanted place, (n,) [m].
-        iterations: How many were needed.
     """
 
     q: Floats
     command: Floats
     residual: Floats
-    iterations: int
 
 
 def solve(
@@ -129,61 +120,10 @@ def solve(
         states: The nominal states at the targets: angles, direction, loads.
         orientation: Correct the orientation as well as the position.
     """
-    n = len(wanted)
-    tool = np.broadcast_to(tool, (n, 4, 4))
+    tool = np.broadcast_to(tool, (len(wanted), 4, 4))
     states = states.with_(tool=tool[:, :3, 3])
-    from_tcp = inverse(tool)
-    command, q = np.array(wanted), np.array(states.q)
-    place = wanted[:, :3, 3]
-    branch = arm.branch(np.nan_to_num(q))
-    landing = place + model.error(arm, states)
-    turned, allowed = np.zeros((n, 3)), np.zeros((n, 3))  # [rad] found and allowed for
-    if orientation:
-        turned = turn(model, arm, states)
-    iterations = 0
-    while iterations < MOST:
-        off = _distance(landing, place) > CLOSE  # NaN is not far
-        if orientation:
-            off |= _distance(turned, allowed) > CLOSE_TURN
-        far = np.flatnonzero(off)
-        if len(far) == 0:
-            break
-        command[far, :3, 3] += (place - landing)[far]
-        if orientation:
-            back = rotation_from_vector(-turned[far])
-            command[far, :3, :3] = back @ wanted[far, :3, :3]
-            allowed[far] = turned[far]
-        own = None if branch is None else branch[far]
-        q[far] = nearest_joints(arm, times(command[far], from_tcp[far]), q[far], own)
-        moved = states[far].with_(q=np.array(q[far]))
-        landing[far] = command[far, :3, 3] + model.error(arm, moved)
-        if orientation:
-            turned[far] = turn(model, arm, moved)
-        iterations += 1
-    return Solution(q, command, _distance(landing, place), iterations)
-
-
-def _distance(a: Floats, b: Floats) -> Floats:
-    """Distance between points (n, 3), (n,) [m]."""
-    return lengths(a - b)
-
-
-def nearest_joints(
-    arm: Arm, flange: Floats, near: Floats, branch: NDArray[np.int64] | None
-) -> Floats:
-    """Solve for the joint angles next to given ones, in closed form or by Newton."""
-    if branch is not None:
-        return arm.nearest(flange, near, branch)
-    q = np.array(near)
-    for _ in range(4):
-        at = arm.flange(q)
-        turned = flange[:, :3, :3] @ np.swapaxes(at[:, :3, :3], 1, 2)
-        gap = np.concatenate(
-            [flange[:, :3, 3] - at[:, :3, 3], rotation_vector(turned)], axis=1
-        )
-        J = arm.jacobian(q, np.zeros(3))
-        q = q + np.linalg.solve(J + 1e-12 * np.eye(6), gap[:, :, None])[:, :, 0]
-    return q
+    found = model.evaluator(arm).commands(wanted, tool, states, orientation)
+    return Solution(*found)
 
 
 # Commands that would land where the program says, visit by visit.
@@ -464,7 +404,7 @@ def solve_written(
     found = np.array(near)
     known = np.isfinite(near).all(axis=1) & np.isfinite(flange).all(axis=(1, 2))
     own = arm.branch(near[known])
-    q = nearest_joints(arm, np.ascontiguousarray(flange[known]), near[known], own)
+    q = arm.nearest(flange[known], near[known], own)
     found[known] = np.where(np.isnan(q), near[known], q)
     return found
 

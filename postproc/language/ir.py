@@ -292,11 +292,13 @@ class RoutineParameter:
         name: Its name.
         by_reference: The routine may change what it is called with; others are copies.
         optional: ``\name``.
+        type: Of the data, "" where a declaration in the routine says it.
     """
 
     name: str
     by_reference: bool = False
     optional: bool = False
+    type: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -75,12 +77,30 @@ class Start:
         taught = frozenset(name.lower() for name in self.taught)
         object.__setattr__(self, "taught", taught)
 
+    def effect_of(self, *names: str) -> str:
+        """Return what the cell says that a routine does, "" where it says nothing.
+
+        What it says by name comes before what it says by pattern.
+
+        Args:
+            names: Of the routine: ``name``, ``program.name``.
+        """
+        said = (self.routines[name] for name in names if name in self.routines)
+        still = "motionless" if matches(self.motionless, names) else ""
+        return next(said, still)
+
     @property
     def records(self) -> frozenset[Record]:
         """Return all frames that the cell gives."""
         tables = [e for table in self.frame_tables.values() for e in table.values()]
         given = [record for entry in tables for record in entry.values()]
         return frozenset([self.tool, self.base, self.uframe, *given])
+
+
+@lru_cache(maxsize=8192)
+def matches(patterns: tuple[str, ...], names: tuple[str, ...]) -> bool:
+    """Return True if a pattern with ``*``, ``?`` means one of some names."""
+    return any(fnmatchcase(name, pattern) for name in names for pattern in patterns)
 
 
 @dataclass(frozen=True)

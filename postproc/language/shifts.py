@@ -15,9 +15,11 @@ from postproc.robot.pose import MM, inverse, rotation_vector
 ANGLES = slice(3, 6)  # of the six numbers of a shift
 NUMBERS = 6
 NO_TURN = 1e-12  # of a matrix: rotations that differ less are the same
+LEAST_DEG = 1e-10  # angles that are computed, and less, turn nothing
 TURNED = 1e-7  # [rad] and more are written into the angles of a shift
 Pose = tuple[float, ...]
-STILL: Pose = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)
+"""The rows of a pose (4, 4) [m] one after the other, empty where it is not known."""
+IDENTITY: Pose = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)
 
 
 class ShiftKind(IntEnum):
@@ -44,9 +46,14 @@ class Shift:
     kind: ShiftKind
     numbers: tuple[float, ...]
     origin: tuple[float, ...]
-    left: Pose = STILL
-    right: Pose = STILL
+    left: Pose = IDENTITY
+    right: Pose = IDENTITY
     flagged: bool = True
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns the point, too."""
+        return any(abs(angle) > LEAST_DEG for angle in self.numbers[ANGLES])
 
     def around(self, inner: Shift, dialect: Dialect) -> Shift:
         """Shift what another shift has shifted, which stays.
@@ -67,16 +74,24 @@ class Shift:
             case ShiftKind.FRAME:
                 left = by @ left
         return replace(
-            self, origin=inner.origin, left=_flat(left), right=_flat(right),
+            self, origin=inner.origin, left=flat(left), right=flat(right),
             flagged=self.flagged and inner.flagged,
         )  # fmt: skip
+
+    def apply(self, dialect: Dialect) -> tuple[float, ...]:
+        """Return the numbers of the target, w; flags that it has not are -1."""
+        row, none = np.zeros(1, dtype=np.int64), np.full(1, -1)
+        flags = np.full((1, dialect.width), -1.0)
+        own = Shifts.of(row, [self], none, none, flags, row > 0, dialect)
+        return tuple(own.carry(own.origin, own.numbers)[0].tolist())
 
 
 def _matrix(pose: Pose) -> Floats:
     return np.array(pose).reshape(4, 4)
 
 
-def _flat(pose: Floats) -> Pose:
+def flat(pose: Floats) -> Pose:
+    """Write the rows of a pose, (4, 4) [m], one after the other."""
     return tuple(pose.ravel().tolist())
 
 

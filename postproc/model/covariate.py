@@ -9,7 +9,7 @@ from postproc.model.kinematics import ArmStates
 from postproc.robot.state import States
 
 JOINT_KINDS = (
-    "joint", "drive", "lambda", "before", "travel", "way", "loop", "torque",
+    "joint", "drive", "lambda", "before", "travel", "way", "loop", "turned", "torque",
 )  # fmt: skip
 SHORTEST = 1e-4  # [rad] of a way whose logarithm is taken
 TILTING = "tilting"
@@ -29,8 +29,8 @@ def covariate(batch: ArmStates, name: str) -> Floats:
     Names are ``joint 5`` (its angle [rad]), ``drive 5`` (that of its coupled drive
     [rad]), ``lambda 5`` (its direction), ``before 5`` (its direction at the visit
     before), ``way 5`` (since its last reversal [rad]), ``travel 5`` (its logarithm),
-    ``loop 5`` (between its
-    last two reversals [log rad]), ``torque 5`` (of gravity about it [N m]),
+    ``loop 5`` (between its last two reversals [log rad]), ``turned 5`` (the same
+    [rad]), ``torque 5`` (of gravity about it [N m]),
     ``moment 5x`` (of gravity across it, about x of the frame before it [N m]),
     ``tilting`` (moment of all weight about the base's origin [N m]),
     ``speed``, ``payload``, ``temperature``, ``time`` and ``order`` (SI units).
@@ -64,6 +64,8 @@ def covariate(batch: ArmStates, name: str) -> Floats:
             return sides_before(batch, j)
         if kind == "loop":
             return np.log(np.maximum(loops(batch, j), SHORTEST))
+        if kind == "turned":
+            return loops(batch, j)
         return np.asarray((batch.loads.gravity + batch.loads.payload)[:, j])
     raise ValueError(f"there is no covariate {name!r}")
 

@@ -78,6 +78,11 @@ class Combination:
                 return effect.deviation(p[part])
         return NOMINAL
 
+    @property
+    def placing(self) -> list[Geometry]:
+        """List the effects that deviate the chain itself: one at most, of one model."""
+        return [e for e in self.effects if isinstance(e, Geometry)]
+
     def at(self, batch: ArmStates, p: Floats) -> ArmStates:
         """Return the batch with its kinematics taken at parameters p."""
         return batch.move(self.deviation(p), self.shift(batch, p))

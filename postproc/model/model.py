@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, all_in_rows, any_in_rows, chunks, map_chunks
+from postproc.arrays import Bools, Floats, all_in_rows, any_in_rows, map_chunks
 from postproc.exceptions import ModelError
 from postproc.files import write_all
 from postproc.model.doubt import Doubt
 from postproc.model.effect_sum import Combination
 from postproc.model.effects import restore
+from postproc.model.evaluator import Evaluator, Scatter, Spread, make_evaluator
 from postproc.model.kinematics import ArmStates
 from postproc.model.model_file import (
     FORMAT,
@@ -252,15 +253,38 @@ class Model:
             q += effect.joint_zeros(values[part])
         return np.asarray(np.linalg.solve(arm.dh.mix, arm.dh.sense * theta) + q)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Travel between processes without what was made of it."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    @cached_property
+    def _evaluators(self) -> dict[int, tuple[Arm, Evaluator]]:
+        return {}
+
+    def evaluator(self, arm: Arm) -> Evaluator:
+        """Return the effects that may be compensated in the core's terms."""
+        if id(arm) not in self._evaluators:
+            self._evaluators[id(arm)] = arm, self._make_evaluator(arm)
+        return self._evaluators[id(arm)][1]
+
+    def _make_evaluator(self, arm: Arm) -> Evaluator:
+        effects, values, covariance = self.compensable()
+        keep = self.effects.where(*COMPENSATED)
+        prior_std = self.prior_std[keep] if len(self.prior_std) else self.prior_std
+        both, doubt = effects, self.doubt
+        if doubt is not None:
+            doubt = doubt.get_settings(keep)
+            both = Combination((*effects.effects, *doubt.effects.effects))
+            own, covariance = len(covariance), np.array(doubt.covariance)
+            if own:
+                covariance[:own, :own] += self.compensable()[2]
+        spread = Spread(both, covariance) if len(covariance) else None
+        scatter = Scatter(self.noise, self.spread)
+        return make_evaluator(arm, effects, values, prior_std, spread, scatter)
+
     def error(self, arm: Arm, states: States) -> Floats:
         """Predict the error without its uncertainty, (n, 3) [m]."""
-        effects, values, _ = self.compensable()
-        parts = map_chunks(
-            lambda rows: effects.error(ArmStates(arm, states[rows]), values),
-            len(states),
-            CHUNK,
-        )
-        return np.concatenate([np.zeros((0, 3)), *parts])
+        return self.evaluator(arm).errors(states)
 
     @property
     def share_names(self) -> tuple[str, ...]:
@@ -316,24 +340,17 @@ class Model:
         Where a direction is not known (0), the error is that of the middle of the gap,
         and half the gap enters both standard deviations.
         """
-        known, arrival = np.empty((2, len(states), 6))
-        for rows in chunks(len(states), CHUNK):
-            known[rows], at = self._covariance(arm, states[rows])
-            scatter = covariance_of(self.noise.scatter_columns(at.jacobian))
-            arrival[rows] = known[rows] + scatter
+        error, known, arrival = self.evaluator(arm).predict(states)
         model = np.sqrt(np.maximum(known[:, :3], 0.0))
         outside = self.ranges.outside(states, self.needs, self.bent)
         unsure = _on_flanks(states) & any_in_rows(model > self._certain_up_to)
         if unsure.any():
             outside[UNSURE] = unsure
-        return Prediction(self.error(arm, states), model, arrival, outside)
+        return Prediction(error, model, arrival, outside)
 
     def std_error(self, arm: Arm, states: States) -> Floats:
         """Standard error of the predicted error, (n, 3) [m], as `predict` gives it."""
-        parts = map_chunks(
-            lambda rows: self._covariance(arm, states[rows])[0], len(states), CHUNK
-        )
-        variance = np.concatenate([np.zeros((0, 6)), *parts])[:, :3]
+        variance = self.evaluator(arm).predict(states)[1][:, :3]
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def std_on_flanks(self, arm: Arm, states: States) -> Floats:
@@ -362,15 +379,6 @@ class Model:
     def _certain_up_to(self) -> float:
         """Standard error per axis up to which the survey vouches for it [m]."""
         return 3 * (self.statistics.get(WORST_STD, np.inf) * MM)
-
-    def _covariance(self, arm: Arm, states: States) -> tuple[Floats, ArmStates]:
-        """Return that of the error, (n, 6) [m^2], and the kinematics it is of."""
-        effects, values, covariance = self.compensable()
-        at = effects.at(ArmStates(arm, states), values)
-        known = self.unmodelled_covariance(effects, at, values)
-        if len(covariance):
-            known += parameter_covariance(effects, at, covariance)
-        return known, at
 
     def unmodelled_covariance(
         self, effects: Combination, at: ArmStates, values: Floats

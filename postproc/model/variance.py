@@ -7,14 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc import _native
 from postproc.arrays import Floats, any_in_rows
 from postproc.model.effect_sum import Combination
-from postproc.model.effects.effect import JointEffect
-from postproc.model.effects.geometry import Geometry
-from postproc.model.kinematics import ArmStates, base_of, deviate
+from postproc.model.kinematics import ArmStates
 
-NONE = np.empty(0, dtype=np.int64)
 ROWS, COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)  # of a covariance
 
 
@@ -51,10 +47,6 @@ def parameter_covariance(
         at: n states, with the kinematics taken at the parameters.
         covariance: Of the parameters, (p, p).
     """
-    placing = sum(isinstance(e, Geometry) for e in effects.effects)
-    turning = sum(isinstance(e, JointEffect) for e in effects.effects)
-    if placing == 1 and 1 + turning == len(effects.effects):
-        return _covariance_by_joints(effects, at, covariance)
     return spread_covariance(effects.columns(at), covariance)
 
 
@@ -63,31 +55,6 @@ def parameter_variance(
 ) -> Floats:
     """Return the variance that uncertain parameters give, (n, 3) [m^2]."""
     return parameter_covariance(effects, at, covariance)[:, :3]
-
-
-def _covariance_by_joints(
-    effects: Combination, at: ArmStates, covariance: Floats
-) -> Floats:
-    """Do it for one geometry and joint effects, whose columns are the Jacobian's."""
-    parts = list(zip(effects.effects, effects.slices, strict=True))
-    ((geometry, first),) = [(e, s) for e, s in parts if isinstance(e, Geometry)]
-    turning = [(e, s) for e, s in parts if isinstance(e, JointEffect)]
-    acts_on = np.concatenate([NONE, *(e.acts_on() for e, _ in turning)])
-    by_joint = np.argsort(acts_on, kind="stable")
-    columns = np.arange(len(covariance))
-    turns = np.concatenate([NONE, *(columns[s] for _, s in turning)])[by_joint]
-    order = np.concatenate([columns[first], turns])
-    given = [np.empty((len(at), 0)), *(e.basis(at) for e, _ in turning)]
-    basis = np.ascontiguousarray(np.concatenate(given, axis=1)[:, by_joint])
-    tool = at.states.tool + at.deviation.tool
-    return _native.covariance(
-        deviate(at.arm.dh, at.deviation).pack(at.deviation.link[:, 4]),
-        base_of(at.deviation),
-        (np.ascontiguousarray(at.angles), np.ascontiguousarray(tool)),
-        (geometry.base, geometry.links, True),
-        (basis, np.bincount(acts_on, minlength=6).tolist()),
-        np.ascontiguousarray(covariance[np.ix_(order, order)]),
-    )
 
 
 def side_covariance(effects: Combination, at: ArmStates, values: Floats) -> Floats:

@@ -56,7 +56,7 @@ class Trajectory:
     begins: Bools
     visit: Ints
 
-    def sample(self, step: float) -> tuple[Floats, Ints]:
+    def sample(self, step: float, most: int = MOST_SAMPLES) -> tuple[Floats, Ints]:
         """Sample the runs at least so often, up to the end of each interval.
 
         Between waypoints each joint goes on a cubic that does not turn there (Fritsch
@@ -67,13 +67,14 @@ class Trajectory:
         Args:
             step: Time between two samples [s]; more where a move lasts long, as no
                 joint turns between waypoints.
+            most: Samples of an interval, at the most; the last one is its end.
 
         Returns:
             Joint angles, (m, 6) [rad], and the move of each sample, (m,).
         """
         i = np.flatnonzero(~self.begins[1:])  # intervals by the waypoint they begin at
         lasts = self.since[i + 1] - self.since[i]
-        count = np.clip(np.ceil(lasts / step), 1, MOST_SAMPLES).astype(np.int64)
+        count = np.clip(np.ceil(lasts / step), 1, most).astype(np.int64)
         own = np.repeat(np.arange(len(i)), count)
         nth = np.arange(len(own)) - np.repeat(np.cumsum(count) - count, count) + 1
         t, i = nth / count[own], i[own]

@@ -28,17 +28,22 @@ class ProgramCycle:
         targets: The moves.
         path: Their ways, fly points rounded, sampled for the time law.
         arrived: How every joint arrives.
-        clock: When the arm arrives, and what that asks of the joints.
+        arm: The arm; its limits hold.
     """
 
     targets: Targets
     path: Trace
     arrived: Arrivals
-    clock: ArrivalTimes
+    arm: Arm
 
     def __len__(self) -> int:
         """Return the number of moves."""
         return len(self.targets)
+
+    @cached_property
+    def clock(self) -> ArrivalTimes:
+        """When the arm arrives, and what that asks of the joints."""
+        return tell_time(self.arm, self.targets, self.path)
 
     @property
     def seconds(self) -> float:
@@ -90,4 +95,4 @@ def run(arm: Arm, targets: Targets) -> ProgramCycle:
     """
     path = blend(arm, targets, trace(arm, targets))
     arrived = arrivals(arm, path.q, path.driven)
-    return ProgramCycle(targets, path, arrived, tell_time(arm, targets, path))
+    return ProgramCycle(targets, path, arrived, arm)

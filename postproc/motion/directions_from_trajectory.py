@@ -15,6 +15,7 @@ from postproc.robot.arm import Arm
 from postproc.robot.backlash_operator import along, never_turned
 
 STEP = 4e-3  # [s] between samples of the trajectory
+COUPLED = 8  # samples between waypoints, at the most, of arms with coupled drives
 LONE = 8  # samples of a lone JOINT move, which goes straight from stop to stop
 
 
@@ -30,7 +31,7 @@ def read_directions(arm: Arm, cycle: ProgramCycle) -> Floats:
         of moves began, or the joint angles are not known.
     """
     n, (_, source) = len(cycle), cycle.ways
-    q, visit = _samples(cycle)
+    q, visit = _samples(arm, cycle)
     order = np.argsort(visit, kind="stable")
     q, visit = q[order] @ arm.coupling.T, visit[order]
     if not n:
@@ -52,9 +53,13 @@ def read_directions(arm: Arm, cycle: ProgramCycle) -> Floats:
     return side
 
 
-def _samples(cycle: ProgramCycle) -> tuple[Floats, Floats]:
-    """Sample all moves: joint angles, (m, 6) [rad], and the move of each, (m,)."""
-    q, visit = cycle.clock.runs.sample(STEP)
+def _samples(arm: Arm, cycle: ProgramCycle) -> tuple[Floats, Floats]:
+    """Sample all moves: joint angles, (m, 6) [rad], and the move of each, (m,).
+
+    Between waypoints no joint turns: only drives of several joints may.
+    """
+    alone = (np.count_nonzero(arm.coupling, axis=1) == 1).all()
+    q, visit = cycle.clock.runs.sample(STEP, 1 if alone else COUPLED)
     _, source = cycle.ways
     known = ~any_in_rows(np.isnan(cycle.path.q))
     others = np.flatnonzero(known & (np.bincount(visit, minlength=len(cycle)) == 0))

@@ -10,7 +10,12 @@ import numpy as np
 from postproc import _native
 from postproc.arrays import Bools, Floats, Ints, few_rows, floats
 from postproc.motion.targets import Targets
-from postproc.robot.pose import inverse, rotation_from_vector, rotation_vector
+from postproc.robot.pose import (
+    inverse,
+    lengths,
+    rotation_from_vector,
+    rotation_vector,
+)
 from postproc.robot.trajectory import Motion
 
 # Cartesian paths: straight lines and arcs of the TCP, sampled.
@@ -53,14 +58,13 @@ class Segments:
     @cached_property
     def length(self) -> Floats:
         """Lengths of the paths, (m,) [m]."""
-        arc = np.linalg.norm(self.radius, axis=1) * self.angle
-        length: Floats = np.linalg.norm(self.chord, axis=1) + arc
-        return length
+        arc = lengths(self.radius) * self.angle
+        return lengths(self.chord) + arc
 
     @cached_property
     def turning(self) -> Floats:
         """Angles of reorientation, (m,) [rad]."""
-        return np.asarray(np.linalg.norm(self.turn, axis=1))
+        return lengths(self.turn)
 
     def intervals(self, least: Ints) -> Ints:
         """Choose how many intervals to cut each path into, at least those given."""

@@ -22,7 +22,7 @@ from postproc.robot.inverse import (
     NumericForm,
     wrap,
 )
-from postproc.robot.pose import MM, rotation_vector
+from postproc.robot.pose import MM
 
 # The Denavit-Hartenberg chain: frames and points along it, for many poses at once.
 
@@ -82,8 +82,6 @@ class DH:
 # base frame.
 
 SPEED_UP, SPEED_UP_OF_PUSH = 0.4, 0.1  # [s] to full speed, to full acceleration
-NEARBY = 0.5  # [rad] that Newton's method goes from one solution to the next
-NEWTON_ROUNDS, NEWTON_CLOSE, NEWTON_SINGULAR = 8, 1e-11, 1e-6
 GRAVITY = 9.80665  # [m/s^2], standard gravity
 FLOOR = (0.0, 0.0, -1.0)  # direction of weight in the base frame of an arm that stands
 BEHIND = np.triu(np.ones((6, 6)))  # by joint, then link: 1 where the joint carries it
@@ -140,9 +138,16 @@ class Arm:
         return bool((self.weight == FLOOR).all())
 
     @property
-    def _pull(self) -> Floats:
+    def pull(self) -> Floats:
         """Acceleration of gravity, (3,) [m/s^2], base frame."""
         return GRAVITY * self.weight
+
+    @property
+    def lumps(self) -> Floats:
+        """Mass [kg] and first moment [kg m] of every link in its D-H frame, (6, 4)."""
+        links = np.array(self._links)
+        links[:, 1:] *= links[:, :1]
+        return links
 
     @cached_property
     def velocity(self) -> Floats:
@@ -319,7 +324,7 @@ class Arm:
         com = np.where((load > 0.0)[:, None], com, 0.0)
         held = np.einsum("nab,nb->na", frames[:, 6, :3, :3], com) + frames[:, 6, :3, 3]
         carried = load[:, None, None] * (held[:, None] - origin)
-        return np.cross(own, self._pull), np.cross(carried, self._pull)
+        return np.cross(own, self.pull), np.cross(carried, self.pull)
 
     def tilting_moment(
         self, q: Floats, payload: Floats | float, payload_com: Floats | float
@@ -340,7 +345,7 @@ class Arm:
         com = np.broadcast_to(payload_com, (len(q), 3))
         carried = np.einsum("nab,nb->na", frames[:, 5, :3, :3], com)
         place += np.multiply(payload, (carried + frames[:, 5, :3, 3]).T).T
-        return np.cross(place, self._pull)
+        return np.cross(place, self.pull)
 
     def gravity_basis(self, q: Floats) -> Floats:
         """Give the joint torque per unit of every lumped mass parameter.
@@ -355,7 +360,7 @@ class Arm:
         axis, origin = frames[:, :6, :3, 2], frames[:, :6, :3, 3]
         lever = frames[:, None, 1:, :3, 3] - origin[:, :, None]  # joint, then link
         basis = np.empty((len(q), 6, 6, 4))
-        basis[..., 0] = np.cross(axis[:, :, None], lever) @ self._pull
+        basis[..., 0] = np.cross(axis[:, :, None], lever) @ self.pull
         basis[..., 1:] = self._by_first_moments(frames, axis[..., None])[:, :, 0]
         basis *= BEHIND[:, :, None]
         return self._to_controller(basis).reshape(len(q), 6, 24)
@@ -397,9 +402,14 @@ class Arm:
             axes: By joint, as columns, (n, 6, 3, k).
         """
         along = np.swapaxes(frames[:, 1:, :3, :3], 2, 3)  # (n, link, axis of it, 3)
-        turned = np.cross(along, self._pull)
+        turned = np.cross(along, self.pull)
         across: Floats = np.einsum("njca,nibc->njaib", axes, turned, optimize=True)
         return across
+
+    @property
+    def solver(self) -> _native.Solver:
+        """What the core solves its inverse kinematics by."""
+        return self._solver.solver
 
     def inverse(self, flange: Floats) -> Branches:
         """Solve the inverse kinematics of flange poses (n, 4, 4) [m]."""
@@ -440,15 +450,8 @@ class Arm:
         Returns:
             (n, 6) [rad] on the turn nearest to `near`, NaN where no solution exists.
         """
-        if branch is not None and self.file.opw is not None:
-            one: Floats = near + wrap(self.on_branch(flange, branch) - near)
-            return one
         if branch is not None:
-            one = self._from_nearby(flange, near)
-            far = np.flatnonzero(~self._regular_between(near, one))
-            found = self.on_branch(flange[far], branch[far])
-            one[far] = near[far] + wrap(found - near[far])
-            return one
+            return self._solver.nearest(flange, near, branch)
         slots = self.inverse(flange).q
         slots = near[:, None, :] + wrap(slots - near[:, None, :])
         gap = np.abs(slots - near[:, None, :]).max(-1)
@@ -456,55 +459,9 @@ class Arm:
         q: Floats = slots[np.arange(len(slots)), best]
         return q
 
-    def _from_nearby(self, flange: Floats, near: Floats) -> Floats:
-        """Go from joint angles (n, 6) to flange poses (n, 4, 4) by Newton's method.
-
-        An arm without a closed form can have 16 solutions, more than there are
-        branches: the one that is near is found by going there.
-
-        Returns:
-            (n, 6) [rad], NaN where the way does not lead there or is longer than
-            `NEARBY`.
-        """
-        q, rows = np.array(near), np.flatnonzero(~np.isnan(near).any(axis=1))
-        out = np.full(q.shape, np.nan)
-        for _ in range(NEWTON_ROUNDS):
-            off = _twist(self.flange(q[rows]), flange[rows])
-            close = np.abs(off).max(axis=1) < NEWTON_CLOSE
-            out[rows[close]] = q[rows[close]]
-            rows, off = rows[~close], off[~close]
-            if len(rows) == 0:
-                break
-            J = self.jacobian(q[rows], np.zeros(3))
-            regular = np.linalg.svd(J, compute_uv=False)[:, -1] > NEWTON_SINGULAR
-            rows, J, off = rows[regular], J[regular], off[regular]
-            q[rows] += np.linalg.solve(J, off[..., None])[..., 0]
-            rows = rows[np.abs(q[rows] - near[rows]).max(axis=1) < NEARBY]
-        return out
-
-    def _regular_between(self, start: Floats, end: Floats) -> NDArray[np.bool_]:
-        """Return True for joint angles (n, 6) [rad] with no singularity between them.
-
-        Branches meet at singularities alone: so both are on one branch.
-        """
-        known = np.asarray(~np.isnan(start + end).any(axis=1))
-        first, step = start[known, None], (end - start)[known, None]
-        way = first + np.linspace(0.0, 1.0, 5)[:, None] * step
-        J = self.jacobian(way.reshape(-1, 6), np.zeros(3))
-        sign = np.sign(np.linalg.det(J)).reshape(-1, 5)
-        known[known] = (sign == sign[:, :1]).all(axis=1) & (sign[:, 0] != 0.0)
-        return known
-
     def within_limits(self, q: Floats) -> NDArray[np.bool_]:
         """Tell which joint angles (n, 6) [rad] respect the limits, (n,)."""
         return np.asarray(((q >= self.lower) & (q <= self.upper)).all(axis=-1))
-
-
-def _twist(start: Floats, end: Floats) -> Floats:
-    """Return shift [m] and turn [rad] from poses (n, 4, 4) to others, (n, 6)."""
-    turn = end[:, :3, :3] @ np.swapaxes(start[:, :3, :3], 1, 2)
-    shift = end[:, :3, 3] - start[:, :3, 3]
-    return np.concatenate([shift, rotation_vector(turn)], axis=1)
 
 
 def load_arm(name: str | Path, beside: Path | None = None) -> Arm:

@@ -68,6 +68,10 @@ class ClosedForm:
         slot = np.ascontiguousarray(slot)
         return _native.branch(self._packed, floats(flange), slot)
 
+    def solver(self, mix: Floats, unmix: Floats) -> _native.Solver:
+        """Return what goes from pose to pose, see `Inverse.nearest`."""
+        return _native.Solver.of_closed_form(self._packed, (floats(mix), floats(unmix)))
+
     def slot(self, theta: Floats) -> Ints:
         """Name the branch of geometric joint angles (n, 6) [rad], (n,)."""
         t = theta * self._sign - self._offset
@@ -103,6 +107,10 @@ class NumericForm:
     def branch(self, flange: Floats, slot: Ints) -> Floats:
         """Solve for one branch of every pose, as `ClosedForm`."""
         return self.branches(flange)[np.arange(len(flange)), slot]
+
+    def solver(self, mix: Floats, unmix: Floats) -> _native.Solver:
+        """Return what goes from pose to pose; its angles are the controller's."""
+        return _native.Solver.of_chain(self._packed)
 
     def slot(self, theta: Floats) -> Ints:
         """Name the branch of joint angles (n, 6) [rad], (n,)."""
@@ -142,8 +150,27 @@ class Inverse:
     ) -> None:
         """Build it from a form, the angles' mixing in it, and joint limits [rad]."""
         self._form = form
-        self._mix, self._unmix = mix, np.linalg.inv(mix)
+        self._mix, self._unmix = mix, np.asarray(np.linalg.inv(mix), dtype=float)
         self._lower, self._upper = lower, upper
+        self.solver = form.solver(self._mix, self._unmix)
+
+    def nearest(self, flange: Floats, near: Floats, slot: Ints) -> Floats:
+        """Solve for joint angles on branches, on the turns nearest to given ones.
+
+        An arm without a closed form can have more solutions than branches: there that
+        one counts which Newton's method reaches and no singularity parts from `near`,
+        if there is one.
+
+        Args:
+            flange: Flange poses, (n, 4, 4) [m].
+            near: Joint angles to stay close to, (n, 6) [rad].
+            slot: Branches, (n,).
+
+        Returns:
+            (n, 6) [rad], NaN where there is no solution.
+        """
+        slot = np.ascontiguousarray(slot)
+        return self.solver.nearest(floats(flange), floats(near), slot)
 
     def branches(self, flange: Floats) -> Branches:
         """Solve for all branches of flange poses (n, 4, 4) [m]."""

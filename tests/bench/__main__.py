@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 
 from postproc import _native
 from tests.bench.beside import TARGETS, Beside, side_by_side
-from tests.bench.languages import compared
+from tests.bench.languages import compared, files_table, measure_files
 from tests.bench.made import KINDS
 from tests.bench.memory import watched
 
@@ -49,6 +49,9 @@ for a model with an effect that depends on the speed, which this one has not. Al
 the longest program that ran, in one process; growth is from 10,000 targets to that."""
 ABOUT_LANGUAGES = """One milled job in the words of each language: processor time in one
 process, `python -m tests.bench.languages`. Lines of KRL and RAPID are longer."""
+ABOUT_FILES = """The same as one fly run, from files to written output and reports, by a
+process for a core, `python -m tests.bench.languages --files`: seconds as above, and
+processor seconds of all processes."""
 Row = dict[str, float]
 
 
@@ -235,6 +238,8 @@ def main() -> None:
         "## Languages",
         ABOUT_LANGUAGES,
         "\n".join(compared()),
+        ABOUT_FILES,
+        "\n".join(files_table(measure_files(LENGTHS[-1]))),
         "## From the command line",
         f"`postproc --help`: {helps:.2f} s. `postproc compensate` of 1,000 milling "
         f"targets from the command line, start of Python included: {timed:.2f} s, with "

@@ -79,8 +79,8 @@ def side_by_side(cell_path: Path, model_path: Path) -> Beside:
 def _parsing() -> tuple[float, float]:
     """Lines a second with lark for every line, and by shapes."""
     few, many = milling(LINES), milling(100_000)
-    masks = [read.text(k) for read in (read_lines(source_from_bytes("a", few.source)),)
-             for k in range(len(read))]  # fmt: skip
+    read = read_lines(source_from_bytes("a", few.source))
+    masks = [read.shapes[k] for k in read.shape.tolist()]
     parser = line_parser("pdl2", "line")
     start = time.perf_counter()
     for mask in masks:

@@ -1,15 +1,22 @@
 """One milled job of 20,000 targets in every language: processor time of every stage.
 
     python -m tests.bench.languages [--targets 20000] [--rounds 3]
+    python -m tests.bench.languages --files [--targets 1000000]
 
 The same moves in the same cell, one process, without cycle times. Languages take
 turns; the fastest round of each counts.
+
+`--files`: from files to written output and reports, by as many processes as there are
+cores. The moves are one fly run; those of 20,000 targets are repeated.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import re
+import shutil
+import sys
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,11 +32,14 @@ from postproc.compensation.program import read_program
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
 from postproc.robot.trajectory import Motion
+from tests.bench.memory import watched
 from tests.language.neutral_job import LANGUAGES, NeutralJob, NeutralMove, drawn
 from tests.language.true_error import fitted
 
 ARM = 56  # seed
 ROW = 200  # targets of a milled row
+ONCE = 20_000  # targets after which rows repeat
+ROOT = Path(__file__).parents[2]
 NAMES = {"job.pdl": "PDL2", "job.mod": "RAPID", "job.src": "KRL"}
 
 
@@ -99,6 +109,63 @@ def table(found: Mapping[str, dict[str, float]]) -> list[str]:
     return rows
 
 
+FLY = re.compile(rb"^ *(MOVEFLY LINEAR TO POS|MoveL|SLIN) ?[({\[].*$", re.M)
+STAGES = (
+    "read", "parse", "plan", "solve", "decide", "plan again", "rewrite", "verify",
+    "report", "write",
+)  # fmt: skip
+
+
+def lengthened(text: bytes, times: int) -> bytes:
+    """Go through the fly points of a program so many times."""
+    moves = list(FLY.finditer(text))
+    begin, end = moves[0].start(), text.index(b"\n", moves[-1].end()) + 1
+    return text[:begin] + times * text[begin:end] + text[end:]
+
+
+def measure_files(targets: int) -> dict[str, dict[str, float]]:
+    """Compensate long programs in every language, each in a process of its own.
+
+    Returns:
+        By the name of the file: seconds of every stage, and memory [MiB].
+    """
+    found = {}
+    with TemporaryDirectory() as folder:
+        place = Path(folder)
+        cell, _ = fitted(ARM, place)
+        texts = written(milled(cell, min(targets, ONCE)))
+        given = place / "cell.toml", place / "model.json"
+        for name, own in texts.items():
+            own_folder = place / NAMES[name]
+            own_folder.mkdir()
+            for page, data in own.items():
+                long = lengthened(data, targets // ONCE) if page == name else data
+                (own_folder / page).write_bytes(long)
+            command = [sys.executable, "-m", "tests.bench.stages", "--program"]
+            command += map(str, (own_folder / name, *given))
+            out, errors, code, most = watched(command, ROOT)
+            if code:
+                raise SystemExit(errors)
+            found[name] = json.loads(out)
+            found[name]["peak_mib"] = max(found[name]["peak_mib"], most)
+            shutil.rmtree(own_folder)
+    return found
+
+
+def files_table(found: Mapping[str, dict[str, float]]) -> list[str]:
+    """Write the table of long programs."""
+    head = ["language", "targets", *STAGES, "all", "of PDL2's", "processor", "MiB"]
+    rows = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    base = found["job.pdl"]
+    for name, f in found.items():
+        cells = [f"{f.get(stage, 0.0):.2f}" for stage in (*STAGES, "all")]
+        share = f["all"] / f["targets"] * base["targets"] / base["all"]
+        cells += [f"{share:.2f}", f"{f['processor']:.1f}", f"{f['peak_mib']:,.0f}"]
+        told = [NAMES[name], f"{f['targets']:,.0f}", *cells]
+        rows.append("| " + " | ".join(told) + " |")
+    return rows
+
+
 def compared(targets: int = 20_000, rounds: int = 3) -> list[str]:
     """Compensate one job in every language in turn, and write the table."""
     with TemporaryDirectory() as folder:
@@ -118,7 +185,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--targets", type=int, default=20_000)
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--files", action="store_true")
     asked = parser.parse_args()
+    if asked.files:
+        print("\n".join(files_table(measure_files(asked.targets))))
+        return
     print("\n".join(compared(asked.targets, asked.rounds)))
 
 

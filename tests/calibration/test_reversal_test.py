@@ -21,7 +21,8 @@ from postproc.calibration.reversal_test import (
     tell_widths,
 )
 from postproc.calibration.survey_files import read_measurements
-from postproc.model.backlash_width import SHARP, half_gap, on_the_way
+from postproc.language.measuring_program import SHARE
+from postproc.model.backlash_width import SHARP, ahead, half_gap, on_the_way
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.flank_hypotheses import verdict_of
 from postproc.model.kinematics import ArmStates
@@ -33,11 +34,14 @@ from tests.written import cli
 POSES, EACH = 150, 4
 
 
-def surveyed(folder: Path, gears: str, seed: int = SEED) -> Path:
+def surveyed(folder: Path, gears: str, seed: int = SEED, percent: int = SHARE) -> Path:
     """A survey with reversals of an arm whose gears are of one kind."""
-    rows, written = folder / f"{gears}{seed}.csv", folder / "survey.pdl"
+    rows, written = folder / f"{gears}{seed}-{percent}.csv", folder / "survey.pdl"
     design = ("--poses", POSES, "--set", f"survey.reversals={EACH}")
     done("survey", "--cell", CELL, *design, "-o", written)
+    speed = "$PROG_SPD_OVR := {}"
+    text = written.read_text().replace(speed.format(SHARE), speed.format(percent))
+    written.write_text(text)
     arm = (f"simulation.seed={seed}", f"simulation.backlash_model={gears}")
     done("simulate", written, "--cell", CELL, "--set", arm[0], "--set", arm[1],
          "-o", rows)  # fmt: skip
@@ -76,12 +80,23 @@ def test_widths_hold_what_the_gears_do(
 
 @pytest.mark.parametrize("gears", ["gravity", "inertia"])
 def test_other_gears_are_not_taken_for_sharp_ones(folder: Path, gears: str) -> None:
-    model = fitted(surveyed(folder, gears), "measurements.lambda_sign=1")
+    rows = surveyed(folder, gears, percent=100)
+    model = fitted(rows, "measurements.lambda_sign=1")
     verdicts = [*map(verdict_of, model.flank_widths)]
     # About a vertical axis weight pushes nothing: that gear is as a sharp one. Those
     # that weight holds on one flank have no gap that steps could tell.
     loaded = verdicts if gears == "inertia" else verdicts[1:]
     assert "sharp" not in loaded and ("unlike" in loaded) == (gears == "inertia")
+
+
+def test_a_gentle_survey_finds_links_pushed_by_their_drives(folder: Path) -> None:
+    """Links that run on as an arm brakes do not where it is as slow as on paths."""
+    sign = "measurements.lambda_sign=1"
+    pushed = fitted(surveyed(folder, "inertia"), sign)
+    run_on = fitted(surveyed(folder, "inertia", percent=100), sign)
+    assert not ahead(pushed, load_cell(CELL).arm).any()
+    assert ahead(run_on, load_cell(CELL).arm).all()
+    assert {*map(verdict_of, pushed.flank_widths)} == {"sharp"}
 
 
 def test_reversals_are_no_rows_of_the_fit(sharp: Path) -> None:

@@ -16,7 +16,7 @@ from postproc.compensation.program import plan_visits, read_program
 from postproc.compensation.program_files import find_pages
 from postproc.compensation.sidecar import restore_file
 from postproc.language.languages import languages
-from postproc.language.measuring_program import name_of_file
+from postproc.language.measuring_program import SHARE, name_of_file
 from postproc.report.simulation import simulate_file
 from postproc.robot.cell import load_cell
 from tests.any_controller import any_controller
@@ -68,6 +68,7 @@ def test_all_languages_are_read_back_as_one_survey(cell, surveys):
         tools = [v.frame.poses[v.frame.tool][:, :3, 3] for v in (first, other)]
         np.testing.assert_allclose(*tools, atol=1e-9)
         assert not other.motion.fly.any()
+    assert (first.speed.override == SHARE / 100).all()  # of the axes, by PDL2
 
 
 @pytest.mark.parametrize(("arm", "suffix"), ARMS.items())

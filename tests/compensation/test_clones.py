@@ -303,3 +303,13 @@ def test_the_via_point_of_an_arc(run):
     outcome = run(source)
     assert b"VIA p__2\r\n" in outcome.outputs["job.pdl"]
     assert given_back(outcome) == {"job.pdl": source}
+
+
+@pytest.mark.parametrize(("change", "averages"), [("UFRAME", True), ("TOOL", False)])
+def test_joint_angles_hold_in_every_user_frame(run, change, averages):
+    """What the TCP of one tool needs does not ask for the frame of poses."""
+    joints = "p := {2.0, 5.0, -110.0, 10.0, 40.0, 10.0}"
+    frame = f"${change} := POS(1.0, 2.0, 3.0, 0.0, 0.0, 0.0, '')"
+    source = text_of(joints, *BOTH[:2], frame, *BOTH[2:], declared="p : JOINTPOS")
+    codes = {one.code for one in run(source, clone=False).decisions.reasons}
+    assert (Code.ARRIVALS_AVERAGED in codes) == averages

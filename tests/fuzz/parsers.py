@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+from typing import Any
 
 import numpy as np
 
 from postproc.exceptions import PostprocError
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.text.logical_lines import Lines, read_lines
+from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.number_edits import difference
 from postproc.language.text.source import Replacements, Source, apply, source_from_bytes
+from postproc.language.text.statement_table import Statements
 
 
 def program(data: bytes) -> None:
@@ -31,7 +33,7 @@ def variables(data: bytes) -> None:
         check_numbers(read_lines(source))
 
 
-def check_numbers(lines: Lines) -> None:
+def check_numbers(lines: Statements[Any]) -> None:
     """Check that the numbers can be written anew, and nothing else changes by that.
 
     What stands behind a sign of its own (``+-5``) is computed, and never written.
@@ -49,7 +51,7 @@ def check_numbers(lines: Lines) -> None:
     assert not problem, problem
 
 
-def replaced(lines: Lines, texts: list[bytes]) -> Replacements:
+def replaced(lines: Statements[Any], texts: list[bytes]) -> Replacements:
     """Return the edits that give every number a text."""
     return Replacements(
         lines.numbers.start, lines.numbers.end, np.array(texts, dtype=np.bytes_)

@@ -10,8 +10,8 @@ def rows(text: str) -> list[tuple[str, int, list[float]]]:
     lines = read_lines(source_from_bytes("job.pdl", text.encode("latin-1")))
     return [
         (
-            lines.text(row).replace("\x00", "N"),
-            int(lines.line[row]),
+            lines.shapes[int(lines.shape[row])].replace("\x00", "N"),
+            int(lines.begin_line[row]),
             lines.value[lines.first[row] : lines.first[row + 1]].tolist(),
         )
         for row in range(len(lines))

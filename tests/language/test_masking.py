@@ -141,9 +141,9 @@ def test_statements_are_joined_up_to_endmove() -> None:
         b" ENDMOVE\r\nMOVE TO q,\nMOVE TO r"
     )
     lines = read_lines(source_from_bytes("x", text))
-    assert lines.line.tolist() == [1, 7, 8]
+    assert lines.begin_line.tolist() == [1, 7, 8]
     assert lines.value.tolist() == [3.0, 0.5]
-    assert lines.text(0).endswith("ENDMOVE")
+    assert lines.shapes[int(lines.shape[0])].endswith("ENDMOVE")
 
 
 def test_an_open_string_is_refused_with_its_line() -> None:

@@ -1,13 +1,15 @@
 """Numbered names are taken out of whole files as they are out of one line."""
 
 import random
+from typing import Any
 
 import numpy as np
 import pytest
 
 from postproc.language.text.lexer import NAME_MARK, form_of, mask_of, scan_lines
-from postproc.language.text.logical_lines import Lines, read_lines
+from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source, source_from_bytes
+from postproc.language.text.statement_table import Statements
 from tests.reference import text as plain
 from tests.reference.text import mask_line
 
@@ -45,9 +47,9 @@ def test_whole_files_are_read_as_line_by_line() -> None:
     assert taken > 300
 
 
-def shapes_of(data: bytes) -> tuple[Lines, list[str]]:
+def shapes_of(data: bytes) -> tuple[Statements[Any], list[str]]:
     lines = read_lines(source_from_bytes("x", data))
-    return lines, [lines.text(row) for row in range(len(lines))]
+    return lines, [lines.shapes[int(lines.shape[row])] for row in range(len(lines))]
 
 
 def test_shapes_are_what_lines_say_without_numbers() -> None:

@@ -50,7 +50,7 @@ def test_other_numbers_are_read_as_by_themselves(
         assert said(after)[stamped:] != said(before)
         return
     assert found.added == (0 if stamped else -1)
-    for name in ("shape", "line", "first"):
+    for name in ("shape", "begin_line", "first"):
         assert np.array_equal(getattr(found.lines, name), getattr(alone, name)), name
     for name in ("start", "end"):
         now, meant = getattr(found.lines.numbers, name), getattr(alone.numbers, name)

@@ -11,8 +11,9 @@ plain survey (`plain`), one with reversals (`reversals`), that and a measured pa
 (`track`); `+stops` preloads the backlash. A row says what 95 % of all the way stays
 within, the largest deviation, how much farther a place is than the same program without
 points [mm], the share of the way that is within 0.05 mm and that is nearer than
-without, the share of moves whose promise holds, the moves with points, and the points a
-move has in the middle.
+without, the share of moves whose promise holds, the share of the way of moves with an
+end that a guard rejects, and the largest deviation of the others, the moves with
+points, and the points a move has in the middle.
 """
 
 from __future__ import annotations
@@ -125,11 +126,18 @@ def even(found: PathScores, visit: int) -> tuple[np.ndarray, np.ndarray]:
     return found.way[rows], found.across[rows]
 
 
+def guarded(report: dict[str, Any]) -> set[int]:
+    """Return the moves with an end whose target a guard rejects, by visit."""
+    status = [target["status"] for target in report["targets"]]
+    visits = [path["visit"] for path in report["path"]]
+    return {v for v in visits if "rejected" in (status[v - 1], status[v])}
+
+
 def compared(
-    new: PathScores, old: PathScores, told: list[dict[str, Any]]
+    new: PathScores, old: PathScores, told: list[dict[str, Any]], whole: set[int]
 ) -> dict[str, float]:
     """Compare the ways of a program with those of the one without points."""
-    every, usual, kept, ways = [], [], [], []
+    every, usual, kept, ways, rejected = [], [], [], [], []
     for path in told:
         (way, off), (old_way, before) = (even(one, path["visit"]) for one in (new, old))
         at = np.arange(way[0], way[-1], 1e-3)
@@ -137,10 +145,11 @@ def compared(
         every.append(here)
         usual.append(np.interp(at, old_way, before))
         ways.append(at)
+        rejected.append(np.full(len(at), path["visit"] in whole))
         promise = path.get("promise_mm")
         if promise is not None:
             kept.append(np.percentile(here, 95) <= 1e-3 * promise + 5e-6)
-    off, before, far = map(np.concatenate, (every, usual, ways))
+    off, before, far, held = map(np.concatenate, (every, usual, ways, rejected))
     far = far >= BEGINS
     return {
         "95 %": 1e3 * np.percentile(off, 95),
@@ -150,6 +159,8 @@ def compared(
         "within": (off < NEAR).mean(),
         "nearer": (off < before - NEARER).mean(),
         "kept": np.mean(kept) if kept else np.nan,
+        "guarded": held.mean(),
+        "max of others": 1e3 * off[~held].max(initial=0.0),
     }
 
 
@@ -202,8 +213,9 @@ def row(bench: Bench, state: str, tolerance: str) -> None:
     asked = ("--path-tolerance", tolerance, *(STOPS if stops else ()))
     report = bench.compensate(f"{knows}+{stops}", asked)
     told = report["path"]
-    found = compared(bench.run(f"{knows}+{stops}"), without, told)
-    usual = compared(without, without, told)
+    whole = guarded(report)
+    found = compared(bench.run(f"{knows}+{stops}"), without, told, whole)
+    usual = compared(without, without, told, whole)
     points = [path["inserted"] for path in told]
     print(
         f"{bench.seed:4d} {state:16} without {usual['95 %']:.3f} {usual['max']:.3f}  "

@@ -42,22 +42,6 @@ class BacklashPreload:
     crossing: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class MeantSides:
-    """From which sides k points on a way are meant to be passed.
-
-    Attributes:
-        side: Where each joint is to lie in its play, (k, 6) from -1 to 1.
-        turn: What the tool turns by in its own frame, (k, 3) [rad].
-        between: Where it is to lie half way between a point and the one before, and
-            behind the last one, (k + 1, 6).
-    """
-
-    side: Floats
-    turn: Floats
-    between: Floats
-
-
 def cross_at_once(side: Floats) -> Floats:
     """Let drives that cross their gaps on a way do so where they begin to, (k, 6).
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 
 import numpy as np
 
@@ -22,6 +23,9 @@ LATE = 0.01  # [m] of the way by which a flank changes later
 AT_ONCE = 0.02  # gaps over which a flank goes that changes as its drive turns back
 UNSURE = 1e-3  # of half the play: a side that is known
 
+
+_WIDE = FlankKind.SHARP, FlankKind.ELASTIC, FlankKind.EARLIER
+"""Hypotheses that say over how many gaps a joint goes."""
 
 Key = tuple[int, FlankKind, int]
 """A joint (from 1), what it does, and which of its cases of that kind it is."""
@@ -157,14 +161,9 @@ class FlankCases:
         usual = self.run.side[:, joint]
         for kind in flank.open_kinds:
             weight = flank.weight[kind]
-            if kind is FlankKind.SHARP:
-                yield kind, weight, self._over(1.0)[:, joint]
-            elif kind is FlankKind.ELASTIC:
-                ends = {flank.widths[1], *flank.widths[flank.nominal == 1.0 :]}
-                for width in sorted(ends):
-                    yield kind, weight, self._over(width)[:, joint]
-            elif kind is FlankKind.EARLIER:
-                yield kind, weight, self._over(AT_ONCE)[:, joint]
+            if kind in _WIDE:
+                for width in _widths_of(flank, kind):
+                    yield kind, weight, self._over(joint, width)
             elif kind is FlankKind.LATER:
                 yield kind, weight, usual[self._behind]
             elif kind is FlankKind.PUSHED:
@@ -176,18 +175,25 @@ class FlankCases:
             yield FlankKind.START, 1.0, least
             yield FlankKind.START, 1.0, most
 
-    @cached_property
-    def _known(self) -> dict[float, Floats]:
-        return {}
+    def _over(self, joint: int, width: float) -> Floats:
+        """Return the sides of a joint (from 0) if it goes over so many gaps, (s,)."""
+        return self._all_over[self._widths[joint].index(width)][:, joint]
 
-    def _over(self, width: float) -> Floats:
-        """Return the sides if all joints go over so many gaps, (s, 6)."""
-        if width not in self._known:
-            model, cell = self.error.model, self.error.cell
-            widths = np.full(6, width)
-            own = AlongWays.of(cell, model, self.run.cycle, self.run.ways, widths)
-            self._known[width] = own.side
-        return self._known[width]
+    @cached_property
+    def _widths(self) -> list[list[float]]:
+        """List the gaps that the hypotheses of each joint let it go over."""
+        found = []
+        for flank in self._flanks:
+            kinds = [kind for kind in _WIDE if flank.is_open(kind)]
+            found.append([width for kind in kinds for width in _widths_of(flank, kind)])
+        return found
+
+    @cached_property
+    def _all_over(self) -> list[Floats]:
+        """The sides of all joints, each over the k-th of its gaps, (s, 6) each."""
+        columns = zip_longest(*self._widths, fillvalue=1.0)
+        cell = self.error.cell
+        return [self.run.over(cell, np.array(width)).side for width in columns]
 
     @cached_property
     def _move(self) -> Ints:
@@ -201,3 +207,13 @@ class FlankCases:
         there = self.way + apart * self._move
         back = np.searchsorted(there, there - LATE, side="right") - 1
         return np.maximum(back, self.first[:-1][self._move])
+
+
+def _widths_of(flank: FlankOfJoint, kind: FlankKind) -> tuple[float, ...]:
+    """Return the gaps that a joint may go over by a hypothesis of `_WIDE`."""
+    if kind is FlankKind.SHARP:
+        return (1.0,)
+    if kind is FlankKind.EARLIER:
+        return (AT_ONCE,)
+    least, most = flank.widths
+    return (most,) if flank.nominal == 1.0 or least == most else (least, most)

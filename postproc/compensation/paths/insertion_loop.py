@@ -3,28 +3,35 @@
 A plan is immutable. A rule is a function from a plan and what is predicted of it (a
 `PathPrediction` holds both) to another plan, which is predicted again:
 
-1. `insert_reapproaches`: targets are approached anew from a stop, where asked for.
-2. `find_split`: which moves leave their paths too far, and may get points.
+1. `insert_reapproaches` (`reapproach.py`): targets are approached again from a stop,
+   where asked for.
+2. `find_split` (`split_selection.py`): which moves leave their paths too far, and may
+   get points.
 3. `drop_where_steep`: of two points between which a correction changes too fast, the
    one with less room goes.
 4. `put_points`: a point comes where every part of a path is left the farthest, and in
    front of it a stop that preloads the backlash. Where a joint changes its flank that
    gives one point on the old flank, one on the new, and few others. Arcs are cut at
-   their points on the way as well; flat pieces become chords, or are halved.
-5. `join_flat_pieces`: pieces of arcs that are still too flat go on to the next cut.
-6. `BestPoints.restore`: of all that was tried on a move what did best.
-7. `choose_plans`: of these points, fewer of them and none, what the data allow.
-8. `judge`: what is no better for certain is thinned out, or taken back.
+   their points on the way as well; flat pieces become chords, or are halved
+   (`arc_splitting.py`).
+5. `join_flat_pieces` (`arc_splitting.py`): pieces of arcs that are still too flat go on
+   to the next cut.
+6. `BestPoints.restore` (`best_points.py`): of all that was tried on a move what did
+   best.
+7. `choose_plans` (`prune.py`): of these points, fewer of them and none, what the data
+   allow. `plan_rule.py` holds the rule, `plan_outcomes.py` what it weighs.
+8. `judge` (`prune.py`): what is no better for certain is thinned out, or taken back.
 
-3 and 4 are repeated until neither changes anything, then 5, then 8.
+3 and 4 are repeated until neither changes anything, then 5, then 8. How a plan is
+predicted says `insertion_prediction.py`, how it is written `write_points.py`, and what
+is told of it `insertion_summary.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
-from math import hypot
 
 import numpy as np
 
@@ -36,45 +43,22 @@ from postproc.compensation.paths.arc_splitting import (
     new_chords,
     whole_arcs,
 )
-from postproc.compensation.paths.arcs import Cut, halves, point_on_way
+from postproc.compensation.paths.arcs import point_on_way
+from postproc.compensation.paths.best_points import BestPoints
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import (
     InsertionTask,
     PathPrediction,
     Write,
-    of_source,
 )
-from postproc.compensation.paths.insertion_report import Insertions
-from postproc.compensation.paths.path_error import sizes_of
-from postproc.compensation.paths.plan_outcomes import BEGINS, compare
+from postproc.compensation.paths.insertion_summary import summarize
 from postproc.compensation.paths.prune import judge
-from postproc.compensation.paths.reapproach import (
-    find_reapproaches,
-    insert_reapproaches,
-)
-from postproc.compensation.paths.split_selection import can_stop, find_split
+from postproc.compensation.paths.reapproach import insert_reapproaches
+from postproc.compensation.paths.split_selection import find_split
 from postproc.compensation.pipeline import CompensatedProgram
 from postproc.language.languages import language_of
-from postproc.robot.pose import MM
 
 ROUNDS = 16  # of points put on the ways
-BETTER = 1e-6  # [m] less is no matter
-PRELOAD = "Preload the backlash: compensation.preload_backlash"
-MEASURE_STARTS = (
-    "Measure how the joints change their flanks: survey.reversals, or diagnose --path"
-)
-IN_CORNER = (
-    "Joints change their flanks where it begins, and the arm does not stop there, or "
-    "may not stop once more: let it stop there, or lead the corner elsewhere"
-)
-BY_HAND = "Change what the reason names, or put targets on its way in the program"
-MORE_ROOM = "Allow more points: compensation.max_inserted"
-SHORTER = "A lower speed, or a smaller [limits] segment_ms, allows shorter pieces"
-STEEP = "between points on it the correction would change faster than may be"
-TURNS = (
-    "Lead it where the wrist turns less on the way, or raise [limits] "
-    "correction_step_mm"
-)
 TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
 LATEST = 0.9  # of a way: the last place of it for a stop
 
@@ -109,7 +93,7 @@ def correct_paths(
         now, best = _repeat(now, BestPoints(), put_points, drop_where_steep)
         now, best = _repeat(now, best, join_flat_pieces)
         now = judge(task.predict(best.restore(now)))
-    return _result(now)
+    return summarize(now)
 
 
 def _nothing(now: PathPrediction) -> InsertionPlan:
@@ -262,165 +246,3 @@ def _on_path(now: PathPrediction, v: int) -> list[float]:
             at = min(max(float(way[top]), low), high)
             found.append((float(far[top]), at / float(way[-1])))
     return [share for _, share in sorted(found, reverse=True)]
-
-
-def _result(now: PathPrediction) -> CompensatedProgram:
-    """Tell of the program as of the source's visits."""
-    in_time = replace(
-        now.in_time, before=now.task.first.before, inserted=_report_insertions(now)
-    )
-    kept = of_source(now.program.kept, now.own)
-    return replace(now.program, kept=kept, in_time=in_time)
-
-
-def _report_insertions(now: PathPrediction) -> Insertions:
-    """Say what was put on ways, and why moves that are left too far got nothing."""
-    task, plan, visits = now.task, now.plan, now.task.visits
-    why = "its pieces would be too short, or the path no better"
-    if plan.crowded:
-        why = "no more points may be inserted (max_inserted)"
-    too_far = set(now.too_far) - plan.points.keys()
-    left = {}
-    for v in sorted(too_far):  # what is known of one half of an arc is so of both
-        halved = (plan.left[h] for h in halves(visits, v) if h in plan.left)
-        usual = STEEP if v in plan.shut and not plan.crowded else why
-        left[v] = plan.left.get(v) or next(halved, usual)
-    return Insertions(
-        now.own,
-        task.tolerance,
-        plan.points,
-        plan.stops & plan.points.keys(),
-        left,
-        sizes_of(task.first.paths),
-        _promises(now),
-        find_reapproaches(now),
-        plan.unconfirmed,
-        _cures(now),
-        _cell_speed(now),
-        _limit_speed(now),
-    )
-
-
-def _cell_speed(now: PathPrediction) -> float:
-    """Return the speed of the cell if moves with points are judged at it [mm/s]."""
-    task = now.task
-    speed = task.setting.cell.file.motion.linear_mm_s or 0.0
-    own = task.first.before.targets.linear_speed[sorted(now.plan.points)] / MM
-    return speed if np.isclose(own, speed).any() else 0.0
-
-
-def _limit_speed(now: PathPrediction) -> float:
-    """Return the limit of the cell if moves with points are judged at it [mm/s]."""
-    unknown = np.isnan(now.task.first.before.targets.linear_speed)
-    judged = unknown[sorted(now.plan.points)].any()
-    return float(now.task.setting.cell.file.motion.linear_limit_mm_s or 0.0) * judged
-
-
-def _cures(now: PathPrediction) -> dict[int, str]:
-    """Say what helps the moves that are left too far, by visit."""
-    plan, found = now.plan, dict[int, str]()
-    for v in now.too_far:
-        paths, k = now.path_to(v)
-        both = halves(now.task.visits, v)
-        known = [plan.cures[h] for h in both if plan.cures.get(h)]
-        if known:
-            found[v] = known[0]
-        elif v not in plan.open:
-            found[v] = BY_HAND
-        elif paths.way[paths.after.largest[k]] < BEGINS and v not in plan.stops:
-            start = MEASURE_STARTS if v in plan.unconfirmed else PRELOAD
-            found[v] = start if can_stop(now.task, both[0]) else IN_CORNER
-        elif plan.crowded:
-            found[v] = MORE_ROOM
-        else:
-            found[v] = TURNS if v in plan.shut else SHORTER
-    return found
-
-
-def _promises(now: PathPrediction) -> dict[int, float]:
-    """Return what 95 % of every move stays within by all open hypotheses [m]."""
-    task = now.task
-    moves = {halves(task.visits, v) for v in now.sizes}
-    return {
-        v: compare((now.part_of(v).paths,), rows, task.tolerance).choose()[1]
-        for rows in moves
-        for v in rows
-    }
-
-
-@dataclass(frozen=True)
-class _Tried:
-    """What was put on the way of a move.
-
-    Attributes:
-        size: How far the move left its path with it [m]; of an arc, of both halves.
-        points: The points by visit; of an arc, of both its halves.
-        stops: Those of these visits whose first point is a stop.
-        chords: Which of its pieces are chords.
-    """
-
-    size: float
-    points: Mapping[int, tuple[float, ...]]
-    stops: frozenset[int]
-    chords: frozenset[Cut]
-
-
-@dataclass(frozen=True)
-class BestPoints:
-    """What did best for every move that may be split, so far.
-
-    Points are put where a path is left the farthest, one after the other; near a place
-    where two joints turn back a next one can make the move worse.
-
-    Attributes:
-        best: What did best, by the first visit of each move.
-        refused: Why points of moves could not be corrected, what was said first.
-    """
-
-    best: Mapping[int, _Tried] = field(default_factory=dict)
-    refused: Mapping[int, str] = field(default_factory=dict)
-
-    def note(self, now: PathPrediction) -> BestPoints:
-        """Look at how the moves do with the points that they have now."""
-        best, bad = dict(self.best), _unfit(now)
-        for v, tried in _list_tried(now).items():
-            known = best.setdefault(v, tried)
-            if v not in bad and tried.size <= known.size + BETTER:  # the later one
-                best[v] = replace(tried, size=min(tried.size, known.size))
-        return BestPoints(best, {**now.refusals, **self.refused})
-
-    def restore(self, now: PathPrediction) -> InsertionPlan:
-        """Give moves back the points that did better than those they have."""
-        plan, bad = now.plan, _unfit(now)
-        for v, has in _list_tried(now).items():
-            best = self.best[v]
-            if v in bad or has.size > best.size + BETTER:
-                others = {k: s for k, s in plan.points.items() if k not in has.points}
-                plan = replace(
-                    plan,
-                    points={**others, **best.points},
-                    stops=plan.stops - has.stops | best.stops,
-                    chords=plan.chords - has.chords | best.chords,
-                )
-        for v in self.refused.keys() - plan.points.keys():
-            plan = plan.leave(v, self.refused[v])
-        return plan
-
-
-def _unfit(now: PathPrediction) -> set[int]:
-    """Return the moves with flat pieces, or refused points, by first visits."""
-    rows: Collection[int] = {*(v for v, _ in now.flat), *now.refusals}
-    return {halves(now.task.visits, v)[0] for v in rows}
-
-
-def _list_tried(now: PathPrediction) -> dict[int, _Tried]:
-    """Say what the moves have now, by their first visits, and how they do."""
-    plan, sizes, found = now.plan, now.sizes, dict[int, _Tried]()
-    for own in {halves(now.task.visits, v) for v in plan.open}:
-        found[own[0]] = _Tried(
-            hypot(*(sizes.get(row, np.inf) for row in own)),
-            {row: plan.points[row] for row in own if row in plan.points},
-            plan.stops.intersection(own),
-            frozenset(cut for cut in plan.chords if cut[0] in own),
-        )
-    return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -18,12 +18,6 @@ from postproc.compensation.paths.arcs import (
     Cut,
     WantedArcs,
     flat_pieces,
-    halves,
-)
-from postproc.compensation.paths.backlash_preload import (
-    MeantSides,
-    cross_at_once,
-    find_drive_turns,
 )
 from postproc.compensation.paths.changed_windows import (
     Key,
@@ -32,6 +26,7 @@ from postproc.compensation.paths.changed_windows import (
     take_windows,
 )
 from postproc.compensation.paths.insertion_plan import InsertionPlan, Written
+from postproc.compensation.paths.meant_sides import PlanSides
 from postproc.compensation.paths.moved_corners import SourceCorners
 from postproc.compensation.paths.path_error import PathAccuracy
 from postproc.compensation.paths.split_constraints import (
@@ -39,7 +34,11 @@ from postproc.compensation.paths.split_constraints import (
     speeds_of_pieces,
     unwritable,
 )
-from postproc.compensation.paths.write_points import insert, lines_in_files
+from postproc.compensation.paths.write_points import (
+    PathPoints,
+    insert,
+    lines_in_files,
+)
 from postproc.compensation.pipeline import (
     BY_VISIT,
     EXPLAINING,
@@ -56,11 +55,9 @@ from postproc.model.flank_hypotheses import FlankOfJoint, flanks_of
 from postproc.robot.pose import MM
 
 AIM = 0.4  # of the tolerance: what points are to reach
+AGREE = 1e-6  # [m] by which two predictions of a move may differ
 KEPT = 4  # predictions that are kept: plans return to what was tried
 
-
-MeantKey = tuple[int, tuple[float, ...], bool]
-"""A visit, the points on its way, and whether they correct half of what flanks do."""
 Write = Callable[[ParsedProgram, WindowResult, Job], tuple[Output, ParsedProgram]]
 
 
@@ -97,8 +94,6 @@ class InsertionTask:
     _whole: dict[Written, Whole] = field(default_factory=dict, repr=False)
     _parts: dict[tuple[int, Key], Part] = field(default_factory=dict, repr=False)
 
-    _meant: dict[MeantKey, MeantSides] = field(default_factory=dict, repr=False)
-
     @property
     def visits(self) -> Visits:
         """Return the visits of the source, n."""
@@ -113,6 +108,11 @@ class InsertionTask:
     def flanks(self) -> tuple[FlankOfJoint, ...]:
         """Return what is known of how joints 1 to 6 change their flanks."""
         return flanks_of(self.setting.model, self.setting.cell.arm)
+
+    @cached_property
+    def sides(self) -> PlanSides:
+        """Return from which sides points of plans are meant to be passed."""
+        return PlanSides(self.setting, self.visits, self.first, self.flanks)
 
     @cached_property
     def windows(self) -> Windows:
@@ -265,11 +265,11 @@ class InsertionTask:
     def _insert(self, plan: InsertionPlan) -> tuple[ParsedProgram, Ints]:
         """Put the points of a plan into the program, see `insert`."""
         with self.setting.clock("insert"):
-            return insert(
-                self.source.reading, plan.points, plan.preloads, self.splitter,
-                self.setting.cell, plan.chords, plan.approaches,
-                self._list_meant_sides(plan), self._joints_along,
+            put = PathPoints(
+                plan.points, plan.preloads, plan.chords, plan.approaches,
+                self.sides.of_plan(plan), self._joints_along,
             )  # fmt: skip
+            return insert(self.source.reading, put, self.splitter, self.setting.cell)
 
     def _correct(self, reading: ParsedProgram) -> tuple[ParsedProgram, WindowResult]:
         options = self.setting.options.without_clones()
@@ -282,59 +282,6 @@ class InsertionTask:
         way = paths.way[rows]
         found = [np.interp(share * way[-1], way, q) for q in paths.q[rows].T]
         return np.stack(found, axis=1)
-
-    def _list_meant_sides(self, plan: InsertionPlan) -> dict[int, MeantSides]:
-        """Say from which sides points on ways are meant to be passed.
-
-        An arc is one way, from where it begins to where it ends.
-        """
-        found = dict[int, MeantSides]()
-        for move in {halves(self.visits, v) for v in plan.points}:
-            half = bool(plan.halved.intersection(move))
-            keys = {v: (v, plan.points[v], half) for v in move if v in plan.points}
-            if not self._meant.keys() >= {*keys.values()}:
-                self._mean_on(move, keys.values(), half)
-            found.update({v: self._meant[key] for v, key in keys.items()})
-        return found
-
-    def _mean_on(
-        self, move: tuple[int, ...], keys: Collection[MeantKey], half: bool
-    ) -> None:
-        """Say from which sides points on a move are meant to be passed, and keep it."""
-        paths, own = self.first.paths, [self.first.paths.samples_to(v) for v in move]
-        sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
-        side = np.array(paths.side[own[0].start : own[-1].stop])
-        side[:, sharp] = cross_at_once(side[:, sharp])
-        if half:
-            side = (side + _evenly(side, [paths.way[rows] for rows in own])) / 2
-        samples = dict(zip(move, own, strict=True))
-        for key in keys:
-            rows = samples[key[0]]
-            there = side[rows.start - own[0].start :]
-            self._meant[key] = self._mean(key[0], key[1], rows, side[0], there)
-
-    def _mean(
-        self, v: int, points: Sequence[float], rows: slice, begin: Floats, side: Floats
-    ) -> MeantSides:
-        """Say from which sides the points of one way are meant to be passed.
-
-        Args:
-            v: The visit at its end.
-            points: Shares of the way, (k,).
-            rows: Its samples.
-            begin: Where joints lie in their play where the move begins, (6,).
-            side: .. at these samples, and any behind them, (s, 6).
-        """
-        paths = self.first.paths
-        way = paths.way[rows]
-        ends = np.array([0.0, *points, 1.0]) * way[-1]
-        at = np.searchsorted(way, ends).clip(0, len(way) - 1)
-        tool, there = self.first.after.targets.tool[v, :3, :3], side[at]
-        turn = find_drive_turns(
-            self.setting, self.visits, v, tool, paths.q[at + rows.start], there - begin
-        )
-        between = (there[:-1] + there[1:]) / 2
-        return MeantSides(there[1:-1], turn[1:-1], between)
 
     def list_wanted_arcs(self, plan: InsertionPlan) -> WantedArcs:
         """Return the arcs that a plan cuts."""
@@ -378,6 +325,16 @@ class PathPrediction:
     def whole(self) -> PathPrediction:
         """Return the same, written and predicted as a whole."""
         return self if self.written else self.task.predict_whole(self.plan)
+
+    def agrees_with(self, other: PathPrediction) -> bool:
+        """Return True if all moves and points come out as another one predicts them."""
+        mine, others = self.sizes, other.sizes
+        return (
+            mine.keys() == others.keys()
+            and all(abs(mine[v] - others[v]) <= AGREE for v in mine)
+            and self.refusals == other.refusals
+            and self.flat.keys() == other.flat.keys()
+        )
 
     def part_of(self, v: int) -> Part:
         """Return what tells of a visit of the source."""
@@ -486,19 +443,6 @@ class PathPrediction:
 def cut_arcs(visits: Visits, plan: InsertionPlan) -> list[int]:
     """Return the points on the ways of the arcs that a plan cuts."""
     return sorted(v for v in plan.points if visits.motion.via[v])
-
-
-def _evenly(side: Floats, ways: list[Floats]) -> Floats:
-    """Let joints go evenly from where they lie first to where they lie last, (s, 6).
-
-    Args:
-        side: Where they lie along a move, (s, 6).
-        ways: Path length at the samples of its parts [m].
-    """
-    ends = np.cumsum([0.0, *(way[-1] for way in ways)])
-    along = np.concatenate([way + end for way, end in zip(ways, ends, strict=False)])
-    u = (along / max(ends[-1], 1e-12))[:, None]
-    return np.asarray((1 - u) * side[0] + u * side[-1])
 
 
 def of_source(kept: WindowResult, own: Ints) -> WindowResult:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,19 +28,20 @@ class AlongWays:
     Attributes:
         cycle: The program.
         ways: Its ways.
+        half: Half of the joints' gaps, (s, 6) [rad].
         least, most: Sides of the joints' plays, see `sides_along`, (s, 6) each.
     """
 
     cycle: ProgramCycle
     ways: PathSamples
+    half: Floats
     least: Floats
     most: Floats
 
     @classmethod
     def of(
-        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples,
-        width: Floats | None = None,
-    ) -> AlongWays:  # fmt: skip
+        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples
+    ) -> AlongWays:
         """Follow the joints' plays along the ways, each as wide as its gap there.
 
         What is known of them where a way begins is what the way before it leaves, where
@@ -50,20 +52,29 @@ class AlongWays:
             model: The arm's error.
             cycle: The program.
             ways: Its ways.
-            width: Gaps over which each joint goes from flank to flank, (6,); default
-                what the model says.
         """
+        width = nominal_widths(flanks_of(model, cell.arm))
+        half = half_widths(model, cell.arm, ways.q)
+        return cls._follow(cell, cycle, ways, half, width)
+
+    def over(self, cell: Cell, width: Floats) -> AlongWays:
+        """Return it if joints go over so many gaps from flank to flank, (6,)."""
+        return self._follow(cell, self.cycle, self.ways, self.half, width)
+
+    @classmethod
+    def _follow(
+        cls, cell: Cell, cycle: ProgramCycle, ways: PathSamples, half: Floats,
+        width: Floats,
+    ) -> AlongWays:  # fmt: skip
         begins, alone = ways.begins, np.ones(len(ways.visit), dtype=bool)
         alone[1:] = ways.source[1:] != ways.visit[:-1]
         begins[ways.first[:-1]] = alone
         play = cycle.arrived.past.play[ways.source[alone]]
-        if width is None:
-            width = nominal_widths(flanks_of(model, cell.arm))
-        half = width * half_widths(model, cell.arm, ways.q)
-        least, most = sides_along(cell.arm, ways.q, begins, play, half)
-        return cls(cycle, ways, on_the_way(least, width), on_the_way(most, width))
+        least, most = sides_along(cell.arm, ways.q, begins, play, width * half)
+        least, most = on_the_way(least, width), on_the_way(most, width)
+        return cls(cycle, ways, half, least, most)
 
-    @property
+    @cached_property
     def side(self) -> Floats:
         """Where each joint lies in its play, the middle of what is known, (s, 6)."""
         return (self.least + self.most) / 2

@@ -24,6 +24,9 @@ BEGINS = 5e-3  # [m] in which drives cross their gaps, where a move begins
 
 LAST = 1.0 - 1e-9  # share of a way that is still on it
 
+_Ways = Sequence[tuple[Floats, Floats]]
+"""Way (s,) and distance from the path (h, s) of the parts of a move [m]."""
+
 
 @dataclass(frozen=True)
 class Objection:
@@ -114,16 +117,12 @@ def compare(
     weights = {key: w for move in found for key, w in move.weights.items()}
     usually = min((usual.usually[key[0] - 1] for key in keys), default=1.0)
     weight = np.array([usually, *(weights[key] for key in keys)])
-    outcomes, shares = [], []
-    for move in found:
-        off, worse, share = np.array(
-            [move.compare(usual, key) for key in (None, *keys)]
-        ).T
-        outcomes.append(PlanOutcome(off, worse))
-        shares.append(share)
+    hypotheses = (None, *keys)
+    ways = [[*move.across(hypotheses)] for move in found]
+    outcomes, shares = zip(*(_outcome(own, ways[0]) for own in ways), strict=True)
     if usually <= OPEN:  # it is what corrections are made for, and counts
         weight[0] = np.nextafter(OPEN, 1.0)
-    return MoveOutcomes(tuple(outcomes), np.array(shares), keys, weight, tolerance)
+    return MoveOutcomes(outcomes, np.array(shares), keys, weight, tolerance)
 
 
 @dataclass(frozen=True)
@@ -166,42 +165,58 @@ class _Move:
                 found[joint - 1] = max(found[joint - 1], moved)
         return found
 
-    def across(self, key: Key | None) -> Iterator[tuple[Floats, Floats]]:
-        """Yield way and distance from the path of its parts under a hypothesis."""
-        case = None if key is None else self.cases.get(key)
+    def across(self, keys: Sequence[Key | None]) -> Iterator[tuple[Floats, Floats]]:
+        """Yield way (s,) and distance from the path (h, s) of its parts [m].
+
+        Args:
+            keys: The h hypotheses, None if all joints do as predicted.
+        """
         for part in self.parts:
-            far = np.array(self.paths.after.across[part])
-            if case is not None:
-                own = case.within(part)
-                far[case.rows[own] - part.start] = case.across[own]
+            far = np.tile(self.paths.after.across[part], (len(keys), 1))
+            for row, key in zip(far, keys, strict=True):
+                case = None if key is None else self.cases.get(key)
+                if case is not None:
+                    own = case.within(part)
+                    row[case.rows[own] - part.start] = case.across[own]
             yield self.paths.way[part], far
 
-    def compare(self, usual: _Move, key: Key | None) -> tuple[float, float, float]:
-        """Return what 95 % stays within, how much worse it is [m], and where.
 
-        Where a move begins, what the whole of it is off without points counts there.
-        """
-        ways: list[Floats] = []
-        sizes: list[Floats] = []
-        worst, at = 0.0, 0.0
-        for (way, far), (old, before) in zip(
-            self.across(key), usual.across(key), strict=True
-        ):
-            usually = np.interp(way, old, before)
-            if not ways:
-                usually[way < BEGINS] = before.max()
-            more = far - usually
-            top = int(more.argmax())
-            if self is not usual and more[top] > worst:
-                share = float(way[top] / max(way[-1], 1e-12))
-                worst, at = float(more[top]), len(ways) + min(share, LAST)
-            ways.append(np.diff(way, prepend=0.0))
-            sizes.append(far)
-        return _within(np.concatenate(sizes), np.concatenate(ways)), worst, at
+def _outcome(own: _Ways, usual: _Ways) -> tuple[PlanOutcome, Floats]:
+    """Return how a plan does under h hypotheses, and where it is worst, (h,).
+
+    Where a move begins, what the whole of it is off without points counts there.
+
+    Args:
+        own: The parts of the move with the plan, see `_Move.across`.
+        usual: .. and without points; the same if the plan has none.
+    """
+    worst, at = np.zeros((2, len(own[0][1])))
+    rows = np.arange(len(worst))
+    for k, ((way, far), (old, before)) in enumerate(zip(own, usual, strict=True)):
+        if own is usual:
+            break
+        usually = np.array([np.interp(way, old, row) for row in before])
+        if k == 0:
+            usually[:, way < BEGINS] = before.max(axis=1)[:, None]
+        more = far - usually
+        top = more.argmax(axis=1)
+        share = np.minimum(way[top] / max(way[-1], 1e-12), LAST)
+        at = np.where(more[rows, top] > worst, k + share, at)
+        worst = np.maximum(worst, more[rows, top])
+    length = np.concatenate([np.diff(way, prepend=0.0) for way, _ in own])
+    far = np.concatenate([part for _, part in own], axis=1)
+    return PlanOutcome(_within(far, length), worst), at
 
 
-def _within(far: Floats, length: Floats) -> float:
-    """Return the distance that 95 % of a way stays within, of samples (s,)."""
-    order = np.argsort(far)
-    done = np.cumsum(length[order])
-    return float(far[order[np.searchsorted(done, ALONG * done[-1])]])
+def _within(far: Floats, length: Floats) -> Floats:
+    """Return the distance that 95 % of a way stays within, (h,) [m].
+
+    Args:
+        far: Distances at s samples, (h, s) [m].
+        length: Of the way up to each, (s,) [m].
+    """
+    order = np.argsort(far, axis=1)
+    done = np.cumsum(length[order], axis=1)
+    place = (done < ALONG * done[:, -1:]).sum(axis=1)
+    rows = np.arange(len(far))
+    return np.asarray(far[rows, order[rows, place]])

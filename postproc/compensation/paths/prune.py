@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -20,7 +20,8 @@ from postproc.compensation.paths.changed_windows import Part
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
 from postproc.compensation.paths.path_error import apart, sizes_of
-from postproc.compensation.paths.plan_outcomes import Objection, compare
+from postproc.compensation.paths.plan_outcomes import MoveOutcomes, Objection, compare
+from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.reapproach import WORSE, bad_approaches
 from postproc.language.visits import Visits
 from postproc.robot.pose import lengths
@@ -55,6 +56,8 @@ def _find_bad(
 ) -> tuple[PathPrediction, dict[int, Removal], set[int]]:
     """Find what must go: in changed windows first, and in the whole if nothing there.
 
+    A whole that comes out as its windows did is not judged again.
+
     Args:
         now: The program.
         without: How far each move leaves its path without points [m].
@@ -68,7 +71,9 @@ def _find_bad(
         anew = bad_approaches(now) if now.plan.approaches else set()
         if bad or anew or now.written:
             return now, bad, anew
-        now = now.whole()
+        now, alone = now.whole(), now
+        if now.agrees_with(alone):
+            return now, {}, set()
 
 
 def choose_plans(now: PathPrediction) -> InsertionPlan:
@@ -78,12 +83,8 @@ def choose_plans(now: PathPrediction) -> InsertionPlan:
     correct half of what flanks change by, or none. What a hypothesis speaks against
     is thinned out later.
     """
-    task, chosen = now.task, now.plan
-    plans = [*_variants(now)]
-    made = [now, *map(task.predict, plans[1:])]
-    for rows in _moves_with_points(now):
-        paths = [one.part_of(rows[0]).paths for one in made]
-        compared = compare((task.first.paths, *paths), rows, task.tolerance)
+    visits, chosen = now.task.visits, now.plan
+    for rows, compared, plans in _try_plans(now):
         best, _ = compared.choose()
         if best:
             for v in rows:
@@ -91,19 +92,40 @@ def choose_plans(now: PathPrediction) -> InsertionPlan:
         elif compared.objection(1) is None:
             for v in now.plan.points.keys() & {*rows}:
                 chosen = chosen.leave(v, "inserted points make it no better")
-                chosen = chosen.take_back(task.visits, v)
+                chosen = chosen.take_back(visits, v)
     return chosen
 
 
-def _variants(now: PathPrediction) -> Iterator[InsertionPlan]:
-    """Yield the plan, it without stops that preload, and points that correct half."""
-    plain = now.plan
-    yield plain
-    if plain.stops:
-        plain = plain.without_stops()
-        yield plain
-    if plain.points and any(flank.open_kinds for flank in now.task.flanks):
-        yield replace(plain, halved=frozenset(plain.points))
+def _try_plans(
+    now: PathPrediction,
+) -> Iterator[tuple[tuple[int, ...], MoveOutcomes, list[InsertionPlan]]]:
+    """Yield every move with points, how it does without and by some plans, and these.
+
+    Half is looked at where nothing else keeps the finest promise.
+    """
+    task, made = now.task, [now]
+    if now.plan.stops:
+        made.append(task.predict(now.plan.without_stops()))
+    moves = {rows: _compare_plans(made, rows) for rows in _moves_with_points(now)}
+    finest, halved = resolution(task.tolerance), dict[tuple[int, ...], MoveOutcomes]()
+    if any(flank.open_kinds for flank in task.flanks):
+        open_ = [rows for rows, own in moves.items() if own.choose()[1] > finest]
+        plain = made[-1].plan
+        own = plain.points.keys() & {v for rows in open_ for v in rows}
+        made.append(task.predict(replace(plain, halved=frozenset(own))))
+        halved = {rows: _compare_plans(made, rows) for rows in open_}
+    plans = [one.plan for one in made]
+    for rows, compared in moves.items():
+        yield rows, halved.get(rows, compared), plans
+
+
+def _compare_plans(
+    made: Sequence[PathPrediction], rows: tuple[int, ...]
+) -> MoveOutcomes:
+    """Compare no points on a move with what some plans put there."""
+    task = made[0].task
+    paths = [one.part_of(rows[0]).paths for one in made]
+    return compare((task.first.paths, *paths), rows, task.tolerance)
 
 
 def _moves_with_points(now: PathPrediction) -> list[tuple[int, ...]]:
@@ -216,11 +238,9 @@ def _harmful(
 
 def _objections(now: PathPrediction) -> dict[int, Objection]:
     """Say which hypotheses make moves with points worse, and at what share."""
-    found, task = dict[int, Objection](), now.task
+    found = dict[int, Objection]()
     for rows in _moves_with_points(now):
-        paths = task.first.paths, now.part_of(rows[0]).paths
-        compared = compare(paths, rows, task.tolerance)
-        objection = compared.objection(1)
+        objection = _compare_plans((now,), rows).objection(1)
         if objection is not None:
             found[rows[int(objection.place)]] = objection
     return found

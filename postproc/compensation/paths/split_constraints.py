@@ -6,6 +6,8 @@ counted, timed or enabled along a move may depend on it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
@@ -68,6 +70,7 @@ def hindrances(
             taught | taught[before],
             "one of its ends is taught and contains the arm's error",
         ),
+        *_reasons_of_ends(decisions, corrected, before),
         (~(ends & ends[before]), "its ends are not both corrected poses"),
         (v.target.shift >= 0, "its end is shifted from a point"),
         (
@@ -90,6 +93,17 @@ def hindrances(
             if one in found:
                 found.setdefault(other, found[one])
     return found
+
+
+def _reasons_of_ends(
+    decisions: Decisions, corrected: Bools, before: Ints
+) -> Iterator[tuple[Bools, str]]:
+    """Yield where an end is not corrected for some reason, (n,), and what that says."""
+    for k in np.unique(decisions.why[~corrected]).tolist():
+        if reason := decisions.reasons[k]:
+            here = ~corrected & (decisions.why == k)
+            yield here, f"its end is not corrected: {reason}"
+            yield here[before], f"its start is not corrected: {reason}"
 
 
 def speeds_of_pieces(cycle: ProgramCycle, cell: Cell, model: Model) -> Floats:

@@ -5,10 +5,8 @@ They lie on the programmed path; what corrects them is what corrects all targets
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from types import MappingProxyType
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,8 +15,9 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.inverse_model import base_in_uframe
 from postproc.compensation.paths.arcs import Chords, CutArc, is_arc
-from postproc.compensation.paths.backlash_preload import BacklashPreload, MeantSides
+from postproc.compensation.paths.backlash_preload import BacklashPreload
 from postproc.compensation.paths.insertion_report import Points
+from postproc.compensation.paths.meant_sides import MeantSides
 from postproc.compensation.program import ParsedProgram, read_program
 from postproc.compensation.rewrite import VerificationError
 from postproc.language.language import Splitter
@@ -36,29 +35,51 @@ ROUNDED = 2e-6  # [m] that a point on a way may move where it is written anew
 TURNED = 2e-3  # [rad] .. and the tool turn: what drives turn it by is a tenth of that
 
 
+@dataclass(frozen=True)
+class PathPoints:
+    """What is put on the ways of a program, by the visits that they lead to.
+
+    Attributes:
+        points: Where points lie.
+        stops: Moves whose first point is a stop, where the backlash is preloaded.
+        chords: Pieces of arcs that are chords.
+        approaches: Stops from which targets are approached again, (w,) each.
+        meant: From which sides points of lines are meant to be passed.
+        joints: Where the joints are, for the flags of points; None: as at their starts.
+    """
+
+    points: Points
+    stops: Mapping[int, BacklashPreload] = field(default_factory=dict)
+    chords: Chords = ()
+    approaches: Mapping[int, Floats] = field(default_factory=dict)
+    meant: Mapping[int, MeantSides] = field(default_factory=dict)
+    joints: JointsAlong | None = None
+
+    @property
+    def count(self) -> int:
+        """Return the number of points, stops before targets among them."""
+        return sum(map(len, self.points.values())) + len(self.approaches)
+
+    def turns(self, visit: int) -> Floats:
+        """Return what the tool turns by at the points of a move, (k, 3) [rad]."""
+        found = np.zeros((len(self.points.get(visit, ())), 3))
+        if visit in self.meant:
+            found[:] = self.meant[visit].turn
+        if visit in self.stops:
+            found[0] = self.stops[visit].turn
+        return found
+
+
 def insert(
-    reading: ParsedProgram,
-    points: Points,
-    stops: Mapping[int, BacklashPreload],
-    splitter: Splitter,
-    cell: Cell,
-    chords: Chords = (),
-    approaches: Mapping[int, Floats] = MappingProxyType({}),
-    meant: Mapping[int, MeantSides] = MappingProxyType({}),
-    joints: JointsAlong | None = None,
+    reading: ParsedProgram, put: PathPoints, splitter: Splitter, cell: Cell
 ) -> tuple[ParsedProgram, Ints]:
     """Put points on the ways of a program.
 
     Args:
         reading: The program, n visits.
-        points: Where.
-        stops: Moves whose first point is a stop, where play is taken up.
+        put: The points.
         splitter: Its files.
         cell: What holds at program start.
-        chords: Pieces of arcs that are chords.
-        approaches: Stops from which targets are approached anew, by visit, (w,) each.
-        meant: From which sides points of lines are meant to be passed, by visit.
-        joints: Where the joints are, for the flags of points; None: as at their starts.
 
     Returns:
         The program with points, proven to make the same moves otherwise, and those of
@@ -68,13 +89,8 @@ def insert(
         VerificationError: It would make other moves.
         CloneError: A point cannot be written.
     """
-    edits = _edits(reading, points, stops, splitter, cell, chords, meant, joints)
-    lines, visits = lines_in_files(reading, cell), reading.visits
-    for visit, numbers in approaches.items():
-        config = visits.target.configs[visits.target.config[visit]]
-        file, line = int(visits.place.file[visit]), int(lines[visit])
-        edits[file].append(splitter.approach(file, line, numbers, config))
-    edits = [sorted(own, key=lambda edit: edit.span) for own in edits]
+    visits = reading.visits
+    edits = _edits(reading, lines_in_files(reading, cell), put, splitter)
     sources = [
         Source(source.name, apply(source.data, own))
         for source, own in zip(reading.sources, edits, strict=True)
@@ -82,8 +98,7 @@ def insert(
     again = read_program({s.name: s.data for s in sources}, cell)
     found = _find_inserted(again.visits, sources, edits)
     new = points_on_ways(again.visits, sources, found)
-    count = sum(map(len, points.values())) + len(approaches)
-    _prove(reading.visits, again.visits, found, new, count)
+    _prove(visits, again.visits, found, new, put.count)
     cloned = tuple(
         tuple(compose(one, own))
         for one, own in zip(reading.cloned or [()] * len(edits), edits, strict=True)
@@ -91,59 +106,45 @@ def insert(
     given = reading.given or reading.sources
     with_points = replace(again, cloned=cloned, given=given, missed=reading.missed)
     own = np.flatnonzero(~new)
-    aims = _aims(visits, again.visits.motion.via, own, points, stops, meant)
+    aims = _aims(visits, again.visits.motion.via, own, put)
     told = replace(with_points, diagnostics=reading.diagnostics, aims=aims)
     return told, own
 
 
 def _edits(
-    reading: ParsedProgram,
-    points: Points,
-    stops: Mapping[int, BacklashPreload],
-    splitter: Splitter,
-    cell: Cell,
-    chords: Chords,
-    meant: Mapping[int, MeantSides],
-    joints: JointsAlong | None,
+    reading: ParsedProgram, lines: Ints, put: PathPoints, splitter: Splitter
 ) -> list[list[Edit]]:
-    """Write the points, file by file."""
-    visits, found = reading.visits, defaultdict[int, list[Edit]](list)
-    lines = lines_in_files(reading, cell)
-    for visit in sorted(points):
+    """Write the points, and the stops before targets, file by file in their order."""
+    visits, found = reading.visits, [list[Edit]() for _ in reading.sources]
+    for visit in sorted({*put.points, *put.approaches}):
         config = visits.target.configs[visits.target.config[visit]]
         file, line = int(visits.place.file[visit]), int(lines[visit])
+        stops = visit in put.stops
+        if visit in put.approaches:
+            numbers = put.approaches[visit]
+            found[file].append(splitter.approach(file, line, numbers, config))
+        if visit not in put.points:
+            continue
         if visits.motion.via[visit]:
-            turns = {v: _turns(v, points, stops, meant) for v in (visit, visit + 1)}
-            arc = CutArc.of(visits, points, visit, chords, turns, joints)
+            turns = {v: put.turns(v) for v in (visit, visit + 1)}
+            arc = CutArc.of(visits, put.points, visit, put.chords, turns, put.joints)
             pieces, via = arc.pieces()
-            found[file] += splitter.arc(file, line, pieces, via, config, visit in stops)
+            found[file] += splitter.arc(file, line, pieces, via, config, stops)
         elif not is_arc(visits, visit):
-            share = np.array(points[visit])
-            numbers = between(visits, visit, share)
-            if joints is not None:
-                numbers = visits.dialect.count_flags(numbers, joints(visit, share))
-            tool = visits.dialect.poses(numbers)[:, :3, :3]
-            axis = np.einsum("kij,kj->ki", tool, _turns(visit, points, stops, meant))
-            numbers = visits.dialect.rotate(numbers, rotation_from_vector(axis))
-            found[file].append(
-                splitter.points(file, line, numbers, config, visit in stops)
-            )
-    return [found[k] for k in range(len(reading.sources))]
+            numbers = _points_of_line(visits, visit, put)
+            found[file].append(splitter.points(file, line, numbers, config, stops))
+    return [sorted(own, key=lambda edit: edit.span) for own in found]
 
 
-def _turns(
-    visit: int,
-    points: Points,
-    stops: Mapping[int, BacklashPreload],
-    meant: Mapping[int, MeantSides],
-) -> Floats:
-    """Return what the tool turns by at the points of a move, (k, 3) [rad]."""
-    found = np.zeros((len(points.get(visit, ())), 3))
-    if visit in meant:
-        found[:] = meant[visit].turn
-    if visit in stops:
-        found[0] = stops[visit].turn
-    return found
+def _points_of_line(visits: Visits, visit: int, put: PathPoints) -> Floats:
+    """Write the numbers of the points on a line, turned as they are to be, (k, w)."""
+    share = np.array(put.points[visit])
+    numbers = between(visits, visit, share)
+    if put.joints is not None:
+        numbers = visits.dialect.count_flags(numbers, put.joints(visit, share))
+    tool = visits.dialect.poses(numbers)[:, :3, :3]
+    axis = np.einsum("kij,kj->ki", tool, put.turns(visit))
+    return visits.dialect.rotate(numbers, rotation_from_vector(axis))
 
 
 def lines_in_files(reading: ParsedProgram, cell: Cell) -> Ints:
@@ -176,25 +177,18 @@ def between(visits: Visits, visit: int, share: Floats) -> Floats:
     return visits.dialect.rotate(out, rotation_from_vector(share[:, None] * axis))
 
 
-def _aims(
-    visits: Visits,
-    via: Bools,
-    own: Ints,
-    points: Points,
-    stops: Mapping[int, BacklashPreload],
-    meant: Mapping[int, MeantSides],
-) -> Floats:
+def _aims(visits: Visits, via: Bools, own: Ints, put: PathPoints) -> Floats:
     """Tell from which sides m visits are meant to be reached, (m, 6), NaN: any."""
     out = np.full((len(via), 6), np.nan)
-    for visit, sides in meant.items():
+    for visit, sides in put.meant.items():
         rows = np.arange(own[visit - 1] + 1 if visit else 0, own[visit] + 1)
-        ends = rows[~via[rows]][: len(points[visit])]
+        ends = rows[~via[rows]][: len(put.points[visit])]
         out[ends] = sides.side[: len(ends)]
         piece = np.cumsum(~via[rows])[via[rows]]
         out[rows[via[rows]]] = sides.between[piece]
-    for visit, taken in stops.items():
+    for visit, taken in put.stops.items():
         arc = bool(visits.motion.via[visit])
-        first = own[visit - 1] + 1 if arc else own[visit] - len(points[visit])
+        first = own[visit - 1] + 1 if arc else own[visit] - len(put.points[visit])
         out[first] = taken.side
     return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -91,6 +92,7 @@ class Points:
         used: What of it has been asked for, by everybody who wants to know that.
         places: Places of all points in it, and maybe of others.
         routines: File, module and routine of these.
+        alike: Tells whether two assignments gave the same to a point.
     """
 
     held: SharedMap[Key, AssignedPoint] = field(default_factory=SharedMap, hash=False)
@@ -98,6 +100,9 @@ class Points:
     places: SharedMap[Place, bool] = field(default_factory=SharedMap, compare=False)
     routines: frozenset[tuple[int, str, str]] = field(
         default=frozenset(), compare=False
+    )
+    alike: Callable[[AssignedPoint, AssignedPoint], bool] = field(
+        default=operator.eq, compare=False
     )
 
     def watch(self) -> Points:
@@ -129,7 +134,11 @@ class Points:
             places = places.copy()
             places[point.place] = True
             routines |= {point.place[:3]}
-        return Points(held, self.used, places, routines)
+        return Points(held, self.used, places, routines, self.alike)
+
+    def forget_shared(self) -> Points:
+        """Return it with what routines declare alone: nothing else knows that."""
+        return self._without(lambda key: not key[0][2])
 
     def forget(self, place: Place) -> Points:
         """Return it without any element of an array, or without a point."""
@@ -147,13 +156,17 @@ class Points:
         """Keep what is the same on another way here."""
         lost = [
             key for key in self.held.differing(other.held)
-            if (mine := self.held.get(key)) and mine != other.held.get(key)
+            if (mine := self.held.get(key)) and not other._holds(mine)
         ]  # fmt: skip
         return self._drop(lost)
 
     def agree(self, given: Iterable[AssignedPoint]) -> bool:
         """Return True if points hold what is given."""
-        return all(self.held.get(point.key) == point for point in given)
+        return all(map(self._holds, given))
+
+    def _holds(self, given: AssignedPoint) -> bool:
+        held = self.held.get(given.key)
+        return held == given or (held is not None and self.alike(held, given))
 
     def _without(self, lost: Callable[[Key], bool]) -> Points:
         return self._drop([key for key in self.held if lost(key)])

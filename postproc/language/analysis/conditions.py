@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from postproc.arrays import Bools, Floats, Indices, Interned, Ints, is_one_value, slim
+from postproc.language.shifts import Pose, flat
 from postproc.language.visits import (
     Blend,
     FrameColumns,
@@ -23,15 +24,7 @@ from postproc.language.visits import (
 )
 from postproc.robot.pose import pose_from_record
 
-Pose = tuple[float, ...]
-"""The rows of a pose (4, 4) [m] one after the other, empty where it is not known."""
-IDENTITY: Pose = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)
 NO_LOAD: tuple[float, ...] = (math.nan,) * 4  # one object: NaN differs from itself
-
-
-def flat(pose: Floats) -> Pose:
-    """Write the rows of a pose, (4, 4) [m], one after the other."""
-    return tuple(pose.ravel().tolist())
 
 
 def compose_poses(first: Pose, second: Pose) -> Pose:

@@ -137,13 +137,18 @@ class FlowReader:
         elif word in CLOSING:
             self._close(row, word)
         elif ir.divides(one):
-            self._divide(row, word)
+            around = self._open[-1:]
+            if around and around[0][1] in _DIVIDED_BY.get(word, ("test",)):
+                self._divisions[around[0][0]].append(row)
+            else:
+                self._refuse(row, word)
         elif word == CYCLE:
             self._cycle = row
         elif isinstance(one, ir.JumpTo):
             self._jumps.append((row, one.name))
         elif one == ir.Leave(EXIT):
-            self._exit(row)
+            loops = [head for head, word in self._open if word in LOOPS]
+            self._exits |= {row: loops[-1]} if loops else {}
 
     def _take_behind(self, row: int, one: ir.SourceStatement) -> None:
         """Read what stands behind a statement on its line."""
@@ -166,20 +171,6 @@ class FlowReader:
             self._end[part] = row
         self._head[row] = head
 
-    def _divide(self, row: int, word: str) -> None:
-        """Divide the innermost block: ELSE, CASE."""
-        if self._open and self._open[-1][1] in _DIVIDED_BY.get(word, ("test",)):
-            self._divisions[self._open[-1][0]].append(row)
-        else:
-            self._refuse(row, word)
-
-    def _exit(self, row: int) -> None:
-        """Leave the innermost loop."""
-        around = (head for head, word in reversed(self._open) if word in LOOPS)
-        head = next(around, -1)
-        if head >= 0:
-            self._exits[row] = head
-
     def _refuse(self, row: int, word: str) -> None:
         text = f"this {self.spell(word)} closes or divides no block"
         if self._open:
@@ -199,22 +190,18 @@ class FlowReader:
             if label not in self._labels
         ]
         heads = {head: end for end, head in self._head.items()}
-        of = self._words
+        of, cycle = self._words, {self._cycle} - {-1}
+        behind = {end + 1 for head, end in heads.items() if of[head] != "if"}
+        joins = {*self._labels.values(), *heads, *self._head, *behind, *cycle}
         return ControlFlow(
             first, last, handlers, self._end, self._head,
             {row: tuple(parts) for row, parts in self._divisions.items()},
-            self._labels, self._joins(heads),
+            self._labels, frozenset(joins),
             {head: end for head, end in heads.items() if of[head] == "for"},
             self._exits,
             tuple(sorted((h, e) for h, e in heads.items() if of[h] == "condition")),
             self._cycle, (*self.problems, *never, *lost),
         )  # fmt: skip
-
-    def _joins(self, heads: Mapping[int, int]) -> frozenset[int]:
-        """Return the rows that several ways lead to."""
-        behind = {e + 1 for h, e in heads.items() if self._words[h] not in ("if",)}
-        cycle = {self._cycle} - {-1}
-        return frozenset({*self._labels.values(), *heads, *self._head, *behind, *cycle})
 
 
 def flow_of(

@@ -7,7 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis.assigned_points import AssignedPoint, Scope
@@ -226,7 +226,6 @@ class FoundVisit:
             where they go: this one is the first.
         agreed: The points that it names hold the same on every way here.
         taken: What assignments gave to the frames and other data that it names.
-        kept: These hold the same on every way here.
     """
 
     scope: Scope
@@ -243,10 +242,9 @@ class FoundVisit:
     count: int = 1
     agreed: bool = True
     taken: frozenset[AssignedPoint] = frozenset()
-    kept: bool = True
 
-    def forget_conditions(self) -> None:
-        """Forget what it is carried out with, where that differs on the ways here."""
+    def meet(self, other: Self) -> None:
+        """Forget what it is carried out with otherwise on another way here."""
 
 
 def whole_name(name: str) -> str:

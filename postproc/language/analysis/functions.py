@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import operator
+from collections.abc import Callable, Mapping, Sequence
 
 ALIKE = frozenset("abs sqrt sin cos tan".split())  # the same in all languages
 FUNCTIONS = ALIKE | {"round", "trunc"}
@@ -30,13 +31,17 @@ def apply_function(name: str, x: float) -> float:
     return abs(x) if name == "abs" else float(math.trunc(x))
 
 
-def apply_operator(operator: str, parts: Sequence[float]) -> float:
-    """Compute what an operator gives, NaN where that is no number.
+def apply_operator(sign: str, parts: Sequence[float]) -> float:
+    """Compute what an operator gives, NaN where that is no number; truth is 0 or 1.
 
     >>> apply_operator("-", [5.0]), apply_operator("*", [2.0, 4.0])
     (-5.0, 8.0)
+    >>> apply_operator("<", [2.0, 4.0]), apply_operator("AND", [0.0, math.nan])
+    (1.0, 0.0)
     """
-    match operator, parts:
+    if sign in COMPARISONS and len(parts) == 2:
+        return _compare(sign, *parts)
+    match sign, parts:
         case "-", [a]:
             return -a
         case "+", [a]:
@@ -49,4 +54,37 @@ def apply_operator(operator: str, parts: Sequence[float]) -> float:
             return a * b
         case "/", [a, b] if b:
             return a / b
+        case "NOT", [a]:
+            return 1.0 - a
+        case "INCR", [a]:
+            return a + 1.0
+        case "DECR", [a]:
+            return a - 1.0
+        case "CLEAR", [_]:
+            return 0.0
+        case "AND", [a, b]:
+            return 0.0 if 0.0 in parts else a * b
+        case "OR", [a, b]:
+            return 1.0 if 1.0 in parts else a + b
     return math.nan
+
+
+COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
+    "=": operator.eq,
+    "==": operator.eq,
+    "<>": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+CLOSE = 1e-5  # of numbers that controllers, which round otherwise, may take for equal
+
+
+def _compare(sign: str, a: float, b: float) -> float:
+    """Compare two numbers; NaN where they are so close that rounding decides."""
+    whole = a.is_integer() and b.is_integer()
+    close = abs(a - b) <= CLOSE * max(1.0, abs(a), abs(b))
+    if math.isnan(a + b) or (close and not whole):
+        return math.nan
+    return float(COMPARISONS[sign](a, b))

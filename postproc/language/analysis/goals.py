@@ -39,8 +39,6 @@ class ReadShift:
 
     Attributes:
         by: What by, None where that is not known.
-        values: Numbers of the shifted point, (w,).
-        turns: It turns the point, too.
         file, slots: Where its numbers stand, w as of a target; -1 where they stay.
         own: File and first number of a shift that stands in the move itself.
         aux: External axes of the shifted point, None where they are those of the point.
@@ -48,8 +46,6 @@ class ReadShift:
     """
 
     by: Shift | None = None
-    values: tuple[float, ...] = ()
-    turns: bool = False
     file: int = -1
     slots: tuple[int, ...] = (-1,)
     own: frozenset[tuple[int, int]] = frozenset()
@@ -168,7 +164,7 @@ class GoalReader(ABC):
         if found.shift is None:
             return replace(found, pins=pins)
         held = found.shift.shift  # its numbers stay
-        turned = "it is shifted and turned" if any(held.numbers[3:]) else ""
+        turned = "it is shifted and turned" if held.turns else ""
         return replace(found, shift=FoundShift(held), pins=found.pins or turned)
 
     def _read_returned(self, call: ir.FunctionCall) -> FoundGoal:
@@ -243,7 +239,10 @@ class GoalReader(ABC):
         goal = self.unknown(AT_RUN_TIME)
         if held.operand is not None:
             goal = there.goal(held.operand)
-        why = [self._explain_chain(place, goal) for place in held.chain]
+        why = []
+        for place in held.chain:
+            where = self.at(self.row, Scope(*place[:3]))
+            why.append(where.explain_pinned(place[-1], goal.file))
         why += self.explain_kept(held)
         pins = next(filter(None, (goal.pins, *why)), "")
         if held.components:
@@ -254,9 +253,6 @@ class GoalReader(ABC):
         if shift is not None:
             shift = replace(shift, pins=shift.pins or pins)
         return replace(goal, name=name, pins=pins, shift=shift)
-
-    def _explain_chain(self, place: tuple[int, str, str, str], goal: FoundGoal) -> str:
-        return self.at(self.row, Scope(*place[:3])).explain_pinned(place[-1], goal.file)
 
     def _set_components(
         self, held: AssignedPoint, base: FoundGoal, name: str, pins: str
@@ -295,10 +291,11 @@ class GoalReader(ABC):
                 stays=base.stays, holds=holds,
             )  # fmt: skip
         aux = base.aux if by.aux is None else by.aux
+        values = by.by.apply(self.dialect)
         if base.stays:
             why, kept = base.why or COMPUTED, replace(base, holds=holds)
             return hold_numbers(
-                kept, base.name, why, base.pins, base.target, by.values, aux
+                kept, base.name, why, base.pins, base.target, values, aux
             )
         found = FoundShift(by.by)
         if base.shift is not None:
@@ -307,9 +304,9 @@ class GoalReader(ABC):
             pins = self.system if self.task.files[by.file].is_system else ""
             found = FoundShift(found.shift, by.file, by.slots, pins)
         fixed = found.slots[0] < 0
-        pins = base.pins or (by.turned if by.turns and fixed else "")
+        pins = base.pins or (by.turned if by.by.turns and fixed else "")
         return FoundGoal(
-            Meaning.POSE, by.values, base.file, (-1,) * len(by.values), base.origin,
+            Meaning.POSE, values, base.file, (-1,) * len(values), base.origin,
             base.name, aux, base.why, pins, base.shared, found,
             holds=holds if fixed else base.holds,
         )  # fmt: skip

@@ -134,23 +134,68 @@ class Interpreter(ABC, Generic[S]):
         """Allow for what a statement does besides leading elsewhere."""
         return state
 
+    @abstractmethod
+    def evaluate(
+        self, context: Context, row: int, operand: ir.Operand | None, state: S
+    ) -> float | str | None:
+        """Return what decides a way, None where only the run tells; truth is 0 or 1."""
+
     def truth(
         self, context: Context, row: int, condition: ir.Operand, state: S
     ) -> bool | None:
         """Tell whether a condition holds, None where only the run tells."""
-        return None
+        found = self.evaluate(context, row, condition, state)
+        return bool(found) if isinstance(found, float | bool) else None
 
     def fits(
         self, context: Context, row: int, case: ir.Branch, head: int, state: S
     ) -> bool | None:
         """Tell whether a case means what its block tests, None where it may."""
-        return None
+        tested = self.selector(context.place.statement(head))
+        value = self.evaluate(context, head, tested, state)
+        found: bool | None = not case.values and None
+        for choice in case.values:
+            low, high = choice, choice
+            if isinstance(choice, ir.Interval):
+                low, high = choice.low, choice.high
+            a, b = (self.evaluate(context, row, one, state) for one in (low, high))
+            known = type(a) is type(b) is type(value) and isinstance(value, float | str)
+            if not known:
+                found = None
+            elif a <= value <= b:  # type: ignore[operator]
+                return True
+        return found
 
-    @abstractmethod
+    def selector(self, head: ir.SourceStatement) -> ir.Operand | None:
+        """Return what a block of cases tests."""
+        return head.values[0] if isinstance(head, ir.Branch) and head.values else None
+
+    def loop_limit(
+        self, context: Context, row: int, operand: ir.Operand | None, state: S
+    ) -> float | str | None:
+        """Return a bound of a loop, None where it is not known."""
+        return self.evaluate(context, row, operand, state)
+
     def count(
         self, context: Context, row: int, loop: ir.ForLoop, state: S
     ) -> Counting | None:
         """Return the rounds of a loop, None where they are not known."""
+        first, last, step = (
+            self.loop_limit(context, row, one, state)
+            for one in (loop.first, loop.last, loop.step)
+        )
+        if not (isinstance(first, float) and isinstance(last, float)):
+            return None
+        if loop.step is None:
+            step = self.usual_step(first, last)
+        if not isinstance(step, float):
+            return None
+        return Counting.of(first, last, -step if loop.down and step > 0 else step)
+
+    @staticmethod
+    def usual_step(first: float, last: float) -> float:
+        """Return what a loop counts by where it does not say so."""
+        return 1.0
 
     def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
         """Tell whether nothing but a loop itself changes its variable."""
@@ -236,7 +281,7 @@ class Interpreter(ABC, Generic[S]):
                 if row != start:
                     self.go_on(context, row, state)
                     return
-                one = _then(one)
+                one = getattr(one, "then", None) or ir.SourceStatement()
             after = self.run_one(context, row, one, state)
             if after is None:
                 return
@@ -310,21 +355,16 @@ class Interpreter(ABC, Generic[S]):
         for at in flow.divisions_behind(row):
             one = place.statement(at)
             state = self.before(context, at, one, state)
-            fits = self._fits(context, at, one, row, state)
+            fits: bool | None = True
+            if isinstance(one, ir.Branch) and one.word == "elseif":
+                fits = self.truth(context, at, one.values[0], state)
+            elif isinstance(one, ir.Branch) and one.word != "default":
+                fits = self.fits(context, at, one, row, state)
             if fits is not False:
                 self.enter(context, at, state)
             if fits is True:
                 return
         self.enter(context, flow.end.get(row, flow.last), state)
-
-    def _fits(
-        self, context: Context, row: int, one: ir.SourceStatement, head: int, state: S
-    ) -> bool | None:
-        if not isinstance(one, ir.Branch) or one.word == "default":
-            return True
-        if one.word == "elseif":
-            return self.truth(context, row, one.values[0], state)
-        return self.fits(context, row, one, head, state)
 
     def _jump(
         self, context: Context, row: int, to: int | None, one: ir.SourceStatement,
@@ -394,7 +434,9 @@ class Interpreter(ABC, Generic[S]):
         """Go into the next round, out of the loop, or both where that is not known."""
         place = context.place
         head = place.flow.head[row]
-        loop = _loop_at(place.statement(head))
+        loop = place.statement(head)
+        loop = loop.then if isinstance(loop, ir.LabelMark) else loop
+        assert isinstance(loop, ir.ForLoop)
         if context.is_round and context.at == place.offset + head:
             outer, number = context.outer, context.kind + 1
             if number < self.counted[outer, head].rounds:
@@ -444,16 +486,3 @@ def _rounds_of(context: Context, row: int) -> Context:
             break
         context = context.outer
     return context
-
-
-def _then(one: ir.SourceStatement) -> ir.SourceStatement:
-    """Return what follows a division of a block on its line."""
-    return getattr(one, "then", None) or ir.SourceStatement()
-
-
-def _loop_at(one: ir.SourceStatement) -> ir.ForLoop:
-    """Return the loop that begins at a row."""
-    if isinstance(one, ir.LabelMark):
-        one = one.then or one
-    assert isinstance(one, ir.ForLoop)
-    return one

@@ -42,7 +42,8 @@ def find_runs(
         places = places_of(text.statement(first))
         if places is None:
             continue
-        numbers = _numbers(text, first, behind)
+        start, end = int(text.first[first]), int(text.first[behind])
+        numbers = text.value[start:end].reshape(behind - first, -1)
         others = np.delete(numbers, places, axis=1)
         own = plain(numbers[:, places])
         same = own[1:] & own[:-1] & (others[1:] == others[:-1]).all(axis=1)
@@ -71,12 +72,6 @@ def _alike(
     long = np.flatnonzero(np.diff(at) >= LEAST)
     for k in long.tolist():
         yield flow.first + int(at[k]), flow.first + int(at[k + 1])
-
-
-def _numbers(text: StatementText[Any], first: int, behind: int) -> Floats:
-    """Return the numbers of statements of one shape, a row each."""
-    start, end = int(text.first[first]), int(text.first[behind])
-    return text.value[start:end].reshape(behind - first, -1)
 
 
 def rows_of_lines(text: StatementText[Any], lines: Collection[int]) -> set[int]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, Generic, TypeVar
+
+import numpy as np
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import (
@@ -30,11 +32,13 @@ from postproc.language.analysis.values import (
     Layout,
     Value,
     WrittenNumber,
+    is_written,
     number_in,
     put_together,
     spell_components,
     step_into,
     take_apart,
+    without_places,
 )
 from postproc.language.text.comment_directives import Comments
 
@@ -54,11 +58,13 @@ class TaskSymbols(ABC, Generic[F]):
         comments: How the language writes them.
         layouts: Components of data by type.
         followed: Types of data whose assignments are followed.
+        targets: Those of them whose numbers a move may have written anew.
         constants: Names that the language gives values to.
         functions: Kinds of routines that return values.
         by_name: Records hold their components by name, not by their order.
         divides: ``a / b`` is known, whatever kind of numbers they are.
         apart: Data may be declared in one place and get their first value elsewhere.
+        volatile: Names of data that may change at any time, by what runs beside.
     """
 
     files: Sequence[F]
@@ -66,11 +72,13 @@ class TaskSymbols(ABC, Generic[F]):
     comments: ClassVar[Comments]
     layouts: ClassVar[Mapping[str, Layout]]
     followed: ClassVar[Collection[str]]
+    targets: ClassVar[Collection[str]]
     constants: ClassVar[Mapping[str, float]] = {}
     functions: ClassVar[str]
     by_name: ClassVar[bool] = False
     divides: ClassVar[bool] = True
     apart: ClassVar[bool] = False
+    volatile: frozenset[str] = field(default=frozenset(), init=False)
     _own: dict[Place, dict[tuple[int, ...], tuple[int, Datum]]] = field(
         default_factory=lambda: defaultdict(dict), init=False
     )
@@ -88,8 +96,16 @@ class TaskSymbols(ABC, Generic[F]):
     def __post_init__(self) -> None:
         """Index data by the scopes that declare them."""
         for number, file in enumerate(self.files):
-            for datum in file.data:
+            for datum in (*file.data, *self._list_parameters(file)):
                 self._declare(number, datum)
+
+    def _list_parameters(self, file: F) -> Iterator[Datum]:
+        """Yield the parameters of routines that are data of their own."""
+        for rows in file.routines:
+            module, name = file.module_of(rows), rows.head.name
+            for one in rows.head.parameters:
+                if one.type and not one.by_reference:
+                    yield Datum(one.name, one.type, rows.first, module, name)
 
     def _declare(self, number: int, datum: Datum) -> None:
         place = self.unit(number), datum.module, datum.routine, datum.name
@@ -123,8 +139,8 @@ class TaskSymbols(ABC, Generic[F]):
         """Return True if what data are given is there when the task runs again."""
 
     def is_followed(self, name: str, datum: Datum, here: Scope) -> bool:
-        """Return True if nothing but assignments changes data."""
-        return name not in self.uses.changed
+        """Return True if nothing but assignments on the way changes data."""
+        return not (name in self.uses.changed or name in self.volatile)
 
     def fits(self, type_: str, component: str, value: float) -> bool:
         """Return True if data, or a component, hold a number as it is given."""
@@ -170,6 +186,11 @@ class TaskSymbols(ABC, Generic[F]):
         uses.changed |= self.odd_words
         uses.read |= self.odd_words
 
+    @property
+    def calls_by_text(self) -> bool:
+        """Whether routines are called whose names only the run tells."""
+        return False
+
     # Names.
 
     @cached_property
@@ -205,8 +226,12 @@ class TaskSymbols(ABC, Generic[F]):
 
     def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
         """Return where the statements of a routine stand."""
-        given = frozenset(one.name for one in routine.head.parameters)
-        return Scope(file, module, routine.head.name, given)
+        place = self.unit(file), module, routine.head.name
+        named = frozenset(
+            one.name for one in routine.head.parameters
+            if one.by_reference or (*place, one.name) not in self._own
+        )  # fmt: skip
+        return Scope(file, module, routine.head.name, named)
 
     def scope_of_datum(self, file: int, datum: Datum) -> Scope:
         """Return where data are declared."""
@@ -261,8 +286,8 @@ class TaskSymbols(ABC, Generic[F]):
     def uses(self) -> NamesUsed:
         """The names that statements change and take."""
         uses = self.new_uses()
-        for file in (one for one in self.files if not one.is_submit):
-            for one in file.text.said:
+        for number, file in enumerate(self.files):
+            for one in () if file.is_submit else self._list_live(number):
                 self.note_in(uses, file, one)
         self.note_odd(uses)
         data = [datum for file in self.files for datum in file.data]
@@ -273,6 +298,37 @@ class TaskSymbols(ABC, Generic[F]):
         uses.read |= {one for target, one in uses.copies if target not in alone}
         uses.pass_on()
         return uses
+
+    def _list_live(self, number: int) -> Iterable[ir.SourceStatement]:
+        """Return what the statements of a file say, but for routines that are dead."""
+        text, live = self.files[number].text, None
+        for routine in self.routines_by_file[number] if self.dead else ():
+            if routine.key in self.dead:
+                live = np.ones(len(text), bool) if live is None else live
+                live[routine.inside.start : routine.inside.stop] = False
+        if live is None:
+            return text.said
+        return [text.said[k] for k in np.unique(text.shape[live]).tolist()]
+
+    @cached_property
+    def dead(self) -> frozenset[tuple[int, int]]:
+        """Keys of routines that nothing calls, and that nothing else may call.
+
+        One that other files know counts as if it were called: by a program that is not
+        at hand, or by the operator.
+        """
+        every = (one for own in self.routines.values() for one in own)
+        local = [one for one in every if one.rows.head.local]
+        if not local or self.calls_by_text:
+            return frozenset()
+        calls, found = ir.Instruction | ir.FunctionCall, set(self.odd_words)
+        for file in self.files:
+            parts = ir.walk(*file.text.said)
+            found |= {one.name for one in parts if isinstance(one, calls)}
+        return frozenset(
+            one.key for one in local
+            if one.rows.head.name not in found and one.rows.head.kind != "trap"
+        )  # fmt: skip
 
     @cached_property
     def written(self) -> frozenset[str]:
@@ -311,7 +367,8 @@ class TaskSymbols(ABC, Generic[F]):
     ) -> Scope | None:  # fmt: skip
         """Return where the statements of a routine stand, and what it is called with.
 
-        A parameter that something may change has no value that is known.
+        That are parameters that stand for other data, and those that hold what never
+        changes; `hand_over` gives the others their values.
 
         Args:
             routine: The routine.
@@ -328,9 +385,42 @@ class TaskSymbols(ABC, Generic[F]):
         given = tuple(
             (parameter.name, argument.value, row, there)
             for parameter, argument in pairs
-            if argument.value is not None and parameter.name not in self.written
+            if argument.value is not None
+            and (parameter.by_reference or self._is_fixed(parameter, argument.value))
         )
         return replace(self.scope_of(*routine), given=given)
+
+    def _is_fixed(self, parameter: ir.RoutineParameter, value: ir.Operand) -> bool:
+        """Return True if a parameter is a copy of what never changes, nor does it."""
+        changing = self.written | self.volatile
+        return changing.isdisjoint(self.names_of(value) | {parameter.name})
+
+    def hand_over(
+        self, points: Points, routine: TaskRoutine,
+        call: ir.Instruction | ir.FunctionCall, row: int, there: Scope,
+    ) -> Points:  # fmt: skip
+        """Return what points hold where a routine begins that gets copies.
+
+        Args:
+            points: What they hold there without them.
+            routine: The routine.
+            call: The call.
+            row: Its row.
+            there: Where it stands.
+        """
+        pairs = match_arguments(routine.rows.head.parameters, call.arguments) or ()
+        here = self.scope_of(*routine)
+        for parameter, argument in pairs:
+            if parameter.by_reference or argument.value is None:
+                continue
+            part = self.locate(ir.DataObject(parameter.name), routine.rows.first, here)
+            if part is None or part.index is None or argument.passed_on:
+                continue
+            if not self._is_fixed(parameter, argument.value):
+                watched = replace(there, points=there.points.watch())
+                given = self._give_value(part, (), argument.value, row, watched)
+                points = points.give(given)
+        return points
 
     def behind(
         self, operand: ir.Operand | None, row: int, here: Scope
@@ -361,14 +451,65 @@ class TaskSymbols(ABC, Generic[F]):
             given = next(found, None)
             if given is None:
                 return
-            yield given
-            _, operand, _, here = given
+            name, operand, row, there = given
+            here = replace(there, points=here.points)
+            yield name, operand, row, here
 
     # Values.
 
     def number(self, operand: ir.Operand | None, row: int, here: Scope) -> float:
         """Evaluate a number, NaN where it is not known before the program runs."""
         return number_in(self.value(operand, row, here))
+
+    def decide(
+        self, operand: ir.Operand | None, row: int, here: Scope
+    ) -> float | str | None:
+        """Evaluate what decides a way, None where more than the program decides it.
+
+        It is written as a number, or the program has given its data values on the way.
+        """
+        if isinstance(operand, ir.Operation) and operand.operator in ("AND", "OR"):
+            parts = [self.decide(one, row, here) for one in operand.operands]
+            numbers = [one if isinstance(one, float) else math.nan for one in parts]
+            truth = apply_operator(operand.operator, numbers)
+            return None if math.isnan(truth) else truth
+        names = frozenset() if operand is None else self.names_of(operand)
+        given = [self._is_given(name, row, here) for name in names]
+        if names and (None in given or not any(given)):
+            return None
+        found = self.value(operand, row, here)
+        if isinstance(found, WrittenNumber):
+            return found.value
+        return found if isinstance(found, str) else None
+
+    def _is_given(self, name: str, row: int, here: Scope) -> bool | None:
+        """Tell whether a program gives data a value on the way; None: more than it."""
+        if name in dict(here.loops):
+            return True
+        if self.find_held(ir.DataObject(name), row, here) is not None:
+            return True
+        for _, operand, at, there in self.find_given(ir.DataObject(name), here):
+            inner = [self._is_given(one, at, there) for one in self.names_of(operand)]
+            return None if None in inner else True
+        if name in self.routines:
+            return True if self._is_closed(name, here) else None
+        place = self.place(name, here)
+        found = self.datum(name, here)
+        if found is None:
+            fixed = name in ALIKE or name in self.constants
+            return False if place is None and fixed else None
+        return False if found[1].kind == "const" else None
+
+    def _is_closed(self, name: str, here: Scope) -> bool:
+        """Return True if a function names nothing but data of its own."""
+        found = self.routine(name, here)
+        if found is None:
+            return False
+        scope, text = self.scope_of(*found), self.files[found.file].text
+        said = [text.statement(row) for row in found.inside]
+        parts = [one for one in ir.walk(*said) if isinstance(one, ir.DataObject)]
+        places = (self.place(one.name, scope) for one in parts)
+        return all(place is not None and place[2] for place in places)
 
     def value(
         self, operand: ir.Operand | None, row: int, here: Scope, depth: int = 0
@@ -410,11 +551,7 @@ class TaskSymbols(ABC, Generic[F]):
         name, steps, loops = data.name, data.steps, dict(here.loops)
         if name in loops:
             return None if steps else WrittenNumber(loops[name])
-        if name in here.parameters:
-            given = next((one[1:] for one in here.given if one[0] == name), None)
-            value, type_ = given and self.value(*given, depth + 1), ""
-        else:
-            value, steps, type_ = self._evaluate_named(data, row, here, depth + 1)
+        value, steps, type_ = self._evaluate_named(data, row, here, depth + 1)
         layout = self.layouts.get(type_, {})
         for step in steps:
             into = step if isinstance(step, str) else self.index(step, row, here)
@@ -432,6 +569,8 @@ class TaskSymbols(ABC, Generic[F]):
         if held is not None:
             value = self.evaluate_held(held, depth)
             return value, steps[count:], self.type_of(held.place)
+        for _, operand, at, there in self.find_given(ir.DataObject(name), here):
+            return self.value(operand, at, there, depth + 1), steps, ""
         if not steps and self.place(name, here) is None and name in self.constants:
             return WrittenNumber(self.constants[name]), steps, ""
         found = None
@@ -465,12 +604,17 @@ class TaskSymbols(ABC, Generic[F]):
 
     def locate(self, data: ir.DataObject, row: int, here: Scope) -> PointPart | None:
         """Find the point that only assignments change, None for all other data."""
-        place = self.place(data.name, here)
-        found = None if place is None else self.datum(data.name, here)
+        name, there = data.name, here
+        for _, operand, _, outer in self.find_given(ir.DataObject(name), here):
+            if not isinstance(operand, ir.DataObject) or operand.steps:
+                return None
+            name, there = operand.name, outer
+        place = self.place(name, there)
+        found = None if place is None else self.datum(name, there)
         if place is None or found is None or found[1].type not in self.followed:
             return None
         file, datum = found
-        if not self.is_followed(data.name, datum, here):
+        if not self.is_followed(name, datum, there):
             return None
         steps = data.steps
         index: tuple[int, ...] | None = ()
@@ -543,6 +687,23 @@ class TaskSymbols(ABC, Generic[F]):
             return KnownRecord(tuple(fields.items()), known)
         return put_together(fields, layout) if len(fields) >= len(names) else None
 
+    def are_alike(self, one: AssignedPoint, other: AssignedPoint) -> bool:
+        """Tell whether two assignments gave the same to data.
+
+        To points they give the same numbers of the text: those may be written anew.
+        """
+        if self.type_of(one.place) not in self.targets:
+            mine, theirs = map(without_places, map(self.evaluate_held, (one, other)))
+            return mine is not None and mine == theirs
+        if (one.copied, one.operand is None) != (other.copied, other.operand is None):
+            return False
+        parts = [[(c.name, c.value) for c in p.components] for p in (one, other)]
+        if parts[0] != parts[1] or any(value is None for _, value in parts[0]):
+            return False
+        bases = (self.evaluate_held(replace(p, components=())) for p in (one, other))
+        mine, theirs = bases
+        return mine == theirs and (mine is None or is_written(mine))
+
     def names_of(self, operand: ir.Operand) -> frozenset[str]:
         """Return the names of all data and functions in an operand."""
         key = id(operand)
@@ -595,7 +756,7 @@ class TaskSymbols(ABC, Generic[F]):
         plain = replace(here, points=NO_POINTS)
         known = self.find_held(value, row, here)
         if known is not None and not part.component:
-            copied = known.copied | {known.place}
+            copied = (known.copied | {known.place}) - {place}
             return replace(
                 known, place=place, index=index, copied=copied, names=known.names | own
             )
@@ -616,7 +777,7 @@ class TaskSymbols(ABC, Generic[F]):
         if base is None:
             point = AssignedPoint(place, source, row, plain, index)
         else:
-            copied = base.copied | {base.place}
+            copied = (base.copied | {base.place}) - {place}
             point = replace(base, place=place, index=index, copied=copied)
         return point.with_components(numbers, names)
 
@@ -635,9 +796,10 @@ class TaskSymbols(ABC, Generic[F]):
         found = self.routine(call.name, here)
         if found is None or found.rows.head.kind != self.functions:
             return None
-        scope, points = self.bind(found, call, row, here), here.points
+        scope = self.bind(found, call, row, here)
         if scope is None:
             return None
+        points = self.hand_over(here.points, found, call, row, here)
         own = self.unit(scope.file), scope.module, scope.routine
         for at in found.inside:
             one = self.files[found.file].text.statement(at)

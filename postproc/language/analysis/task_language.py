@@ -76,7 +76,7 @@ class TaskLanguage(Language):
 
     def skeleton(self, file: TaskFile) -> Skeleton:
         """Take over what statements tell, for comparing a text with another."""
-        return file.text.skeleton(lambda source: self.skeleton(self.read_file(source)))
+        return Skeleton.of(file.text, lambda one: self.skeleton(self.read_file(one)))
 
     def report(
         self, machine: TaskMachine, visits: Visits, files: Sequence[Any],

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Iterator,
+    Mapping,
+    Sequence,
+)
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import accumulate
 from typing import Any, ClassVar, TypeVar
@@ -31,7 +38,6 @@ from postproc.language.analysis.control_flow import (
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.interpreter import (
     NOT_UNROLLED,
-    Counting,
     Interpreter,
     calls_around,
 )
@@ -96,8 +102,8 @@ class Arrived:
         return self if both == self else both
 
     def forget(self) -> Arrived:
-        """Forget where the arm is, what moves are carried out with, and points."""
-        return Arrived(NOWHERE, self.modes.forget())
+        """Forget where the arm is, what moves are made with, and all shared data."""
+        return Arrived(NOWHERE, self.modes.forget(), self.points.forget_shared())
 
     def with_points(self, points: Points) -> Arrived:
         """Return it where points hold something else."""
@@ -156,6 +162,7 @@ class TaskMachine(Interpreter[Arrived]):
     )
     _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
     _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
+    _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
 
     # What a language says.
 
@@ -227,18 +234,9 @@ class TaskMachine(Interpreter[Arrived]):
         """Return rows that are read by themselves, None where all are."""
         return set()
 
-    def bind_arguments(
-        self, scope: Scope, routine: HeadedRows, caller: Context, row: int
-    ) -> Scope:
-        """Add what a routine is called with, as far as that is known.
-
-        Args:
-            scope: Where its statements stand.
-            routine: The routine.
-            caller: Where the call stands.
-            row: .. and its row.
-        """
-        return scope
+    def acting(self, one: ir.SourceStatement) -> ir.SourceStatement:
+        """Return what a statement does: what stands behind its condition, or itself."""
+        return one
 
     def part_otherwise(
         self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
@@ -264,7 +262,34 @@ class TaskMachine(Interpreter[Arrived]):
 
     def scopes_of(self, routine: TaskRoutine) -> Iterable[Scope]:
         """Yield where the statements of a routine stand, by all calls of it."""
+        return self._scopes_of(routine, frozenset())
+
+    def _scopes_of(
+        self, routine: TaskRoutine, seen: frozenset[tuple[int, int]]
+    ) -> Iterator[Scope]:
         yield self.task.scope_of(*routine)
+        head = routine.rows.head
+        if not head.parameters or routine.key in seen:
+            return
+        seen = seen | {routine.key}
+        for caller, row, call in self._calls_by_name[head.name]:
+            for there in self._scopes_of(caller, seen):
+                bound = self.task.bind(routine, call, row, there)
+                if bound is not None:
+                    yield bound
+
+    @cached_property
+    def _calls_by_name(
+        self,
+    ) -> Mapping[str, list[tuple[TaskRoutine, int, ir.Instruction]]]:
+        """Return all calls of routines of the task, and where they stand."""
+        found = defaultdict[str, list[tuple[TaskRoutine, int, ir.Instruction]]](list)
+        for routine in (one for own in self.task.routines.values() for one in own):
+            for row in routine.inside:
+                one = self.acting(self.texts[routine.file].statement(row))
+                if isinstance(one, ir.Instruction):
+                    found[one.name].append((routine, row, one))
+        return found
 
     def is_beside(self, one: Any) -> bool:
         """Return True if a statement runs otherwise than it is followed."""
@@ -327,28 +352,27 @@ class TaskMachine(Interpreter[Arrived]):
         file = context.place.scope.file
         self.say(file, row, Code.LOOP_NOT_UNROLLED, NOT_UNROLLED.format(rounds))
 
-    def truth(
-        self, context: Context, row: int, condition: ir.Operand, state: Arrived
-    ) -> bool | None:
-        """Tell that ``WHILE TRUE`` goes on for ever; all else only the run tells.
+    def evaluate(
+        self, context: Context, row: int, operand: ir.Operand | None, state: Arrived
+    ) -> float | str | None:
+        """Return what the program itself has decided before, and ``WHILE TRUE``.
 
-        What is switched off by a condition that never holds stays in the program as
-        if it ran: somebody may switch it on.
+        What is switched off by data that somebody may set, or by FALSE, stays in the
+        program as if it ran.
         """
         one = context.place.statement(row)
         endless = isinstance(one, ir.Branch) and one.word == "while"
-        return True if endless and condition == ir.DataObject("true") else None
+        if endless and operand == ir.DataObject("true"):
+            return True
+        here = replace(context.place.scope, points=state.points)
+        return self.task.decide(operand, row, here)
 
-    def count(
-        self, context: Context, row: int, loop: ir.ForLoop, state: Arrived
-    ) -> Counting | None:
-        """Return the rounds of a loop, None where they are not known."""
-        scope = context.place.scope
-        first, last = (self.task.number(x, row, scope) for x in (loop.first, loop.last))
-        step = self.usual_step(first, last)
-        if loop.step is not None:
-            step = self.task.number(loop.step, row, scope)
-        return Counting.of(first, last, step)
+    def loop_limit(
+        self, context: Context, row: int, operand: ir.Operand | None, state: Arrived
+    ) -> float:
+        """Return a bound of a loop, NaN where it is not known."""
+        here = replace(context.place.scope, points=state.points)
+        return self.task.number(operand, row, here)
 
     def begin_round(
         self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: Arrived
@@ -383,23 +407,15 @@ class TaskMachine(Interpreter[Arrived]):
             )
         return self._runs[key]
 
-    @staticmethod
-    def usual_step(first: float, last: float) -> float:
-        """Return what a loop counts by where it does not say so."""
-        return 1.0 if last >= first else -1.0
-
     # Calls and moves.
 
     def declares_motionless(self, name: str) -> bool:
         """Tell whether the cell says that a routine neither moves nor sets frames."""
-        start = self.start
-        if start.routines.get(name) == "motionless":
-            return True
-        return any(fnmatchcase(name, pattern) for pattern in start.motionless)
+        return self.start.effect_of(name) == "motionless"
 
     def outside(self, context: Context, row: int, name: str, here: Arrived) -> Arrived:
         """Call a routine that is not at hand: the cell may say what it does."""
-        said_of_it = self.start.routines.get(name)
+        said_of_it = self.start.effect_of(name)
         if said_of_it in ("moves", "sets-frames"):
             self.lost |= here.origins
         if said_of_it == "moves":
@@ -453,7 +469,10 @@ class TaskMachine(Interpreter[Arrived]):
         What holds behind such a call is not known.
         """
         file, _, routine = found
-        running = self._find_running(context, routine)
+        if self._is_recursive(found):
+            self.run_beside(file, routine)
+        calls = (one for one in calls_around(context) if one.place is not None)
+        running = next((one for one in calls if one.place.routine is routine), None)
         if running is not None:
             first = running.place.flow.first
             self.enter(running, first, self.at_call(running, here))
@@ -462,13 +481,6 @@ class TaskMachine(Interpreter[Arrived]):
             self.run_beside(file, routine)
             return self.unknown(context, row, here, RECURSIVE)
         self.call_routine(found, context, row, here)
-        return None
-
-    def _find_running(self, context: Context, routine: HeadedRows) -> Context | None:
-        """Return the call of a routine that is being run here, None without one."""
-        for one in calls_around(context):
-            if one.place is not None and one.place.routine is routine:
-                return one
         return None
 
     def call_routine(
@@ -490,7 +502,11 @@ class TaskMachine(Interpreter[Arrived]):
         if context is None:
             context = caller.within(at, CALLED, self._place_of(found, caller, row))
         own = self.task.unit(file), module, context.place.scope.routine
-        here = here.with_points(here.points.leave(own))  # declared anew
+        points = here.points.leave(own)  # declared anew
+        if (call := self._call_of(found, caller, row)) is not None:
+            there = replace(caller.place.scope, points=here.points)
+            points = self.task.hand_over(points, found, call, row, there)
+        here = here.with_points(points)
         self.enter(context, context.place.flow.first, self.at_call(context, here))
 
     def _place_of(self, found: TaskRoutine, caller: Context, row: int) -> TaskPlace:
@@ -501,10 +517,34 @@ class TaskMachine(Interpreter[Arrived]):
             rows = text.where(is_structural, routine.first + 1, routine.last)
             handlers = text.where(self.handles, routine.first + 1, routine.last)
             self._flows[key] = flow_of(text.statement, rows, routine, handlers)
-        scope = self.task.scope_of(file, module, routine)
-        if caller is not self.root:
-            scope = self.bind_arguments(scope, routine, caller, row)
+        scope, call = None, self._call_of(found, caller, row)
+        if call is not None:
+            scope = self.task.bind(found, call, row, caller.place.scope)
+        scope = scope or self.task.scope_of(file, module, routine)
         return TaskPlace(scope, routine, self._flows[key], text, self.offsets[file])
+
+    def _call_of(
+        self, found: TaskRoutine, caller: Context, row: int
+    ) -> ir.Instruction | None:
+        """Return a call whose arguments are followed; None where it has none.
+
+        A routine that calls itself has other values the next time.
+        """
+        if caller is self.root or not found.rows.head.parameters:
+            return None
+        call = self.acting(self.texts[caller.place.scope.file].statement(row))
+        if not isinstance(call, ir.Instruction) or call.name != found.rows.head.name:
+            return None
+        return None if self._is_recursive(found) else call
+
+    def _is_recursive(self, routine: TaskRoutine) -> bool:
+        """Return True if a routine has parameters and may come to call itself."""
+        if routine.key not in self._recursive:
+            own = routine.file, routine.rows.first, routine.rows.last
+            called = reach(self._list_calls(own), self._list_calls, tuple)
+            found = bool(routine.rows.head.parameters) and own in called
+            self._recursive[routine.key] = found
+        return self._recursive[routine.key]
 
     @cached_property
     def offsets(self) -> Sequence[int]:
@@ -533,14 +573,25 @@ class TaskMachine(Interpreter[Arrived]):
             self.keys += [(context, at, k) for k in range(len(found))]
             for before, after in zip(known, found[1:], strict=False):
                 after.origins = frozenset([before])
+        self._take_again(context, row, one, here, known)
         for number in known:
             visit = self.visits[number]
             if visit.modes != here.modes:
                 visit.modes = visit.modes.join(here.modes)
             visit.agreed = visit.agreed and here.points.agree(visit.goal.given)
-            visit.kept = visit.kept and here.points.agree(visit.taken)
         self.visits[known[0]].origins |= here.origins
         return replace(here, origins=frozenset([known[-1]]))
+
+    def _take_again(
+        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived,
+        known: Sequence[int],
+    ) -> None:  # fmt: skip
+        """Forget what visits are carried out with that differs where data do."""
+        visits = [self.visits[number] for number in known]
+        if not all(here.points.agree(visit.taken) for visit in visits):
+            again = self.read_visits(one, row, context.place.scope, here)
+            for visit, other in zip(visits, again, strict=True):
+                visit.meet(other)
 
     def assign_point(
         self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
@@ -551,21 +602,34 @@ class TaskMachine(Interpreter[Arrived]):
         points = self.task.assign(here.points, one, row, context.place.scope)
         return here.with_points(points)
 
+    def begin(self, origins: frozenset[int], modes: Any) -> Arrived:
+        """Return how the arm comes to where the task begins: no point is assigned."""
+        return Arrived(origins, modes, Points(alike=self.task.are_alike))
+
     def settle_points(self) -> None:
         """Forget what moves take of data that hold other values on other ways."""
-        given = [visit for visit in self.visits if visit.goal.given or visit.taken]
-        if not given:
-            return
+        for visit in self.visits:
+            if not visit.agreed:
+                visit.goal = visit.goal.lost
+
+    def list_changed_beside(self) -> frozenset[str]:
+        """List names of data that change in ways that are not followed.
+
+        What a routine declares changes for nothing else.
+        """
         rows = self._rows_of({*self.beside, *self._list_beside()})
-        lost = {
+        changed = {
             data.name for at, row in rows
             for data in self.task.list_changes(self.texts[at].statement(row))
+            if not self._is_own(data.name, at, row)
         }  # fmt: skip
-        for visit in given:
-            if not visit.agreed or any(lost & one.names for one in visit.goal.given):
-                visit.goal = visit.goal.lost
-            if not visit.kept or any(lost & one.names for one in visit.taken):
-                visit.forget_conditions()
+        return self.task.uses.add_passed(changed)
+
+    def _is_own(self, name: str, file: int, row: int) -> bool:
+        """Return True for data that the routine around a statement declares anew."""
+        routine = self.task.routine_around(file, row)
+        found = routine and self.task.datum(name, self.task.scope_of(*routine))
+        return bool(found and found[1].routine and found[1].kind != "pers")
 
     def pause(self, here: Arrived) -> None:
         """Note that the arm may stop where it stands, although a zone is written."""
@@ -674,6 +738,8 @@ class TaskMachine(Interpreter[Arrived]):
         """
         for file, text in enumerate(self.texts):
             for routine in self.task.routines_by_file.get(file, ()):
+                if routine.key in self.task.dead:
+                    continue
                 if routine.rows.head.kind not in self.procedures:
                     yield file, routine.inside.start, routine.inside.stop
                 yield from self.list_handlers(routine)
@@ -722,14 +788,22 @@ class TaskMachine(Interpreter[Arrived]):
 def follow(make: Callable[[], M]) -> M:
     """Make a machine and run it.
 
+    It runs again where data turn out to change in ways that are not followed.
     Where anything runs beside the program another one reads each move by itself: what
     runs beside may be one of several that were read at once.
     """
     machine = make()
+    machine.task.volatile = machine.list_changed_beside()
     machine.run()
-    if machine.beside and any(v.count > 1 for v in machine.visits):
+    while True:
+        task, changed = machine.task, machine.list_changed_beside()
+        runs = bool(machine.beside) and any(v.count > 1 for v in machine.visits)
+        if changed <= task.volatile and not runs:
+            break
+        task.volatile |= changed
+        at_once = machine.at_once and not machine.beside
         machine = make()
-        machine.at_once = False
+        machine.at_once = at_once
         machine.run()
     machine.settle_points()
     return machine

@@ -39,8 +39,7 @@ from postproc.language.analysis.visit_columns import (
     to_visits,
 )
 from postproc.language.pose_encoding import Dialect
-from postproc.language.text.comment_directives import MEASURE, Comments
-from postproc.language.text.source import NumberSpans
+from postproc.language.text.comment_directives import MEASURE
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import (
     Blend,
@@ -103,8 +102,6 @@ def visits_of(
     machine: TaskMachine,
     dialect: Dialect,
     arrive: Callable[[Any], Arrival],
-    comments: Comments,
-    moves: Mapping[int, Sequence[int]],
 ) -> Visits:
     """Put the arrivals into the order of the program, as columns.
 
@@ -112,27 +109,22 @@ def visits_of(
         machine: It has followed all ways.
         dialect: What the numbers mean.
         arrive: Says what an arrival is carried out with.
-        comments: How the language writes them.
-        moves: Rows of statements that move, by file.
     """
     order = in_program_order(machine.keys)
     found: list[FoundVisit] = [machine.visits[k] for k in order]
     runs = _Runs.of(found)
-    numbering = Numbering.of(
-        [(text.source, NumberSpans.of(text.start, text.stop)) for text in machine.texts]
-    )
+    numbering = Numbering.of([(text.source, text.numbers) for text in machine.texts])
     written = _Written.of(found)
     followed = _find_followed(found, written)
     columns = _fill(found, runs, numbering, machine, dialect.width)
     _fill_conditions(columns, [arrive(v) for v in found], followed, machine, runs)
-    taught = _find_taught(found, machine, comments)
-    columns.taught = np.array(taught, bool)[runs.owner]
-    columns.measured = _read_measure_ids(found, machine.texts, comments, moves)
+    columns.taught = np.array(_find_taught(found, machine), bool)[runs.owner]
+    columns.measured = _read_measure_ids(found, machine)
     literals, literal = find_literals(columns, numbering)
     own = np.append(literal[runs.begin[written.example]], -1)  # each one's first
-    other = [*_goals_beside(machine, moves)]
+    other = [*_goals_beside(machine)]
     pinned = _find_pinned(found, written, other, machine.task.uses.copies)
-    _hold_for_taught(pinned, found, written.index, machine, comments)
+    _hold_for_taught(pinned, found, written.index, machine)
     return to_visits(
         columns,
         [text.source.name for text in machine.texts],
@@ -245,14 +237,10 @@ def _fill_numbers(
             columns.slots[rows.start, is_written] = own[is_written] + base
             continue
         text = machine.texts[file]
-        places = own[is_written] + _stride(v, text) * np.arange(v.count)[:, None]
+        stride = int(text.first[v.row + 1] - text.first[v.row])  # of a statement
+        places = own[is_written] + stride * np.arange(v.count)[:, None]
         columns.slots[rows, is_written] = places + base
         columns.values[rows, is_written] = text.value[places]
-
-
-def _stride(v: FoundVisit, text: StatementText[Any]) -> int:
-    """Return how many numbers the statement of a visit has."""
-    return int(text.first[v.row + 1] - text.first[v.row])
 
 
 def _fill_conditions(
@@ -268,34 +256,27 @@ def _fill_conditions(
     flies = [one.conditions.zone.blend != Blend.UNSET for one in arrivals]
     c.fly[:] = np.array(flies, bool)[owner]
     c.config_given[:] = np.array([one.flagged for one in arrivals], bool)[owner]
-    reasons = [_reason(one, machine.exhausted) for one in arrivals]
+    reasons = [
+        TOO_COMPLEX if machine.exhausted else next(filter(None, one.reasons), NO_REASON)
+        for one in arrivals
+    ]
     for k in np.flatnonzero(followed == _NO_LITERAL).tolist():
         reasons[k] = reasons[k] or ONLY_SHIFTED
     c.reason[:] = c.reasons.of(reasons)[owner]
 
 
-def _reason(arrival: Arrival, exhausted: bool) -> Reason:
-    """Say why a visit cannot be compensated."""
-    if exhausted:
-        return TOO_COMPLEX
-    return next((why for why in arrival.reasons if why), NO_REASON)
-
-
 def _read_measure_ids(
-    found: Sequence[FoundVisit],
-    texts: Sequence[StatementText[Any]],
-    comments: Comments,
-    moves: Mapping[int, Sequence[int]],
+    found: Sequence[FoundVisit], machine: TaskMachine
 ) -> dict[int, str]:
     """Return the ids that comments give to visits."""
     ids: dict[tuple[int, int], str] = {}
-    for file, rows in moves.items():
-        text = texts[file]
+    for number, file in enumerate(machine.task.files):
+        text, rows = file.text, file.moves
         last = text.source.lines_of(text.end[np.asarray(rows, np.int64)])
-        for line, mark in comments.marks(text.source, MEASURE):
+        for line, mark in machine.task.comments.marks(text.source, MEASURE):
             at = int(np.searchsorted(last, line))
             if at < len(rows):
-                ids.setdefault((file, rows[at]), mark)
+                ids.setdefault((number, rows[at]), mark)
     if not ids:
         return {}
     each = ((v, k) for v in found for k in range(v.count))
@@ -439,10 +420,9 @@ def _hold_for_taught(
     found: Sequence[FoundVisit],
     index: Mapping[tuple[int, int], int],
     machine: TaskMachine,
-    comments: Comments,
 ) -> None:
     """Hold the points of targets that are computed and marked as taught, in place."""
-    lines = [comments.list_taught(text.source) for text in machine.texts]
+    lines = machine.task.taught_lines
     if not any(lines):
         return
     for v in found:
@@ -453,28 +433,25 @@ def _hold_for_taught(
             pinned[at] = pinned[at] or TAUGHT_SHIFT
 
 
-def _goals_beside(
-    machine: TaskMachine, moves: Mapping[int, Sequence[int]]
-) -> Iterator[tuple[FoundGoal, str]]:
+def _goals_beside(machine: TaskMachine) -> Iterator[tuple[FoundGoal, str]]:
     """Yield where moves go that run in ways that are not followed, and say so."""
-    known = {(file, row) for file, rows in moves.items() for row in rows}
-    for file, row in sorted(known.intersection(machine.rows_beside())):
+    files = enumerate(machine.task.files)
+    moves = {(number, row) for number, file in files for row in file.moves}
+    for file, row in sorted(moves.intersection(machine.rows_beside())):
         text = machine.texts[file]
         why = BESIDE.format(text.line(row), text.source.name)
         for goal in machine.goals_of(file, row):
             yield goal, why
 
 
-def _find_taught(
-    found: Sequence[FoundVisit], machine: TaskMachine, comments: Comments
-) -> list[bool]:
+def _find_taught(found: Sequence[FoundVisit], machine: TaskMachine) -> list[bool]:
     """Tell which visits go to taught points, or to targets shifted from one, (r,)."""
-    lines = [comments.list_taught(text.source) for text in machine.texts]
+    lines = machine.task.taught_lines
     if not (any(lines) or machine.start.taught):
         return [False] * len(found)
     places = [{(v.goal.writes[0], v.goal.writes[1][0]), v.goal.point} for v in found]
     written = {place for some in places for place in some if place[1] >= 0}
-    marked = _find_marked(written, machine, lines)
+    marked = _find_marked(written, machine)
     return [
         whole_name(v.goal.name).strip().lower() in machine.start.taught
         or not marked.isdisjoint(some)
@@ -483,25 +460,19 @@ def _find_taught(
 
 
 def _find_marked(
-    places: Collection[tuple[int, int]],
-    machine: TaskMachine,
-    lines: Sequence[Collection[int]],
+    places: Collection[tuple[int, int]], machine: TaskMachine
 ) -> set[tuple[int, int]]:
-    """Find the targets that a comment marks as taught.
+    """Find the targets, by file and first number, that a comment marks as taught.
 
     It speaks of those whose numbers stand on its line; where none do, of all in its
     statement.
-
-    Args:
-        places: File and first number of targets.
-        machine: It has read the files.
-        lines: Lines of such comments, by file.
     """
     found = set[tuple[int, int]]()
-    for file, text in enumerate(machine.texts):
-        own = sorted(slot for at, slot in places if at == file) if lines[file] else []
+    for file, lines in enumerate(machine.task.taught_lines):
+        text = machine.texts[file]
+        own = sorted(slot for at, slot in places if at == file) if lines else []
         rows = {slot: text.row_of(slot) for slot in own}
-        for line in lines[file]:
+        for line in lines:
             there = _on_line(own, rows, text, line)
             near = (slot for slot in own if line in text.lines(rows[slot]))
             found |= {(file, slot) for slot in there or near}
@@ -514,7 +485,7 @@ def _on_line(
     """Return the targets, by their first numbers, with numbers on a line."""
     starts = text.source.line_starts
     begin, end = (*starts[line - 1 : line + 1].tolist(), len(text.source.data))[:2]
-    first, last = np.searchsorted(text.start, [begin, end]).tolist()
+    first, last = np.searchsorted(text.numbers.start, [begin, end]).tolist()
     found = set[int]()
     for slot in range(first, last):
         at = bisect_right(own, slot) - 1

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import is_point, source_of
@@ -24,6 +25,22 @@ def match_arguments(
     return [*zip(required, placed, strict=True), *pairs]
 
 
+class PassedData(NamedTuple):
+    """Data that a routine of the task is called with.
+
+    Attributes:
+        name: Of the data.
+        parameter: What they are there.
+        by_reference: The routine may change them through it.
+        whole: They are named whole: whatever the routine does to them is followed.
+    """
+
+    name: str
+    parameter: str
+    by_reference: bool
+    whole: bool
+
+
 @dataclass
 class NamesUsed:
     """Names that statements may change, and those that they take.
@@ -35,8 +52,7 @@ class NamesUsed:
         read: Those that something but the destination of a move takes.
         copies: Points that are assigned, and those that they are made from.
         targets: What may be changed, as it is written.
-        passed: Data and the parameter that they are given to, and whether the routine
-            may change them through it.
+        passed: Data that routines are called with.
         parts: Names of which moves go to elements or components.
     """
 
@@ -46,7 +62,7 @@ class NamesUsed:
     read: set[str] = field(default_factory=set)
     copies: set[tuple[str, str]] = field(default_factory=set)
     targets: list[ir.DataObject] = field(default_factory=list)
-    passed: set[tuple[str, str, bool]] = field(default_factory=set)
+    passed: set[PassedData] = field(default_factory=set)
     parts: set[str] = field(default_factory=set)
 
     # What a language says.
@@ -127,7 +143,13 @@ class NamesUsed:
 
     def note_call(self, name: str, arguments: Sequence[ir.Argument]) -> None:
         """Note arguments: what is called may change them, unless it is known not to."""
-        changed = arguments if name in self.own else self.list_changed(name, arguments)
+        changed = self.list_changed(name, arguments)
+        if name in self.own:
+            pairs = self._pair(name, arguments)
+            by_reference = [
+                one for parameter, one in pairs or () if parameter.by_reference
+            ]
+            changed = arguments if pairs is None else by_reference
         for argument in changed:
             if isinstance(argument.value, ir.DataObject):
                 self.changed.add(argument.value.name)
@@ -139,19 +161,29 @@ class NamesUsed:
             else:
                 self.take(argument.value)
 
+    def _pair(
+        self, name: str, arguments: Sequence[ir.Argument]
+    ) -> list[tuple[ir.RoutineParameter, ir.Argument]] | None:
+        """Pair arguments with parameters, None where it is not sure what is called."""
+        found = self.own.get(name, ())
+        if len(found) != 1 or not self.is_passed(found[0]):
+            return None
+        if any(one.passed_on for one in arguments):
+            return None
+        return match_arguments(found[0].rows.head.parameters, arguments)
+
     def _note_instruction(self, name: str, arguments: Sequence[ir.Argument]) -> None:
         """Note what an instruction, or a routine of the task, is given."""
-        found = self.own.get(name, ())
-        pairs = None
-        if len(found) == 1 and self.is_passed(found[0]):
-            pairs = match_arguments(found[0].rows.head.parameters, arguments)
-        if pairs is None or any(one.passed_on for one in arguments):
+        pairs = self._pair(name, arguments)
+        if pairs is None:
             self.note_call(name, arguments)
             return
         for parameter, argument in pairs:
             if isinstance(argument.value, ir.DataObject):
-                given = argument.value.name, parameter.name, parameter.by_reference
-                self.passed.add(given)
+                name, whole = argument.value.name, not argument.value.steps
+                given = name, parameter.name, parameter.by_reference, whole
+                self.passed.add(PassedData(*given))
+                self.targets += [argument.value] if parameter.by_reference else []
                 self._take_subscripts(argument.value)
             else:
                 self.take(argument.value)
@@ -187,19 +219,32 @@ class NamesUsed:
 
     # What follows from that.
 
+    def add_passed(self, changed: Set[str]) -> frozenset[str]:
+        """Add data to names that change, which routines change by their parameters."""
+        found, before = frozenset(changed), -1
+        while before != len(found):
+            before = len(found)
+            found |= {
+                one.name for one in self.passed
+                if one.by_reference and one.parameter in found
+            }  # fmt: skip
+        return found
+
     def pass_on(self) -> None:
         """Note of data what is noted of what is made from them, or of parameters.
 
         Which of the points in a parameter a move takes is not followed.
         """
-        self.read |= self.parts & {parameter for _, parameter, _ in self.passed}
+        self.read |= self.parts & {one.parameter for one in self.passed}
         before = -1
-        while before != len(self.changed) + len(self.read):
-            before = len(self.changed) + len(self.read)
-            for name, parameter, by_reference in self.passed:
+        while before != len(self.changed) + len(self.written) + len(self.read):
+            before = len(self.changed) + len(self.written) + len(self.read)
+            for name, parameter, by_reference, whole in self.passed:
                 written = parameter in self.written | self.changed
                 if written or parameter in self.read:
                     self.read.add(name)
                 if written and by_reference:
+                    (self.written if whole else self.changed).add(name)
+                if parameter in self.changed and by_reference:
                     self.changed.add(name)
             self.read |= {one for target, one in self.copies if target in self.read}

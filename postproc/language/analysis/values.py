@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,20 @@ def without_places(found: Value | None) -> Value | None:
     if isinstance(found, tuple):
         parts = [without_places(one) for one in found]
         return tuple(one for one in parts if one is not None)
+    if isinstance(found, KnownRecord):
+        fields = [(name, without_places(one)) for name, one in found.fields]
+        known = tuple((name, one) for name, one in fields if one is not None)
+        return replace(found, fields=known)
     return WrittenNumber(found.value) if isinstance(found, WrittenNumber) else found
+
+
+def is_written(found: Value | None) -> bool:
+    """Tell whether all numbers of a value stand in a text."""
+    if isinstance(found, KnownRecord):
+        return all(is_written(one) for _, one in found.fields)
+    if isinstance(found, tuple):
+        return all(map(is_written, found))
+    return not isinstance(found, WrittenNumber) or found.slot >= 0
 
 
 def take_apart(found: Value | None, names: list[str]) -> dict[str, Value]:

@@ -265,8 +265,11 @@ def find_literals(
     _, example, inverse = np.unique(slots[:, 0], return_index=True, return_inverse=True)
     distinct = slots[example]
     mixed = np.zeros(len(distinct), dtype=bool)
-    mixed[inverse[(slots != distinct[inverse]).any(axis=1)]] = True
-    used = np.bincount(distinct[distinct >= 0])
+    odd = (slots != distinct[inverse]).any(axis=1)
+    mixed[inverse[odd]] = True
+    used = np.bincount(distinct[distinct >= 0], minlength=int(slots.max()) + 1)
+    own = slots[odd]
+    used[np.unique(own[own >= 0])] += 1
     mixed |= any_in_rows((used[distinct] > 1) & (distinct >= 0))
     mixed |= numbering.apart(distinct)
     kept = np.flatnonzero(~mixed)

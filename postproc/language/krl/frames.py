@@ -11,7 +11,7 @@ import numpy as np
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
-from postproc.language.analysis.conditions import IDENTITY, Pose, compose_poses, flat
+from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
 from postproc.language.krl.abstract_state import (
@@ -27,6 +27,7 @@ from postproc.language.krl.pose_encoding import (
     abc_from_rotation,
 )
 from postproc.language.krl.symbols import CONFIG, KrlTask
+from postproc.language.shifts import IDENTITY, Pose, flat
 from postproc.robot.pose import MM
 
 

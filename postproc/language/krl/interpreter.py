@@ -114,7 +114,7 @@ class KrlMachine(TaskMachine):
         modes = KrlModes(tool=_frame(self.start.tool), base=_frame(self.start.uframe))
         modes = modes.beside(self.task)
         first = self.task.files[0]
-        here = Arrived(frozenset([START]), modes)
+        here = self.begin(frozenset([START]), modes)
         main = TaskRoutine(0, first.name, first.routines[0])
         self.call_routine(main, self.root, -1, here)
         self.follow()
@@ -164,7 +164,11 @@ class KrlMachine(TaskMachine):
         rows = range(row + 1, context.place.flow.loops.get(row, row))
         text = self.texts[context.place.scope.file]
         inside = [text.statement(k) for k in rows]
-        if any(one.name in self._sets(other) for other in inside):
+        changed = {
+            data.name for other in inside for data in self.task.list_changes(other)
+        }
+        changed |= {other.name for other in inside if isinstance(other, ir.ForLoop)}
+        if one.name in changed:
             return False
         if one.name in self.task.odd_words:
             return False
@@ -175,17 +179,9 @@ class KrlMachine(TaskMachine):
         if one.name in self.task.beside:
             return False
         others = self.task.counted[one.name] > 1 or one.name in self.task.assigned
-        return not (others and (self._has_interrupts or self._calls_own(inside)))
-
-    def _sets(self, one: ir.SourceStatement) -> set[str]:
-        """Return the names of data that a statement sets, also as a loop."""
-        named = {one.name} if isinstance(one, ir.ForLoop) else set()
-        return named | {data.name for data in self.task.list_changes(one)}
-
-    def _calls_own(self, statements: Sequence[ir.SourceStatement]) -> bool:
-        """Return True if a statement calls a routine of the files."""
-        called = set[str]().union(*map(list_calls, statements))
-        return not called.isdisjoint(self.task.routines)
+        called = set[str]().union(*map(list_calls, inside))
+        calls_own = not called.isdisjoint(self.task.routines)
+        return not (others and (self._has_interrupts or calls_own))
 
     @cached_property
     def _has_interrupts(self) -> bool:
@@ -193,11 +189,6 @@ class KrlMachine(TaskMachine):
         kinds = said.InterruptDeclared | said.PathTrigger
         said_ones = (one for text in self.texts for one in text.said)
         return any(isinstance(one, kinds) for one in said_ones)
-
-    @staticmethod
-    def usual_step(first: float, last: float) -> float:
-        """Count by 1: a loop downwards needs STEP."""
-        return 1.0
 
     # What it does.
 
@@ -225,7 +216,9 @@ class KrlMachine(TaskMachine):
         here = self._forget(context, row, one, here)
         match one:
             case said.KrlMove():
-                return self._move(context, row, one, here)
+                here = self.arrive(context, row, one, here)
+                modes = replace(here.modes, halted=False, goes_on=False)
+                return replace(here, modes=modes)
             case ir.Assignment():
                 return self._assign(context, row, one, here)
             case ir.Instruction():
@@ -262,13 +255,6 @@ class KrlMachine(TaskMachine):
         if store == here.modes.store:
             return here
         return replace(here, modes=here.modes.with_(store=store))
-
-    def _move(
-        self, context: Context, row: int, one: said.KrlMove, here: Arrived
-    ) -> Arrived:
-        """Record the visits of a move."""
-        after = self.arrive(context, row, one, here)
-        return replace(after, modes=replace(after.modes, halted=False, goes_on=False))
 
     def _modes(self, context: Context, row: int) -> ModeReader:
         return ModeReader(self.task, row, context.place.scope)
@@ -371,7 +357,7 @@ class KrlMachine(TaskMachine):
             moves = _INTERRUPT if MOVES in effects else _RESUMED
             own = number, _ENDED if ends else moves
             modes = replace(modes, declared=others | {own})
-            if not {number, EVERY} & self._enabled_interrupts:
+            if not self._find_routines(("on",), {number, EVERY}):  # nothing does
                 self._begin_early(own[1], here)
                 modes = replace(modes, active=modes.active | {own})
         return replace(here, modes=modes)
@@ -392,12 +378,12 @@ class KrlMachine(TaskMachine):
     @cached_property
     def _interrupts(self) -> list[_InterruptStatement]:
         """List all that programs say of interrupts, but for submit programs."""
-        found = []
+        found, kinds = [], said.InterruptDeclared | said.InterruptSwitched
         for file, text in enumerate(self.texts):
             if self.task.files[file].is_submit:
                 continue
             here = Scope(file, self.task.files[file].name, "")
-            for row in text.where(_is_interrupt):
+            for row in text.where(lambda one: isinstance(one, kinds)):
                 one, around = text.statement(row), self.task.routine_around(file, row)
                 word = "decl" if isinstance(one, said.InterruptDeclared) else one.word
                 number = self._number_of(here, row, one.number)
@@ -417,21 +403,18 @@ class KrlMachine(TaskMachine):
     def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Allow for a RESUME in the routine, see `TaskMachine.at_return`."""
         ending = {own for own in here.modes.declared if own[1] == _ENDED}
-        numbers = {number for number, _ in ending}
-        scope = context.place.scope
+        if not ending:
+            return here
+        scope, numbers = context.place.scope, {number for number, _ in ending}
         at = TaskRoutine(scope.file, scope.module, context.place.routine)
-        active = bool(ending & here.modes.active)
-        if not ending or not (active or self._may_switch(at, numbers)):
+        switching = self._find_routines(("on", "off"), numbers | {EVERY})
+        switches = any(one.key in switching for one in self.reach_from([at]))
+        if not (ending & here.modes.active or switches):
             return here
         ended = here.forget()
         on = {own for own in ending if own[0] in self._still_enabled}
         left = (ended.modes.active - ending) | on
         return here.join(replace(ended, modes=ended.modes.with_(active=left)))
-
-    def _may_switch(self, routine: TaskRoutine, numbers: set[int]) -> bool:
-        """Return True if a routine, or one that it calls, switches interrupts."""
-        switching = self._find_routines(("on", "off"), numbers | {EVERY})
-        return any(one.key in switching for one in self.reach_from([routine]))
 
     @cached_property
     def _still_enabled(self) -> set[int]:
@@ -507,11 +490,6 @@ class KrlMachine(TaskMachine):
         """Return the number of an interrupt, EVERY where it is not known."""
         number = whole(self.task.number(operand, row, here))
         return EVERY if number is None else number
-
-    @cached_property
-    def _enabled_interrupts(self) -> set[int]:
-        """Numbers of the interrupts that some statement switches on."""
-        return {one.number for one in self._interrupts if one.word == "on"}
 
     def _trigger(
         self, context: Context, one: said.PathTrigger, here: Arrived
@@ -598,11 +576,6 @@ class KrlMachine(TaskMachine):
         known = name in STILL or name in FUNCTIONS or self.declares_motionless(name)
         listed = name in package_routines() and not self._is_overruled(name)
         return known or listed
-
-
-def _is_interrupt(one: ir.SourceStatement) -> bool:
-    """Return True if a statement declares or switches interrupts."""
-    return isinstance(one, said.InterruptDeclared | said.InterruptSwitched)
 
 
 def _is_modal(name: str) -> bool:

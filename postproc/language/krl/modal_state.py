@@ -417,7 +417,10 @@ class ModeReader:
             case "$vel", "cp":
                 return replace(modes, speed=number)
             case "$vel", "":
-                return replace(modes, speed=self._path_speed(one.value))
+                speed = self._record(one.value).number("cp")
+                if isinstance(one.value, ir.FunctionCall):  # SVEL_CP(2, , LCPDAT1)
+                    speed = self._number(self._argument(one.value))
+                return replace(modes, speed=number_or_unknown(speed))
             case "$vel_axis", ir.ElementStep():
                 inside = self._argument(one.value)
                 percent = (
@@ -433,12 +436,6 @@ class ModeReader:
             case "$apo", "":
                 return self._blending(modes, one.value)
         return modes
-
-    def _path_speed(self, operand: ir.Operand) -> float:
-        """Read ``SVEL_CP(2, , LCPDAT1)`` or ``{CP 2.0, ..}`` [m/s]."""
-        if isinstance(operand, ir.FunctionCall):
-            return number_or_unknown(self._number(self._argument(operand)))
-        return number_or_unknown(self._record(operand).number("cp"))
 
     def _blending(self, modes: KrlModes, operand: ir.Operand) -> KrlModes:
         """Read ``SAPO(LCPDAT1)``, ``SAPO_PTP(PPDAT1)`` or ``{CDIS 5.0, ..}``."""
@@ -543,17 +540,21 @@ class ModeReader:
         if linked:
             store = store.with_(_KEPT_ON, PERHAPS)
         modes = replace(modes, store=store)
-        reader, given = self.frames(modes), self._default
-        advance = given("def_advance")
+        reader = self.frames(modes)
+
+        def number(name: str) -> float:
+            return self._number(ir.DataObject(name))
+
+        advance = number("def_advance")
         return replace(
             modes,
             tool=reader.entry("tool_data", 1),
             base=reader.read_numbered("$base", 0),
             interpolation="#base",
             speed=UNKNOWN,
-            share=_share(given("def_vel_ptp")),
-            distance=number_or_unknown(given("def_apo_cdis")),
-            overlap=number_or_unknown(given("def_apo_cptp")),
+            share=_share(number("def_vel_ptp")),
+            distance=number_or_unknown(number("def_apo_cdis")),
+            overlap=number_or_unknown(number("def_apo_cptp")),
             orientation="#var",
             circle=self._default_circle,
             through=False,
@@ -564,10 +565,6 @@ class ModeReader:
     def _default_circle(self) -> str:
         """Return ``DEF_CIRC_TYP`` of ``$config.dat``, "" where it is not known."""
         return self._word(ir.DataObject("def_circ_typ"), "")
-
-    def _default(self, name: str) -> float:
-        """Return a number of ``$config.dat``, NaN where it is not known."""
-        return self._number(ir.DataObject(name))
 
     def _frames(self, modes: KrlModes) -> KrlModes:
         """Take the frames of FDAT_ACT, and the load of its tool."""
@@ -596,20 +593,15 @@ class ModeReader:
         """Take blending and orientation of LDAT_ACT."""
         lost = KnownRecord((), whole=False)
         held = modes.ldat if isinstance(modes.ldat, KnownRecord) else lost
-        word = held.get("ori_typ")
+        word, circle = held.get("ori_typ"), held.get("circ_typ")
+        if held.whole and circle is None:  # which may be left out
+            circle = self._default_circle
         return replace(
             modes,
             distance=number_or_unknown(held.number("apo_dist")),
             orientation=word if isinstance(word, str) else "",
-            circle=self._circle(held),
+            circle=circle if isinstance(circle, str) else "",
         )
-
-    def _circle(self, held: KnownRecord) -> str:
-        """Return how the tool turns on arcs by LDAT_ACT, which may leave it out."""
-        word = held.get("circ_typ")
-        if isinstance(word, str):
-            return word
-        return self._default_circle if held.whole and word is None else ""
 
 
 def load_of(record: KnownRecord) -> tuple[float, ...]:

@@ -7,8 +7,6 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import (
@@ -36,8 +34,6 @@ from postproc.language.krl.pose_encoding import (
     NOT_WRITTEN,
     UNKNOWN_STATUS,
     WIDTH,
-    abc_from_rotation,
-    rotation_from_abc,
 )
 from postproc.language.krl.symbols import (
     AXES,
@@ -47,7 +43,6 @@ from postproc.language.krl.symbols import (
 )
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.visits import Meaning
-from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
 NOTHING = (math.nan,) * WIDTH
@@ -158,7 +153,7 @@ class KrlGoals:
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
         reader = self._reader(move, row, replace(here, points=points))
-        angle = self._angle(move, row, here)
+        angle = math.radians(self.task.number(move.angle, row, here))
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
         if move.via is not None:
@@ -195,15 +190,6 @@ class KrlGoals:
             move = replace(move, words=(*move.words, *end.words))
         shared = {"block": (here, rows.start), "begin": rows.start, "inner": inner}
         return move, shared
-
-    def _angle(self, move: said.KrlMove, row: int, here: Scope) -> float:
-        """Return the angle [rad] at which an arc ends, NaN where it is not known."""
-        if move.angle is None:
-            return math.nan
-        found = self.task.value(move.angle, row, here)
-        return (
-            math.radians(found.value) if isinstance(found, WrittenNumber) else math.nan
-        )
 
 
 def motion_of(word: str) -> Motion:
@@ -413,7 +399,10 @@ class KrlGoal(GoalReader):
 
         What is on the right tells what comes out: a frame has no S and T.
         """
-        behind = isinstance(first, ir.DataObject) and self._is_point(first)
+        behind = False
+        if isinstance(first, ir.DataObject):
+            found = self.task.datum(first.name, self.here)
+            behind = found is not None and found[1].type in POSITIONS
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, ir.DataObject):
             return self.unknown(AT_RUN_TIME)
@@ -429,13 +418,12 @@ class KrlGoal(GoalReader):
                 pins=base.pins or f"{base.name} is shifted without S and T",
                 holds=base.holds | own,
             )  # fmt: skip
-        values, turns = _link(base.values, shift, behind)
         by, file, slots = self._shift(base, other, shift, behind)
         base = replace(base, stays=base.stays or base.slots[0] < 0)
         aux = self._outside_of(base, other) if behind else base.aux
         turned = f"{base.name} is turned too"
         return self.apply_shift(
-            base, ReadShift(by, values, turns, file, slots, own, aux, shifts, turned)
+            base, ReadShift(by, file, slots, own, aux, shifts, turned)
         )
 
     def _find_own_shift(self, other: ir.Operand) -> frozenset[tuple[int, int]]:
@@ -475,11 +463,6 @@ class KrlGoal(GoalReader):
         file, slots = locate_numbers(written or (), WIDTH)
         own = file == self.here.file
         return shift, file, slots if own else (-1,) * WIDTH
-
-    def _is_point(self, operand: ir.DataObject) -> bool:
-        """Tell whether data is a position, and no frame."""
-        found = self.task.datum(operand.name, self.here)
-        return found is not None and found[1].type in POSITIONS
 
     # Steps.
 
@@ -522,28 +505,3 @@ def _numbers(found: KnownRecord, names: Sequence[str]) -> list[WrittenNumber] | 
     values = [found.get(name) for name in names]
     numbers = [value for value in values if isinstance(value, WrittenNumber)]
     return numbers if len(numbers) == len(names) else None
-
-
-def _link(
-    values: Sequence[float], shift: KrlFrame, behind: bool
-) -> tuple[tuple[float, ...], bool]:
-    """Link a point and a frame; tell whether the frame turns.
-
-    Args:
-        values: Numbers of the point.
-        shift: The frame.
-        behind: It stands behind the point.
-    """
-    by = np.array(shift.pose).reshape(4, 4)
-    point, angles = np.eye(4), np.deg2rad([values[3:6]])
-    point[:3, :3] = rotation_from_abc(angles)[0]
-    point[:3, 3] = np.array(values[:3]) * MM
-    both = point @ by if behind else by @ point
-    turns = bool(np.abs(by[:3, :3] - np.eye(3)).max() > 1e-12)
-    out = list(values)
-    out[:3] = (both[:3, 3] / MM).tolist()
-    if turns:
-        out[3:6] = np.rad2deg(abc_from_rotation(both[None, :3, :3], angles))[0].tolist()
-    if behind:
-        out[6:] = [NOT_WRITTEN, NOT_WRITTEN]
-    return tuple(out), turns

@@ -9,23 +9,11 @@ from typing import Any
 from postproc.language import ir
 from postproc.language.analysis.control_flow import EXIT
 from postproc.language.krl import syntax as said
-from postproc.language.text.common_rules import COMMON, build_item, low
+from postproc.language.text.common_rules import COMMON, low, part, parts
 from postproc.language.text.template_parser import Children, FormParser, Word
 
 # From trees to statements, rule by rule. Every function here is named after a rule of
 # ``grammars/krl.lark`` and takes what its children gave.
-
-
-class FlagPart(str):
-    """GLOBAL or CONST."""
-
-
-class TypePart(str):
-    """The type of data, or of a function's value."""
-
-
-class BlendPart(str):
-    """A word of blending, or the frame of a relative move."""
 
 
 def _tokens(c: Children, kind: str) -> list[str]:
@@ -51,24 +39,16 @@ _BUILT_IN = frozenset(
 
 
 def _build_declaration(c: Children) -> ir.Declaration:
-    flags = {low(x) for x in c if isinstance(x, FlagPart)}
-    type_ = next(str(x) for x in c if isinstance(x, TypePart))
+    flags, ((type_,),) = _words(c, "flag"), parts(c, "type")
     items = tuple(x for x in c if isinstance(x, ir.DeclaredItem))
     kind = "const" if "const" in flags else "var"
-    return ir.Declaration(type_, items, kind, "global" if "global" in flags else "")
+    scope = "global" if "global" in flags else ""
+    return ir.Declaration(low(type_), items, kind, scope)
 
 
 def _build_builtin(c: Children) -> ir.SourceStatement:
     found = _build_declaration(c)
     return found if found.type in _BUILT_IN else ir.NotUnderstood()
-
-
-_WORDS = {"endswitch": "endtest"}  # as neutral flow calls it
-
-
-def _block_word(c: Children) -> ir.BlockWord:
-    word = low(c[0])
-    return ir.BlockWord(_WORDS.get(word, word))
 
 
 def _move(c: Children) -> said.KrlMove:
@@ -77,7 +57,7 @@ def _move(c: Children) -> said.KrlMove:
     arc = word.split("_")[0] in ("circ", "scirc")
     via, to = operands[:2] if arc else (None, operands[0])
     angle = operands[2] if arc and len(operands) > 2 else None
-    return said.KrlMove(word, to, via, angle, _blends(c), _settings(c))
+    return said.KrlMove(word, to, via, angle, _words(c, "blend"), _settings(c))
 
 
 def _build_switch(c: Children) -> said.InterruptSwitched:
@@ -90,8 +70,9 @@ def _trigger(c: Children) -> said.PathTrigger:
     return said.PathTrigger(action, tuple(x for x in c if isinstance(x, ir.Operand)))
 
 
-def _blends(c: Children) -> tuple[str, ...]:
-    return tuple(str(x) for x in c if isinstance(x, BlendPart))
+def _words(c: Children, name: str) -> tuple[str, ...]:
+    """Return what parts of a name say, one word each."""
+    return tuple(low(word) for (word,) in parts(c, name))
 
 
 def _settings(c: Children) -> tuple[ir.Assignment, ...]:
@@ -99,17 +80,12 @@ def _settings(c: Children) -> tuple[ir.Assignment, ...]:
 
 
 def _spline(c: Children) -> said.SplineBlock:
-    return said.SplineBlock(low(c[0]), _blends(c), _settings(c))
+    return said.SplineBlock(low(c[0]), _words(c, "blend"), _settings(c))
 
 
-def _build_call(make: Callable[[str, tuple[ir.Argument, ...]], Any]) -> Any:
-    def build(c: Children) -> Any:
-        given = c[1]
-        if len(given) == 1 and given[0].value is None:
-            given = ()
-        return make(low(c[0]), given)
-
-    return build
+def _arguments(c: Children) -> tuple[ir.Argument, ...]:
+    """Return what is given; one that is left out alone is none."""
+    return () if len(c) == 1 and c[0].value is None else tuple(c)
 
 
 def _aggregate(c: Children) -> said.KrlAggregate:
@@ -122,20 +98,22 @@ def _field(c: Children) -> said.NamedField:
     return said.NamedField(low(c[0]), c[-1])
 
 
+def _parameter(name: str, way: str = "out") -> ir.RoutineParameter:
+    return ir.RoutineParameter(name, way != "in")
+
+
 RULES: Mapping[str, Callable[[Children], Any]] = {
     **COMMON,
     "header": lambda c: said.AccessHeader(),
     "procedure": _routine("def"),
     "function": _routine("deffct"),
     "data_list": lambda c: said.DataList(low(c[0]), bool(_tokens(c, "PUBLIC"))),
-    "type": lambda c: TypePart(low(c[0])),
-    "parameter": lambda c: ir.RoutineParameter(_tokens(c, "NAME")[0], True),
+    "type": part("type"),
+    "parameter": lambda c: _parameter(*_tokens(c, "NAME")),
     "empty_dimensions": lambda c: None,
     "declared": _build_declaration,
     "built_in": _build_builtin,
-    "flag": lambda c: FlagPart(c[0]),
-    "item": build_item,
-    "block_word": _block_word,
+    "flag": part("flag"),
     "exit_loop": lambda c: ir.Leave(EXIT),
     "halt": lambda c: said.Waiting(),
     "continue_": lambda c: said.ContinueWord(),
@@ -152,15 +130,12 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "arc_relative": _move,
     "spline": _spline,
     "spline_end": _spline,
-    "blend": lambda c: BlendPart(low(c[0])),
-    "settings": lambda c: tuple(c),
+    "blend": part("blend"),
+    "settings": tuple,
     "setting": lambda c: ir.Assignment(*c),
     "proceed": lambda c: ir.Instruction("on_error_proceed", ()),
-    "instruction": _build_call(ir.Instruction),
-    "arguments": lambda c: tuple(c),
-    "argument": lambda c: ir.Argument(c[0] if c else None),
+    "arguments": _arguments,
     "enumerated": lambda c: said.EnumValue(low(c[0])),
-    "function_call": _build_call(ir.FunctionCall),
     "aggregate": _aggregate,
     "field": _field,
 }

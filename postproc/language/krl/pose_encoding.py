@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -225,13 +224,3 @@ def abc_from_rotation(R: Floats, near: Floats) -> Floats:
     both -= 2 * np.pi * np.round((both - near) / (2 * np.pi))
     gap = np.abs(both - near).max(axis=2)
     return np.asarray(np.where((gap[0] <= gap[1])[:, None], both[0], both[1]))
-
-
-def compose_numbers(first: Sequence[float], second: Sequence[float]) -> list[float]:
-    """Compose two frames: X, Y, Z [mm] and A, B, C [deg] of each, and of both."""
-    rows = np.array([[*first, 0.0, 0.0], [*second, 0.0, 0.0]])
-    one, other = KRL_DIALECT.poses(rows)
-    both = one @ other
-    near = np.deg2rad([first[3:6]])
-    angles = abc_from_rotation(both[None, :3, :3], near)[0]
-    return [*(both[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist()]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from postproc import _native
 from postproc.files import base_name
 from postproc.language import ir
 from postproc.language.analysis.control_flow import HeadedRows
@@ -13,9 +14,10 @@ from postproc.language.analysis.declarations import Datum, TaskFile
 from postproc.language.analysis.symbols import whole
 from postproc.language.krl import syntax as said
 from postproc.language.krl.files import KrlFileName
-from postproc.language.krl.statements import KrlText, read_krl_statements
+from postproc.language.krl.parser import parse_statement
 from postproc.language.text.blocks import BlockWords, Outline
 from postproc.language.text.source import Source
+from postproc.language.text.statement_table import StatementText, read_text
 
 _ROUTINES = ("def", "deffct")
 _WORDS = BlockWords(
@@ -69,7 +71,8 @@ def read_krl(source: Source) -> KrlFile:
     Raises:
         ProgramError: A string does not end.
     """
-    text, name = read_krl_statements(source), base_name(source.name)
+    text = read_text(source, _native.scan_krl, parse_statement)
+    name = base_name(source.name)
     outline, splines, begin = Outline(text, _WORDS), list[range](), -1
     for row in text.where(lambda one: not isinstance(one, said.KrlMove)):
         match one := text.statement(row):
@@ -107,7 +110,9 @@ def read_krl(source: Source) -> KrlFile:
 
 
 def _index(
-    text: KrlText, row: int, steps: Sequence[str | ir.ElementStep]
+    text: StatementText[ir.SourceStatement],
+    row: int,
+    steps: Sequence[str | ir.ElementStep],
 ) -> tuple[int, ...] | None:
     """Return the index of an element, None where it is none that can be told."""
     if not steps:

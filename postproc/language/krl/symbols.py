@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_graph import reach
-from postproc.language.analysis.declarations import Datum
+from postproc.language.analysis.declarations import Datum, TaskRoutine
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import (
@@ -28,9 +29,10 @@ from postproc.language.krl.external_routines import package_routines
 from postproc.language.krl.pose_encoding import (
     COMMENTS,
     COMPONENTS,
-    compose_numbers,
+    KRL_DIALECT,
 )
 from postproc.language.krl.program import KrlFile
+from postproc.language.shifts import Shift, ShiftKind
 
 CONFIG = "$config"
 ANY = -1  # an entry of a table whose number is not known
@@ -99,7 +101,9 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     comments = COMMENTS
     layouts = FIELDS
-    followed = (*FIELDS, "int", "real")
+    followed = (*FIELDS, "int", "real", "bool")
+    targets = (*FIELDS,)
+    constants: ClassVar = {"true": 1.0, "false": 0.0}
     functions = "deffct"
     by_name = True
     divides = False  # whole numbers divide otherwise than others
@@ -107,7 +111,7 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def new_uses(self) -> NamesUsed:
         """Return what knows moves and routines by name."""
-        return _KrlUses(self.routines, points=self._points)
+        return _KrlUses(self.routines, points=self._points, callers=self._callers)
 
     def shares(self, file: int, datum: Datum) -> bool:
         """Return True for GLOBAL data, and those of ``$config.dat``."""
@@ -279,8 +283,9 @@ class KrlTask(TaskSymbols[KrlFile]):
             uses.note(one)
         odd = file.text.words(file.text.where(holds_odd, rows.start, rows.stop))
         called = odd.union(*map(list_calls, statements))
-        written = frozenset(uses.written | uses.changed | odd).difference(own)
-        return _Beside(written, frozenset(uses.read.difference(own)), called)
+        handed = {data.name for data in uses.targets}
+        written = (handed | uses.written | uses.changed | odd).difference(own)
+        return _Beside(frozenset(written), frozenset(uses.read.difference(own)), called)
 
     def note_in(self, uses: NamesUsed, file: KrlFile, one: ir.SourceStatement) -> None:
         """Note a statement; what a data list assigns is the first value of data."""
@@ -296,6 +301,15 @@ class KrlTask(TaskSymbols[KrlFile]):
         uses.changed |= self.beside | self.odd_words
         uses.read |= self.beside.union(*(part.read for part in self._beside))
         uses.read |= self.words_of_odd()
+
+    @cached_property
+    def _callers(self) -> Mapping[str, set[int]]:
+        """Files by the names of routines that their statements call."""
+        found = defaultdict[str, set[int]](set)
+        for number, file in enumerate(self.files):
+            for name in set[str]().union(*map(list_calls, file.text.said)):
+                found[name].add(number)
+        return found
 
     @cached_property
     def _points(self) -> frozenset[str]:
@@ -339,7 +353,9 @@ def _link(parts: Sequence[Value | None]) -> KnownRecord | None:
     numbers = [[one.number(name) for name in COMPONENTS[:6]] for one in records]
     if len(records) != 2 or np.isnan(numbers).any():
         return None
-    place = zip(COMPONENTS[:6], compose_numbers(*numbers), strict=True)
+    first, second = numbers
+    both = Shift(ShiftKind.OWN, tuple(second), (*first, 0.0, 0.0)).apply(KRL_DIALECT)
+    place = zip(COMPONENTS[:6], both, strict=False)
     fields = dict(records[1].fields) | {key: WrittenNumber(one) for key, one in place}
     return KnownRecord(tuple(fields.items()))
 
@@ -370,9 +386,11 @@ class _KrlUses(NamesUsed):
 
     Attributes:
         points: Names of positions.
+        callers: Files by the names of routines that they call.
     """
 
     points: Collection[str] = ()
+    callers: Mapping[str, set[int]] = field(default_factory=dict)
 
     def note(self, one: ir.SourceStatement) -> None:
         """Note where moves go; what holds for them alone changes nothing."""
@@ -405,6 +423,11 @@ class _KrlUses(NamesUsed):
         first, second = operand.operands
         behind = isinstance(first, ir.DataObject) and first.name in self.points
         return (first, [second]) if behind else (second, [first])
+
+    def is_passed(self, routine: TaskRoutine) -> bool:
+        """Return True unless another file may mean another routine by its name."""
+        head = routine.rows.head
+        return not head.local or self.callers.get(head.name, set()) <= {routine.file}
 
 
 def _is_of_part(target: ir.DataObject) -> bool:

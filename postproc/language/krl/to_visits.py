@@ -11,7 +11,6 @@ from postproc.language.analysis import to_visits
 from postproc.language.analysis.conditions import (
     NO_LOAD,
     Conditions,
-    Pose,
     Zone,
     cell_pose,
 )
@@ -27,8 +26,9 @@ from postproc.language.krl.modal_state import (
     ModeReader,
 )
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
-from postproc.language.krl.pose_encoding import COMMENTS, KRL_DIALECT
+from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.syntax import SplineBlock
+from postproc.language.shifts import Pose
 from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
 from postproc.robot.trajectory import Motion
 
@@ -76,8 +76,7 @@ def visits_of(machine: KrlMachine) -> Visits:
         early = machine.early.get(at, frozenset())
         return _arrive(machine, v, base, ends[at], at in odd, early)
 
-    moves = {k: file.moves for k, file in enumerate(machine.task.files)}
-    return to_visits.visits_of(machine, KRL_DIALECT, arrive, COMMENTS, moves)
+    return to_visits.visits_of(machine, KRL_DIALECT, arrive)
 
 
 def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, Reason]:

@@ -18,6 +18,7 @@ from postproc.language.pdl2.values import (
 from postproc.language.visits import ELSEWHERE
 
 Settings = Mapping[str, Value]
+FRAMES = ("tool", "base", "uframe")  # those of the settings that are frames
 
 Log = tuple[str, "Log | None"]
 """A key that was given a value, and those before it: copies share what they share."""
@@ -177,6 +178,15 @@ class Store:
         """Change frames or motion variables (names without ``$``)."""
         self.settings = {**self.settings, **settings}
 
+    def forget_frames(self, why: str) -> None:
+        """Which frames hold is no longer known."""
+        self.set(**dict.fromkeys(FRAMES, Nothing(why)))
+
+    def forget_surroundings(self, why: str) -> None:
+        """Forget where the arm is, its frames, and all motion settings."""
+        self.set(**dict.fromkeys((*FRAMES, *self.settings), Nothing(why)))
+        self.lose_place()
+
     def join(self, other: Store) -> Store:
         """Return what may hold on either way; itself where the other adds nothing."""
         both = self.copy()
@@ -200,24 +210,17 @@ class Store:
             merged = {n: join(a.get(n, unset), b.get(n, unset)) for n in {**a, **b}}
             changed |= merged != self.settings
             self.settings = merged
-        for key, mine, before, after in self._join(other):
-            if mine is None or after is not mine:
-                changed |= after != before
-                self.write(key, after)
-        return changed
-
-    def _join(self, other: Store) -> list[tuple[str, Value | None, Value, Value]]:
-        """Return what keys are given here, what they hold and what they may hold.
-
-        All is read before anything is written: an array hides its elements.
-        """
-        found = []
+        found = []  # before anything is written: an array hides its elements
         for key in self.values.differing(other.values):
             mine, theirs = self.values.get(key), other.values.get(key)
             before = self.read(key) if mine is None else mine
             after = join(before, other.read(key) if theirs is None else theirs)
-            found.append((key, mine, before, after))
-        return found
+            if after is not mine:
+                found.append((key, before, after))
+        for key, before, after in found:
+            changed |= after != before
+            self.write(key, after)
+        return changed
 
 
 def root_of(key: str) -> str:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.language import Record
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.abstract_state import Store
+from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.evaluate import (
-    FRAME_NAMES,
     bare,
     component_index,
     copy_parts,
@@ -37,10 +37,10 @@ from postproc.language.pdl2.machine import (
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.side_effects import (
     CHANGING,
-    FRAMES,
     NODES,
     PURE,
     CallGraph,
+    LiveRows,
     call_graph_of,
     list_changed_arguments,
 )
@@ -70,21 +70,34 @@ def summarise_call(
     name: str,
     reach: CallGraph,
     arguments: tuple[ir.Operand | None, ...] = (),
+    parameters: Sequence[ast.FormalParameter] = (),
 ) -> None:
     """Take in what a call may do without following it; list the moves it may make."""
-    for argument in list_changed_arguments(arguments):
-        here.world.pin(here.value(argument), f"{name} may move to it")
-        invalidate(here, argument, f"{name} may change it")
+    still = {one.name for one in parameters} - reach.may_change
+    for at, argument in enumerate(arguments):
+        if isinstance(argument, ir.DataObject):
+            here.world.pin(here.value(argument), f"{name} may move to it")
+            if at >= len(parameters) or parameters[at].name not in still:
+                invalidate(here, argument, f"{name} may change it")
+    take_effects(
+        here, reach.parts, f"{name} may compute with it", f"{name} may change it"
+    )
     for part in reach.parts:
-        within = Execution(here.world, part.place, here.row, here.store, here.volatile)
-        escape_names(within, part.effects.read, f"{name} may compute with it")
-        invalidate_names(within, part.effects.assigned, f"{name} may change it")
         list_moves(machine, here, part.place, name)
     if reach.frames:
-        why = f"a routine that {name} calls sets it"
-        here.store.set(**{frame: Nothing(why) for frame in FRAMES})
+        here.store.forget_frames(f"a routine that {name} calls sets it")
     if reach.moves:
         here.store.lose_place()
+
+
+def take_effects(
+    here: Execution, parts: Sequence[LiveRows], computes: str, changes: str
+) -> None:
+    """Take in what rows do to variables that are not followed, and say so."""
+    for part in parts:
+        within = Execution(here.world, part.place, here.row, here.store, here.volatile)
+        escape_names(within, part.effects.read, computes)
+        invalidate_names(within, part.effects.assigned, changes)
 
 
 def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
@@ -95,13 +108,12 @@ def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> No
         return
     context = machine.root.within(first, _UNFOLLOWED, place)
     why = f"{name}, which is not followed, runs this move"
-    nothing = Nothing(why)
-    reason = Reason(Code.NEVER_REACHED, why)
+    nothing, reason = Nothing(why), Reason(Code.NEVER_REACHED, why)
     for row in range(body.first + 1, body.last):
-        statement = program.statement(row)
+        statement = program.lines.statement(row)
         if isinstance(statement, ast.Move):
             store = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
-            store.set(**dict.fromkeys(FRAMES, nothing))
+            store.forget_frames(why)
             at = Execution(
                 here.world, place, row, store, here.volatile, context, reason
             )
@@ -122,7 +134,12 @@ def call_statement(machine: Machine, here: Execution, call: ir.Instruction) -> b
     running = machine.calls_to(inside.body, here.context)
     if running:
         machine.recursive |= {id(body) for body in running}
-        _refuse_recursion(machine, here, inside)
+        name = inside.body.name or inside.program.name
+        _say(here, Code.RECURSION, name, "calls itself and is not followed: the next "
+             "move is assumed to start at an unknown place. Write it as a "
+             "loop")  # fmt: skip
+        summarise_call(machine, here, name, call_graph_of(here.world, inside))
+        here.store.lose_place()
         return False
     _bind(here, inside, call.values)
     machine.call(here.context, here.row, inside, here.store)
@@ -137,42 +154,45 @@ def calls_in_expressions(
         inside = here.world.find_routine(here.place.program, call.name)
         if inside is None:
             opaque_call(here, call.name, call.values)
-        else:
-            _apply_summary(machine, here, inside, call.values)
+            continue
+        name, reach = inside.body.name, call_graph_of(here.world, inside)
+        answer, key = _run_function(machine, here, inside, call), here.answer_key(call)
+        here.store.drop(key)
+        if answer is not None:
+            here.store.write(key, answer)
+        summarise_call(machine, here, name, reach, call.values, inside.body.parameters)
+        if reach.moves:
+            _say(here, Code.CALL_NOT_FOLLOWED, name, "is called in an expression and "
+                 "may move the arm: the next move is assumed to start at an unknown "
+                 "place. Call it as a statement")  # fmt: skip
 
 
-def _apply_summary(
-    machine: Machine,
-    here: Execution,
-    inside: Place,
-    arguments: tuple[ir.Operand | None, ...],
-) -> None:
-    """Take a function's effects from its text instead of running it."""
-    name, reach = inside.body.name, call_graph_of(here.world, inside)
-    summarise_call(machine, here, name, reach, arguments)
-    if reach.moves:
-        here.world.report_once(
-            here.place.program,
-            here.row,
-            Code.CALL_NOT_FOLLOWED,
-            name,
-            f"{name} is called in an expression and may move the arm: the next move "
-            "is assumed to start at an unknown place. Call it as a statement",
-        )
+def _run_function(
+    machine: Machine, here: Execution, inside: Place, call: ir.FunctionCall
+) -> Value | None:
+    """Return what a function returns that only sets variables of its own.
 
-
-def _refuse_recursion(machine: Machine, here: Execution, inside: Place) -> None:
-    name = inside.body.name or inside.program.name
-    here.world.report_once(
-        here.place.program,
-        here.row,
-        Code.RECURSION,
-        name,
-        f"{name} calls itself and is not followed: the next move is assumed to start "
-        "at an unknown place. Write it as a loop",
-    )
-    summarise_call(machine, here, name, call_graph_of(here.world, inside))
-    here.store.lose_place()
+    None for one that does more than that.
+    """
+    store, body = here.store.copy(), inside.body
+    _bind(replace(here, store=store), inside, call.values)
+    given = {parameter.name for parameter in body.parameters}
+    for row in range(body.flow.first, body.flow.last):
+        at = Execution(here.world, inside, row, store, here.volatile, here.context)
+        one = inside.statement(row)
+        if machine.find_calls(inside, one):
+            return None
+        match one:
+            case ir.Leave("return", ir.Operand() as value):
+                found = at.value(value)
+                if isinstance(found, Position):
+                    found = replace(found, derived=f"{body.name} returns it")
+                return found
+            case ir.Assignment(target) if target.name in body.own_names - given:
+                assign(at, one, False)
+            case _ if type(one) is not ir.SourceStatement:
+                return None
+    return None
 
 
 def _bind(
@@ -230,8 +250,9 @@ def opaque_call(
         case RoutineEffect.MOVES:
             here.store.lose_place()
         case RoutineEffect.SETS_FRAMES:
-            _unknown_frames(here, f"{name} sets it; give its table under "
-                            f"[frames.routines.{name}] in the cell file")  # fmt: skip
+            here.store.forget_frames(f"{name} sets it; give its table under "
+                                     f"[frames.routines.{name}] in the cell "
+                                     "file")  # fmt: skip
         case RoutineEffect.TRACKS:
             on = here.value(arguments[0]) if arguments else Nothing("")
             here.store.set(**{TRACKING: on})
@@ -246,24 +267,13 @@ def opaque_call(
                  "cell, or set assume_motion")  # fmt: skip
         case RoutineEffect.UNKNOWN:
             report_unknown_routine(here.world, here.place.program, here.row, name)
-            forget_surroundings(here, f"{name}, which is not in the given files, may "
-                                "set it: declare it under [routines] of the "
-                                "cell")  # fmt: skip
+            here.store.forget_surroundings(
+                f"{name}, which is not in the given files, may set it: declare it "
+                "under [routines] of the cell")  # fmt: skip
 
 
 def _say(here: Execution, code: Code, name: str, text: str) -> None:
-    here.world.report_once(here.place.program, here.row, code, name, f"{name} {text}")
-
-
-def _unknown_frames(here: Execution, why: str) -> None:
-    here.store.set(**{frame: Nothing(why) for frame in FRAMES})
-
-
-def forget_surroundings(here: Execution, why: str) -> None:
-    """Forget where the arm is, its frames, and all motion settings of the program."""
-    names = (*FRAMES, *here.store.settings)
-    here.store.set(**dict.fromkeys(names, Nothing(why)))
-    here.store.lose_place()
+    here.report_once(code, name, f"{name} {text}")
 
 
 def _frames_from_table(
@@ -278,10 +288,9 @@ def _frames_from_table(
     )
     rows = {k.replace(" ", ""): v for k, v in table.items()}
     if len(key.split(",")) != max(len(values), 1) or key not in rows:
-        _unknown_frames(
-            here,
+        here.store.forget_frames(
             f'{name}({key}) sets it and the cell file has no "{key}" under '
-            f"[frames.routines.{name}]",
+            f"[frames.routines.{name}]"
         )
         return
     for frame, record in rows[key].items():
@@ -367,7 +376,7 @@ def _setting(here: Execution, reference: ir.DataObject, value: Value) -> None:
         off = value is False and here.store.settings.get(part, False) is False
         if part and not off:
             here.store.set(**{part: Nothing("a part of it is assigned")})
-        if reference.name[1:] in FRAME_NAMES or not reference.steps:
+        if reference.name[1:] in FRAMES or not reference.steps:
             said = f"a part of {reference.name.upper()} is assigned"
             why = said if reference.steps else here.other_default()
             here.store.set(**{reference.name[1:]: Nothing(why)})
@@ -376,6 +385,8 @@ def _setting(here: Execution, reference: ir.DataObject, value: Value) -> None:
             here.store.set(**{field: Nothing("it is set for an arm known at run time")})
         return
     here.world.pin(value, f"${name.upper()} is set to it")
+    if isinstance(value, Position) and name in FRAMES:
+        value = replace(value, slots=(-1,) * 6, along=frozenset())
     if f"${name}" in here.volatile:
         value = Nothing("a condition handler changes it")
     here.store.set(**{name: value})

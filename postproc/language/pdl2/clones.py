@@ -12,7 +12,7 @@ import numpy as np
 from postproc.language import ir
 from postproc.language.language import Cloner, NamedPoint
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.entries import is_nested, last_head
+from postproc.language.pdl2.entries import EntryLines, is_nested, last_head
 from postproc.language.pdl2.parser import parse_value_form
 from postproc.language.pdl2.program import Body, Program, Variable
 from postproc.language.text.lexer import scan_lines
@@ -26,11 +26,10 @@ from postproc.language.text.source import (
     find_free_name,
     insert_after,
 )
-from postproc.language.text.templates import parse_shapes
 from postproc.language.visits import Literals
 
-# The variable that a move names as where it goes, as far as it can be cloned.
-
+LONGEST_NAME = 32  # characters of an identifier (likely)
+_EXPORTED = re.compile(r"\s+EXPORTED\s+FROM\s+\w+", re.I)
 _POINTS = frozenset({"position", "xtndpos", "jointpos"})
 _STRING = re.compile(r"'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\"")
 
@@ -62,46 +61,82 @@ class CloneTarget:
         return self.variable.name
 
 
-def find_clone_target(
-    programs: Sequence[Program], file: int, line: int, via: bool, name: str
-) -> CloneTarget:
-    """Find the variable that a move goes to, as far as it can be cloned.
+@dataclass
+class Pdl2Cloner(Cloner):
+    """The files of a job, to clone variables in them.
 
-    Args:
-        programs: The program files of a job.
-        file: Where the move stands.
-        line: Its line there.
-        via: Its VIA point is meant, not its end.
-        name: Owner of the value that it goes to.
+    The new variable is declared behind the old one; wherever the old one is given one
+    of the values, the new one is given it next. Until a move that the old one reaches
+    with that value, the new one therefore holds the same.
 
-    Raises:
-        CloneError: The move names no variable that can be.
+    Attributes:
+        programs: Its program files, parsed.
+        values: Its variable file, or None; its index follows those of the programs.
+        taken: All words of its files, in lower case.
     """
-    program = programs[file]
-    row = int(np.searchsorted(program.lines.line, line))
-    move = ast.action(program.statement(row))
-    where = None
-    if isinstance(move, ast.Move) and move.how == "TO":
-        where = move.via if via else move.where[0]
-    if not isinstance(where, ir.DataObject):
-        raise CloneError("the numbers stand in the move itself, or are computed")
-    if where.steps:
-        raise CloneError("elements of arrays, records and paths are not cloned")
-    body = body_at(program, row)
-    if any(p.name == where.name for p in body.parameters):
-        raise CloneError(f"{where.name} is a parameter")
-    own = body.variables.get(where.name)
-    variable = own or program.variables.get(where.name)
-    if variable is None or variable.type is None:
-        raise CloneError(f"{where.name} is not declared as a variable in this file")
-    if variable.type.name not in _POINTS or variable.type.array or variable.type.path:
-        raise CloneError(f"{variable.name} is no single point")
-    if variable.exported not in ("", program.name):
-        raise CloneError(f"{variable.name} belongs to {variable.exported}")
-    if variable.name.lower() != name.lower():
-        raise CloneError(f"{variable.name} holds a copy of {name}")
-    span = _destination(program, row, "VIA" if via else "TO", variable.name)
-    return CloneTarget(file, body.name if own else "", variable, span)
+
+    programs: list[Program]
+    values: Source | None
+    taken: set[str]
+
+    def target(self, file: int, line: int, via: bool, name: str) -> CloneTarget:
+        """Find the variable that a move goes to, as far as it can be cloned."""
+        program = self.programs[file]
+        row = int(np.searchsorted(program.lines.begin_line, line))
+        move = ast.action(program.lines.statement(row))
+        where = None
+        if isinstance(move, ast.Move) and move.how == "TO":
+            where = move.via if via else move.where[0]
+        if not isinstance(where, ir.DataObject):
+            raise CloneError("the numbers stand in the move itself, or are computed")
+        if where.steps:
+            raise CloneError("elements of arrays, records and paths are not cloned")
+        body = body_at(program, row)
+        if any(p.name == where.name for p in body.parameters):
+            raise CloneError(f"{where.name} is a parameter")
+        own = body.variables.get(where.name)
+        variable = own or program.variables.get(where.name)
+        if variable is None or variable.type is None:
+            raise CloneError(f"{where.name} is not declared as a variable in this file")
+        type_ = variable.type
+        if type_.name not in _POINTS or type_.array or type_.path:
+            raise CloneError(f"{variable.name} is no single point")
+        if variable.exported not in ("", program.name):
+            raise CloneError(f"{variable.name} belongs to {variable.exported}")
+        if variable.name.lower() != name.lower():
+            raise CloneError(f"{variable.name} holds a copy of {name}")
+        span = _destination(program, row, "VIA" if via else "TO", variable.name)
+        return CloneTarget(file, body.name if own else "", variable, span)
+
+    def find_declaration(self, named: NamedPoint) -> int:
+        """Return the 1-based line that declares a variable."""
+        target = cast(CloneTarget, named)
+        return int(self.programs[target.file].lines.begin_line[target.variable.row])
+
+    def clone(
+        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
+    ) -> tuple[str, list[tuple[int, Edit]]]:
+        """Give some moves a variable of their own, see `Cloner.clone`."""
+        first, old = cast(CloneTarget, named[0]), named[0].name
+        program, at = self.programs[first.file], self.find_declaration(first)
+        name = find_free_name(old, self.taken, LONGEST_NAME)
+        found = [(first.file, _declare_clone(program, at, old, name))]
+        for row in rows:
+            file, line = int(literals.file[row]), int(literals.line[row])
+            starts = literals.places[row : row + 1].start[0].tolist()
+            if file == len(self.programs) and self.values and first.file == 0:
+                entry = copy_entry(self.values, line, old, name, starts)
+                found.append((file, entry))
+            elif file != first.file:
+                raise CloneError("its value stands in another file")
+            elif line != at:
+                found.append((file, _assign_clone(program, first, line, name, starts)))
+        for one in (cast(CloneTarget, one) for one in named):
+            source = program.lines.source
+            length = len(source.line_text(source.line_of(one.span.start)))
+            check_length(source, length + len(name) - len(old))
+            found.append((one.file, Edit(one.span, name.encode("latin-1"))))
+        return name, found
 
 
 def body_at(program: Program, row: int) -> Body:
@@ -110,8 +145,8 @@ def body_at(program: Program, row: int) -> Body:
     Raises:
         CloneError: It stands in none.
     """
-    for body in (program.main, *program.routines.values()):
-        if body is not None and body.first < row < body.last:
+    for body in program.bodies:
+        if body.first < row < body.last:
             return body
     raise CloneError("the move stands outside of any body")
 
@@ -119,9 +154,9 @@ def body_at(program: Program, row: int) -> Body:
 def _destination(program: Program, row: int, word: str, name: str) -> Span:
     """Find the name after TO or VIA in a statement."""
     lines = program.lines
-    first = int(lines.line[row])
+    first = lines.line(row)
     after = len(lines.source.line_starts) + 1
-    last = int(lines.line[row + 1]) if row + 1 < len(lines) else after
+    last = lines.line(row + 1) if row + 1 < len(lines) else after
     pattern = re.compile(rf"\b{word}\s+({re.escape(name)})\b(?!\s*[\[.(:])", re.I)
     found = []
     for line in range(first, last):
@@ -144,6 +179,46 @@ def code_of(program: Program, line: int) -> str:
     return text if comment < 0 else text[:comment]
 
 
+def _declare_clone(program: Program, line: int, old: str, name: str) -> Edit:
+    """Declare the new name in a line behind the old one's."""
+    code = code_of(program, line).rstrip()
+    head = re.match(r"(\s*)(VAR\b\s*)?([\w\s,]*?)(\s*:.*)\Z", code, re.I)
+    if head is None or old.lower() not in re.split(r"[\s,]+", head[3].lower()):
+        raise CloneError("its declaration is not understood")
+    indent = head[1] + ("  " if head[2] else "")
+    return insert_after(
+        program.lines.source, line, indent + name + _EXPORTED.sub("", head[4])
+    )
+
+
+def _assign_clone(
+    program: Program, named: CloneTarget, line: int, name: str, starts: list[int]
+) -> Edit:
+    """Assign a value to the new name behind the line that gives it to the old one."""
+    row = int(np.searchsorted(program.lines.begin_line, line))
+    statement = program.lines.statement(row)
+    old = named.variable.name
+    own = (
+        isinstance(statement, ir.Assignment)
+        and statement.target == ir.DataObject(old.lower())
+        and isinstance(statement.value, ir.Composite | ir.FunctionCall)
+    )
+    body = body_at(program, row)  # a name there may mean another variable
+    meant = body.name == named.scope
+    if not named.scope:
+        meant = old.lower() not in body.own_names
+    if not (own and meant):
+        raise CloneError(f"line {line} is no plain assignment of its value")
+    code = code_of(program, line).rstrip()
+    begin = int(program.lines.source.line_starts[line - 1])
+    if not all(begin <= start < begin + len(code) for start in starts):
+        raise CloneError("its numbers are assigned one by one")
+    head = re.match(rf"(\s*){re.escape(old)}\b", code, re.I)
+    if head is None:
+        raise CloneError(f"line {line} is not understood")
+    return insert_after(program.lines.source, line, head[1] + name + code[head.end() :])
+
+
 # Copy an entry of a variable file under another name.
 
 _XPORT = re.compile(r"\bXport\b(?P<other>\s+from\b)?", re.I)
@@ -164,18 +239,17 @@ def copy_entry(
     Raises:
         CloneError: The entry is not one of this variable alone.
     """
-    lines = read_lines(values)
-    said = parse_shapes(lines.shapes, parse_value_form)
-    heads = last_head(lines, said)
-    row = int(np.searchsorted(lines.line, line, side="right")) - 1
+    lines: EntryLines = read_lines(values, parse_value_form)
+    heads = last_head(lines)
+    row = int(np.searchsorted(lines.begin_line, line, side="right")) - 1
     at = int(heads[row]) if row >= 0 else -1
-    head = said[int(lines.shape[at])] if at >= 0 else None
+    head = lines.statement(at) if at >= 0 else None
     if head is None or head.name.lower() != old.lower() or head.element:
         raise CloneError(f"line {line} of {values.name} is no entry of {old}")
     if is_nested(head):
         raise CloneError(f"{old} is a record or a path: its parts are not cloned")
     after = int(np.searchsorted(heads, at, side="right"))
-    first, last = int(lines.line[at]), int(lines.line[after - 1])
+    first, last = lines.line(at), lines.line(after - 1)
     end = [*values.line_starts.tolist(), len(values.data)][last]
     begin = int(values.line_starts[first - 1])
     if not all(begin <= start < end for start in starts):
@@ -198,139 +272,3 @@ def _own(title: str, old: str) -> str:
     if found["other"]:
         raise CloneError(f"{old} belongs to another program")
     return title[: found.start()] + "Priv" + title[found.end() :]
-
-
-# Clone a variable: another name with its own value, laid out as the file is.
-
-LONGEST_NAME = 32  # characters of an identifier (likely)
-_EXPORTED = re.compile(r"\s+EXPORTED\s+FROM\s+\w+", re.I)
-
-
-def clone(
-    programs: Sequence[Program],
-    values: Source | None,
-    literals: Literals,
-    named: Sequence[CloneTarget],
-    rows: Sequence[int],
-    name: str,
-) -> list[tuple[int, Edit]]:
-    """Give some moves a variable of their own with the value of the one they share.
-
-    The new variable is declared behind the old one; wherever the old one is given one
-    of the values, the new one is given it next. Until a move that the old one reaches
-    with that value, the new one therefore holds the same.
-
-    Args:
-        programs: The program files of a job.
-        values: Its variable file, whose index follows those of the programs.
-        literals: Where the values stand.
-        named: Where the moves name the old variable; all mean the same one.
-        rows: Literals that it may hold there.
-        name: The new name.
-
-    Returns:
-        Edits with the index of their file.
-
-    Raises:
-        CloneError: A value stands where it cannot be given twice.
-    """
-    first = named[0]
-    program, variable = programs[first.file], first.variable
-    at = int(program.lines.line[variable.row])
-    found = [(first.file, _declare_clone(program, at, variable.name, name))]
-    for row in rows:
-        file, line = int(literals.file[row]), int(literals.line[row])
-        starts = literals.places[row : row + 1].start[0].tolist()
-        if file == len(programs) and values is not None and first.file == 0:
-            entry = copy_entry(values, line, variable.name, name, starts)
-            found.append((file, entry))
-        elif file != first.file:
-            raise CloneError("its value stands in another file")
-        elif line != at:
-            found.append((file, _assign_clone(program, first, line, name, starts)))
-    for one in named:
-        source = program.lines.source
-        length = len(source.line_text(source.line_of(one.span.start)))
-        check_length(source, length + len(name) - len(variable.name))
-        found.append((one.file, Edit(one.span, name.encode("latin-1"))))
-    return found
-
-
-def _means(program: Program, row: int, named: CloneTarget) -> bool:
-    """Tell whether a name in a row means the variable, and no other of its name."""
-    body, name = body_at(program, row), named.variable.name.lower()
-    if named.scope:
-        return body.name == named.scope
-    hidden = name in body.variables or any(p.name == name for p in body.parameters)
-    return not hidden
-
-
-def _declare_clone(program: Program, line: int, old: str, name: str) -> Edit:
-    """Declare the new name in a line behind the old one's."""
-    code = code_of(program, line).rstrip()
-    head = re.match(r"(\s*)(VAR\b\s*)?([\w\s,]*?)(\s*:.*)\Z", code, re.I)
-    if head is None or old.lower() not in re.split(r"[\s,]+", head[3].lower()):
-        raise CloneError("its declaration is not understood")
-    indent = head[1] + ("  " if head[2] else "")
-    return insert_after(
-        program.lines.source, line, indent + name + _EXPORTED.sub("", head[4])
-    )
-
-
-def _assign_clone(
-    program: Program, named: CloneTarget, line: int, name: str, starts: list[int]
-) -> Edit:
-    """Assign a value to the new name behind the line that gives it to the old one."""
-    row = int(np.searchsorted(program.lines.line, line))
-    statement = program.statement(row)
-    old = named.variable.name
-    own = (
-        isinstance(statement, ir.Assignment)
-        and statement.target == ir.DataObject(old.lower())
-        and isinstance(statement.value, ir.Composite | ir.FunctionCall)
-    )
-    if not own or not _means(program, row, named):
-        raise CloneError(f"line {line} is no plain assignment of its value")
-    code = code_of(program, line).rstrip()
-    begin = int(program.lines.source.line_starts[line - 1])
-    if not all(begin <= start < begin + len(code) for start in starts):
-        raise CloneError("its numbers are assigned one by one")
-    head = re.match(rf"(\s*){re.escape(old)}\b", code, re.I)
-    if head is None:
-        raise CloneError(f"line {line} is not understood")
-    return insert_after(program.lines.source, line, head[1] + name + code[head.end() :])
-
-
-# All of it behind the interface of languages.
-
-
-@dataclass
-class Pdl2Cloner(Cloner):
-    """The files of a job, to clone variables in them.
-
-    Attributes:
-        programs: Its program files, parsed.
-        values: Its variable file, or None.
-        taken: All words of its files, in lower case.
-    """
-
-    programs: list[Program]
-    values: Source | None
-    taken: set[str]
-
-    def target(self, file: int, line: int, via: bool, name: str) -> CloneTarget:
-        """Find the variable that a move goes to, as far as it can be cloned."""
-        return find_clone_target(self.programs, file, line, via, name)
-
-    def find_declaration(self, named: NamedPoint) -> int:
-        """Return the 1-based line that declares a variable."""
-        target = cast(CloneTarget, named)
-        return int(self.programs[target.file].lines.line[target.variable.row])
-
-    def clone(
-        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
-    ) -> tuple[str, list[tuple[int, Edit]]]:
-        """Give some moves a variable of their own, see `Cloner.clone`."""
-        own = [cast(CloneTarget, one) for one in named]
-        name = find_free_name(own[0].variable.name, self.taken, LONGEST_NAME)
-        return name, clone(self.programs, self.values, literals, own, rows, name)

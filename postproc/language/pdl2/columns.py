@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -138,7 +138,7 @@ class Collector:
         """Enter where moves stand, and what their forms say."""
         c, visit, lines = self.columns, moves.visit, moves.program.lines
         c.file[visit] = self.machine.world.files.index(lines.source.name)
-        c.line[visit] = lines.line[moves.row]
+        c.line[visit] = lines.begin_line[moves.row]
         c.motion[visit] = moves.of_forms(lambda form: form.motion)
         c.fly[visit] = moves.of_forms(lambda form: form.fly)
         c.via[visit] = moves.of_forms(lambda form: form.via)
@@ -216,8 +216,11 @@ class Collector:
             for k, _, goal in moves.list_evaluated()
             if goal.position
         }
-        if told:
-            at, names = _between(at, names, told)
+        if told:  # among the others, ascending
+            places = np.append(np.array([*told], dtype=np.int64), at)
+            every, order = NameColumn(told.values()), np.argsort(places)
+            every.extend(names)
+            at, names = places[order], every.take(order)
         self.columns.name[moves.visit[at]] = self.columns.names.of(names)
 
     def _points(self, moves: ProgramMoves) -> None:
@@ -235,8 +238,9 @@ class Collector:
         if self.machine.world.start.taught:
             names = entries.name.take(rows)
             c.taught[visit] |= [self.is_listed(name) for name in names]
-        for number in _in_order(entries.layout[rows]):
-            layout, mine = entries.layouts[number], entries.layout[rows] == number
+        written = entries.layout[rows]
+        for number in written[number_in_order(written)[1]].tolist():
+            layout, mine = entries.layouts[number], written == number
             c.config[visit[mine]] = self.columns.configs[layout.config or ""]
             c.config_given[visit[mine]] = layout.config is not None
             joints = layout.kind == "JNTP"
@@ -294,7 +298,12 @@ class Collector:
         c, runs = self.columns, [run for _, run in moves.runs]
         whole = Interned[Reason]()
         kinds: list[Indices]
-        kinds = [moves.first, whole.of([self._reason(run) for run in runs])[moves.run]]
+        recursive = [id(run.place.body) in self.machine.recursive for run in runs]
+        own = [
+            run.reason or (_RECURSIVE if again else NO_REASON)
+            for run, again in zip(runs, recursive, strict=True)
+        ]
+        kinds = [moves.first, whole.of(own)[moves.run]]
         kinds += [
             moves.form,
             self._setting[moves.visit],
@@ -312,12 +321,6 @@ class Collector:
             why = reason or problem or firsts[last] or self.machine.handler
             reasons.append(self.columns.reasons[why])
         c.reason[moves.visit] = np.array(reasons, dtype=np.int64)[which]
-
-    def _reason(self, run: MoveRun) -> Reason:
-        """Return why no move of a run can be compensated."""
-        if run.reason or id(run.place.body) not in self.machine.recursive:
-            return run.reason
-        return _RECURSIVE
 
     def aux_problem(self, axes: tuple[int, ...] | None) -> Reason:
         """Return why a target with some auxiliary axes stays, None: not known which."""
@@ -372,34 +375,16 @@ def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:
     return number_in_order(code)
 
 
-def _in_order(numbers: Ints) -> list[int]:
-    """Return what differs, in the order in which it first stands."""
-    found, first = np.unique(numbers, return_index=True)
-    ordered: list[int] = found[np.argsort(first)].tolist()
-    return ordered
-
-
-def _between(
-    at: Ints, names: NameColumn, others: Mapping[int, str]
-) -> tuple[Ints, NameColumn]:
-    """Put names by what they stand at, others among them, ascending."""
-    places = np.append(np.array([*others], dtype=np.int64), at)
-    every, order = NameColumn(others.values()), np.argsort(places)
-    every.extend(names)
-    return places[order], every.take(order)
-
-
 def _find_measured(program: Program) -> tuple[Ints, list[str]]:
     """Return the rows of moves with a ``-- MEASURE`` comment, and its ids."""
     lines = program.lines
     marks = [*COMMENTS.marks(lines.source, MEASURE)]
     if not marks:
         return np.empty(0, dtype=np.int64), []
-    moves = program.statements.which(lambda said: isinstance(said, ast.Move))
-    rows = np.flatnonzero(moves[lines.shape])
+    rows = np.flatnonzero(lines.which(lambda said: isinstance(said, ast.Move)))
     found: dict[int, str] = {}
     for line, mark in marks:
-        at = int(np.searchsorted(lines.line[rows], line))
+        at = int(np.searchsorted(lines.begin_line[rows], line))
         if at < len(rows):
             found.setdefault(int(rows[at]), mark)
     return np.array([*found], dtype=np.int64), [*found.values()]

@@ -10,17 +10,17 @@ import numpy as np
 
 from postproc.arrays import Indices, Interned, Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.analysis.conditions import Conditions, Pose, Zone, cell_pose
-from postproc.language.pdl2.abstract_state import Settings
+from postproc.language.analysis.conditions import Conditions, Zone, cell_pose
+from postproc.language.pdl2.abstract_state import FRAMES, Settings
 from postproc.language.pdl2.untracked_settings import (
     disturbance,
     load_of_settings,
     weaves,
 )
 from postproc.language.pdl2.values import Nothing, Position, Value
+from postproc.language.shifts import Pose
 from postproc.language.visits import Blend, Meaning, OrientationLaw, Switch, ZoneRule
 
-_FRAMES = ("tool", "base", "uframe")
 _OVERRIDES = ("arm_spd_ovr", "prog_spd_ovr", "gen_ovr")
 _BLENDS = {"FLY_NORM": Blend.OVERLAP, "FLY_CART": Blend.ZONE}
 _ZONE_RULES = {
@@ -78,7 +78,7 @@ class SettingTable:
 
 def _conditions(settings: Settings) -> Conditions:
     """Say what moves are carried out with under some settings."""
-    tool, base, uframe = (settings.get(name) for name in _FRAMES)
+    tool, base, uframe = (settings.get(name) for name in FRAMES)
     return Conditions(
         tool=_pose(tool),
         base=_pose(base),
@@ -180,7 +180,7 @@ def _why_not_known(settings: Settings, name: str) -> Nothing | None:
     value = settings.get(name)
     if isinstance(value, Nothing):
         return value
-    if name not in _FRAMES or (
+    if name not in FRAMES or (
         isinstance(value, Position) and value.complete and not value.joints
     ):
         return None

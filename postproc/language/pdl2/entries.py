@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Indices, Ints, chunks, slim
 from postproc.language.pdl2.parser import EntryPart
-from postproc.language.text.logical_lines import Lines
+from postproc.language.text.statement_table import Statements
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import (
     ParsedShapes,
@@ -22,6 +22,7 @@ from postproc.language.text.templates import (
 
 # The entries of a variable file as columns; single ones are made when asked for.
 
+EntryLines = Statements[EntryPart | None]
 POSITIONS = ("POS", "XTND", "JNTP")
 NESTED = ("REC", "NODE", "PATH")
 _KINDS = {"POS": "POS", "JNT": "JNTP", "JNTP": "JNTP", "XTN": "XTND", "XTND": "XTND"}
@@ -242,9 +243,7 @@ class Records:
     element: Bools
 
 
-def find_records(
-    lines: Lines, said: ParsedShapes[EntryPart | None], head: Ints
-) -> Records:
+def find_records(lines: EntryLines, head: Ints) -> Records:
     """Find where the entries of a file begin and end.
 
     The fields of records and of path nodes, and lines that are not understood, end an
@@ -252,15 +251,14 @@ def find_records(
 
     Args:
         lines: The file.
-        said: What its shapes of lines say.
         head: Row of the last variable's head up to every row, (n,).
     """
-    n, shape = len(lines), lines.shape
+    n = len(lines)
     own = head == np.arange(n)
-    other = (said.which(_is_head) | said.which(is_no_value))[shape] & ~own
-    elements = said.which(lambda e: e is not None and bool(e.element))[shape]
+    other = (lines.which(_is_head) | lines.which(is_no_value)) & ~own
+    elements = lines.which(lambda e: e is not None and bool(e.element))
     elements &= (head >= 0) & ~other
-    arrays = said.which(lambda e: e is not None and kind_of(e.type)[1])[shape]
+    arrays = lines.which(lambda e: e is not None and kind_of(e.type)[1])
     # a line may hold a head, then an element: two places on an axis of half lines
     half = [2 * np.flatnonzero(own | other), 2 * np.flatnonzero(elements) + 1]
     place = np.sort(np.concatenate(half))
@@ -270,32 +268,25 @@ def find_records(
     return Records(head[first], first, closed, place[begins] % 2 == 1)
 
 
-def last_head(lines: Lines, said: ParsedShapes[EntryPart | None]) -> Ints:
+def last_head(lines: EntryLines) -> Ints:
     """Return the row of the last variable's head up to every row, (n,), -1: none.
 
     A head below that of a record or path which does not say whose variable it is heads
     a field, not a variable.
     """
-    rows = np.flatnonzero(said.which(_is_head)[lines.shape])
-    shapes = lines.shape[rows]
-    nested = said.which(is_nested)[shapes]
-    heads = _heads(rows, said.which(_may_be_field)[shapes], nested)
+    rows = np.flatnonzero(lines.which(_is_head))
+    nested = lines.which(is_nested)[rows]
+    if nested.any():
+        fields, heads, within = lines.which(_may_be_field)[rows], [], False
+        columns = (rows.tolist(), fields.tolist(), nested.tolist())
+        for row, is_field, has_fields in zip(*columns, strict=True):
+            if not (within and is_field):
+                heads.append(row)
+                within = has_fields
+        rows = np.array(heads, dtype=np.int64)
     last = np.full(len(lines), -1, dtype=np.int64)
-    last[heads] = heads
+    last[rows] = rows
     return np.asarray(np.maximum.accumulate(last))
-
-
-def _heads(rows: Ints, fields: Bools, nested: Bools) -> Ints:
-    """Return which rows of heads are those of variables."""
-    if not nested.any():
-        return rows
-    heads, within = [], False
-    columns = (rows.tolist(), fields.tolist(), nested.tolist())
-    for row, is_field, has_fields in zip(*columns, strict=True):
-        if not (within and is_field):
-            heads.append(row)
-            within = has_fields
-    return np.array(heads, dtype=np.int64)
 
 
 def is_nested(entered: EntryPart | None) -> bool:
@@ -385,7 +376,7 @@ class _Columns:
         return cls(np.full((k, 6), np.nan), slots, layout, arm)
 
     def fill(
-        self, lines: Lines, some: Ints, first: Ints, read: _Read, shared: bool
+        self, lines: EntryLines, some: Ints, first: Ints, read: _Read, shared: bool
     ) -> None:
         """Enter those that are laid out alike.
 
@@ -406,10 +397,9 @@ class _Columns:
         self.layouts.append(read.layout(shared))
 
 
-def read_records(
-    lines: Lines, said: ParsedShapes[EntryPart | None], records: Records
-) -> Entries:
+def read_records(lines: EntryLines, records: Records) -> Entries:
     """Read the entries of a file, layout by layout; no name is told yet to be twice."""
+    said = lines.said
     form, k = said.form[lines.shape], len(records.first)
     c = _Columns.blank(k)
     for mine in _alike(form, records):
@@ -428,8 +418,8 @@ def read_records(
         stacked[rows, : values.shape[1]] = values
     return Entries(
         Rows(NameColumn(), np.empty(0, dtype=np.int32)),
-        _names(lines, said, records),
-        lines.line[records.first],
+        _names(lines, records),
+        lines.begin_line[records.first],
         slim(c.layout),
         tuple(c.layouts),
         c.numbers,
@@ -451,7 +441,7 @@ def _alike(form: Ints, records: Records) -> Iterator[Ints]:
 
 
 def _by_axes(
-    lines: Lines, first: Ints, mine: Ints, parts: Sequence[EntryPart | None]
+    lines: EntryLines, first: Ints, mine: Ints, parts: Sequence[EntryPart | None]
 ) -> Iterator[tuple[Ints, list[int]]]:
     """Split entries that are written alike by the axes that they give values of."""
     places = [
@@ -469,7 +459,7 @@ def _by_axes(
         yield mine[which.ravel() == number], one
 
 
-def _columns(lines: Lines, first: Ints, places: Sequence[Place]) -> Floats:
+def _columns(lines: EntryLines, first: Ints, places: Sequence[Place]) -> Floats:
     """Return the values at some places of entries that begin at some rows, (k, p)."""
     found = np.full((len(first), len(places)), np.nan)
     for column, (row, slot) in enumerate(places):
@@ -478,7 +468,7 @@ def _columns(lines: Lines, first: Ints, places: Sequence[Place]) -> Floats:
     return found
 
 
-def _values(lines: Lines, rows: Ints, slot: int) -> Floats:
+def _values(lines: EntryLines, rows: Ints, slot: int) -> Floats:
     """Return a number of every row, NaN where it cannot be read."""
     value = lines.value[lines.first[rows] + slot]
     return np.where(np.isfinite(value), value, np.nan)
@@ -490,23 +480,19 @@ def _whole(values: Floats) -> Ints:
     return np.trunc(np.where(sound, values, 0.0)).astype(np.int64)
 
 
-def _names(
-    lines: Lines, said: ParsedShapes[EntryPart | None], records: Records
-) -> NameColumn:
+def _names(lines: EntryLines, records: Records) -> NameColumn:
     """Name every entry: as its head does, elements with their index."""
     heads, at = np.unique(records.head, return_inverse=True)
-    names = _head_names(said, lines.shape[heads]).take(at.astype(np.int64))
-    index = _indices(lines, said, records)
+    names = _head_names(lines.said, lines.shape[heads]).take(at.astype(np.int64))
+    index = _indices(lines, records)
     if not index:
         return names
     return NameColumn(name + index.get(row, "") for row, name in enumerate(names))
 
 
-def _indices(
-    lines: Lines, said: ParsedShapes[EntryPart | None], records: Records
-) -> dict[int, str]:
+def _indices(lines: EntryLines, records: Records) -> dict[int, str]:
     """Write the indices of the entries that are elements of an array."""
-    elements = np.flatnonzero(records.element)
+    said, elements = lines.said, np.flatnonzero(records.element)
     form = said.form[lines.shape[records.first[elements]]]
     found = {}
     for one in np.unique(form).tolist():

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from postproc.diagnostics import Code
 from postproc.language import ir
-from postproc.language.pdl2.abstract_state import Store
+from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.job import Place, World, base_variable
 from postproc.language.pdl2.values import (
     COMPONENTS,
@@ -28,9 +29,6 @@ from postproc.language.pdl2.values import (
     unary,
 )
 
-# Evaluate expressions as far as the program text tells.
-
-FRAME_NAMES = ("tool", "base", "uframe")
 _DEFAULT_ARM = ("prog_arm", "dft_arm")  # the arm of all that names none
 _TRUTH = {"true": True, "on": True, "false": False, "off": False}
 _WORDS = frozenset(
@@ -51,6 +49,10 @@ class ProgramPoint:
     row: int
     store: Store
     volatile: frozenset[str] = frozenset()
+
+    def report_once(self, code: Code, what: str, text: str) -> None:
+        """Report something of a thing, at the row where it comes up first."""
+        self.world.report_once(self.place.program, self.row, code, what, text)
 
     # ---- arms -----------------------------------------------------------------------
     def is_ours(self, arm: ir.Operand | None) -> bool | None:
@@ -166,11 +168,20 @@ class ProgramPoint:
                 for frame in values if sign == ":" else ():
                     self.world.pin(frame, "the program composes it with a frame (`:`)")
                 return binary(sign, *values)
+            case ir.Composite(items) if len(items) < 6:
+                return Nothing("it has fewer than six joint values")
             case ir.Composite(items):
-                return self._joints(items)
+                own = enumerate(items[6:], start=1)
+                aux = tuple((axis, self.real(item)) for axis, item in own)
+                return replace(self._components(items[:6]), joints=True, aux=aux)
             case ir.FunctionCall(name):
-                return self._invoke(name, expression.values)
+                answer = self.store.get_assigned(self.answer_key(expression))
+                return answer or self._invoke(name, expression.values)
         return RUN_TIME
+
+    def answer_key(self, call: ir.FunctionCall) -> str:
+        """Return where it is kept what a function of the job has returned."""
+        return f"{self.place.program.name}:{self.place.body.name}/{hash(call)}"
 
     def read(self, reference: ir.DataObject) -> Value:
         """Return what a variable holds."""
@@ -183,7 +194,7 @@ class ProgramPoint:
             if name in _WORDS:
                 return name
         if self.world.is_function(self.place, name):
-            return Nothing(f"it comes from {name.upper()}, known only at run time")
+            return self.value(ir.FunctionCall(name, ()))
         target = self.locate(reference)
         if not target.exact:
             for key in target.keys:
@@ -226,7 +237,7 @@ class ProgramPoint:
             case _:
                 return None
         frame = self.setting_name(whole)
-        known = frame in FRAME_NAMES and part in COMPONENTS
+        known = frame in FRAMES and part in COMPONENTS
         return (frame, COMPONENTS[part]) if frame and known else None
 
     def setting_name(self, reference: ir.DataObject) -> str | None:
@@ -241,12 +252,6 @@ class ProgramPoint:
                 ours = setting in _DEFAULT_ARM or not self.other_default()
                 return setting if ours else None
         return None
-
-    def _joints(self, items: tuple[ir.Operand, ...]) -> Value:
-        if len(items) < 6:
-            return Nothing("it has fewer than six joint values")
-        aux = tuple((i, self.real(item)) for i, item in enumerate(items[6:], start=1))
-        return replace(self._components(items[:6]), joints=True, aux=aux)
 
     def _components(self, items: tuple[ir.Operand | None, ...]) -> Position:
         parts = [self.read_number(item) for item in items]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from postproc.files import base_name
+from postproc.language.language import matches
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import root_of
-from postproc.language.pdl2.external_routines import matches
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.program import Program, Variable
 from postproc.language.pdl2.side_effects import rows_effects

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from fnmatch import fnmatchcase
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 
 from postproc.diagnostics import Code
@@ -58,8 +57,8 @@ def list_motionless() -> frozenset[str]:
 def effect_of(world: World, program: Program, name: str) -> RoutineEffect:
     """Tell what a routine, or a program, that the job does not hold does.
 
-    What the cell says of a routine holds; what it says by pattern comes after what it
-    says by name, and the shipped list last, unless calls are taken strictly.
+    What the cell says of a routine holds; the shipped list comes last, unless calls
+    are taken strictly.
 
     Args:
         world: The files of the job.
@@ -72,23 +71,14 @@ def effect_of(world: World, program: Program, name: str) -> RoutineEffect:
     exporter = program.outside.get(name)
     holders = [exporter] if exporter else [*map(base_name, program.imports)]
     full = (f"{holders[0]}.{name}",) if len(set(holders)) == 1 else ()
-    for said in (start.routines.get(one) for one in (name, *full)):
-        if said is not None:
-            return RoutineEffect(said)
-    if matches(start.motionless, (name, *full[:1])):
-        return RoutineEffect.STILL
+    if said := start.effect_of(name, *full):
+        return RoutineEffect(said)
     if name == TRACKING:
         return RoutineEffect.TRACKS
     if name in _BUILT_IN:
         return RoutineEffect.STILL
     known = not start.assume_motion and name in list_motionless()
     return RoutineEffect.KNOWN if known else RoutineEffect.UNKNOWN
-
-
-@lru_cache(maxsize=8192)
-def matches(patterns: tuple[str, ...], names: tuple[str, ...]) -> bool:
-    """Tell whether a pattern with ``*``, ``?`` means one of some names."""
-    return any(fnmatchcase(name, pattern) for name in names for pattern in patterns)
 
 
 def stays_still(world: World, program: Program, name: str) -> bool:

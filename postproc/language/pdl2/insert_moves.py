@@ -48,9 +48,9 @@ class Pdl2Splitter(LayoutSplitter):
         if self._events:
             return self._events
         program = self.programs[file]
-        row = int(np.searchsorted(program.lines.line, line))
-        move = program.statement(row)
-        if not isinstance(move, ast.Move) or int(program.lines.line[row]) != line:
+        row = int(np.searchsorted(program.lines.begin_line, line))
+        move = program.lines.statement(row)
+        if not isinstance(move, ast.Move) or program.lines.line(row) != line:
             return "it does not stand alone on its line"
         for problem, hinders in (
             ("it ends on a condition (TIL)", move.til is not None),
@@ -65,18 +65,21 @@ class Pdl2Splitter(LayoutSplitter):
     @cached_property
     def _events(self) -> str:
         """Why no move may be split: what may count the segments of a motion."""
-        handled = any(_has_events(program) for program in self.programs)
-        if handled:
-            return "a condition on events along a move may be enabled"
-        if any(_enables_others(program) for program in self.programs):
-            return "a condition that these files do not define may be enabled"
+        for program in self.programs:
+            spans = (range(*rows) for rows in program.handlers)
+            if any(_EVENT.search(_code(program, rows)) for rows in spans):
+                return "a condition on events along a move may be enabled"
+        for program in self.programs:
+            code = _code(program, range(len(program.lines)))
+            if _ENABLE.search(code) or (_ENABLED.search(code) and not program.handlers):
+                return "a condition that these files do not define may be enabled"
         return ""
 
     def stops(self, file: int, line: int) -> bool:
         """Return True if the arm may stop once more, see `Splitter.stops`."""
         program = self.programs[file]
-        row = int(np.searchsorted(program.lines.line, line)) - 1
-        for one in map(program.statement, range(row, -1, -1)):
+        row = int(np.searchsorted(program.lines.begin_line, line)) - 1
+        for one in map(program.lines.statement, range(row, -1, -1)):
             if not isinstance(one, ir.Assignment) or one.target.name not in _MOTION:
                 return isinstance(one, ast.Move)
         return False
@@ -128,7 +131,7 @@ class Pdl2Layout(MoveLayout):
 def _in_its_text(program: Program, row: int) -> str:
     """Say what in the text of a move hinders, "" where nothing does."""
     lines = program.lines
-    line = int(lines.line[row])
+    line = lines.line(row)
     code = code_of(program, line)
     if _HEAD.match(code) is None or code.rstrip().endswith(","):
         return "it stands on several lines"
@@ -136,7 +139,7 @@ def _in_its_text(program: Program, row: int) -> str:
     if settings and "(" in settings[0]:
         return "a routine may be called for its settings (WITH)"
     if _ADVANCE.search(code):
-        after = program.statement(row + 1) if row + 1 < len(lines) else None
+        after = program.lines.statement(row + 1) if row + 1 < len(lines) else None
         if not isinstance(after, ast.Move):
             return "the program goes on while it moves (ADVANCE)"
     return ""
@@ -145,28 +148,9 @@ def _in_its_text(program: Program, row: int) -> str:
 def _code(program: Program, rows: range) -> str:
     """Return the text of rows, without comments."""
     lines = program.lines
-    first = int(lines.line[rows.start])
-    after = int(lines.line[rows.stop]) if rows.stop < len(lines) else None
+    if not rows:
+        return ""
+    first = lines.line(rows.start)
+    after = lines.line(rows.stop) if rows.stop < len(lines) else None
     last = len(lines.source.line_starts) + 1 if after is None else after
     return "\n".join(code_of(program, line) for line in range(first, last))
-
-
-def _has_events(program: Program) -> bool:
-    """Tell whether a condition handler of a program may look at segments."""
-    bodies = (program.main, *program.routines.values())
-    return any(
-        _EVENT.search(_code(program, range(opener, end)))
-        for body in bodies
-        if body is not None
-        for opener, end in body.flow.conditions
-    )
-
-
-def _enables_others(program: Program) -> bool:
-    """Tell whether a program enables conditions that it does not define itself."""
-    bodies = [b for b in (program.main, *program.routines.values()) if b is not None]
-    if not len(program.lines):
-        return False
-    code = _code(program, range(len(program.lines)))
-    own = any(body.flow.conditions for body in bodies)
-    return bool(_ENABLE.search(code)) or bool(_ENABLED.search(code) and not own)

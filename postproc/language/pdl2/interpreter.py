@@ -11,17 +11,17 @@ import numpy as np
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, Context
-from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED, Counting
+from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.abstract_state import Store, root_of
+from postproc.language.pdl2.abstract_state import FRAMES, Store, root_of
 from postproc.language.pdl2.calls import (
     assign,
     call_statement,
     calls_in_expressions,
-    forget_surroundings,
     frame_value,
     list_moves,
+    take_effects,
 )
 from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
 from postproc.language.pdl2.evaluate import ProgramPoint
@@ -38,7 +38,6 @@ from postproc.language.pdl2.machine import (
     Goal,
     Machine,
     MoveForm,
-    escape_names,
     invalidate,
     invalidate_names,
     let_others_run,
@@ -51,8 +50,9 @@ from postproc.language.pdl2.side_effects import (
     CallGraph,
     is_harmless,
     list_changed_arguments,
+    list_live,
     live_rows,
-    rows_effects,
+    names_but_ends,
     words_in,
 )
 from postproc.language.pdl2.to_visits import collect
@@ -123,7 +123,7 @@ class Pdl2Machine(Machine):
     ) -> Store:
         """Allow for what a line does besides leading elsewhere."""
         here = self.at(context, row, state)
-        written = here.place.program.statement(row)
+        written = here.place.program.lines.statement(row)
         text = written.text if isinstance(written, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
         if text:
@@ -132,41 +132,26 @@ class Pdl2Machine(Machine):
                 _forget_by_text(here, _why_unknown(here))
         return state
 
-    def truth(
-        self, context: Context, row: int, condition: ir.Operand, state: Store
-    ) -> bool | None:
-        """Tell whether a condition holds, None where only the run tells."""
-        found = self.at(context, row, state).value(condition)
-        return found if isinstance(found, bool) else None
+    def evaluate(
+        self, context: Context, row: int, operand: ir.Operand | None, state: Store
+    ) -> float | str | None:
+        """Return a number, a text or a truth, None where only the run tells."""
+        found = self.at(context, row, state).value(operand)
+        return found if isinstance(found, float | bool | str) else None
 
-    def fits(
-        self, context: Context, row: int, case: ir.Branch, head: int, state: Store
-    ) -> bool | None:
-        """Tell whether a CASE means the value that SELECT names."""
-        select = ast.action(context.place.statement(head))
-        tested = select.values if isinstance(select, ir.Branch) else ()
-        value = self.at(context, head, state).value(tested[0] if tested else None)
-        return _fits(self.at(context, row, state), case, value)
-
-    def count(
-        self, context: Context, row: int, loop: ir.ForLoop, state: Store
-    ) -> Counting | None:
-        """Return the rounds of a loop, None where they are not known."""
-        here = self.at(context, row, state)
-        first, last = here.value(loop.first), here.value(loop.last)
-        by = here.value(loop.step) if loop.step is not None else 1.0
-        if not (
-            isinstance(first, float) and isinstance(last, float)
-            and isinstance(by, float)
-        ):  # fmt: skip
-            return None
-        return Counting.of(first, last, -by if loop.down and by > 0 else by)
+    def selector(self, head: ir.SourceStatement) -> ir.Operand | None:
+        """Return what SELECT names."""
+        return super().selector(ast.action(head) or head)
 
     def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
         """Tell whether nothing but a loop itself changes its variable."""
-        program, end = context.place.program, context.place.flow.end[row]
-        changed = rows_effects(program, row + 1, end).assigned | self.volatile
-        return loop.name not in changed
+        place, key = context.place, self.world.root(context.place, loop.name)
+        inside = list_live(self.world, place, row + 1, place.flow.end[row])
+        return loop.name not in self.volatile and not any(
+            loop.name in part.effects.assigned
+            and self.world.root(part.place, loop.name) == key
+            for part in inside
+        )
 
     def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
         """Say that a loop runs too often to be followed round by round."""
@@ -250,7 +235,7 @@ def step(machine: Machine, here: Execution, statement: ir.SourceStatement) -> bo
         case ir.Assignment():
             lines = here.place.program.lines
             taught = here.world.taught_lines[lines.source.name]
-            assign(here, statement, int(lines.line[here.row]) in taught)
+            assign(here, statement, lines.line(here.row) in taught)
         case ir.Instruction():
             return not call_statement(machine, here, statement)
         case ast.Transfer("WRITE", operands):
@@ -287,22 +272,6 @@ def _cancel(here: Execution) -> None:
         here.store.last |= {ELSEWHERE}
 
 
-def _fits(at: Execution, case: ir.Branch, value: Value) -> bool | None:
-    """Tell whether a CASE means a value, None where it is not known."""
-    found: bool | None = not case.values and None
-    for choice in case.values:
-        low, high = choice, choice
-        if isinstance(choice, ir.Interval):
-            low, high = choice.low, choice.high
-        a, b = at.value(low), at.value(high)
-        known = type(a) is type(value) and type(b) is type(value)
-        if not known or not isinstance(value, float | str):
-            found = None
-        elif a <= value <= b:  # type: ignore[operator]
-            return True
-    return found
-
-
 def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> None:
     """Forget all that unknown text could influence."""
     why = _why_unknown(here)
@@ -320,7 +289,7 @@ def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> 
 
 
 def _why_unknown(here: Execution) -> str:
-    line = int(here.place.program.lines.line[here.row])
+    line = here.place.program.lines.line(here.row)
     return f"line {line}, which is not understood, may change it"
 
 
@@ -332,15 +301,13 @@ def _is_harmless(here: Execution, text: str) -> bool:
 
 def _forget_by_text(here: Execution, why: str) -> None:
     """Forget what only a statement that may move the arm could change."""
-    forget_surroundings(here, why)
-    here.world.report(
-        here.place.program,
-        here.row,
-        Code.MOTION_UNKNOWN,
+    here.store.forget_surroundings(why)
+    text = (
         "this statement is not understood: the position of the arm, its frames and "
         "its motion settings are not known after it, and targets are not corrected "
-        "until these are set again",
+        "until these are set again"
     )
+    here.world.report(here.place.program, here.row, Code.MOTION_UNKNOWN, text)
 
 
 def run_broken(machine: Machine, here: Execution) -> None:
@@ -350,15 +317,14 @@ def run_broken(machine: Machine, here: Execution) -> None:
     why = f"the block structure is broken (line {body.broken})"
     here.reason = Reason(Code.BLOCK_STRUCTURE, why)
     for row in range(body.first + 1, body.last):
-        said = ast.action(program.statement(row))
+        said = ast.action(program.lines.statement(row))
         if isinstance(said, ast.Move):
             here.row = row
             here.store.last = frozenset({ELSEWHERE})
             move(machine, here, said)
-    effects = rows_effects(program, body.first, body.last)
-    escape_names(here, effects.read, f"{why}: it may be used in a computation")
-    invalidate_names(here, effects.assigned, why)
-    here.store.set(tool=Nothing(why), base=Nothing(why), uframe=Nothing(why))
+    inside = list_live(here.world, here.place, body.first, body.last)
+    take_effects(here, inside, f"{why}: it may be used in a computation", why)
+    here.store.forget_frames(why)
     here.store.last = frozenset({ELSEWHERE})
 
 
@@ -386,7 +352,7 @@ def _report_drift(world: World, place: Place, file: ValueFile) -> None:
     if entries.parts:
         bases = {base_variable(name): name.partition(".")[0] for name in written}
         names, written = NameColumn(bases), [*bases.values()]
-    used = place.program.statements.tell(names)
+    used = place.program.lines.said.tell(names)
     declared = place.program.variables.names.find(names) >= 0
     if used.all() and declared.all():  # as nearly always
         return
@@ -567,9 +533,22 @@ def resolve(
             "in it is compensated",
         )  # fmt: skip
         machine = _list_moves(world)
+    _keep_exported(world, machine)
     world.pin_loose()
     world.settle()
     return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
+
+
+def _keep_exported(world: World, machine: Machine) -> None:
+    """Keep the numbers of what routines use that other programs alone may call."""
+    run = {id(context.place.body) for context, _ in machine.entries}
+    for program in world.programs():
+        for body in program.routines.values():
+            if body.exported and id(body) not in run:
+                place = world.place(program, body)
+                why = f"{body.name} uses it, which another program may call"
+                for name in names_but_ends(program, body.first, body.last):
+                    world.loosen(world.root(place, name), why)
 
 
 def _follow(world: World) -> Machine:
@@ -595,11 +574,7 @@ def _start(machine: Machine) -> None:
     program, start = world.main, world.start
     store = Store(world.initial.find, last=frozenset({START}), changing=world.changing)
     why = "the cell file does not say what it is"
-    store.set(
-        tool=frame_value(start.tool, why),
-        base=frame_value(start.base, why),
-        uframe=frame_value(start.uframe, why),
-    )
+    store.set(**{name: frame_value(getattr(start, name), why) for name in FRAMES})
     if start.linear_speed is not None:
         store.set(lin_spd=start.linear_speed)
     if start.override is not None:
@@ -618,22 +593,19 @@ def _handlers(machine: Machine, store: Store) -> None:
     unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
     unknown.changing = world.changing
     unknown.given, unknown.lost = store.given, store.lost
-    unknown.set(tool=nothing, base=nothing, uframe=nothing)
-    for program in world.programs():
-        for body in (program.main, *program.routines.values()):
-            for first, last in body.flow.conditions if body else ():
-                assert body is not None
-                place = world.place(program, body)
-                reach = live_rows(world, place, first, last)
-                machine.volatile |= reach.may_change
-                for part in reach.parts:
-                    for name in part.effects.read:
-                        root = world.root(part.place, name)
-                        world.loosen(root, "a condition handler may use it")
-                if reach.moves:
-                    _moving_handler(machine, place, first, unknown)
-                elif reach.cancels:
-                    _cancelling_handler(machine, place, first, reach)
+    unknown.forget_frames(nothing.why)
+    for place in world.places():
+        for first, last in place.flow.conditions:
+            reach = live_rows(world, place, first, last)
+            machine.volatile |= reach.may_change
+            for part in reach.parts:
+                for name in part.effects.read:
+                    root = world.root(part.place, name)
+                    world.loosen(root, "a condition handler may use it")
+            if reach.moves:
+                _moving_handler(machine, place, first, unknown)
+            elif reach.cancels:
+                _cancelling_handler(machine, place, first, reach)
     for name in machine.volatile:
         if name.startswith("$"):
             store.set(**{name[1:]: Nothing("a condition handler changes it")})
@@ -644,7 +616,7 @@ def _ends_ours(world: World, place: Place, first: int, reach: CallGraph) -> bool
     if any(part.effects.cancels for part in reach.parts[1:]):
         return True
     for row in range(first, place.flow.end[first]):
-        action = ast.action(place.program.statement(row))
+        action = ast.action(place.program.lines.statement(row))
         if isinstance(action, ast.CancelMove):
             at = Execution(world, place, row, Store(lambda key: None))
             ours = [at.is_ours(arm) is not False for arm in action.arms]
@@ -662,28 +634,20 @@ def _cancelling_handler(
         return
     machine.interrupted = True
     machine.cycle_left |= cycles
-    machine.world.report_once(
-        place.program,
-        row,
-        Code.HANDLER_CANCELS,
-        str(row),
+    text = (
         "this condition handler may end any move early (CANCEL, EXIT CYCLE): the start "
-        "of every move is uncertain",
+        "of every move is uncertain"
     )
+    code, program = Code.HANDLER_CANCELS, place.program
+    machine.world.report_once(program, row, code, str(row), text)
 
 
 def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> None:
-    line = int(place.program.lines.line[row])
+    line = place.program.lines.line(row)
     machine.interrupted = True
-    text = f"a condition handler (line {line}) may move the arm at any time"
-    machine.handler = Reason(Code.HANDLER_MOVES, text)
-    machine.world.report_once(
-        place.program,
-        row,
-        Code.HANDLER_MOVES,
-        str(row),
-        "this condition handler may move the arm at any time: the start of every move "
-        "is uncertain",
-    )
+    code, moves = Code.HANDLER_MOVES, "may move the arm at any time"
+    machine.handler = Reason(code, f"a condition handler (line {line}) {moves}")
+    text = f"this condition handler {moves}: the start of every move is uncertain"
+    machine.world.report_once(place.program, row, code, str(row), text)
     context = machine.root.within(place.offset + row, HANDLED, place)
     machine.enter(context, row + 1, store)

@@ -206,7 +206,7 @@ class Place:
 
     def statement(self, row: int) -> ir.SourceStatement:
         """Return what a row says; of what is not understood, which block it opens."""
-        return recover_block(self.program.statement(row))
+        return recover_block(self.program.lines.statement(row))
 
 
 @dataclass
@@ -288,6 +288,13 @@ class World:
             found.setdefault(id(program), program)
         return list(found.values())
 
+    def places(self) -> list[Place]:
+        """Return where the statements of every body stand."""
+        every = (
+            (program, body) for program in self.programs() for body in program.bodies
+        )
+        return [self.place(program, body) for program, body in every]
+
     def place(self, program: Program, body: Body) -> Place:
         """Return where the statements of a body stand."""
         return Place(program, body, self.row_base[program.lines.source.name])
@@ -295,7 +302,7 @@ class World:
     def report(self, program: Program, row: int, code: Code, message: str) -> None:
         """Collect a finding at a logical line."""
         lines = program.lines
-        line = int(lines.line[row]) if 0 <= row < len(lines) else 1
+        line = lines.line(row) if 0 <= row < len(lines) else 1
         self.diagnostics[Diagnostic(lines.source.name, line, code, message)] = None
 
     def report_once(
@@ -370,11 +377,10 @@ class World:
         What a body does not hide means what it means in the first one.
         """
         for program in self.programs():
-            bodies = [b for b in (program.main, *program.routines.values()) if b]
-            for body in bodies:
-                seen = program.variables
-                if body is not bodies[0]:
-                    seen = seen.some(bodies[0].own_names | body.own_names)
+            for body in program.bodies:
+                seen, first = program.variables, program.bodies[0]
+                if body is not first:
+                    seen = seen.some(first.own_names | body.own_names)
                 yield self.place(program, body), seen
 
     @cached_property

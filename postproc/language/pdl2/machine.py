@@ -193,11 +193,11 @@ class Machine(Interpreter[Store]):
         key = (here.context, here.place.offset + here.row, sub)
         self.arrivals[key] = arrival
         if MANY in arrival.predecessors:
-            here.world.report_once(
-                here.place.program, here.row, Code.MANY_ORIGINS, str(here.row),
+            text = (
                 f"more than {MOST_ORIGINS} moves may come before this one: they are "
-                "not followed separately, and the approach direction is not known",
-            )  # fmt: skip
+                "not followed separately, and the approach direction is not known"
+            )
+            here.report_once(Code.MANY_ORIGINS, str(here.row), text)
         return self.visit_id(key, len(arrival))
 
     def predecessors(self, here: Execution) -> frozenset[int]:

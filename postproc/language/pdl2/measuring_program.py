@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from postproc.language.measuring_program import (
     CORNER_MM,
+    SHARE,
     SLOW,
     MeasuringLine,
     MeasuringProgram,
@@ -14,9 +15,11 @@ from postproc.language.measuring_program import (
     number_list,
 )
 
-# Speed of lines, and where they leave them for the next one.
+# Of all speeds: links that run on as an arm brakes rest on other flanks than at work.
+_GENTLY = f"  $PROG_SPD_OVR := {SHARE}"
+# Speed of lines, at that override, and where they leave them for the next one.
 _LINES = (
-    f"  $LIN_SPD := {SLOW / 1000:g}",
+    f"  $LIN_SPD := {SLOW / 10 / SHARE:g}",
     "  $FLY_TYPE := FLY_CART",
     "  $FLY_TRAJ := FLY_FROM",
     f"  $FLY_DIST := {CORNER_MM}",
@@ -30,6 +33,7 @@ def write_pdl2(program: MeasuringProgram) -> str:
         f"PROGRAM {program.name} EZ, HOLD",
         "BEGIN",
         "  $TERM_TYPE := FINE",
+        _GENTLY,
         *(_LINES if program.has_lines else ()),
     ]
     for step in program.steps:

@@ -24,6 +24,7 @@ from postproc.language.pdl2.machine import (
     MoveRun,
 )
 from postproc.language.pdl2.moves import UNSURE, from_value, motion_of
+from postproc.language.pdl2.program import ProgramLines
 from postproc.language.pdl2.side_effects import (
     CHANGING,
     PURE,
@@ -31,7 +32,6 @@ from postproc.language.pdl2.side_effects import (
     references,
 )
 from postproc.language.pdl2.values import Nothing
-from postproc.language.text.logical_lines import Lines
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import alike, name_index, number_in_order
 from postproc.robot.trajectory import Motion
@@ -118,7 +118,7 @@ def find_plain_moves(
     variants = _Variants(world, place, volatile, used)
     of_shape = np.full(len(used), -1, dtype=np.int64)
     shapes = used[may_be[used]]
-    forms = program.statements.form[shapes]
+    forms = program.lines.said.form[shapes]
     kinds, begins = np.unique(np.sort(forms), return_index=True)
     groups = np.split(shapes[np.argsort(forms, kind="stable")], begins[1:])
     for form, mine in zip(kinds.tolist(), groups, strict=False):
@@ -227,7 +227,7 @@ class _Variants:
 
     def add(self, form: int, shapes: Ints) -> Ints:
         """Return the variants of shapes of one form, -1 where one is not quiet."""
-        said = self.place.program.statements
+        said = self.place.program.lines.said
         one = said.said[form]
         where = one.where[0] if isinstance(one, ast.Move) else None
         if len(shapes) == 1:
@@ -308,7 +308,7 @@ class _Variants:
 
     def _variant(self, shape: int, names: tuple[str, ...]) -> int:
         """Return the variant of a shape, which its form and some names tell."""
-        said = self.place.program.statements
+        said = self.place.program.lines.said
         key = int(said.form[shape]), names
         variant = self._known.get(key)
         if variant is None:
@@ -436,7 +436,7 @@ class MoveBlocks:
     def _quiet(self, here: Execution) -> PlainMoves:
         program, body = here.place.program, here.place.body
         if id(program) not in self._may_be:
-            self._may_be[id(program)] = program.statements.which(_may_be_plain)
+            self._may_be[id(program)] = program.lines.said.which(_may_be_plain)
         if id(body) not in self.quiet:
             self.quiet[id(body)] = find_plain_moves(
                 here.world, here.place, here.volatile, self._may_be[id(program)]
@@ -524,7 +524,7 @@ def _find_assigned(here: Execution, quiet: PlainMoves, names: Ints) -> Bools:
     return found
 
 
-def _key(lines: Lines, point: PointVariable, row: int) -> str:
+def _key(lines: ProgramLines, point: PointVariable, row: int) -> str:
     """Return where the point of a move is stored, "" where its index is not known."""
     if not point.index:
         return point.key

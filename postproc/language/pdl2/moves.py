@@ -171,11 +171,16 @@ def absolute(here: Execution, expression: ir.Operand) -> Goal:
     """Tell what a place means that does not depend on where the arm is."""
     if isinstance(expression, ir.DataObject) and expression.name.startswith("$"):
         return _system(here, expression)
+    value: Value | None = None
     if isinstance(expression, ir.DataObject):
-        _check_declared(here, expression.name)
-    if isinstance(expression, ir.DataObject) and may_be_node(here, expression):
-        value = destination(here, expression)
-    else:
+        name = expression.name
+        declared = here.world.find_declaration(here.place, name)
+        if declared is None and here.world.type_of(here.place, name) is None:
+            text = f"{name} is used and not declared"
+            here.report_once(Code.UNDECLARED_VARIABLE, name, text)
+        if may_be_node(here, expression):
+            value = destination(here, expression)
+    if value is None:
         value = here.value(expression)
     if isinstance(value, Nothing):
         here.world.pin(value, UNSURE)
@@ -199,19 +204,6 @@ def _system(here: Execution, reference: ir.DataObject) -> Goal:
     return replace(from_value(held), reason=_why(f"${name.upper()}"))
 
 
-def _check_declared(here: Execution, name: str) -> None:
-    if here.world.type_of(here.place, name) is None:
-        if here.world.find_declaration(here.place, name) is not None:
-            return
-        here.world.report_once(
-            here.place.program,
-            here.row,
-            Code.UNDECLARED_VARIABLE,
-            name,
-            f"{name} is used and not declared",
-        )
-
-
 def from_value(value: Value, system: bool = False) -> Goal:
     """Tell what a move to a value means; `system`: to that of a system variable."""
     if isinstance(value, Nothing):
@@ -221,8 +213,14 @@ def from_value(value: Value, system: bool = False) -> Goal:
         return Goal(Meaning.UNKNOWN, reason=NO_POSITION)
     if not value.complete:
         return Goal(Meaning.UNKNOWN, position=value, reason=IN_PART)
+    reason = NO_REASON if value.editable else COMPUTED
+    if value.derived:
+        text = f"the target is computed: {value.derived}"
+        reason = Reason(Code.COMPUTED_TARGET, text)
+    elif system:
+        reason = SYSTEM
     target = Meaning.JOINTS if value.joints else Meaning.POSE
-    return Goal(target, value.numbers, value, reason=_explain_computed(value, system))
+    return Goal(target, value.numbers, value, reason=reason)
 
 
 NO_POSITION = Reason(Code.RUNTIME_VALUE, "the target is no position")
@@ -233,16 +231,6 @@ SYSTEM = Reason(Code.COMPUTED_TARGET, "the target is a system variable")
 COMPUTED = Reason(
     Code.COMPUTED_TARGET, "a number of the target is computed, not written"
 )
-
-
-def _explain_computed(value: Position, system: bool) -> Reason:
-    """Say why the numbers of a known position cannot be written."""
-    if value.derived:
-        text = f"the target is computed: {value.derived}"
-        return Reason(Code.COMPUTED_TARGET, text)
-    if system:
-        return SYSTEM
-    return NO_REASON if value.editable else COMPUTED
 
 
 # What one move statement means at a point of the execution.
@@ -282,7 +270,7 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
         form = MoveForm(motion, reason, fly=True, via=True)
         via = single(here, form, predecessors, settings, goal)
         predecessors = frozenset({machine.record(here, _VIA, via)})
-        if several or machine.interrupted:  # the arc depends on where it starts
+        if machine.interrupted:  # the arm may have been moved off the way
             predecessors |= {ELSEWHERE}
     goal = goal_of(here, statement, motion)
     form = MoveForm(motion, reason, fly=statement.fly)
@@ -352,13 +340,10 @@ def motion_of(
     if with_:
         said = settings.get("move_type")
     if said is None:
-        here.world.report_once(
-            here.place.program,
-            here.row,
-            Code.ASSUMED_JOINT,
-            "move_type",
-            "the move names no trajectory and $MOVE_TYPE is not set: JOINT is assumed",
+        text = (
+            "the move names no trajectory and $MOVE_TYPE is not set: JOINT is assumed"
         )
+        here.report_once(Code.ASSUMED_JOINT, "move_type", text)
         return Motion.JOINT, NO_REASON
     motion = _MOTIONS.get(said) if isinstance(said, str) else None
     if motion is None:

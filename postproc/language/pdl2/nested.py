@@ -14,15 +14,14 @@ from postproc.language.pdl2.entries import (
     NESTED,
     POSITIONS,
     Entries,
+    EntryLines,
     Records,
     is_nested,
     kind_of,
 )
 from postproc.language.pdl2.parser import EntryPart
 from postproc.language.pdl2.values import COMPONENTS
-from postproc.language.text.logical_lines import Lines
 from postproc.language.text.symbol_column import NameColumn
-from postproc.language.text.templates import ParsedShapes
 from postproc.language.visits import Diagnostic
 
 # A field of a record or of a node, as a variable file lists it.
@@ -90,15 +89,14 @@ class Nested:
     """A record, an array of records or a path, line by line.
 
     Attributes:
-        lines, said: The file, and what its shapes of lines say.
+        lines: The file.
         row: Row of its head.
         found: Its fields by part (``.NODE[1]``, ``[1]``, "") and lower-case name.
         unread: Rows of what is not read, and why not.
         dropped: Parts of which nothing is read.
     """
 
-    lines: Lines
-    said: ParsedShapes[EntryPart | None]
+    lines: EntryLines
     row: int
     found: dict[str, dict[str, Field]] = field(default_factory=dict)
     unread: list[tuple[int, str]] = field(default_factory=list)
@@ -129,9 +127,9 @@ class Nested:
         ]
 
     def _enter(self, row: int) -> EntryPart:
-        entered = self.said[int(self.lines.shape[row])]
+        entered = self.lines.statement(row)
         if entered is None:
-            text = self.lines.source.line_text(int(self.lines.line[row]))
+            text = self.lines.source.line_text(self.lines.line(row))
             raise OddLine(row, f"{text.strip()[:60]!r} is not understood")
         return entered
 
@@ -261,21 +259,19 @@ class Fields:
     unread: frozenset[str] = frozenset()
 
 
-def find_fields(
-    lines: Lines, said: ParsedShapes[EntryPart | None], head: Ints
-) -> Fields:
+def find_fields(lines: EntryLines, head: Ints) -> Fields:
     """Find the fields of the records and paths of a file.
 
     Args:
         lines: The file.
-        said: What its shapes of lines say.
         head: Row of the last variable's head up to every row, (n,).
     """
     own = np.flatnonzero(head == np.arange(len(head)))
-    nested = np.flatnonzero(said.which(is_nested)[lines.shape[own]])
+    nested = np.flatnonzero(lines.which(is_nested)[own])
     if not len(nested):
         return Fields()
-    names = [_name(lines, said, row) for row in own.tolist()]
+    heads = map(lines.statement, own.tolist())
+    names = ["" if head is None else head.name.lower() for head in heads]
     count, ends = Counter(names), np.append(own[1:], len(head))
     each: list[Field] = []
     findings: list[Finding] = []
@@ -284,55 +280,36 @@ def find_fields(
         row, end = int(own[at]), int(ends[at])
         if count[names[at]] > 1:
             text = "has two entries: it is not compensated; delete one"
-            findings.append(
-                (end, _finding(lines, said, row, row, Code.LSV_DUPLICATE, text))
-            )
+            findings.append((end, _finding(lines, row, row, Code.LSV_DUPLICATE, text)))
             unread.add(names[at])
             continue
-        entry = Nested(lines, said, row)
+        entry = Nested(lines, row)
         try:
             each += entry.fields(end)
         except OddLine as odd:
             unread.add(names[at])
             text = f"is not read: {odd}"
-            findings.append(
-                (end, _finding(lines, said, row, odd.row, Code.LSV_PARTS, text))
-            )
+            findings.append((end, _finding(lines, row, odd.row, Code.LSV_PARTS, text)))
         else:
-            findings += _report_unread(lines, said, entry, end)
+            findings += _report_unread(lines, entry, end)
             unread |= {names[at] + part.lower() for part in entry.dropped}
     twice = frozenset(names[at] for at in nested.tolist() if count[names[at]] > 1)
     return Fields(tuple(each), tuple(findings), twice, frozenset(unread))
 
 
-def _report_unread(
-    lines: Lines, said: ParsedShapes[EntryPart | None], entry: Nested, end: int
-) -> Iterator[Finding]:
+def _report_unread(lines: EntryLines, entry: Nested, end: int) -> Iterator[Finding]:
     """Say which fields of an entry are not read, once."""
     if entry.unread:
         at, why = entry.unread[0]
         more = len(entry.unread) - 1
         text = f"is not read as a whole: {why}" + (f", and {more} more" if more else "")
-        yield end, _finding(lines, said, entry.row, at, Code.LSV_PARTS, text)
+        yield end, _finding(lines, entry.row, at, Code.LSV_PARTS, text)
 
 
-def _finding(
-    lines: Lines,
-    said: ParsedShapes[EntryPart | None],
-    row: int,
-    at: int,
-    code: Code,
-    text: str,
-) -> Diagnostic:
-    entered = said[int(lines.shape[row])]
+def _finding(lines: EntryLines, row: int, at: int, code: Code, text: str) -> Diagnostic:
+    entered = lines.statement(row)
     assert entered is not None
-    line = int(lines.line[at])
-    return Diagnostic(lines.source.name, line, code, f"{entered.name} {text}")
-
-
-def _name(lines: Lines, said: ParsedShapes[EntryPart | None], row: int) -> str:
-    entered = said[int(lines.shape[row])]
-    return entered.name.lower() if entered is not None else ""
+    return lines.diagnostic(at, code, f"{entered.name} {text}")
 
 
 def with_fields(records: Records, fields: Fields) -> Records:

@@ -18,11 +18,13 @@ from postproc.language.analysis.control_flow import ControlFlow, FlowReader
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_form
 from postproc.language.pdl2.pose_encoding import COMMENTS
-from postproc.language.text.logical_lines import Lines, read_lines, reread_lines
+from postproc.language.text.logical_lines import read_lines, reread_lines
 from postproc.language.text.source import Source
+from postproc.language.text.statement_table import Statements
 from postproc.language.text.symbol_column import NameColumn
-from postproc.language.text.templates import ParsedShapes, parse_shapes
 from postproc.language.visits import Diagnostic
+
+ProgramLines = Statements[ir.SourceStatement]
 
 # Block structure of one body: which line closes which, and where jumps lead.
 
@@ -35,6 +37,7 @@ _UNKNOWN_OPENERS: tuple[tuple[str, ir.SourceStatement], ...] = (
     (r"CASE\b", ir.Branch("case")),
     (r"CONDITION\b(?!.*\bENDCONDITION\b)", ir.Branch("condition")),
 )
+_SPELT = {"test": "SELECT", "endtest": "ENDSELECT"}
 _STRING = re.compile(r"'[^']*'")
 _JUMP = re.compile(r"\b(?:GOTO|RETURN|EXIT)\b", re.I)
 _LEADS = (
@@ -52,36 +55,24 @@ def recover_block(statement: ir.SourceStatement) -> ir.SourceStatement:
     return statement
 
 
-def read_flow(
-    lines: Lines,
-    statements: ParsedShapes[ir.SourceStatement],
-    rows: Ints,
-    first: int,
-    last: int,
-) -> ControlFlow:
+def read_flow(lines: ProgramLines, rows: Ints, first: int, last: int) -> ControlFlow:
     """Match the blocks of a body.
 
     Args:
         lines: Those of the program.
-        statements: What their shapes say.
         rows: Those of the body that are no plain ones.
         first: The first row of the body.
         last: The row of its end.
     """
-    reader = FlowReader(lambda row: int(lines.line[row]), _spell)
+    reader = FlowReader(lines.line, lambda word: _SPELT.get(word, word.upper()))
     for row in rows.tolist():
-        written = statements[int(lines.shape[row])]
+        written = lines.statement(row)
         odd = ast.action(written)
         text = odd.text if isinstance(odd, ir.NotUnderstood) else ""
         if _JUMP.search(_STRING.sub("", text)):  # it may lead to another place
             reader.problems.append((row, _LEADS))
         reader.take(row, recover_block(written))
     return reader.flow(first, last)
-
-
-def _spell(word: str) -> str:
-    """Write the words of blocks as the language does."""
-    return {"test": "SELECT", "endtest": "ENDSELECT"}.get(word, word.upper())
 
 
 # Declared variables: a list of names is one declaration, whatever its length.
@@ -246,6 +237,7 @@ class Body:
         flow: Where its jumps lead.
         broken: First line whose block structure is wrong, 0 where all is well.
         arms: ``FOR ARM[n]`` of its parameters, by name, where it is said.
+        exported: Other programs may call it.
     """
 
     name: str
@@ -256,6 +248,7 @@ class Body:
     flow: ControlFlow
     broken: int = 0
     arms: Mapping[str, int] = field(default_factory=dict)
+    exported: bool = False
 
     @cached_property
     def own_names(self) -> frozenset[str]:
@@ -270,7 +263,6 @@ class Program:
     Attributes:
         name: Program name in lower case.
         lines: Its logical lines.
-        statements: What each shape says; parallel to `lines.shapes`.
         main: Its main part, None where it has none.
         routines: Routines with a body, by lower-case name.
         outside: Routines exported from other programs: name to program.
@@ -282,8 +274,7 @@ class Program:
     """
 
     name: str
-    lines: Lines
-    statements: ParsedShapes[ir.SourceStatement]
+    lines: ProgramLines
     main: Body | None
     routines: Mapping[str, Body]
     outside: Mapping[str, str]
@@ -293,16 +284,22 @@ class Program:
     diagnostics: tuple[Diagnostic, ...]
     nodes: Mapping[str, frozenset[str]]
 
-    def statement(self, row: int) -> ir.SourceStatement:
-        """Return what a logical line says."""
-        return self.statements[int(self.lines.shape[row])]
+    @cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        """Its main part, if it has one, and its routines."""
+        return tuple(one for one in (self.main, *self.routines.values()) if one)
+
+    @property
+    def handlers(self) -> list[tuple[int, int]]:
+        """Rows at which its condition handlers begin and end."""
+        return [rows for body in self.bodies for rows in body.flow.conditions]
 
     @property
     def head(self) -> int:
         """Return the line that names the program, 1 where there is none."""
-        heads = self.statements.which(lambda said: isinstance(said, ast.ProgramHead))
-        rows = np.flatnonzero(heads[self.lines.shape])
-        return int(self.lines.line[rows[0]]) if len(rows) else 1
+        heads = self.lines.which(lambda said: isinstance(said, ast.ProgramHead))
+        rows = np.flatnonzero(heads)
+        return int(self.lines.begin_line[rows[0]]) if len(rows) else 1
 
 
 # Programs from lines: declarations, routines, blocks, and where each jump leads.
@@ -326,8 +323,7 @@ class _Scope:
 class _Reader:
     """Collects the parts of a program, one structural line after the other."""
 
-    lines: Lines
-    statements: ParsedShapes[ir.SourceStatement]
+    lines: ProgramLines
     taught: frozenset[int]
     structural: Ints  # rows of other statements than plain ones, ascending
     name: str = ""
@@ -342,9 +338,7 @@ class _Reader:
     nodes: dict[str, frozenset[str]] = field(default_factory=dict)
 
     def report(self, row: int, code: Code, message: str) -> None:
-        name = self.lines.source.name
-        line = int(self.lines.line[row])
-        self.diagnostics.append(Diagnostic(name, line, code, message))
+        self.diagnostics.append(self.lines.diagnostic(row, code, message))
 
     def take(self, row: int, statement: ir.SourceStatement) -> None:
         scope = self.scopes[-1]
@@ -406,7 +400,7 @@ class _Reader:
             statement.initial,
             statement.exported,
             "const" in statement.attributes,
-            int(self.lines.line[row]) in self.taught,
+            self.lines.line(row) in self.taught,
             self._arm(row, statement.type.arm),
         )
         variables.declare(statement.names, said)
@@ -437,17 +431,20 @@ class _Reader:
         routine = scope.routine
         within = np.searchsorted(self.structural, (scope.begin + 1, last))
         rows = self.structural[slice(*within)]
-        flow = read_flow(self.lines, self.statements, rows, scope.begin + 1, last)
+        flow = read_flow(self.lines, rows, scope.begin + 1, last)
         for row, message in flow.problems:
             self.report(row, Code.BLOCK_STRUCTURE, message)
-        wrong = (int(self.lines.line[row]) for row, _ in flow.problems)
+        wrong = (self.lines.line(row) for row, _ in flow.problems)
         broken = min(wrong, default=0)
         name = routine.name if routine else ""
         parameters = routine.parameters if routine else ()
         own = scope.variables if routine else Variables()
         given = {p.name: self._arm(scope.row, p.type.arm) for p in parameters}
         arms = {name: arm for name, arm in given.items() if arm}
-        body = Body(name, scope.begin, last, parameters, own, flow, broken, arms)
+        exported = bool(routine and routine.exported)
+        body = Body(
+            name, scope.begin, last, parameters, own, flow, broken, arms, exported
+        )
         if routine:
             self.routines[name] = body
             self.scopes.pop()
@@ -467,15 +464,13 @@ def parse(source: Source) -> Program:
     Raises:
         ProgramError: A string does not end on its line.
     """
-    lines = read_lines(source)
-    statements = parse_shapes(lines.shapes, parse_form)
-    taught = COMMENTS.list_taught(source)
-    rows = _structural(statements, lines)
-    reader = _Reader(lines, statements, taught, rows)
+    lines: ProgramLines = read_lines(source, parse_form)
+    rows = _structural(lines)
+    reader = _Reader(lines, COMMENTS.list_taught(source), rows)
     for row in rows.tolist():
-        statement = statements.once(int(lines.shape[row]))
+        statement = lines.said.once(int(lines.shape[row]))
         if isinstance(statement, ir.NotUnderstood):
-            line = int(reader.lines.line[row])
+            line = reader.lines.line(row)
             text = reader.lines.source.line_text(line).strip()
             reader.report(
                 row,
@@ -487,7 +482,6 @@ def parse(source: Source) -> Program:
     return Program(
         reader.name,
         lines,
-        statements,
         reader.main,
         reader.routines,
         reader.outside,
@@ -513,16 +507,15 @@ def parse_again(source: Source, before: Program) -> Program:
         ProgramError: A string does not end on its line.
     """
     found = reread_lines(source, before.lines)
-    if found is None or found.change(_structural(before.statements, before.lines)):
+    if found is None or found.change(_structural(before.lines)):
         return parse(source)
     told = found.move(before.diagnostics)
     return replace(before, lines=found.lines, diagnostics=told)
 
 
-def _structural(statements: ParsedShapes[ir.SourceStatement], lines: Lines) -> Ints:
+def _structural(lines: ProgramLines) -> Ints:
     """List the rows of other statements than plain ones, ascending."""
-    structural = statements.which(lambda said: not isinstance(said, _PLAIN))
-    return np.flatnonzero(structural[lines.shape])
+    return np.flatnonzero(lines.which(lambda said: not isinstance(said, _PLAIN)))
 
 
 def _close_open(reader: _Reader) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -13,6 +13,7 @@ from postproc.arrays import Ints
 from postproc.language import ir
 from postproc.language.analysis.call_graph import find_recursive, reach
 from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.abstract_state import FRAMES
 from postproc.language.pdl2.external_routines import (
     TRACKING,
     RoutineEffect,
@@ -43,9 +44,6 @@ CHANGING = frozenset(
 
 NODES = frozenset({"node_app", "node_del", "node_ins"})
 """Those of them that change how many nodes a path has, and no number in them."""
-
-
-FRAMES = ("tool", "base", "uframe")
 
 # What text may do that is not understood.
 
@@ -98,14 +96,14 @@ def is_harmless(text: str) -> bool:
 
 @dataclass(frozen=True)
 class Effects:
-    """What running a routine, and all it calls in its file, may do.
+    """What statements may do, without the routines that they call.
 
     Attributes:
-        moves: It holds a move, or text that is not understood.
-        assigned: Names of variables and settings (with ``$``) it may change.
-        read: Names of variables and settings that occur in it.
-        calls: Names it calls that its file does not hold.
-        cancels: Statements of it that end moves on their way.
+        moves: They hold a move, or text that is not understood.
+        assigned: Names of variables and settings (with ``$``) that they may change.
+        read: Names of variables and settings that occur in them.
+        calls: Names that they call and their file does not hold.
+        cancels: Those of them that end moves on their way.
     """
 
     moves: bool
@@ -134,54 +132,32 @@ def list_changed_arguments(
 
 def rows_effects(program: Program, first: int, last: int) -> Effects:
     """Return what the statements of rows first to last - 1 may do."""
-    own, names = _reach(program, _shapes(program, first, last))
-    return _unite(program, own, names)
-
-
-def _own_effects(program: Program, first: int, last: int) -> Effects:
-    """Return what the statements of rows do, without the routines that they call."""
-    own = [_direct(program.statements[s]) for s in _shapes(program, first, last)]
-    return _unite(program, own, frozenset().union(*(e.calls for e in own)))
-
-
-def _unite(program: Program, own: list[Effects], names: frozenset[str]) -> Effects:
+    own = [_direct(one) for one in _list_statements(program, first, last)]
     return Effects(
         any(e.moves for e in own),
         frozenset().union(*(e.assigned for e in own)),
         frozenset().union(*(e.read for e in own)),
-        frozenset(n for n in names if n not in program.routines),
+        frozenset().union(*(e.calls for e in own)).difference(program.routines),
         frozenset().union(*(e.cancels for e in own)),
     )
 
 
-def _shapes(program: Program, first: int, last: int) -> tuple[int, ...]:
-    return tuple(np.unique(program.lines.shape[first:last]).tolist())
+def names_but_ends(program: Program, first: int, last: int) -> frozenset[str]:
+    """Return the names in rows first to last - 1 but for destinations of moves."""
+    found = set[str]()
+    for one in _list_statements(program, first, last):
+        move = ast.action(one)
+        ends = [*move.where, move.via] if isinstance(move, ast.Move) else []
+        found |= {r.name for r in references(one) if all(r is not e for e in ends)}
+    return frozenset(found)
 
 
-def _reach(
-    program: Program, shapes: tuple[int, ...]
-) -> tuple[list[Effects], frozenset[str]]:
-    found = [_direct(program.statements[s]) for s in shapes]
-
-    def enter(name: str) -> list[str]:
-        body = program.routines.get(name)
-        if body is None:
-            return []
-        shapes = _shapes(program, body.first, body.last)
-        inside = [_direct(program.statements[s]) for s in shapes]
-        # What goes in by reference is named where it is called.
-        own = body.own_names
-        found.extend(replace(e, assigned=e.assigned - own) for e in inside)
-        return _names_in(inside)
-
-    done = {*reach(_names_in(found), enter, str)}
-    named = frozenset().union(*(e.calls for e in found))
-    return found, named & done
-
-
-def _names_in(found: Sequence[Effects]) -> list[str]:
-    """List the names that statements call, or may call."""
-    return [name for effects in found for name in effects.calls | effects.read]
+def _list_statements(
+    program: Program, first: int, last: int
+) -> Iterator[ir.SourceStatement]:
+    """Yield the distinct statements of rows."""
+    shapes = np.unique(program.lines.shape[first:last])
+    return (program.lines.said[shape] for shape in shapes.tolist())
 
 
 @lru_cache(maxsize=8192)
@@ -190,7 +166,8 @@ def _direct(statement: ir.SourceStatement) -> Effects:
     calls = {i.name for i in invocations(statement)}
     moves = False
     action = ast.action(statement)
-    cancels = frozenset([action] if action and _cancels(action) else [])
+    ends = isinstance(action, ast.CancelMove) or action == ir.Leave("exitcycle")
+    cancels = frozenset([action] if action and ends else [])
     if then := ast.behind(statement):
         inner = _direct(then)
         moves, assigned = inner.moves, set(inner.assigned)
@@ -221,11 +198,6 @@ def _direct(statement: ir.SourceStatement) -> Effects:
     read = frozenset(reference.name for reference in references(statement))
     called = frozenset(calls - PURE - CHANGING)
     return Effects(moves, frozenset(assigned), read, called, cancels)
-
-
-def _cancels(one: ir.SourceStatement) -> bool:
-    """Tell whether a statement ends moves on their way."""
-    return isinstance(one, ast.CancelMove) or one == ir.Leave("exitcycle")
 
 
 def _name_assigned(reference: ir.DataObject) -> str:
@@ -287,8 +259,20 @@ def call_graph_of(world: World, place: Place) -> CallGraph:
 
 
 def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
+    """Tell what rows first to last - 1 of a body may do, and all that they call."""
+    parts = list_live(world, place, first, last)
+    outside = {effect for part in parts for effect in _outside(world, part)}
+    moves = {RoutineEffect.MOVES, RoutineEffect.TRACKS, RoutineEffect.UNKNOWN}
+    frames = {RoutineEffect.SETS_FRAMES, RoutineEffect.TABLE, RoutineEffect.UNKNOWN}
+    moving = any(part.effects.moves for part in parts) or bool(outside & moves)
+    return CallGraph(parts, moving, bool(outside & frames))
+
+
+def list_live(
+    world: World, place: Place, first: int, last: int
+) -> tuple[LiveRows, ...]:
     """Follow rows first to last - 1 of a body into all that they call."""
-    parts = [LiveRows(place, _own_effects(place.program, first, last))]
+    parts = [LiveRows(place, rows_effects(place.program, first, last))]
     whole = (first, last) == (place.body.first, place.body.last)
     for one in reach(
         _list_called(world, place, first, last),
@@ -297,16 +281,8 @@ def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
     ):
         if not (whole and one.body is place.body):  # else its rest may be called, too
             rows = (one.body.first, one.body.last)
-            parts.append(LiveRows(one, _own_effects(one.program, *rows)))
-    outside = {effect for part in parts for effect in _outside(world, part)}
-    moves = {RoutineEffect.MOVES, RoutineEffect.TRACKS, RoutineEffect.UNKNOWN}
-    return CallGraph(
-        tuple(parts),
-        any(part.effects.moves for part in parts) or not outside.isdisjoint(moves),
-        not outside.isdisjoint(
-            {RoutineEffect.SETS_FRAMES, RoutineEffect.TABLE, RoutineEffect.UNKNOWN}
-        ),
-    )
+            parts.append(LiveRows(one, rows_effects(one.program, *rows)))
+    return tuple(parts)
 
 
 def _outside(world: World, part: LiveRows) -> Iterator[RoutineEffect]:
@@ -323,38 +299,26 @@ def _outside(world: World, part: LiveRows) -> Iterator[RoutineEffect]:
 
 def _list_called(world: World, place: Place, first: int, last: int) -> Iterator[Place]:
     """Yield the bodies that rows name, as calls or in expressions."""
-    lines = place.program.lines
-    for shape in np.unique(lines.shape[first:last]).tolist():
-        for name, whole in _names(place.program.statements[shape]):
-            find = world.find_program if whole else world.find_routine
-            found = find(place.program, name)
-            if found is not None:
-                yield found
+    for part in ir.walk(*_list_statements(place.program, first, last)):
+        found = None
+        if isinstance(part, ast.ProgramCall):
+            found = world.find_program(place.program, part.name)
+        elif isinstance(part, ir.Instruction | ir.FunctionCall):
+            found = world.find_routine(place.program, part.name)
+        elif isinstance(part, ir.DataObject) and not part.steps:
+            found = world.find_routine(place.program, part.name)
+        if found is not None:
+            yield found
 
 
 def circles(world: World) -> frozenset[int]:
     """Return the bodies (by id) that may call themselves, and those between such."""
     calls: dict[int, set[int]] = {}
-    for program in world.programs():
-        for body in filter(None, (program.main, *program.routines.values())):
-            called = _list_called(
-                world, world.place(program, body), body.first, body.last
-            )
-            calls[id(body)] = {id(one.body) for one in called}
+    for place in world.places():
+        body = place.body
+        called = _list_called(world, place, body.first, body.last)
+        calls[id(body)] = {id(one.body) for one in called}
     return find_recursive(calls)
-
-
-def _names(statement: ir.SourceStatement) -> Iterator[tuple[str, bool]]:
-    """Yield names that may be called, and whether each is that of a program."""
-    if then := ast.behind(statement):
-        yield from _names(then)
-    if isinstance(statement, ir.Instruction):
-        yield statement.name, isinstance(statement, ast.ProgramCall)
-    for call in invocations(statement):
-        yield call.name, False
-    for reference in references(statement):
-        if not reference.steps:
-            yield reference.name, False
 
 
 # Moves that a program never comes to: their targets keep their values.
@@ -370,8 +334,7 @@ def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
     found = {}
     for program in programs:
         name = program.lines.source.name
-        moves = program.statements.which(_has_target)
-        lines = program.lines.line[moves[program.lines.shape]]
+        lines = program.lines.begin_line[program.lines.which(_has_target)]
         own = visits.place.file == visits.files.index(name)
         missed = lines[~np.isin(lines, visits.place.line[own])]
         if len(missed):

@@ -104,7 +104,10 @@ def collect(machine: Machine) -> Visits:
     runs, world = [run for _, run in ordered], machine.world
     offsets = np.concatenate([[0], np.cumsum([len(run) for run in runs])])
     offsets = offsets.astype(np.int64)
-    numbering = _number_files(world)
+    texts = [(one.lines.source, one.lines.numbers) for one in world.programs()]
+    if (values := world.variables) is not None:
+        texts.append((values.source, values.lines.numbers))
+    numbering = Numbering.of(texts)
     collector = _collect_visits(machine, runs, offsets, len(numbering))
     c = collector.columns
     release_memory(len(c))
@@ -112,18 +115,12 @@ def collect(machine: Machine) -> Visits:
     literals, follows = find_uses(
         literals, c.slots, collector.bases, literal, world.pinned
     )
-    numbers = _number_visits(machine, ordered, offsets)
+    ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
+    numbers = np.full(machine.next_id, -1, dtype=np.int32)  # the visit of every id
+    numbers[spans(ids, np.diff(offsets))] = np.arange(offsets[-1], dtype=np.int32)
     graph = _graph(machine, ordered, offsets, numbers)
     visits = to_visits(c, world.files, graph, literals, literal, follows, PDL2_DIALECT)
     return _mark_pauses(visits, machine, numbers)
-
-
-def _number_files(world: World) -> Numbering:
-    """Number the numbers of the files of a job as its slots are."""
-    texts = [program.lines for program in world.programs()]
-    if world.variables is not None:
-        texts.append(world.variables.lines)
-    return Numbering.of([(text.source, text.numbers) for text in texts])
 
 
 def _collect_visits(
@@ -173,16 +170,6 @@ def _mark_pauses(visits: Visits, machine: Machine, visit: Indices) -> Visits:
     rules = np.array(visits.zone.rule)
     rules[rows] = ZoneRule.UNKNOWN
     return visits.with_columns(rule=rules)
-
-
-def _number_visits(
-    machine: Machine, ordered: list[tuple[Key, MoveRun]], offsets: Ints
-) -> Indices:
-    """Return the visit of every id."""
-    ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
-    visit = np.full(machine.next_id, -1, dtype=np.int32)
-    visit[spans(ids, np.diff(offsets))] = np.arange(offsets[-1], dtype=np.int32)
-    return visit
 
 
 def _graph(

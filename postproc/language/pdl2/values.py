@@ -152,7 +152,9 @@ def join(a: Value, b: Value) -> Value:
     if isinstance(a, Alias) and isinstance(b, Alias):
         return Alias(a.keys | b.keys, False)
     if isinstance(a, Position) and isinstance(b, Position):
-        return _join_positions(a, b)
+        fields = ("joints", "numbers", "slots", "along", "config")
+        if all(getattr(a, name) == getattr(b, name) for name in fields):
+            return _mix(a, b)
     return add_unknown(Nothing("it may hold different values here"), a, b)
 
 
@@ -190,19 +192,6 @@ def join_components(a: Value, b: Value) -> Value:
 
 def _component(position: Position, at: int) -> tuple[float | None, int, bool]:
     return position.numbers[at], position.slots[at], at in position.along
-
-
-def _join_positions(a: Position, b: Position) -> Value:
-    same = (a.joints, a.numbers, a.slots, a.along, a.config) == (
-        b.joints,
-        b.numbers,
-        b.slots,
-        b.along,
-        b.config,
-    )
-    if not same:
-        return Nothing("it may hold different values here", may_be(a) | may_be(b))
-    return _mix(a, b)
 
 
 def _mix(a: Position, b: Position) -> Position:

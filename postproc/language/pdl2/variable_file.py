@@ -15,6 +15,7 @@ from postproc.language.pdl2.entries import (
     NESTED,
     POSITIONS,
     Entries,
+    EntryLines,
     Records,
     Rows,
     find_records,
@@ -24,11 +25,10 @@ from postproc.language.pdl2.entries import (
     read_records,
 )
 from postproc.language.pdl2.nested import complete_entries, find_fields, with_fields
-from postproc.language.pdl2.parser import EntryPart, parse_value_form
-from postproc.language.text.logical_lines import Lines, read_lines, reread_lines
+from postproc.language.pdl2.parser import parse_value_form
+from postproc.language.text.logical_lines import read_lines, reread_lines
 from postproc.language.text.source import Source
 from postproc.language.text.symbol_column import NameColumn
-from postproc.language.text.templates import ParsedShapes, parse_shapes
 from postproc.language.visits import Diagnostic
 
 Finding = tuple[int, Diagnostic]
@@ -46,7 +46,7 @@ class VariableFile:
         unread: As in `Fields`.
     """
 
-    lines: Lines
+    lines: EntryLines
     entries: Entries
     diagnostics: tuple[Diagnostic, ...]
     unread: frozenset[str] = frozenset()
@@ -66,17 +66,16 @@ def read_variables(source: Source) -> VariableFile:
     Raises:
         ProgramError: A string does not end on its line.
     """
-    lines = read_lines(source)
-    said = parse_shapes(lines.shapes, parse_value_form)
-    head = last_head(lines, said)
-    fields = find_fields(lines, said, head)
-    records = with_fields(find_records(lines, said, head), fields)
-    read = complete_entries(read_records(lines, said, records), fields)
+    lines: EntryLines = read_lines(source, parse_value_form)
+    head = last_head(lines)
+    fields = find_fields(lines, head)
+    records = with_fields(find_records(lines, head), fields)
+    read = complete_entries(read_records(lines, records), fields)
     entries, twice = _distinguish_entries(read, fields.twice)
     found = [
         *_report_duplicates(source, entries, records, twice),
         *_incomplete(source, entries, records, {*twice}),
-        *_not_understood(lines, said, head),
+        *_not_understood(lines, head),
         *fields.findings,
     ]
     found.sort(key=lambda finding: finding[0])
@@ -135,17 +134,14 @@ def _distinguish_entries(
     return replace(entries, row=Rows(NameColumn(single), rows)), twice
 
 
-def _not_understood(
-    lines: Lines, said: ParsedShapes[EntryPart | None], head: Ints
-) -> Iterator[Finding]:
+def _not_understood(lines: EntryLines, head: Ints) -> Iterator[Finding]:
     """Report lines that the grammar does not know, but for those of nested values."""
-    nested = said.which(is_nested)[lines.shape]
-    for row in np.flatnonzero(said.which(is_no_value)[lines.shape]).tolist():
+    nested = lines.which(is_nested)
+    for row in np.flatnonzero(lines.which(is_no_value)).tolist():
         if head[row] < 0 or not nested[head[row]]:
-            line = int(lines.line[row])
-            text = lines.source.line_text(line).strip()[:60]
+            text = lines.source.line_text(lines.line(row)).strip()[:60]
             message = f"not understood, kept: {text!r}"
-            yield row, Diagnostic(lines.source.name, line, Code.LSV_LINE, message)
+            yield row, lines.diagnostic(row, Code.LSV_LINE, message)
 
 
 def _report_duplicates(

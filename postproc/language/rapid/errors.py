@@ -132,7 +132,8 @@ def clauses_of(
     """
     found: list[ErrorClause] = []
     rows = list(flow.handlers)
-    starts = [k for k in rows if _begins(text.statement(k))] + [flow.handlers.stop]
+    starts = [k for k in rows if begins_handler(text.statement(k))]
+    starts.append(flow.handlers.stop)
     for first, behind in pairwise(starts):
         head = text.statement(first)
         if isinstance(head, said.ErrorHandler):
@@ -149,7 +150,7 @@ def _read(operands: Iterable[ir.Operand | None], row: int, read: ReadNumber) -> 
     return numbers_of(operands, lambda operand: read(operand, row))
 
 
-def _begins(one: ir.SourceStatement) -> bool:
+def begins_handler(one: ir.SourceStatement) -> bool:
     """Return True if a clause behind the statements of a routine begins."""
     return isinstance(one, said.ErrorHandler) or (
         isinstance(one, ir.BlockWord) and one.word in ("undo", "backward")

@@ -141,5 +141,7 @@ WAITING = frozenset(
 )
 """What may take so long that the arm stops at a point with a zone before it."""
 
+SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
+BY_NAME = "callbyvar"
 BY_STRING = frozenset(["setdataval", "setalldataval"])
 """Instructions that change data whose names they are given in strings."""

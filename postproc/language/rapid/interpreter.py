@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Scope
 from postproc.language.analysis.call_context import Context
-from postproc.language.analysis.call_graph import reach
-from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.task_machine import (
     MOVES,
@@ -30,6 +27,7 @@ from postproc.language.rapid.errors import (
     EXIT_CYCLE,
     PATH_ERRORS,
     Numbers,
+    begins_handler,
     clauses_of,
     common,
     key_of,
@@ -38,8 +36,10 @@ from postproc.language.rapid.errors import (
     numbers_of,
 )
 from postproc.language.rapid.instructions import (
+    BY_NAME,
     MOTIONS,
     STILL_FUNCTIONS,
+    SYNCHRONOUS,
     WAITING,
     read_known_instructions,
 )
@@ -59,12 +59,9 @@ from postproc.language.rapid.moves import (
     pose_of,
 )
 from postproc.language.rapid.program import RapidFile, inside, is_move
-from postproc.language.rapid.symbols import RapidTask, functions_in
+from postproc.language.rapid.symbols import RapidTask, as_assignment, functions_in
 from postproc.language.visits import START
 
-HANDLERS = ("undo", "backward")
-SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
-BY_NAME = "callbyvar"
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (
@@ -92,7 +89,6 @@ class RapidMachine(TaskMachine):
     restarts: list[Arrived] = field(default_factory=list)
     _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
     _exits: dict[Context, tuple[ErrorExit, ...]] = field(default_factory=dict)
-    _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -112,7 +108,7 @@ class RapidMachine(TaskMachine):
         """Follow every way from the main routine."""
         mains = self.task.routines.get("main", [])
         found = mains if len(mains) == 1 else self._procedures()
-        here = Arrived(frozenset([START]), AT_START)
+        here = self.begin(frozenset([START]), AT_START)
         if len(mains) != 1:
             here = here.forget()
             self.say(
@@ -144,7 +140,7 @@ class RapidMachine(TaskMachine):
             modes = modes.continue_cycle(end.modes, modes.names(), own)
         found = [here.origins, *(end.origins for end in self.ends)]
         found += [NOWHERE] if self.restarts else []
-        return Arrived(frozenset().union(*found), modes)
+        return self.begin(frozenset().union(*found), modes)
 
     def _own_modes(self) -> set[str]:
         """Return the modes that the task sets to other values than it begins with."""
@@ -183,52 +179,20 @@ class RapidMachine(TaskMachine):
         return own_numbers(one)
 
     is_plain = staticmethod(are_targets)
+    acting = staticmethod(inside)
+
+    @staticmethod
+    def usual_step(first: float, last: float) -> float:
+        """Count up or down."""
+        return 1.0 if last >= first else -1.0
 
     def apart(self, context: Context) -> set[int] | None:
         """Return all (None) where an error may lead to any statement."""
         return None if self._exits_of(context) else set()
 
-    def bind_arguments(
-        self, scope: Scope, routine: HeadedRows, caller: Context, row: int
-    ) -> Scope:
-        """Add what a routine is called with, see `TaskMachine.bind_arguments`.
-
-        One that calls itself has other values the next time.
-        """
-        call = inside(self.texts[caller.place.scope.file].statement(row))
-        known = isinstance(call, ir.Instruction) and call.name == routine.head.name
-        if not known or self._is_recursive(scope.file, routine):
-            return scope
-        assert isinstance(call, ir.Instruction)
-        found = TaskRoutine(scope.file, scope.module, routine)
-        return self.task.bind(found, call, row, caller.place.scope) or scope
-
-    def _is_recursive(self, file: int, routine: HeadedRows) -> bool:
-        """Return True if a routine has parameters and may come to call itself."""
-        key = file, routine.first
-        if key not in self._recursive:
-            found = bool(routine.head.parameters) and key in self._find_reachable(
-                file, routine
-            )
-            self._recursive[key] = found
-        return self._recursive[key]
-
-    def _find_reachable(self, file: int, routine: HeadedRows) -> set[tuple[int, int]]:
-        """Return the routines that one may call, and those that they may call."""
-
-        def calls(one: TaskRoutine) -> Iterator[TaskRoutine]:
-            for row in one.inside:
-                statement = self.texts[one.file].statement(row)
-                yield from self.calls_of(one.file, statement)
-
-        first = calls(TaskRoutine(file, "", routine))
-        return {one.key for one in reach(first, calls, lambda one: one.key)}
-
     def handles(self, one: ir.SourceStatement) -> bool:
         """Tell whether a handler begins, see `TaskMachine.handles`."""
-        return isinstance(one, said.ErrorHandler) or (
-            isinstance(one, ir.BlockWord) and one.word in HANDLERS
-        )
+        return begins_handler(one)
 
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
@@ -335,9 +299,18 @@ class RapidMachine(TaskMachine):
     ) -> Arrived | None:
         """Go on behind ``IF condition statement;``."""
         if isinstance(one, said.CompactIf):
+            holds = self.truth(context, row, one.condition, here)
+            if holds is False:
+                return here
             after = self._compact(context, row, one.statement, here)
+            if holds:
+                return after
             return here if after is None else here.join(after)
-        self._bind_late(one)
+        if isinstance(one, said.LateCall):  # of which procedures, a text may say
+            if _is_text(one.procedure):
+                self.run_named_beside(_name_procedure(one.procedure))
+            else:
+                self._run_all_beside()
         return super().part_otherwise(context, row, one, here)
 
     def may_jump(self, context: Context, row: int, here: Arrived) -> None:
@@ -345,15 +318,6 @@ class RapidMachine(TaskMachine):
         super().may_jump(context, row, here)
         if EXIT_CYCLE in self.texts[context.place.scope.file].words([row]):
             self.restarts.append(here)
-
-    def _bind_late(self, one: ir.SourceStatement) -> None:
-        """Note the procedures that ``%name%`` may call."""
-        if not isinstance(one, said.LateCall):
-            return
-        if _is_text(one.procedure):
-            self.run_named_beside(_name_procedure(one.procedure))
-        else:
-            self._run_all_beside()
 
     def _run_all_beside(self) -> None:
         """Note that every procedure may be called."""
@@ -386,37 +350,6 @@ class RapidMachine(TaskMachine):
             modes, points = (here.modes, here.points) if here else (AT_START, NO_POINTS)
             yield from self.goals.visits(one, row, scope, modes, points)
 
-    def scopes_of(self, routine: TaskRoutine) -> Iterator[Scope]:
-        """Yield what a routine is called with, too."""
-        return self._scopes_of(routine, frozenset())
-
-    def _scopes_of(
-        self, place: TaskRoutine, seen: frozenset[tuple[int, int]]
-    ) -> Iterator[Scope]:
-        yield self.task.scope_of(*place)
-        head = place.rows.head
-        if not head.parameters or place.key in seen:
-            return
-        seen = seen | {place.key}
-        for caller, row, call in self._calls_by_name[head.name]:
-            for there in self._scopes_of(caller, seen):
-                bound = self.task.bind(place, call, row, there)
-                if bound is not None:
-                    yield bound
-
-    @cached_property
-    def _calls_by_name(
-        self,
-    ) -> Mapping[str, list[tuple[TaskRoutine, int, ir.Instruction]]]:
-        """Return all calls of routines of the task, and where they stand."""
-        found = defaultdict[str, list[tuple[TaskRoutine, int, ir.Instruction]]](list)
-        for place in (r for own in self.task.routines.values() for r in own):
-            for row in place.inside:
-                one = inside(self.texts[place.file].statement(row))
-                if isinstance(one, ir.Instruction):
-                    found[one.name].append((place, row, one))
-        return found
-
     def _compact(
         self, context: Context, row: int, inside: ir.SourceStatement, here: Arrived
     ) -> Arrived | None:
@@ -435,12 +368,11 @@ class RapidMachine(TaskMachine):
         """Run an instruction; None where it goes on in a routine."""
         here = self.after_functions(context, row, one, here)
         name, scope = one.name, context.place.scope
+        if (given := as_assignment(one, self.task.routines)) is not None:
+            return self.assign_point(context, row, given, here)
         if name in MOTIONS and name not in self.task.routines:
             return self._move(context, row, one, here)
         if name in self.task.routines:
-            found = self.task.routine(name, scope)
-            if found is not None and self._is_recursive(found.file, found.rows):
-                self.run_beside(found.file, found.rows)
             return self.call_named(context, row, name, here)
         kind = read_known_instructions().get(name)
         if name in WAITING or self.declares_motionless(name):
@@ -481,7 +413,7 @@ class RapidMachine(TaskMachine):
         self._interrupt(context, row, one, here)
         after = self.arrive(context, row, one, here)
         (last,) = after.origins
-        if self.visits[last].kept and math.isnan(self.visits[last].zone_mm):
+        if math.isnan(self.visits[last].zone_mm):
             after = replace(after, modes=after.modes.settle())
         if one.name in SYNCHRONOUS:
             return self._synchronous(context, row, one, after)

@@ -17,7 +17,7 @@ from postproc.language.analysis.assigned_points import (
     Points,
     Scope,
 )
-from postproc.language.analysis.conditions import IDENTITY, Pose, compose_poses, flat
+from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.found_visits import (
     FoundGoal,
     FoundVisit,
@@ -38,10 +38,9 @@ from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
 from postproc.language.rapid.pose_encoding import (
     RAPID_DIALECT,
     WIDTH,
-    shift_point,
 )
 from postproc.language.rapid.symbols import SHIFTS, RapidTask
-from postproc.language.shifts import Shift, ShiftKind
+from postproc.language.shifts import IDENTITY, Pose, Shift, flat
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
@@ -123,11 +122,16 @@ class RapidVisit(FoundVisit):
     speed: float = field(kw_only=True)
     total: tuple[float, ...] = field(kw_only=True, default=())
 
-    def forget_conditions(self) -> None:
-        """Forget tool, work object, zone and speed."""
+    def meet(self, other: RapidVisit) -> None:
+        """Forget tool, work object, zone, speed or load."""
         why = explain_disagreement(Code.FRAME_UNKNOWN, self.taken)
-        self.tool, self.wobj = FrameOfMove((), True, why), FrameOfMove((), False, why)
-        self.zone_mm, self.speed, self.total = UNKNOWN_ZONE, np.nan, ()
+        for name, lost in (
+            ("tool", FrameOfMove((), True, why)), ("wobj", FrameOfMove((), False, why)),
+            ("zone_mm", UNKNOWN_ZONE), ("speed", np.nan), ("total", ()),
+        ):  # fmt: skip
+            mine, new = getattr(self, name), getattr(other, name)
+            if mine != new and (mine == mine or new == new):  # NaN is NaN
+                setattr(self, name, lost)
 
 
 @dataclass
@@ -223,7 +227,11 @@ class Goals:
         zone = np.nan if one.name in AT_A_STOP else arguments.zone()
         operand = arguments.option("wobj")
         wobj = WORLD if operand is None else self._frame("wobj", operand, arguments)
-        found = self._tool(arguments), wobj, zone, arguments.speed()
+        operand = arguments.of_type("tooldata")
+        tool = FrameOfMove((), True, _NO_TOOL)
+        if operand is not None:
+            tool = self._frame("tool", operand, arguments)
+        found = tool, wobj, zone, arguments.speed()
         if named:
             self._known[key] = one, found  # it keeps its id from being used again
         return found
@@ -233,12 +241,6 @@ class Goals:
     def _is_assigned(self, operand: ir.Operand | None) -> bool:
         """Return True if the program may give data another value on its way."""
         return isinstance(operand, ir.DataObject) and operand.name in self.task.written
-
-    def _tool(self, arguments: _Arguments) -> FrameOfMove:
-        operand = arguments.of_type("tooldata")
-        if operand is None:
-            return FrameOfMove((), True, _NO_TOOL)
-        return self._frame("tool", operand, arguments)
 
     def _frame(
         self, kind: str, operand: ir.Operand, arguments: _Arguments
@@ -269,6 +271,8 @@ class Goals:
                 self.task, arguments.row, arguments.scope, False, self._slots
             )
             why = there.explain_unknown(name)
+            if why.code is Code.RUNTIME_VALUE:
+                why = replace(why, code=Code.FRAME_UNKNOWN)
             return FrameOfMove((), kind == "tool", why)
         return replace(read, taught=self.task.is_taught(name, found))
 
@@ -344,7 +348,7 @@ class RapidGoal(GoalReader):
         by = self.task.read_shift(arguments, self.row, self.here)
         if by is None:
             return self.unknown(AT_RUN_TIME)
-        (shift, angles), turns = by, {one.name: one.value for one in arguments}
+        turns = {one.name: one.value for one in arguments}
         placed = [one.value for one in arguments if not one.name]
         base = replace(self, joints=False).goal(placed[0])
         written = [*placed[1:], *(turns.get(axis) for axis in ("rx", "ry", "rz"))]
@@ -352,17 +356,15 @@ class RapidGoal(GoalReader):
         slots = [first + n.slot if isinstance(n, ir.Num) else -1 for n in written]
         own = frozenset([(self.here.file, slots[0])] if slots[0] >= 0 else [])
         shifts, turned = f"{name} shifts it by what", f"{name} turns it"
-        if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
+        if base.target != Meaning.POSE or np.isnan(by).any():
             return self.apply_shift(base, ReadShift(own=own, shifts=shifts))
-        kind = ShiftKind.AXES if name == "offs" else ShiftKind.OWN
+        shift = Shift(SHIFTS[name], by, base.values)
         # x, y, z, and all angles that are there, must be written as numbers.
         given = [*written[:3], *(one for one in written[3:] if one is not None)]
         if not all(isinstance(one, ir.Num) for one in given):
             slots = [-1] * len(slots)
         return self.apply_shift(base, ReadShift(
-            Shift(kind, (*shift, *angles), base.values),
-            shift_point(np.array(base.values), name, shift, angles), any(angles),
-            self.here.file, (*slots, *(-1,) * (WIDTH - len(slots))), own,
+            shift, self.here.file, (*slots, *(-1,) * (WIDTH - len(slots))), own,
             shifts=shifts, turned=turned,
         ))  # fmt: skip
 
@@ -454,23 +456,18 @@ class _Arguments:
     def is_built_in(self, name: str) -> bool:
         """Tell whether a name is the controller's: no data, no parameter has it."""
         hidden = name in self.task.declared or name in self.scope.parameters
-        return not hidden
-
-    def _stops(self) -> bool:
-        operand, _ = self._find_argument("zonedata")
-        return operand is not None and operand.name == "fine"
+        return not (hidden or self.task.place(name, self.scope))
 
     def zone(self) -> float:
         """Return the size of the zone [mm], NaN for a stop, -1 where not known."""
         if any(one.name == "inpos" for one in self.arguments):
             return np.nan  # stop-point data stand instead of the zone
         size = self.option("z")
-        if size is not None:
-            if self._stops():
-                return UNKNOWN_ZONE
-            own = self.task.number(size, self.row, self.scope)
-            return own if own >= 0.0 else UNKNOWN_ZONE
         operand, there = self._find_argument("zonedata")
+        if size is not None:
+            fine = operand is not None and operand.name == "fine"
+            own = self.task.number(size, self.row, self.scope)
+            return own if own >= 0.0 and not fine else UNKNOWN_ZONE
         if operand is None:
             return UNKNOWN_ZONE
         if operand.name == "fine":
@@ -560,43 +557,14 @@ def _plain_slots(operand: ir.Composite) -> list[int]:
     return slots if len(slots) == len(leaves) else []
 
 
-def _numbers(
-    found: Value | None, joints: bool
-) -> tuple[list[WrittenNumber], tuple[float, ...]] | None:
-    """Take a robtarget or jointtarget apart: its numbers, and the external axes."""
-    counts = (6, 6) if joints else (3, 4, 4, 6)
-    if not isinstance(found, tuple) or len(found) != len(counts):
-        return None
-    parts: list[list[WrittenNumber]] = []
-    for part, count in zip(found, counts, strict=True):
-        if not isinstance(part, tuple) or len(part) != count:
-            return None
-        own = [one for one in part if isinstance(one, WrittenNumber)]
-        if len(own) != count or any(one.value != one.value for one in own):
-            return None
-        parts.append(own)
-    last = (one.value for one in parts[-1])
-    outside = tuple(np.nan if abs(value) > UNUSED else value for value in last)
-    return [one for part in parts[:-1] for one in part], outside
-
-
-def _pose_numbers(found: Value | None) -> list[float] | None:
-    """Return the seven numbers of a pose, None where it is none."""
-    if not isinstance(found, tuple) or len(found) != 2:
-        return None
-    numbers = [
-        one.value
-        for part in found
-        if isinstance(part, tuple)
-        for one in part
-        if isinstance(one, WrittenNumber)
-    ]
-    return numbers if len(numbers) == 7 and _is_unit(numbers[3:]) else None
-
-
 def pose_of(found: Value | None) -> tuple[float, ...]:
     """Return the seven numbers of a pose, nothing where it is none."""
-    return tuple(_pose_numbers(found) or ())
+    if not isinstance(found, tuple) or len(found) != 2:
+        return ()
+    parts = (part for part in found if isinstance(part, tuple))
+    leaves = (one for part in parts for one in part)
+    numbers = tuple(one.value for one in leaves if isinstance(one, WrittenNumber))
+    return numbers if len(numbers) == 7 and _is_unit(numbers[3:]) else ()
 
 
 def pose_of_numbers(numbers: Sequence[float]) -> Pose:
@@ -608,8 +576,8 @@ def _tool_of(found: Value | None) -> FrameOfMove | None:
     """Read ``[robhold, [[x,y,z],[q1..q4]], [load]]``."""
     if not isinstance(found, tuple) or len(found) < 2:
         return None
-    held, pose = found[0], _pose_numbers(found[1])
-    if pose is None or not isinstance(held, WrittenNumber):
+    held, pose = found[0], pose_of(found[1])
+    if not pose or not isinstance(held, WrittenNumber):
         return None
     load = load_of(found[2]) if len(found) > 2 else ()
     stated = load if load and load[0] > PLACEHOLDER else ()
@@ -633,8 +601,8 @@ def _wobj_of(found: Value | None) -> FrameOfMove | None:
     if not isinstance(found, tuple) or len(found) != 5:
         return None
     held, fixed, unit = found[:3]
-    user, object_ = _pose_numbers(found[3]), _pose_numbers(found[4])
-    if user is None or object_ is None or not isinstance(held, WrittenNumber):
+    user, object_ = pose_of(found[3]), pose_of(found[4])
+    if not (user and object_) or not isinstance(held, WrittenNumber):
         return None
     why = NO_REASON
     if (isinstance(unit, str) and unit.strip('"')) or not (

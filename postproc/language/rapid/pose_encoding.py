@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -200,20 +199,3 @@ def quaternion_from_rotation(R: Floats) -> Floats:
     rows = np.arange(len(R))
     scale = 2.0 * np.sqrt(np.maximum(square[rows, first], 0.0))
     return np.asarray(products[rows, first] / scale[:, None])
-
-
-def shift_point(
-    base: Floats, name: str, shift: Sequence[float], angles: Sequence[float]
-) -> tuple[float, ...]:
-    """Shift a point: Offs in its work object, RelTool along and about its own axes."""
-    out = np.array(base)
-    rotation = rotation_from_quaternion(base[3:7])
-    out[:3] += shift if name == "offs" else rotation @ np.array(shift)
-    if any(angles):
-        cos, sin = np.cos(np.deg2rad(angles)), np.sin(np.deg2rad(angles))
-        about_x = np.array([[1, 0, 0], [0, cos[0], -sin[0]], [0, sin[0], cos[0]]])
-        about_y = np.array([[cos[1], 0, sin[1]], [0, 1, 0], [-sin[1], 0, cos[1]]])
-        about_z = np.array([[cos[2], -sin[2], 0], [sin[2], cos[2], 0], [0, 0, 1]])
-        by = rotation @ about_x @ about_y @ about_z @ rotation.T
-        out = RAPID_DIALECT.rotate(out[None], by[None])[0]
-    return tuple(out.tolist())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from postproc import _native
 from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.control_flow import HeadedRows
@@ -12,10 +13,11 @@ from postproc.language.analysis.declarations import TaskFile
 from postproc.language.analysis.symbols import holds_odd
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import MOTIONS
-from postproc.language.rapid.statements import read_statements
+from postproc.language.rapid.parser import parse_statement
 from postproc.language.rapid.syntax import CompactIf, ModuleHead, RecordHead
 from postproc.language.text.blocks import BlockWords, Outline
 from postproc.language.text.source import Source
+from postproc.language.text.statement_table import StatementText, read_text
 
 _SYSTEM = "sysmodule"
 _ROUTINES = ("proc", "func", "trap")
@@ -56,6 +58,18 @@ class RapidFile(TaskFile):
         """Return the name of the module around a routine."""
         around = (m for m in self.modules if m.first < routine.first < m.last)
         return next((m.head.name for m in around), "")
+
+
+def read_statements(source: Source) -> StatementText[ir.SourceStatement]:
+    """Read the statements of a RAPID file.
+
+    A statement ends with ``;``, or where its words are complete (``ENDPROC``,
+    ``IF a THEN``), whatever lines it stands on.
+
+    Raises:
+        ProgramError: A string or the header does not end.
+    """
+    return read_text(source, _native.scan_statements, parse_statement)
 
 
 def read_rapid(source: Source) -> RapidFile:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
-
-import numpy as np
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
@@ -27,14 +25,18 @@ from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import (
     ANSWERS,
     BUILT_IN_FUNCTIONS,
+    BY_NAME,
     BY_STRING,
     MOTIONS,
     READING,
+    SYNCHRONOUS,
 )
-from postproc.language.rapid.pose_encoding import COMMENTS, shift_point
+from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, inside
+from postproc.language.shifts import Shift, ShiftKind
 
-SHIFTS = ("offs", "reltool")  # functions whose first argument is a target
+SHIFTS = {"offs": ShiftKind.AXES, "reltool": ShiftKind.OWN}
+"""Functions whose first argument is a target."""
 
 
 def _values(names: str) -> Layout:
@@ -74,7 +76,8 @@ class RapidTask(TaskSymbols[RapidFile]):
 
     comments = COMMENTS
     layouts = RECORDS
-    followed = (*RECORDS, "num")
+    followed = (*RECORDS, "num", "bool")
+    targets = ("robtarget", "jointtarget")
     constants: ClassVar = {"true": 1.0, "false": 0.0, "pi": math.pi}
     functions = "func"
     others: Sequence[RapidTask] = ()
@@ -164,15 +167,10 @@ class RapidTask(TaskSymbols[RapidFile]):
         """Return True if a persistent may come to hold another value by this task."""
         if name in self.changes:
             return True
-        found = (self._first_value(*one) for one in self._list_shared(name))
-        return any(one is None or one != value for one in found)
-
-    def _list_shared(self, name: str) -> Iterator[tuple[int, Datum]]:
-        """Yield the declarations of a persistent of several tasks."""
-        for number, file in enumerate(self.files):
-            for datum in file.data:
-                if datum.name == name and _is_shared(datum):
-                    yield number, datum
+        data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
+        own = (one for one in data if one[1].name == name and _is_shared(one[1]))
+        first = (self._first_value(*one) for one in own)
+        return any(one is None or one != value for one in first)
 
     def _first_value(self, file: int, datum: Datum) -> Value | None:
         """Return what data hold at first, without where it is written."""
@@ -205,6 +203,13 @@ class RapidTask(TaskSymbols[RapidFile]):
         return bool(BY_STRING & self.find_calls)
 
     @cached_property
+    def calls_by_text(self) -> bool:
+        """Whether a procedure is called by a name in a text."""
+        found = (inside(one) for file in self.files for one in file.text.said.said)
+        late = any(isinstance(one, said.LateCall) for one in found)
+        return late or bool({BY_NAME, *SYNCHRONOUS} & self.find_calls)
+
+    @cached_property
     def find_calls(self) -> frozenset[str]:
         """Names of all instructions."""
         found = (inside(one) for file in self.files for one in file.text.said.said)
@@ -231,20 +236,21 @@ class RapidTask(TaskSymbols[RapidFile]):
         if call.name not in SHIFTS:
             return super().apply(call, row, here, depth)
         by = self.read_shift(call.arguments, row, here)
-        if by is None or depth > DEEPEST or any(map(math.isnan, [*by[0], *by[1]])):
+        if by is None or depth > DEEPEST or any(map(math.isnan, by)):
             return None
         base = self.value(call.arguments[0].value, row, here, depth + 1)
         own = [one.value for one in list_leaves(base) if isinstance(one, WrittenNumber)]
         if not isinstance(base, tuple) or len(base) != 4 or len(own) != 17:
             return None
-        new = shift_point(np.array(own[:11]), call.name, *by)
+        shift = Shift(SHIFTS[call.name], by, tuple(own[:11]))
+        new = shift.apply(RAPID_DIALECT)
         place, turn = (tuple(map(WrittenNumber, new[k])) for k in _PLACE_AND_TURN)
         return (place, turn, *base[2:])
 
     def read_shift(
         self, arguments: Sequence[ir.Argument], row: int, here: Scope
-    ) -> tuple[list[float], list[float]] | None:
-        """Return how far Offs or RelTool shift [mm], and turn about x, y, z [deg].
+    ) -> tuple[float, ...] | None:
+        """Return how far Offs or RelTool shift [mm], then turn about x, y, z [deg].
 
         None where the arguments are others; NaN where numbers are not known.
         """
@@ -256,7 +262,7 @@ class RapidTask(TaskSymbols[RapidFile]):
             self.number(turns[axis], row, here) if axis in turns else 0.0
             for axis in ("rx", "ry", "rz")
         ]
-        return [self.number(one, row, here) for one in placed[1:]], angles
+        return (*(self.number(one, row, here) for one in placed[1:]), *angles)
 
 
 _PLACE_AND_TURN = slice(3), slice(3, 7)
@@ -282,13 +288,13 @@ class _RapidUses(NamesUsed):
 
     def note(self, one: ir.SourceStatement) -> None:
         """Note what is connected, and what an unknown procedure gets, as changed."""
-        match one:
+        match as_assignment(one, self.own) or one:
             case said.ConnectTrap(interrupt=interrupt):
                 self.changed.add(interrupt.name)
             case said.LateCall(arguments=arguments):
                 self.note_call("", arguments)
-            case _:
-                super().note(one)
+            case plain:
+                super().note(plain)
 
     def list_changed(
         self, name: str, arguments: Sequence[ir.Argument]
@@ -321,6 +327,25 @@ class _RapidUses(NamesUsed):
     def is_passed(self, routine: TaskRoutine) -> bool:
         """Return True but for a local one, which need not be what is called."""
         return not routine.rows.head.local
+
+
+def as_assignment(
+    one: ir.SourceStatement, routines: Container[str]
+) -> ir.Assignment | None:
+    """Return what Incr, Decr, Add and Clear say as an assignment, None for all else.
+
+    Args:
+        one: The statement.
+        routines: Names of routines of the task, which hide them.
+    """
+    if not isinstance(one, ir.Instruction) or one.name in routines:
+        return None
+    match one.name, one.values:
+        case "incr" | "decr" | "clear" as name, (ir.DataObject() as target,):
+            return ir.Assignment(target, ir.Operation(name.upper(), (target,)))
+        case "add", (ir.DataObject() as target, ir.Operand() as by):
+            return ir.Assignment(target, ir.Operation("+", (target, by)))
+    return None
 
 
 def functions_in(one: ir.SourceStatement) -> Iterator[str]:

@@ -9,7 +9,6 @@ from postproc.language.analysis import to_visits
 from postproc.language.analysis.conditions import (
     NO_LOAD,
     Conditions,
-    Pose,
     cell_pose,
     compose_poses,
 )
@@ -22,7 +21,8 @@ from postproc.language.rapid.moves import (
     RapidVisit,
     pose_of_numbers,
 )
-from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
+from postproc.language.rapid.pose_encoding import RAPID_DIALECT
+from postproc.language.shifts import Pose
 from postproc.language.visits import Meaning, Visits
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
@@ -60,8 +60,7 @@ def visits_of(machine: RapidMachine) -> Visits:
         conditions = _conditions(v, base, placed[key], id(v) in paused)
         return Arrival(conditions, _reasons(v), v.goal.target == Meaning.POSE)
 
-    moves = {k: file.moves for k, file in enumerate(machine.task.files)}
-    return to_visits.visits_of(machine, RAPID_DIALECT, arrive, COMMENTS, moves)
+    return to_visits.visits_of(machine, RAPID_DIALECT, arrive)
 
 
 def _conditions(v: RapidVisit, base: Pose, uframe: Pose, paused: bool) -> Conditions:

@@ -3,14 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from postproc.language import ir
 from postproc.language.text.template_parser import Children, Word
 
 
-class SizePart(tuple[Any, ...]):
-    """Indices, or the dimensions of an array."""
+@dataclass(frozen=True)
+class RulePart:
+    """What a rule gives to the one around it, which knows it by a name.
+
+    Attributes:
+        name: As a rule that the statement is made by asks for it.
+        value: What it says.
+    """
+
+    name: str
+    value: Any
+
+
+def part(name: str) -> Callable[[Children], RulePart]:
+    """Give all that a rule holds to the one around it."""
+    return lambda c: RulePart(name, tuple(c))
+
+
+def parts(c: Children, name: str) -> list[Any]:
+    """Return what the rules within one gave by a name."""
+    return [one.value for one in c if isinstance(one, RulePart) and one.name == name]
 
 
 def low(text: str) -> str:
@@ -30,10 +50,26 @@ def count(c: Children) -> ir.ForLoop:
 
 def build_item(c: Children) -> ir.DeclaredItem:
     """Build what is declared: its name, its dimensions and its value."""
-    name, *rest = c
-    sized = bool(rest) and isinstance(rest[0], SizePart)
-    dimensions = tuple(rest[0]) if sized else ()
-    return ir.DeclaredItem(low(name), dimensions, rest[-1] if rest[sized:] else None)
+    dimensions = next(iter(parts(c, "dimensions")), ())
+    value = next((one for one in c if isinstance(one, ir.Operand)), None)
+    return ir.DeclaredItem(low(c[0]), dimensions, value)
+
+
+def build_call(make: Callable[[Any, tuple[ir.Argument, ...]], Any]) -> Any:
+    """Build what is called with arguments, or without: its name, or an operand."""
+
+    def build(c: Children) -> Any:
+        called = low(c[0]) if isinstance(c[0], str) else c[0]
+        return make(called, c[1] if len(c) > 1 else ())
+
+    return build
+
+
+_BLOCK_WORDS = {"endswitch": "endtest", "endselect": "endtest"}  # others are alike
+
+
+def _block_word(c: Children) -> ir.BlockWord:
+    return ir.BlockWord(_BLOCK_WORDS.get(low(c[0]), low(c[0])))
 
 
 def _operation(c: Children) -> ir.Operation:
@@ -45,9 +81,9 @@ def _operation(c: Children) -> ir.Operation:
 COMMON: Mapping[str, Callable[[Children], Any]] = {
     "statement": lambda c: c[0],
     "end": lambda c: ir.BlockWord(low(c[0])),
-    "block_word": lambda c: ir.BlockWord(low(c[0])),
-    "parameters": lambda c: tuple(c),
-    "dimensions": SizePart,
+    "block_word": _block_word,
+    "parameters": tuple,
+    "dimensions": part("dimensions"),
     "if_then": branch("if"),
     "else_if": branch("elseif"),
     "while_do": branch("while"),
@@ -62,11 +98,17 @@ COMMON: Mapping[str, Callable[[Children], Any]] = {
     "goto": lambda c: ir.JumpTo(low(c[0])),
     "return_value": lambda c: ir.Leave("return", *c),
     "assignment": lambda c: ir.Assignment(*c),
+    "item": build_item,
+    "instruction": build_call(ir.Instruction),
+    "function_call": build_call(ir.FunctionCall),
+    "arguments": tuple,
+    "argument": lambda c: ir.Argument(c[0] if c else None),
+    "composite": lambda c: ir.Composite(tuple(c)),
     "infix": _operation,
     "prefix": _operation,
     "number": lambda c: c[0],
     "string": lambda c: ir.StringLiteral(str(c[0])),
     "reference": lambda c: ir.DataObject(low(c[0]), tuple(c[1:])),
     "component": lambda c: low(c[0]),
-    "element": lambda c: ir.ElementStep(tuple(c[0])),
+    "element": lambda c: ir.ElementStep(c[0].value),
 }

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Indices, Interned, Ints, spans
+from postproc.arrays import Bools, Indices, Interned, Ints, spans
 from postproc.exceptions import ProgramError
 from postproc.language.text.lexer import (
     NAME_MARK,
@@ -18,14 +19,17 @@ from postproc.language.text.lexer import (
     rescan_lines,
     scan_lines,
 )
-from postproc.language.text.source import NumberSpans, Source
+from postproc.language.text.source import Source
+from postproc.language.text.statement_table import Statements
 from postproc.language.text.templates import (
-    Shapes,
     alike,
     find_shapes,
     number_in_order,
+    parse_shapes,
 )
 from postproc.language.visits import Diagnostic
+
+T = TypeVar("T")
 
 # Statements over several lines: one that ends with a comma goes on with clauses.
 
@@ -220,43 +224,12 @@ def with_block_rows(rows: LogicalRows) -> LogicalRows:
 # All lines of a file.
 
 
-@dataclass(frozen=True)
-class Lines:
-    """The logical lines of a file that hold code (structure of arrays).
-
-    Attributes:
-        source: The text.
-        shapes: The distinct masks, stripped, in the order of appearance.
-        shape: Index into `shapes`, (n,).
-        line: 1-based physical line on which each logical line starts, (n,).
-        first: CSR offsets into the numbers, (n + 1,).
-        numbers: Where each number stands, its sign included, (m,).
-        value: Its value, NaN where it cannot be read, (m,).
-    """
-
-    source: Source
-    shapes: Shapes
-    shape: Indices
-    line: Indices
-    first: Indices
-    numbers: NumberSpans
-    value: Floats
-
-    def __len__(self) -> int:
-        """Return the number of logical lines."""
-        return len(self.shape)
-
-    def text(self, row: int) -> str:
-        """Return the mask of a logical line."""
-        return self.shapes[int(self.shape[row])]
-
-    def without_values(self) -> Lines:
-        """Let go of what the numbers are worth: it can be read again."""
-        return replace(self, value=np.empty(0))
-
-
-def read_lines(source: Source) -> Lines:
+def read_lines(source: Source, parse: Callable[[str], Any] = str) -> Statements[Any]:
     """Split a source into logical lines with masked numbers.
+
+    Args:
+        source: The file.
+        parse: Says what the form of a line says.
 
     Raises:
         ProgramError: A string does not end on its line.
@@ -282,9 +255,9 @@ def read_lines(source: Source) -> Lines:
     shapes, shape = find_shapes(
         lines.masks, lines.shape, lines.name, found.name, found.names
     )
-    return Lines(
+    return Statements(
         source,
-        shapes,
+        parse_shapes(shapes, parse),
         shape.astype(np.int32),
         lines.line.astype(np.int32),
         lines.first,
@@ -297,7 +270,7 @@ def read_lines(source: Source) -> Lines:
 
 
 @dataclass(frozen=True)
-class RereadLines:
+class RereadLines(Generic[T]):
     """Lines that say what they said before, but for what their numbers are worth.
 
     Attributes:
@@ -306,7 +279,7 @@ class RereadLines:
         added: Physical line (from 0) that was not there, -1 where there is none.
     """
 
-    lines: Lines
+    lines: Statements[T]
     changed: Bools
     added: int
 
@@ -323,7 +296,7 @@ class RereadLines:
         return tuple(replace(d, line=d.line + (d.line > self.added)) for d in found)
 
 
-def reread_lines(source: Source, before: Lines) -> RereadLines | None:
+def reread_lines(source: Source, before: Statements[T]) -> RereadLines[T] | None:
     """Read a text that should differ from one read before in numbers alone.
 
     Every line of both is read, but what lines have in common with those before is not
@@ -339,11 +312,11 @@ def reread_lines(source: Source, before: Lines) -> RereadLines | None:
     )  # fmt: skip
     if found is None:
         return None
-    line = before.line
+    line = before.begin_line
     if found.added >= 0:
         line = line + (line > found.added)
     lines = replace(
-        before, source=source, line=line.astype(np.int32, copy=False),
+        before, source=source, begin_line=line.astype(np.int32, copy=False),
         numbers=found.numbers, value=found.value,
     )  # fmt: skip
     return RereadLines(lines, found.changed, found.added)

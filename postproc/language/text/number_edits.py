@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from postproc import _native
 from postproc.arrays import Floats, Indices, Ints, chunks, floats
 from postproc.exceptions import ProgramError
 from postproc.language.pose_encoding import Dialect
-from postproc.language.text.logical_lines import Lines, read_lines
+from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import (
     NumberSpans,
     Replacements,
@@ -20,6 +21,7 @@ from postproc.language.text.source import (
     apply,
     as_texts,
 )
+from postproc.language.text.statement_table import Statements
 from postproc.language.text.templates import Shapes
 from postproc.language.visits import Literals
 
@@ -51,9 +53,14 @@ class Skeleton:
     reread: Callable[[Source], Skeleton] | None = None
 
     @classmethod
-    def of(cls, lines: Lines) -> Skeleton:
-        """Take over what the lines of a text tell."""
-        return cls(lines.source, lines.shapes, lines.shape, lines.line, lines.numbers)
+    def of(
+        cls,
+        text: Statements[Any],
+        reread: Callable[[Source], Skeleton] | None = None,
+    ) -> Skeleton:
+        """Take over what the statements of a text tell."""
+        where = text.shape, text.begin_line, text.numbers
+        return cls(text.source, text.shapes, *where, reread)
 
     @classmethod
     def read(cls, source: Source) -> Skeleton:

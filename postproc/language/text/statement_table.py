@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Container, Iterable
-from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
-from postproc.arrays import Floats, Indices
+from postproc.arrays import Bools, Floats, Indices
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
-from postproc.language.text.number_edits import Skeleton
 from postproc.language.text.source import NumberSpans, Source, Span
-from postproc.language.text.templates import ParsedShapes, find_shapes, parse_shapes
+from postproc.language.text.templates import (
+    ParsedShapes,
+    Shapes,
+    find_shapes,
+    parse_shapes,
+)
 from postproc.language.visits import Diagnostic
 
 _WORD = re.compile(r"[A-Za-z_$]\w*")
@@ -23,36 +27,44 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class StatementText(Generic[T]):
+class Statements(Generic[T]):
     """The n statements of a file (structure of arrays).
 
     Attributes:
         source: The text.
         said: What the distinct statements say.
         shape: Index into `said`, (n,).
-        begin, end: Byte offsets of every statement, (n,).
+        begin_line: 1-based line on which each begins, (n,).
         first: CSR offsets into the numbers, (n + 1,).
-        start, stop: Byte offsets of each number, its sign included, (m,).
+        numbers: Where each number stands, its sign included, (m,).
         value: What it is worth, NaN where it cannot be read or is infinite, (m,).
     """
 
     source: Source
     said: ParsedShapes[T]
     shape: Indices
-    begin: Indices
-    end: Indices
+    begin_line: Indices
     first: Indices
-    start: Indices
-    stop: Indices
+    numbers: NumberSpans
     value: Floats
 
     def __len__(self) -> int:
         """Return the number of statements."""
         return len(self.shape)
 
+    @property
+    def shapes(self) -> Shapes:
+        """Return the distinct masks of statements, in the order of appearance."""
+        return self.said.shapes
+
     def statement(self, row: int) -> T:
         """Return what a statement says."""
         return self.said[int(self.shape[row])]
+
+    def which(self, test: Callable[[T], bool]) -> Bools:
+        """Tell which statements pass a test that no name in them decides, (n,)."""
+        found: Bools = self.said.which(test)[self.shape]
+        return found
 
     def where(
         self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
@@ -71,7 +83,27 @@ class StatementText(Generic[T]):
 
     def line(self, row: int) -> int:
         """Return the 1-based line that a statement begins on."""
-        return self.source.line_of(int(self.begin[row]))
+        return int(self.begin_line[row])
+
+    def diagnostic(self, row: int, code: Code, message: str) -> Diagnostic:
+        """Say something of a statement."""
+        return Diagnostic(self.source.name, self.line(row), code, message)
+
+    def without_values(self) -> Self:
+        """Let go of what the numbers are worth: it can be read again."""
+        return replace(self, value=np.empty(0))
+
+
+@dataclass(frozen=True)
+class StatementText(Statements[T]):
+    """The n statements of a file, and where each of them stands.
+
+    Attributes:
+        begin, end: Byte offsets of every statement, (n,).
+    """
+
+    begin: Indices
+    end: Indices
 
     def lines(self, row: int) -> range:
         """Return the 1-based lines that a statement stands on."""
@@ -107,26 +139,6 @@ class StatementText(Generic[T]):
         words = " ".join(self.text(row).split())
         return repr(words if len(words) <= SHOWN else f"{words[:SHOWN]} ..")
 
-    def diagnostic(self, row: int, code: Code, message: str) -> Diagnostic:
-        """Say something of a statement."""
-        return Diagnostic(self.source.name, self.line(row), code, message)
-
-    def skeleton(self, reread: Callable[[Source], Skeleton]) -> Skeleton:
-        """Take over what the statements tell, for comparing the text with another.
-
-        Args:
-            reread: Reads another text of the same language.
-        """
-        line = self.source.lines_of(self.begin).astype(np.int32)
-        return Skeleton(
-            self.source,
-            self.said.shapes,
-            self.shape,
-            line,
-            NumberSpans.of(self.start, self.stop),
-            reread=reread,
-        )
-
 
 def read_text(
     source: Source,
@@ -159,6 +171,8 @@ def read_text(
     said = parse_shapes(shapes, parse)
     start, stop, value = numbers
     value = np.where(np.isfinite(value), value, np.nan)
+    line, places = source.lines_of(begin), NumberSpans.of(start, stop)
     return StatementText(
-        source, said, shape.astype(np.int32), begin, end, first, start, stop, value
-    )
+        source, said, shape.astype(np.int32), line.astype(np.int32), first, places,
+        value, begin, end,
+    )  # fmt: skip

@@ -18,6 +18,8 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, Terms, linear, side, turn_joint
+from postproc.robot.arm import Arm
 
 SCALE = 1e-4  # [rad] prior scale of half a backlash
 
@@ -45,6 +47,11 @@ class Backlash(JointEffect):
     def parameters(self) -> tuple[Parameter, ...]:
         """Name one b per joint."""
         return tuple(Parameter(f"b{j}", "rad", SCALE, "b", j) for j in self.joints)
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint in proportion to its direction."""
+        pairs = zip(self.joints, p, strict=True)
+        return [Term(turn_joint(j), linear(b), (side(j),)) for j, b in pairs]
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate lambda, (n, p)."""

@@ -8,7 +8,6 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc import _native
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
@@ -25,6 +24,15 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import (
+    Term,
+    TermLaw,
+    Terms,
+    angle,
+    joint_angles,
+    side,
+    turn_joint,
+)
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -91,14 +99,21 @@ class BacklashProfile(JointEffect):
         turned: Floats = batch.states.direction.T[joint] * flat
         return turned.T
 
-    def angles(self, batch: ArmStates, p: Floats) -> Floats:
-        """Return the joint errors (n, 6) [rad], summed joint by joint."""
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint by its waves, times its direction."""
         sizes = p.reshape(len(self.joints), self.constant + 2 * len(self.orders))
-        states = batch.states.q, batch.states.direction
-        return _native.profile(
-            tuple(map(np.ascontiguousarray, states)), self._profile_joints.tolist(),
-            self.orders, self.constant, sizes, (self.lower, self.upper),
-        )  # fmt: skip
+        first, out = int(self.constant), []
+        for j, own in zip(self.joints, sizes, strict=True):
+            waves = np.zeros((max(self.orders, default=0), 2))
+            waves[np.array(self.orders, dtype=int) - 1] = own[first:].reshape(-1, 2)
+            ends = self.lower[j - 1], self.upper[j - 1], own[0] if first else 0.0
+            law = TermLaw("waves", (*map(float, ends), *waves.ravel().tolist()))
+            out.append(Term(turn_joint(j), law, (angle(j),), (side(j),)))
+        return out
+
+    def angles(self, batch: ArmStates, p: Floats) -> Floats:
+        """Return the joint errors (n, 6) [rad], as in the base class but in one go."""
+        return joint_angles(self.terms(batch.arm, p), batch.states)
 
     @property
     def _profile_joints(self) -> NDArray[np.int64]:

@@ -8,6 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.model.carrier import carrier
 from postproc.model.covariate import TILTING, varies
 from postproc.model.effects.base_shift import rigid_columns, rigid_rotations
 from postproc.model.effects.effect import (
@@ -18,6 +19,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import SearchPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Driver, Term, Terms, about_axis, linear, move, weight
 from postproc.robot.arm import GRAVITY, Arm
 from postproc.robot.state import States
 
@@ -82,6 +84,33 @@ class BaseTilt(Effect):
             out += [Parameter(f"h{a}", unit, scale, "pivot") for a in "xy"]
         return tuple(out)
 
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn the base by moments of weights that are scaled and moved."""
+        x, y, z = (carrier(f"base turn {a}") for a in "xyz")
+        left, out = list(p), []
+        for axis, turned in enumerate((x, y, z) if self.twist else (x, y)):
+            about = _take_moment(arm, left, axis)
+            out.append(Term(move(turned), linear(1.0), (about,)))
+        if self.skew:
+            about_x, about_y = (_take_moment(arm, list(left), axis) for axis in (0, 1))
+            hx, hy = left[len(PLACES) :]
+            whole = [1.0, 0.0, 0.0]
+            out += [
+                Term(move(x), linear(1.0), (about_y,)),
+                Term(move(y), linear(1.0), (about_x,)),
+                Term(
+                    move(carrier("base shift x")),
+                    linear(hx),
+                    (_take_moment(arm, list(whole), 1),),
+                ),
+                Term(
+                    move(carrier("base shift y")),
+                    linear(-hy),
+                    (_take_moment(arm, list(whole), 0),),
+                ),
+            ]
+        return out
+
     def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
         return self._leaning(batch, rigid_columns(batch))
@@ -108,6 +137,15 @@ def uncertain_mass(arm: Arm) -> float:
     """Say how much of an arm's mass may hang elsewhere than its file says [kg]."""
     links = arm.file.links
     return LEAST if links is None else max(links.spread * arm.mass, LEAST)
+
+
+def _take_moment(arm: Arm, left: list[float], axis: int) -> Driver:
+    """Take the sizes of a moment, and of what is unsure of it, off a list."""
+    whole, elbow, wrist = (float(left.pop(0)) for _ in PLACES)
+    links = whole * arm.lumps
+    links[1, 0] += elbow  # at the origins of D-H frames 2 and 4
+    links[3, 0] += wrist
+    return weight(arm, about_axis(0, axis), links, whole)
 
 
 def _moments(batch: ArmStates) -> Floats:

@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.model.carrier import carrier
 from postproc.model.effects.compliance import (
     AXES,
     LOADED,
@@ -21,6 +22,8 @@ from postproc.model.effects.effect import (
     Parameter,
 )
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, Terms, about_axis, linear, move, weight
+from postproc.robot.arm import Arm
 
 BENDING = (2, 3, 4, 5, 6)  # joint 1 stands on the base: that is `base_tilt`
 ACROSS = "xy"  # axes of the frame before a joint, which turns about its z
@@ -100,6 +103,18 @@ class Bending(WeightEffect):
                         for a in AXES
                     ]
         return tuple(out)
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn all behind every joint across it, by moments of weights likewise."""
+        out, left = [], list(p)
+        for j, links in zip(self.joints, self.moments, strict=True):
+            for across, axis in enumerate(ACROSS):
+                own, carried, places = self.take_weights(arm, left, links)
+                share = about_axis(j - 1, across)
+                load = weight(arm, share, own, carried, places)
+                moves = move(carrier(f"link {j} turn {axis}"))
+                out.append(Term(moves, linear(1.0), (load,)))
+        return out
 
     def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""

@@ -22,6 +22,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates, Loads
+from postproc.model.terms import Term, Terms, about_joint, linear, turn_joint, weight
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -136,6 +137,28 @@ class WeightEffect(Effect):
             for c in alternatives([(effect, f"torque {j}")], j)
         ]
 
+    def take_weights(
+        self, arm: Arm, left: list[float], links: tuple[tuple[int, float], ...]
+    ) -> tuple[Floats, float, Floats]:
+        """Take the parameters of one softness off a list.
+
+        Args:
+            arm: The arm.
+            left: Parameters; those that are taken are removed.
+            links: The links whose moments the data may correct.
+
+        Returns:
+            Links, share of the load and places of the load, times the softness; see
+            `terms.weight`.
+        """
+        softness, places = float(left.pop(0)), np.zeros((6, 3))
+        own = softness * arm.lumps
+        for link, _ in links:
+            own[link - 1, 1:] += [left.pop(0) for _ in AXES]
+        if self.payload:
+            places[5] += [left.pop(0) for _ in AXES]
+        return own, softness, places
+
     def pieces(self) -> tuple[Self, ...]:
         """Return the effect of each joint alone."""
         scales = self.softness or (SCALE,) * len(self.joints)
@@ -239,6 +262,16 @@ class Compliance(WeightEffect, JointEffect):
         if self.along is None:
             return batch.loads
         return Loads(batch.arm.mount(np.array(self.along)), batch.states)
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint by torques of weights that are scaled and moved."""
+        pulled = arm if self.along is None else arm.mount(np.array(self.along))
+        out, left = [], list(p)
+        for j, links in zip(self.joints, self.moments, strict=True):
+            own, carried, places = self.take_weights(arm, left, links)
+            load = weight(pulled, about_joint(arm, j), own, carried, places)
+            out.append(Term(turn_joint(j), linear(1.0), (load,)))
+        return out
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate torque [N m] and torque per unit of moment, (n, p)."""

@@ -17,6 +17,8 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, Terms, angle, linear, turn_joint
+from postproc.robot.arm import Arm
 
 SCALE = 5e-5  # [rad/rad]
 HOLLOW_WRIST = ((3, 2), (5, 4), (6, 4), (6, 5))  # receiving, driving
@@ -54,6 +56,11 @@ class Coupling(JointEffect):
             Parameter(f"c{j}_{k}", "rad/rad", SCALE, f"{j} by {k}", j)
             for j, k in self.pairs
         )
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint in proportion to the angle of another one."""
+        pairs = zip(self.pairs, p, strict=True)
+        return [Term(turn_joint(j), linear(c), (angle(k),)) for (j, k), c in pairs]
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the driving angles, (n, p)."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Literal, Self
 
@@ -39,6 +39,16 @@ from postproc.model.effects.transmission import (
     whole,
 )
 from postproc.model.kinematics import ArmStates, Loads
+from postproc.model.terms import (
+    Term,
+    Terms,
+    about_joints,
+    drive,
+    linear,
+    side,
+    turn_joints,
+    weight,
+)
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -146,6 +156,17 @@ class DriveEffect(Effect):
         columns: Floats = (joints @ self.inverse)[:, :, law.acts_on()]
         return np.asarray(columns * law.basis(self.look_up_driver(batch))[:, None, :])
 
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn the joints that a drive moves, by its own law."""
+        return [
+            replace(term, moves=turn_joints(self.inverse[:, j - 1]))
+            for j, term in self.list_laws(arm, p)
+        ]
+
+    @abstractmethod
+    def list_laws(self, arm: Arm, p: Floats) -> list[tuple[int, Term]]:
+        """List drives, from 1, with what turns them."""
+
     def only_joint(self) -> int | None:
         """Tell a drive that moves its own joint alone."""
         drive = self.law.only_joint()
@@ -199,6 +220,13 @@ class DriveBacklash(DriveEffect):
             driver = angle_text(every.coupling[j - 1])
             out += alternatives([(one, f"lambda {j}")], j, driver)
         return out
+
+    def list_laws(self, arm: Arm, p: Floats) -> list[tuple[int, Term]]:
+        """List drives with what their directions turn them by."""
+        return [
+            (j, Term(("", ()), linear(b), (side(j),)))
+            for j, b in zip(self.drives, p, strict=True)
+        ]
 
     @property
     def law(self) -> Backlash:
@@ -271,6 +299,13 @@ class DriveTransmission(DriveEffect):
         """Return that of a single wave and its standard error [rad]."""
         return self.law.amplitude(p, covariance)
 
+    def list_laws(self, arm: Arm, p: Floats) -> list[tuple[int, Term]]:
+        """List drives with what their angles turn them by."""
+        return [
+            (j, replace(term, by=(drive(self.coupling[j - 1]),)))
+            for j, term in self.law.by_angle(p)
+        ]
+
     @property
     def law(self) -> Transmission:
         """Waves of the drives."""
@@ -327,6 +362,14 @@ class DriveLoad(DriveEffect):
     def nonlinear(self) -> dict[str, tuple[float, str]]:
         """Tell the torque."""
         return self.law.nonlinear()
+
+    def list_laws(self, arm: Arm, p: Floats) -> list[tuple[int, Term]]:
+        """List drives with what the torques on them turn them by."""
+        return [
+            (j, replace(term, by=(weight(arm, about_joints(arm, shares)),)))
+            for j, term in self.law.by_torque(p)
+            for shares in [self.inverse[:, j - 1]]
+        ]
 
     @property
     def law(self) -> LoadBacklash:

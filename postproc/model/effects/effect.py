@@ -20,6 +20,7 @@ from postproc.model.covariate import covariate, varies_enough
 from postproc.model.effects.policies import FitPolicy, NamingPolicy, SearchPolicy
 from postproc.model.kinematics import ArmStates
 from postproc.model.splines import Splines
+from postproc.model.terms import Driver, Term, Terms, linear, turn_joint
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -307,6 +308,23 @@ class Effect(ABC):
         """Return the errors of gears, joints or drives, (n, 6) [rad], 0 without."""
         return np.zeros((len(batch), 6))
 
+    def terms(self, arm: Arm, p: Floats) -> Terms | None:
+        """Write it as the core evaluates it; None for what is never compensated.
+
+        Args:
+            arm: The nominal arm.
+            p: Its parameters.
+        """
+        return None
+
+    def list_ended(self, prior_std: Floats) -> tuple[float, ...]:
+        """List what every term may be where it has ended [rad^2], none for nothing.
+
+        Args:
+            prior_std: Of its parameters, as the data chose it, (p,).
+        """
+        return ()
+
     def direction_slopes(self, batch: ArmStates, p: Floats) -> Floats | None:
         """Give its position error per unit of each direction, (n, 3, 6) [m].
 
@@ -400,6 +418,14 @@ class JointEffect(Effect):
     @abstractmethod
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate phi: the angle of each parameter's joint, (n, p) [rad per unit]."""
+
+    def terms(self, arm: Arm, p: Floats) -> Terms | None:
+        """Turn every joint by its columns; laws that the core knows are faster."""
+        columns = [Driver("given", column=(self, k)) for k in range(len(p))]
+        return [
+            Term(turn_joint(int(j) + 1), linear(k), (column,))
+            for j, k, column in zip(self.acts_on(), p, columns, strict=True)
+        ]
 
     def splines(self, batch: ArmStates) -> list[tuple[int, Splines, Floats]] | None:
         """Write the columns as splines, in their order, where they are made of them.

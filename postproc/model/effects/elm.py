@@ -18,6 +18,7 @@ from postproc.model.effects.effect import (
 from postproc.model.effects.joint_spline import LEAST_ROWS
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Neurons, Terms
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -70,6 +71,13 @@ class HiddenLayer:
             upper=tuple(map(float, high)),
             activation=activation,
         )
+
+    def neurons(self, sizes: Floats, turns: bool) -> Neurons:
+        """Return it as the core has it, see `Neurons`."""
+        ends = np.array(self.lower), np.array(self.upper)
+        layer = np.array(self.weights), np.array(self.bias)
+        shape = "logistic" if self.activation == "sigmoid" else self.activation
+        return Neurons(*ends, *layer, shape, turns, sizes)
 
     def __len__(self) -> int:
         """Return the number of neurons."""
@@ -142,6 +150,10 @@ class Elm(JointEffect):
             for k in range(len(self.layer))
         )
 
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn all joints by the neurons."""
+        return [self.layer.neurons(p.reshape(6, -1), turns=True)]
+
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the neurons for every joint, (n, 6 neurons)."""
         low, high = np.array(self.layer.lower), np.array(self.layer.upper)
@@ -180,6 +192,10 @@ class ElmMap(Effect):
             for axis in "xyz"
             for k in range(len(self.layer))
         )
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Move the TCP by the neurons."""
+        return [self.layer.neurons(p.reshape(3, -1), turns=False)]
 
     def columns(self, batch: ArmStates) -> Floats:
         """Lay the neurons out per axis, (n, 3, 3 neurons)."""

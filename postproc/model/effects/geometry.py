@@ -13,6 +13,7 @@ from postproc.model.effects.effect import ZERO, Effect, Parameter
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates, Deviation
+from postproc.model.terms import Terms
 from postproc.robot.arm import Arm
 from postproc.robot.pose import cross
 from postproc.robot.state import States
@@ -112,6 +113,10 @@ class Geometry(Effect):
     def zero_errors(self, p: Floats) -> Floats:
         """Return the errors theta of the joints' zeros, (6,) [rad]."""
         return np.array(self.deviation(p).link[:, KINDS.index("theta")])
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Return none: it deviates the chain itself."""
+        return []
 
     def _kind(
         self, batch: ArmStates, kind: int, joint: int

@@ -23,6 +23,7 @@ from postproc.model.effects.effect import (
 from postproc.model.effects.joint_spline import LONG_SURVEY
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, TermLaw, Terms, angle, turn_joint
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -147,6 +148,16 @@ class JointMap(JointEffect):
             Parameter(f"h{j}_{np.degrees(c):.2f}w{wide:.2f}", "rad", SCALE, f"{j}", j)
             for j, c in self.bumps
         )
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint by its bumps."""
+        each: dict[int, list[float]] = {}
+        for (j, centre), size in zip(self.bumps, p, strict=True):
+            each.setdefault(j, [float(self.width)]).extend([centre, float(size)])
+        return [
+            Term(turn_joint(j), TermLaw("bumps", tuple(numbers)), (angle(j),))
+            for j, numbers in each.items()
+        ]
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the bumps, (n, p)."""

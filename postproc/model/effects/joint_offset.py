@@ -17,6 +17,8 @@ from postproc.model.effects.effect import (
     alternatives,
 )
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, Terms, constant, turn_joint
+from postproc.robot.arm import Arm
 
 MASTERED = 3e-4  # [rad] by which two masterings of a joint differ
 FIRST, LAST = 1, 6  # joints that turn as the base, and as the tool, is turned
@@ -62,6 +64,11 @@ class JointOffset(JointEffect):
         return tuple(
             Parameter(f"theta{j}", "rad", MASTERED, f"{j}", j) for j in self.joints
         )
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint by a constant."""
+        pairs = zip(self.joints, p, strict=True)
+        return [Term(turn_joint(j), constant(k)) for j, k in pairs]
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate 1, (n, p)."""

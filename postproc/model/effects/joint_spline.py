@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from postproc.arrays import Floats
 from postproc.model.effects.effect import DRIVEN, JointEffect, Parameter, fade
 from postproc.model.effects.policies import FitPolicy
-from postproc.model.effects.smooth import smooth, smooth_count
+from postproc.model.effects.smooth import smooth, smooth_count, smooth_mix
 from postproc.model.kinematics import ArmStates
 from postproc.model.splines import Splines
+from postproc.model.terms import Term, TermLaw, Terms, angle, joint_angles, turn_joint
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -140,14 +141,27 @@ class JointSpline(JointEffect):
         columns = [found.combine(mix) for _, found, mix in self.splines(batch)]
         return np.concatenate(columns, axis=1)
 
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint by its splines."""
+        out, left = [], p
+        for part in self._parts():
+            j, own = part.j, left[: part.count]
+            left = left[part.count :]
+            middle = (self.lower[j] + self.upper[j]) / 2.0
+            ends = part.lower, part.upper, not part.closed, self.turns, middle
+            mix = smooth_mix(part.lower, part.upper, part.length, part.closed) @ own
+            law = TermLaw("spline", (*map(float, ends), *mix.tolist()))
+            out.append(Term(turn_joint(j + 1), law, (angle(j + 1),)))
+        return out
+
+    def list_ended(self, prior_std: Floats) -> tuple[float, ...]:
+        """Return the prior variance of every function."""
+        first = np.cumsum([0, *(part.count for part in self._parts())])[:-1]
+        return tuple((prior_std[first] ** 2).tolist())
+
     def angles(self, batch: ArmStates, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad]: one function for every joint."""
-        start, out = 0, np.zeros((len(batch), 6))
-        for j, found, mix in self.splines(batch):
-            part = slice(start, start + mix.shape[1])
-            out[:, j] += found.combine(mix @ p[part])
-            start = part.stop
-        return out
+        return joint_angles(self.terms(batch.arm, p), batch.states)
 
     def beyond(self, batch: ArmStates, prior_std: Floats) -> Floats:
         """Give back the prior's variance as far as the functions have faded, (n, 6)."""

@@ -19,6 +19,8 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, Terms, linear, side, state_value, turn_joint
+from postproc.robot.arm import Arm
 
 SCALE = 2e-4  # [rad s/m]
 
@@ -56,6 +58,13 @@ class Lag(JointEffect):
         return tuple(
             Parameter(f"k{j}", "rad s/m", SCALE, f"{j}", j) for j in self.joints
         )
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint in proportion to the speed, times its direction."""
+        return [
+            Term(turn_joint(j), linear(k), (state_value("speed"),), (side(j),))
+            for j, k in zip(self.joints, p, strict=True)
+        ]
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate lambda * speed [m/s], (n, p)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
@@ -22,6 +23,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, TermLaw, Terms, driver, side, turn_joint
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -120,6 +122,22 @@ class LoadBacklash(JointEffect):
             name += "" if self.form == "load" else f"_{self.form}"
             out.append(Parameter(name, "rad", UNSURE * SCALE, group, j))
         return tuple(out)
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint by the torque about it."""
+        return [
+            replace(term, moves=turn_joint(j), by=(driver(arm, f"torque {j}"),))
+            for j, term in self.by_torque(p)
+        ]
+
+    def by_torque(self, p: Floats) -> Iterator[tuple[int, Term]]:
+        """Yield joints, or drives, with the laws of the torques about them."""
+        for j, (k, second) in zip(self.joints, p.reshape(-1, 2), strict=True):
+            law = TermLaw("size", (float(k), float(second), float(self.t0)))
+            if self.form != "load":
+                law = TermLaw("bend", (float(k), float(second), 0.0, float(self.t0)))
+            sided = () if self.form == "gravity_side" else (side(j),)
+            yield j, Term(turn_joint(j), law, times=sided)
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the laws and their corrections, (n, p)."""

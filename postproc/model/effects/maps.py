@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
+from postproc.model.carrier import carrier
 from postproc.model.effects.effect import Effect, Parameter
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Neighbours, Neurons, Term, Terms, constant, move
+from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
 # Spatial interpolation: the error at a place is that of its measured neighbours.
@@ -49,6 +52,11 @@ class Interpolation(Effect):
             for k in range(len(self.points))
             for axis in "xyz"
         )
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Average the nearest errors."""
+        places, errors = np.array(self.points), p.reshape(-1, 3)
+        return [Neighbours(places, errors, self.neighbours, self.power)]
 
     def _weights(self, batch: ArmStates) -> tuple[NDArray[np.int64], Floats]:
         """Find neighbours and their weights, (n, k) each."""
@@ -111,6 +119,18 @@ class Kriging(Effect):
             for axis in "xyz"
             for name in ("mean", *map(str, range(1, len(self.centres) + 1)))
         )
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Move the TCP by the mean and the kernels."""
+        sizes, centres = p.reshape(3, -1), np.array(self.centres)
+        ends = np.array(self.lower), np.array(self.upper)
+        kernels = Neurons(
+            *ends, centres, np.zeros(len(centres)), "gaussian", False, sizes[:, 1:],
+            self.length,
+        )  # fmt: skip
+        along = [move(carrier(f"base shift {a}")) for a in "xyz"]
+        means = [Term(a, constant(m)) for a, m in zip(along, sizes[:, 0], strict=True)]
+        return [*means, kernels]
 
     def _design(self, batch: ArmStates) -> Floats:
         """Evaluate one and the kernel, (n, 1 + m)."""

@@ -22,6 +22,8 @@ from postproc.model.effects.effect import (
     Parameter,
 )
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Driver, Term, TermLaw, Terms, constant, driver, move
+from postproc.robot.arm import Arm
 
 TURN, SHIFT = 1e-4, 1e-4  # [rad], [m] prior size of a motion
 ANEW = 3e-4  # [rad], [m] by which a part may sit otherwise than a model has it
@@ -118,6 +120,22 @@ class CarriedEffect(Effect):
         group = f"{own[0].group} mean"
         si = self.own_unit()[0]
         return (*own, Parameter(group, si, ANEW, group, self.carrier.joint))
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Move the carrier by the law, and by its mean where that is fitted."""
+        own = self.law_terms(arm, p[: len(p) - self.loose])
+        mean = [Term(("", ()), constant(p[-1]))] if self.loose else []
+        moves = move(self.carrier)
+        return [replace(term, moves=moves) for term in (*own, *mean)]
+
+    @abstractmethod
+    def law_terms(self, arm: Arm, p: Floats) -> list[Term]:
+        """Write the law as the core evaluates it."""
+
+    def drive(self, arm: Arm, name: str, unknown: float = 0.0) -> Driver:
+        """Return what a covariate is in the core, with other weights of links."""
+        more = {link: np.array(by) for link, by in self.heavier}
+        return driver(arm, name, more, unknown)
 
     def turning(self, batch: ArmStates) -> Floats:
         """Evaluate by how much each column moves the carrier, (n, p)."""
@@ -262,6 +280,22 @@ class PartMotion(CarriedEffect):
             )
             value /= self.size
         return value
+
+    def law_terms(self, arm: Arm, p: Floats) -> list[Term]:
+        """Write the law as the core evaluates it."""
+        sizes = (p / self.size if self.factor else p).tolist()
+        place = float(self.middle), float(self.half)
+        if self.order:
+            law = TermLaw("wave", (float(self.order), sizes[1], sizes[0]))
+        elif self.law == "saturating":
+            law = TermLaw("bend", (sizes[0], 0.0, *place))
+        elif self.law == "constant":
+            law = constant(sizes[0])
+        else:
+            law = TermLaw(self.law, (sizes[0], *place))
+        by = () if self.law == "constant" else (self.drive(arm, self.source),)
+        times = (self.drive(arm, self.factor),) if self.factor else ()
+        return [Term(("", ()), law, by, times)]
 
     def _law(self, x: Floats) -> Floats:
         """Evaluate it at values of its covariate."""

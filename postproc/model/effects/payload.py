@@ -19,6 +19,8 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, Terms, about_joint, linear, turn_joint, weight
+from postproc.robot.arm import Arm
 
 UNSURE_LEVER = 0.5  # [m] along the links of an arm of this size
 
@@ -83,6 +85,18 @@ class Payload(JointEffect):
                 for a in AXES
             ]
         return tuple(out)
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint by the torque of a load that is scaled and moved."""
+        out, left = [], list(p)
+        for j in self.joints:
+            carried, places = float(left.pop(0)), np.zeros((6, 3))
+            for _, link, _ in self._places(j):
+                places[link - 1] += [left.pop(0) for _ in AXES]
+            none = np.zeros((6, 4))
+            load = weight(arm, about_joint(arm, j), none, carried, places)
+            out.append(Term(turn_joint(j), linear(1.0), (load,)))
+        return out
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the payload's torque, and that per metre of every lever, (n, p)."""

@@ -18,6 +18,8 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, Terms, angle, linear, turn_joint
+from postproc.robot.arm import Arm
 
 SCALE = 5e-5  # [rad/rad]
 
@@ -47,6 +49,11 @@ class Scale(JointEffect):
         return tuple(
             Parameter(f"gain{j}", "rad/rad", SCALE, f"{j}", j) for j in self.joints
         )
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint in proportion to its angle."""
+        pairs = zip(self.joints, p, strict=True)
+        return [Term(turn_joint(j), linear(k), (angle(j),)) for j, k in pairs]
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate theta, (n, p)."""

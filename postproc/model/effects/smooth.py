@@ -63,6 +63,13 @@ def _mix(points: int, relative: float, closed: bool) -> Floats:
     return mix
 
 
+def smooth_mix(
+    lower: float, upper: float, length: float, closed: bool = False
+) -> Floats:
+    """Return what of every spline makes each column, (points, k), see `smooth`."""
+    return _mix(*_grid(upper - lower, length), closed)
+
+
 def smooth(
     x: Floats, lower: float, upper: float, length: float, closed: bool = False
 ) -> tuple[Splines, Floats]:

@@ -9,6 +9,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.model.carrier import carrier
 from postproc.model.covariate import varies, varies_enough
 from postproc.model.effects.effect import (
     Candidate,
@@ -21,6 +22,7 @@ from postproc.model.effects.policies import FitPolicy, SearchPolicy
 from postproc.model.effects.step import moments
 from postproc.model.effects.tracker_drift import TrackerDrift
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, TermLaw, Terms, linear, move, state_value
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -220,6 +222,28 @@ class Thermal(Effect):
         since = np.maximum(passed - self.start, 0.0)
         warm = self.level - np.exp(-since / self.time_constant)
         return np.nan_to_num(warm)
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Let every length grow with what drives it."""
+        each = zip(self.lengths, p[1:], strict=True)
+        return [self._grow_one(arm, name, float(p[0] + own)) for name, own in each]
+
+    def _grow_one(self, arm: Arm, name: str, by: float) -> Term:
+        """Let a length grow, along the axis on which it lies."""
+        kind, joint = name[0], int(name[1])
+        if kind == "d":
+            part = "base" if joint == 1 else f"link {joint}"
+            along, length = carrier(f"{part} shift z"), arm.dh.d[joint - 1]
+        else:
+            part = "tool" if joint == 6 else f"link {joint + 1}"
+            along, length = carrier(f"{part} shift x"), arm.dh.a[joint - 1]
+        size = float(length * by)
+        if self.form == "temperature":
+            driver = state_value("temperature", unknown=self.reference)
+            return Term(move(along), linear(size, self.reference), (driver,))
+        numbers = size, self.level, self.start, self.time_constant
+        law = TermLaw("warming", tuple(map(float, numbers)))
+        return Term(move(along), law, (state_value(self.clock, unknown=np.nan),))
 
     def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -23,6 +24,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy, SearchPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, TermLaw, Terms, angle, turn_joint
 from postproc.robot.arm import Arm
 
 SCALE = 5e-5  # [rad]
@@ -123,6 +125,19 @@ class Transmission(JointEffect):
         """Tell waves of the output side, which a new motor leaves as they are."""
         sides = (GEARED if k <= OUTPUT_SIDE else DRIVEN for _, k in self.waves)
         return tuple(side for side in sides for _ in ("sin", "cos"))
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint by its waves."""
+        return [
+            replace(term, moves=turn_joint(j), by=(angle(j),))
+            for j, term in self.by_angle(p)
+        ]
+
+    def by_angle(self, p: Floats) -> Iterator[tuple[int, Term]]:
+        """Yield joints, or drives, with the waves of their angles."""
+        for (j, order), sizes in zip(self.waves, p.reshape(-1, 2), strict=True):
+            law = TermLaw("wave", (float(order), *map(float, sizes)))
+            yield j, Term(turn_joint(j), law)
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the waves, (n, p)."""

@@ -22,6 +22,8 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
+from postproc.model.terms import Term, TermLaw, Terms, side, state_value, turn_joint
+from postproc.robot.arm import Arm
 
 SCALE = 3e-5  # [rad]
 WAYS = tuple(np.radians([0.5, 1.0, 2.0, 4.0, 7.0]))  # d0 that are tried
@@ -100,6 +102,16 @@ class Windup(JointEffect):
         return tuple(
             Parameter(f"w{j}", "rad", SCALE, f"{j} {over}", j) for j in self.joints
         )
+
+    def terms(self, arm: Arm, p: Floats) -> Terms:
+        """Turn every joint by its way since it turned, times its direction."""
+        out = []
+        for j, w in zip(self.joints, p, strict=True):
+            names = ("way", "turned") if self.form == "dahl" else ("way",)
+            by = [state_value(f"{name} {j}", unknown=np.inf) for name in names]
+            law = TermLaw(self.form, (float(w), float(self.d0)))
+            out.append(Term(turn_joint(j), law, tuple(by), (side(j),)))
+        return out
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate lambda s(travel), (n, p)."""

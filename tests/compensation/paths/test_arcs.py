@@ -17,9 +17,9 @@ from postproc.compensation.paths.arcs import (
     hindrances_of_arcs,
     measure_passing,
 )
-from postproc.compensation.paths.backlash_preload import MeantSides
+from postproc.compensation.paths.meant_sides import MeantSides
 from postproc.compensation.paths.split_constraints import CLOSEST, shortest_pieces
-from postproc.compensation.paths.write_points import are_near, insert
+from postproc.compensation.paths.write_points import PathPoints, are_near, insert
 from postproc.compensation.program import ParsedProgram, plan_visits, read_program
 from postproc.language.languages import language_of
 from postproc.motion.cycle_time import run
@@ -113,7 +113,7 @@ def test_a_program_with_cut_arcs_is_the_same_without_points(
     points = {VIA: first, **({END: second} if second else {})}
     splitter = language_of("job.pdl").splitter(reading.sources)
     assert splitter is not None
-    found, own = insert(reading, points, {}, splitter, CELL)
+    found, own = insert(reading, PathPoints(points), splitter, CELL)
     v, w = reading.visits, found.visits
     assert len(own) == len(v)
     np.testing.assert_array_equal(
@@ -135,7 +135,7 @@ def test_the_tool_is_turned_at_the_point_on_the_way_as_well() -> None:
         VIA: MeantSides(np.zeros((2, 6)), turned[:2], np.zeros((3, 6))),
         END: MeantSides(np.zeros((1, 6)), turned[2:], np.zeros((2, 6))),
     }
-    found, own = insert(reading, points, {}, splitter, CELL, meant=meant)
+    found, own = insert(reading, PathPoints(points, meant=meant), splitter, CELL)
     v, w = reading.visits, found.visits
     poses = w.dialect.poses(w.target.values[own[0] + 1 : own[END] + 1])
     turn = rotation_vector(poses[0, :3, :3].T @ poses[:, :3, :3])
@@ -178,7 +178,9 @@ def test_half_way_between_points_of_an_arc_joints_are_meant_to_lie_between() -> 
         END: MeantSides(-side[:1], none[:1], np.array([[0.6], [0.5]]) * side[:2]),
     }
     chords = {(VIA, 1.0)}
-    found, own = insert(reading, points, {}, splitter, CELL, chords, meant=meant)
+    found, own = insert(
+        reading, PathPoints(points, chords=chords, meant=meant), splitter, CELL
+    )
     assert found.aims is not None
     rows = slice(int(own[0]) + 1, int(own[END]) + 1)
     assert found.visits.motion.via[rows].tolist() == [1, 0, 0, 1, 0, 1, 0]
@@ -208,7 +210,7 @@ def test_arcs_that_are_cut_lead_where_they_led() -> None:
     splitter = language_of("job.pdl").splitter(reading.sources)
     assert splitter is not None
     points = {VIA: (0.4, 1.0), END: (0.5,)}
-    found, own = insert(reading, points, {}, splitter, CELL)
+    found, own = insert(reading, PathPoints(points), splitter, CELL)
     cycles = [run(CELL.arm, plan_visits(r.visits, CELL).targets)
               for r in (reading, found)]  # fmt: skip
     before, after = cycles

@@ -35,3 +35,15 @@ def test_taught_ends_and_weaving_moves_stay_in_one_piece(desk, line, why):
     assert words == ([why] if why else [])
     written = out.read_text().splitlines()
     assert not why or "inserted" not in written[written.index("END job") - 2]
+
+
+def test_a_move_says_why_its_end_is_not_corrected(desk) -> None:
+    job, out, cell = (
+        desk.folder / name for name in ("job.pdl", "out.pdl", "cell.toml")
+    )
+    job.write_text("\n".join(["PROGRAM job", "BEGIN", *MOVES, "END job", ""]))
+    cell.write_text(desk.cell.read_text() + "\n[limits]\nelbow_mm = 0.001\n")
+    given = ("--cell", cell, "--model", desk.model, "-o", out)
+    found = cli("compensate", job, *given, "--path-tolerance", "0.01")
+    said = " ".join(found.stderr.split())
+    assert "its end is not corrected: corrected, the elbow would move by more" in said

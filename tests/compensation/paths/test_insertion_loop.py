@@ -435,19 +435,6 @@ def test_of_two_points_too_close_for_the_error_the_one_with_more_room_goes() -> 
     assert insertion_loop.drop_where_steep(now) is plan
 
 
-@pytest.mark.parametrize(
-    ("shut", "cure"), [({7: {0.6}}, insertion_loop.TURNS), ({}, insertion_loop.SHORTER)]
-)
-def test_where_the_error_changes_too_fast_the_limit_is_named(shut, cure) -> None:
-    plan = InsertionPlan(points={}, shut=shut, open={7: (0.0, 0.0, 0.0)})
-    now = Mock(plan=plan, too_far=[7])
-    now.task.visits.motion.kind = np.full(9, int(Motion.LINEAR))
-    paths = Mock(way=np.array([0.4]))
-    paths.after.largest = np.array([0])
-    now.path_to.return_value = (paths, 0)
-    assert insertion_loop._cures(now) == {7: cure}
-
-
 def test_where_the_error_changes_fast_points_beside_it_are_taken_back(
     shop: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

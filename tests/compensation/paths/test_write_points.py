@@ -13,7 +13,12 @@ from scipy.spatial.transform import Rotation, Slerp
 from postproc.arrays import Floats
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.paths.backlash_preload import BacklashPreload
-from postproc.compensation.paths.write_points import between, insert, without
+from postproc.compensation.paths.write_points import (
+    PathPoints,
+    between,
+    insert,
+    without,
+)
 from postproc.compensation.program import ParsedProgram, read_program
 from postproc.compensation.rewrite import VerificationError
 from postproc.language.pdl2.insert_moves import Pdl2Splitter
@@ -83,7 +88,7 @@ def test_a_program_with_points_is_the_same_without_them() -> None:
     visit = last(reading)
     points = {visit: (0.1, 0.5), 2: (0.3,)}
     splitter = Pdl2().splitter(reading.sources)
-    found, own = insert(reading, points, {visit: TURNED}, splitter, CELL)
+    found, own = insert(reading, PathPoints(points, {visit: TURNED}), splitter, CELL)
     v, w = reading.visits, found.visits
     assert len(w) == len(v) + 3 == len(own) + 3
     new = np.setdiff1d(np.arange(len(w)), own)
@@ -130,4 +135,4 @@ def test_what_else_changes_is_found() -> None:
     ):
         wrong = Wrong(programs, text, keeps)
         with pytest.raises(VerificationError, match=said):
-            insert(reading, {2: (0.5,)}, {}, wrong, CELL)
+            insert(reading, PathPoints({2: (0.5,)}), wrong, CELL)

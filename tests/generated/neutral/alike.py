@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -37,6 +37,11 @@ from tests.generated.neutral.tree import (
 CLOSE_MM = 0.005  # of corrections, which are rounded differently
 ROUNDED = 1e-5  # of poses [m], whose numbers are rounded differently
 CORRECTED = "corrected"
+TOGETHER = {CORRECTED, "arrivals-differ", "arc-distorted", "dependant-worse"}
+"""Codes that what other arrivals need decides."""
+PINNED = "numbers-used-elsewhere"
+UNFLAGGED = ("configuration-unknown", "unknown-position-before")
+"""Codes of KRL behind a place that is not known: its lines have no S and T."""
 Key = tuple[int, bool, int]  # mark of a move, whether it is a VIA point, which arrival
 PLACES = {START: (START, False, 0), ELSEWHERE: (ELSEWHERE, False, 0)}
 
@@ -78,6 +83,18 @@ class Arrivals:
             "origin": sorted(PLACES.get(k) or self.keys[k] for k in before),
             "code": self.code(row),
         }
+
+    def groups(self) -> list[set[Key]]:
+        """Group arrivals at one point, and those on one arc with where it begins."""
+        visits, found = self.done.visits, defaultdict[int, set[Key]](set)
+        arcs = []
+        for row, key in enumerate(self.keys):
+            found[int(visits.target.literal[row])].add(key)
+            if visits.motion.via[row]:
+                starts = (k for k in visits.graph.predecessors(row).tolist() if k >= 0)
+                arcs.append({self.keys[k] for k in (*starts, row, row + 1)})
+        found.pop(-1, None)
+        return [*found.values(), *arcs]
 
     def code(self, row: int) -> str:
         """Return the code of what keeps a visit from being corrected."""
@@ -132,31 +149,54 @@ def differences(a: Arrivals, b: Arrivals) -> Iterator[tuple[int, str]]:
     """Yield in what two languages differ, with the line in the first one.
 
     These may differ: whether KRL stops at a fly point, where a statement behind it
-    waits for the arm; the origin of the end of an arc, which in PDL2 is unknown if the
-    arc begins at several places; codes at fly points, whose corners are blended
-    otherwise, and at points that more than moves read, or that the program sets in
-    several ways (each language has rules of its own for them); corrections at fly
-    points, where sides differ, and where one is for several arrivals.
+    waits for the arm; codes at fly points, whose corners are blended otherwise, and at
+    points that more than moves read, or that the program sets in several ways (each
+    language has rules of its own for them); numbers that variables hold and that serve
+    something else (what is never gone to counts in RAPID and KRL, a data list of KRL
+    outlives the run); codes of lines of KRL behind a place that is not known; what
+    follows from that for other arrivals there and on arcs; corrections at fly points,
+    where sides differ, and where one is for several arrivals.
     """
-    moves, read = moves_of(a.case.made), read_elsewhere(a.case.made)
+    unlike = codes_unlike(a, b)
     for key in sorted({*a.rows} ^ {*b.rows}):
         where = a if key in a.rows else b
         yield where.case.text.moves[key[0]][1], f"a visit is missing: {key}"
     for key in sorted({*a.rows} & {*b.rows}):
         one, two = a.rows[key], b.rows[key]
-        move = moves[key[0]]
         states = a.state(one), b.state(two)
         exempt = {"fly"} if b.case.language.traits.name == "krl" else set()
-        named = names_in(move.via) | names_in(move.to)
-        if named & read or any(state["fly"] for state in states):
-            exempt.add("code")
-        if move.kind == "arc":
-            exempt.add("origin")
+        exempt |= {"code"} if key in unlike else set()
         found = [*states_differ(*states, exempt)]
         found += poses_differ(a.poses(one), b.poses(two))
         found += corrections_differ(a, b, one, two)
         for what in found:
             yield a.case.text.moves[key[0]][1], what
+
+
+def codes_unlike(a: Arrivals, b: Arrivals) -> set[Key]:
+    """Return arrivals whose codes languages may tell otherwise, by their rules.
+
+    Others at one of their points, or on one of their arcs, may have other codes that
+    say so.
+    """
+    both, krl = {*a.rows} & {*b.rows}, b.case.language.traits.name == "krl"
+    moves, read = moves_of(a.case.made), read_elsewhere(a.case.made)
+    kept = {name for name in a.case.made.variables if not name.startswith("w")}
+    found = set[Key]()
+    for key in both:
+        named = names_in(moves[key[0]].via) | names_in(moves[key[0]].to)
+        said = {one.code(one.rows[key]) for one in (a, b)}
+        flies = any(one.done.visits.motion.fly[one.rows[key]] for one in (a, b))
+        lost = krl and not said.isdisjoint(UNFLAGGED)
+        if flies or lost or named & read or (named & kept and PINNED in said):
+            found.add(key)
+    told = {k for k in both if {one.code(one.rows[k]) for one in (a, b)} <= TOGETHER}
+    before = -1
+    while before != len(found):
+        before = len(found)
+        for group in (group for one in (a, b) for group in one.groups()):
+            found |= told.intersection(group) if group & found else set()
+    return found
 
 
 def states_differ(

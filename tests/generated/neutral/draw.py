@@ -89,7 +89,7 @@ class Draw:
         self.features = drawn - language.lacks
         self.marks = 0
         self.shifts = 0
-        self.inputs = seed % 2 == 1 or not self.can("counts")  # else every other one
+        self.inputs = seed % 2 == 1
         self.own: tuple[str, ...] = ()
         self.given: tuple[str, ...] = ()  # points that are arguments
         self.file = 0
@@ -242,16 +242,14 @@ class Draw:
 
     def _cond(self, depth: int = 0) -> Cond:
         rng = self.rng
-        kinds = ["less", "less", "equal"] if self.can("counts") else ["signal"]
-        kind = rng.choice([*kinds, "signal", "signal", "not", "both"])
+        kinds = ["less", "less", "equal", "signal", "signal", "not", "both"]
+        kind = rng.choice(kinds)
         if kind == "signal" and self.inputs:
             return Signal(rng.randint(1, 3))
         if kind == "not" and depth < 1:
             return Not(self._cond(1))
         if kind == "both" and depth < 1:
             return Both(self._cond(1), self._cond(1))
-        if not self.can("counts"):
-            return Signal(rng.randint(1, 3))
         return Less(Var(rng.choice(self._names())), rng.randint(0, 3), kind == "equal")
 
     # Places.
@@ -306,7 +304,7 @@ class Draw:
     def _offset(self) -> tuple[Expr, Expr, Expr]:
         rng = self.rng
         z: Expr = rng.randint(-20, 20)
-        if rng.random() < 0.3 and self.can("computed shifts"):
+        if rng.random() < 0.3:
             z = Var(rng.choice(self._names()))
         return rng.randint(-10, 10), 0, z
 
@@ -369,7 +367,7 @@ class Draw:
             literal = Inline(self._literal())
             return SetPart(point, axis, literal, mark=SHIFTS + self.shifts)
         of = rng.choice([point, point, self._fixed()])
-        computed = rng.random() < 0.3 and self.can("computed shifts")
+        computed = rng.random() < 0.3
         by = Var(rng.choice(self._names())) if computed else rng.randint(-9, 9)
         return SetPart(point, axis, of, by)
 
@@ -386,7 +384,7 @@ class Draw:
         self.loops += 1
         i = Var(f"i{self.loops}")
         value: Point = self._fixed()
-        if self.can("computed shifts") and self.rng.random() < 0.5:
+        if self.rng.random() < 0.5:
             value = Shifted(value, (0, self.rng.randint(-9, 9), i))
         to = Element("s", i)
         fill: Body = (SetElement("s", i, value), *self._parts(to, 0.5))
@@ -402,8 +400,6 @@ class Draw:
                 "block": 5,
                 "call": 3 * (bool(self.callable) and self.has("call")),
             }
-        if not self.can("frames in blocks") and (depth or self.own):
-            del kinds["frames"]
         kind = self.rng.choices(list(kinds), list(kinds.values()))[0]
         if kind == "block":
             return self._block(depth)
@@ -541,10 +537,8 @@ class Draw:
 
     def _block(self, depth: int) -> Statement:
         rng = self.rng
-        kinds = ["if", "if", "switch", "for", "for", "skip"]
-        if self.can("counts"):
-            kinds[5:5] = ["while", "label"]
-            kinds += ["loop"] * self.has("loop")
+        kinds = ["if", "if", "switch", "for", "for", "while", "label", "skip"]
+        kinds += ["loop"] * self.has("loop")
         kinds += ["poll"] * (self.inputs and self.has("poll"))
         kinds += ["return"] * (self.own != ()) + ["repeat"] * self.can("repeat")
         kind = rng.choice(kinds)
@@ -570,8 +564,7 @@ class Draw:
             cases = tuple(
                 (values, self._inner(depth)) for values in ((0,), (1, 2), (3,))
             )
-            value = self._expr() if self.can("counts") else Read()
-            return Switch(value, cases, self._inner(depth))
+            return Switch(self._expr(), cases, self._inner(depth))
         branches = tuple(
             (self._cond(), self._inner(depth)) for _ in range(rng.randint(1, 2))
         )

@@ -291,7 +291,7 @@ class Writer:
             self._emit(f"  {name} : POSITION")
 
     def _routine(self, routine: Routine) -> None:
-        self._emit(self._head(routine))
+        self._emit(f"{self._head(routine)} EXPORTED FROM {(JOB, PART)[routine.file]}")
         self._emit("VAR")
         self._locals(routine)
         self._emit("BEGIN")
@@ -301,7 +301,8 @@ class Writer:
     def _functions(self) -> None:
         for own in self.made.functions:
             kind = "POSITION" if own.kind == "point" else "INTEGER"
-            self._emit(f"ROUTINE {own.name}(a : INTEGER) : {kind}")
+            head = f"ROUTINE {own.name}(a : INTEGER) : {kind}"
+            self._emit(f"{head} EXPORTED FROM {JOB}")
             match own.kind:
                 case "sum":
                     lines = ["BEGIN", f"  RETURN(a + {own.number})"]

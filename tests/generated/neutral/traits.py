@@ -51,17 +51,14 @@ PDL2 = Traits(
                "plain forms", "repair", "splines"}),
     stops=(("wait", 0.5),), parts_move=True,  # a wait may take long or not
 )  # fmt: skip
-# Left out, as one language follows it and another one does not: computed shifts (KRL
-# puts them into a frame first), what numbers of the program decide ("counts": PDL2
-# alone knows which way), frames that are set in a branch or a routine (RAPID does not
-# join equal values), what functions return (PDL2), points that are arguments ("given":
-# KRL), shifted points (in KRL they have no S and T, in PDL2 no numbers of their own),
-# values that other programs may change ("modules", "shared": PDL2), and what is behind
-# a routine that no file holds.
+# Left out, as one language follows it and another one does not: points that are shifted
+# in their own frame ("tool": in KRL they have no S and T), values that other programs
+# may change ("modules", "shared": PDL2), or that stand in a program before it sets them
+# ("first": PDL2 decides by them), what an interrupt changes ("meddle": KRL leaves all),
+# and what is behind a routine that no file holds.
 ALL = Traits(
     "all",
-    frozenset({"computed shifts", "counts", "early", "first", "foreign",
-               "frames in blocks", "functions", "given", "interrupt", "loop", "made",
-               "modules", "offset", "plain forms", "shared", "tool", "zone"})
-    | (RAPID.lacks | KRL.lacks | PDL2.lacks) - {"forms", "splines"},
+    frozenset({"first", "foreign", "meddle", "modules", "plain forms", "shared",
+               "tool"})
+    | (RAPID.lacks | KRL.lacks | PDL2.lacks) - {"early", "forms", "splines"},
 )  # fmt: skip

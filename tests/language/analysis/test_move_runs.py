@@ -10,7 +10,7 @@ from postproc.compensation.program import read_program
 from postproc.language.analysis import move_runs
 from postproc.language.analysis.move_runs import rows_of_lines, within
 from postproc.language.analysis.visit_columns import chain_visits
-from postproc.language.rapid.statements import read_statements
+from postproc.language.rapid.program import read_statements
 from postproc.language.text.source import Source
 from postproc.language.visits import Graph, Visits
 from postproc.robot.cell import Cell, load_cell

@@ -90,7 +90,9 @@ def test_what_a_list_switches_on_leaves_targets(lines):
 
 
 def test_what_a_routine_never_called_may_switch_leaves_targets():
-    more = "DEF other( )\nBASE_CORR_ON=TRUE\nEND\n"
+    local = "DEF other( )\nBASE_CORR_ON=TRUE\nEND\n"
+    assert reasons(job(*SETS["BAS"], more=local)) == [""]  # nothing can call it
+    more = f"GLOBAL {local}"
     assert "BASE_CORR_ON" in reasons(job(*SETS["BAS"], more=more))[0]
     assert reasons(job(INIT, *SETS["BAS"], more=more)) == [""]
     assert reasons(job("BASE_CORR_ON=FALSE", *SETS["BAS"], more=more)) == [""]

@@ -14,7 +14,6 @@ from postproc.language import ir
 from postproc.language.krl import syntax as said
 from postproc.language.krl.language import Krl
 from postproc.language.krl.program import read_krl
-from postproc.language.krl.statements import read_krl_statements
 from postproc.language.text.source import Source
 from tests.reference.krl_lines import krl_lines
 
@@ -64,7 +63,7 @@ def test_the_core_reads_what_the_expressions_say(text):
 
 
 def test_quoted_numbers():
-    text = read_krl_statements(Source("m.src", b"a={S 'B010',T 'h2F',X -'HF'}"))
+    text = read_krl(Source("m.src", b"a={S 'B010',T 'h2F',X -'HF'}")).text
     assert text.value.tolist() == [2.0, 47.0, -15.0]
     new = _native.rewrite_numbers(
         b"'B010' 'HFE'", np.array([0, 7]), np.array([6, 12]), np.array([2.0, 3.0]),
@@ -75,12 +74,12 @@ def test_quoted_numbers():
 
 def test_a_string_must_end():
     with pytest.raises(ProgramError, match=r"m\.src:2: a string"):
-        read_krl_statements(Source("m.src", b'x=1\r\ny="a\r\n'))
+        read_krl(Source("m.src", b'x=1\r\ny="a\r\n'))
 
 
 def one(text):
     """Parse the only statement of a text."""
-    found = read_krl_statements(Source("x.src", text.encode("latin-1")))
+    found = read_krl(Source("x.src", text.encode("latin-1"))).text
     assert len(found) == 1
     return found.statement(0)
 
@@ -88,9 +87,9 @@ def one(text):
 X = ir.DataObject("x")
 
 
-def given_as(name):
+def given_as(name, way="in"):
     """Return a parameter, which a routine may change."""
-    return ir.RoutineParameter(name, True)
+    return ir.RoutineParameter(name, way == "out")
 
 
 @pytest.mark.parametrize(
@@ -98,7 +97,7 @@ def given_as(name):
     [
         ("&ACCESS RVP", said.AccessHeader()),
         ("GLOBAL DEF Weld1(a :IN, b[] :OUT)",
-         ir.RoutineHead("def", "weld1", (given_as("a"), given_as("b")))),
+         ir.RoutineHead("def", "weld1", (given_as("a"), given_as("b", "out")))),
         ("deffct real f ( )", ir.RoutineHead("deffct", "f", (), True)),
         ("DEFDAT $CONFIG", said.DataList("$config")),
         ("DEFDAT m PUBLIC", said.DataList("m", True)),

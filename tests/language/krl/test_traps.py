@@ -219,6 +219,8 @@ def test_bas_of_the_files_is_followed():
 def test_a_routine_of_the_files_may_change_what_that_of_the_controller_keeps():
     more = "DEF USERSPOT(a:OUT)\nINT a\na=2\nEND\n"
     found = job("USERSPOT(N)", "LIN XS[N]", more=more)
+    assert found.visits.target.values[0, 0] == 2.0
+    found = job("IF $IN[1] THEN", "USERSPOT(N)", "ENDIF", "LIN XS[N]", more=more)
     assert "no value that is known" in reasons(found)[0]
 
 
@@ -259,7 +261,7 @@ def test_a_point_that_a_move_need_not_reach_keeps_its_numbers(lines):
 
 @pytest.mark.parametrize(
     ("line", "why"),
-    [("XHOME.A1=30", "a1 set in line"), ("sub(XHOME)", "changed by the program")],
+    [("XHOME.A1=30", "a1 set in line"), ("sub(XHOME)", "a1 set in line")],
 )
 def test_a_home_position_that_the_program_sets_is_not_known(line, why):
     more = "DEF sub(a:OUT)\nE6AXIS a\na.A1=5\nEND\n"

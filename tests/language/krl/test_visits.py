@@ -535,10 +535,34 @@ def test_calls_are_followed():
     assert "motion-unknown" in codes(found)  # own is another file's
 
 
-def test_a_point_that_is_handed_over_is_left():
-    more = "DEF weld (p:IN)\nE6POS p\nLIN p\nEND\n"
+@pytest.mark.parametrize("way", ["IN", "OUT"])
+def test_a_point_that_is_handed_over(way):
+    more = f"DEF weld (p:{way})\nE6POS p\nLIN p\nEND\n"
     found = job("weld(XP1)", "PTP XP1", more=more)
-    assert "p is a parameter" in reasons(found)[0]
+    assert reasons(found) == ["", ""]
+    assert found.visits.target.literal.tolist() == [0, 0]
+
+
+def test_a_point_that_a_routine_changes_keeps_its_numbers():
+    more = "DEF weld (p:IN)\nE6POS p\np.Z=p.Z+5\nLIN p\nEND\n"
+    found = job("weld(XP1)", "PTP XP1", more=more)
+    assert found.visits.target.values[:, 2].tolist() == [8.0, 3.0]
+    assert "set in line" in reasons(found)[0]
+    assert "used otherwise" in found.visits.literals.pinned[0]
+
+
+def test_numbers_that_routines_get_and_change():
+    more = "DEF next (k:OUT)\nINT k\nk=k+1\nEND\n"
+    more += "DEF go (k:IN)\nINT k\nLIN XS[k]\nEND\n"
+    found = job("N=1", "go(N)", "next(N)", "go(N)", "go(N+1)", more=more)
+    assert found.visits.target.values[:, 0].tolist() == [1.0, 2.0, 3.0]
+
+
+def test_a_routine_of_another_file_may_be_meant():
+    other = "DEF other( )\nnext(N)\nEND\nDEF next(k:OUT)\nINT k\nk=3\nEND\n"
+    more = "DEF next (k:IN)\nINT k\nEND\n"
+    found = job("N=1", "next(N)", "LIN XS[N]", more=more, others=[("other", other)])
+    assert found.visits.target.meaning[0] == Meaning.UNKNOWN
 
 
 def test_what_may_move_forgets_where_the_arm_is():
@@ -548,7 +572,7 @@ def test_what_may_move_forgets_where_the_arm_is():
         "LIN XP1", "grip( )", "LIN XP2", start=Start(routines={"Grip": "motionless"})
     )
     assert origins(found) == [[START], [0]] and codes(found) == set()
-    moves = Start(routines={"grip": "moves"})
+    moves = Start(routines={"grip": "moves"}, motionless=("g*",))  # the name counts
     found = job("LIN XP1", "grip( )", "LIN XP2", start=moves)
     assert origins(found)[1] == [ELSEWHERE] and reasons(found) == ["", ""]
 

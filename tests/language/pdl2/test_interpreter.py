@@ -211,6 +211,34 @@ def test_a_loop_is_unrolled_unless_a_called_routine_changes_its_variable(
     assert len(found.visits) == rounds
 
 
+@pytest.mark.parametrize(
+    ("own", "shared", "rounds"),
+    [("VAR i : INTEGER\n", "", 3),  # the other file changes its own
+     ("VAR i : INTEGER EXPORTED FROM page\n", " EXPORTED FROM page", 1)],
+)  # fmt: skip
+def test_a_routine_of_another_file_may_change_the_variable_of_a_loop(
+    own: str, shared: str, rounds: int
+) -> None:
+    main = program(
+        f"PROGRAM a\n{own}ROUTINE r EXPORTED FROM page\nBEGIN\n"
+        "FOR i := 1 TO 3 DO\nMOVE LINEAR TO POS(1,2,3,4,5,6,'')\nr\nENDFOR\nEND a"
+    )
+    page = program(
+        f"PROGRAM page\nVAR i : INTEGER{shared}\n"
+        "ROUTINE r\nBEGIN\ni := 7\nEND r\nBEGIN\nEND page", "page"
+    )  # fmt: skip
+    assert len(resolve(main, others={"page": page}).visits) == rounds
+
+
+def test_a_loop_counts_its_own_variable_whatever_that_of_the_program_is() -> None:
+    routines = (
+        "VAR i : INTEGER\nROUTINE r\nBEGIN\ni := 7\nEND r\n"
+        "ROUTINE s\nVAR i : INTEGER\nBEGIN\n"
+        "FOR i := 1 TO 3 DO\nMOVE LINEAR TO POS(1,2,3,4,5,6,'')\nr\nENDFOR\nEND s"
+    )
+    assert len(body("s", declared=routines).visits) == 3
+
+
 def test_a_move_in_a_call_inside_of_an_expression_is_reported() -> None:
     text = (
         "PROGRAM a\nROUTINE f : INTEGER\nBEGIN\nMOVE JOINT TO {1,2,3,4,5,6}\n"
@@ -313,6 +341,20 @@ def test_a_handler_calls_a_routine_where_there_is_no_main_body() -> None:
     assert {d.code for d in found.diagnostics} == {"handler-moves"}
 
 
+def test_a_handler_that_moves_may_lead_the_arm_off_an_arc() -> None:
+    arc = "MOVE CIRCULAR TO POS(3,2,3,4,5,6,'') VIA POS(2,3,3,4,5,6,'')\n"
+    handler = (
+        "CONDITION[1] :\nWHEN $DIN[1]+ DO\nMOVE JOINT TO {1,2,3,4,5,6}\nENDCONDITION\n"
+        "ENABLE CONDITION[1]\n"
+    )
+    for text, elsewhere in ((arc, False), (handler + arc, True)):
+        found = body("MOVE LINEAR TO POS(1,2,3,4,5,6,'')\n" + text)
+        (via,) = np.flatnonzero(found.visits.motion.via)
+        graph = found.visits.graph
+        before = graph.pred[graph.pred_start[via + 1] : graph.pred_start[via + 2]]
+        assert (ELSEWHERE in before.tolist()) == elsewhere
+
+
 def test_calls_are_looked_for_in_statements_of_the_program_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -323,7 +365,7 @@ def test_calls_are_looked_for_in_statements_of_the_program_alone(
 
     def note(self, place, statement):
         asked.append(statement)
-        own = place.program.statements
+        own = place.program.lines.said
         lines = [own[k] for k in range(len(own))]
         parts = [ast.behind(one) for one in lines]
         assert any(statement is one for one in (*lines, *parts))
@@ -338,3 +380,17 @@ def test_calls_are_looked_for_in_statements_of_the_program_alone(
     ))  # fmt: skip
     assert len(asked) > 5
     assert sorted(found.visits.graph.predecessors(2).tolist()) == [ELSEWHERE, 1]
+
+
+def test_numbers_that_points_share_are_no_literal_of_any() -> None:
+    """Two targets take X from one assignment, and the rest from two points."""
+    found = body(
+        "set\nsub(p1)\nsub(p2)\nMOVE LINEAR TO p2",
+        declared="VAR p1, p2 : POSITION\n"
+        "ROUTINE sub(v : POSITION)\nVAR w : POSITION\nBEGIN\n"
+        "w := v\nw.X := 7\nMOVE LINEAR TO w\nEND sub\n"
+        "ROUTINE set\nBEGIN\np1 := POS(1, 2, 3, 4, 5, 6, '')\n"
+        "p2 := POS(2, 2, 3, 4, 5, 6, '')\nEND set",
+    )
+    assert found.visits.target.values[:, 0].tolist() == [7.0, 7.0, 2.0]
+    assert found.visits.target.literal.tolist() == [-1, -1, -1]

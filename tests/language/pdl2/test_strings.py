@@ -20,7 +20,7 @@ def test_two_quotes_are_an_apostrophe(text):
     source = Source(
         "a.pdl", f"PROGRAM a\nBEGIN\n  s := {text} -- it's\nEND a\n".encode()
     )
-    found = parse(source).statement(2)
+    found = parse(source).lines.statement(2)
     assert isinstance(found, ir.Assignment) and found.value == ir.StringLiteral(
         STRINGS[text]
     )

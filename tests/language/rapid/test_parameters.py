@@ -167,6 +167,36 @@ def test_a_number_that_its_routine_counts_up():
     more = routine("at", "n:=n+1;", "MoveL Offs(p1,n,0,0),v9,fine,t\\WObj:=w;",
                    given="(num n)")  # fmt: skip
     found = once("at 5;", more=more)
+    assert found.visits.target.values[0, 0] == 1.0 + 6.0
+    assert found.visits.target.literal[0] < 0
+
+
+def test_copies_of_data_that_change():
+    more = routine("at", "n:=n+1;", "MoveL Offs(p1,n,0,0),v9,fine,t\\WObj:=w;",
+                   given="(num n)") + "VAR num k;"  # fmt: skip
+    found = once("k:=2;", "at k;", "at k;", "k:=k+5;", "at k;", more=more)
+    assert found.visits.target.values[:, 0].tolist() == [4.0, 4.0, 9.0]
+
+
+@pytest.mark.parametrize(("what", "known"), [("", True), ("IF di1=1 ", False)])
+def test_data_that_a_routine_changes_by_reference(what, known):
+    more = routine("next", f"{what}n:=n+1;", given="(INOUT num n)") + "VAR num k;"
+    at = "MoveL Offs(p1,k,0,0),v9,fine,t\\WObj:=w;"
+    found = once("k:=2;", "next k;", at, "next k;", at, more=more)
+    wanted = [4.0, 5.0] if known else [np.nan, np.nan]
+    np.testing.assert_array_equal(found.visits.target.values[:, 0], wanted)
+
+
+def test_a_point_that_a_routine_sets_by_reference():
+    more = routine("take", "q:=p2;", given="(INOUT robtarget q)") + "VAR robtarget v;"
+    found = once("take v;", L.format("v"), more=more)
+    assert found.visits.target.values[0, :3].tolist() == [4.0, 5.0, 6.0]
+    assert found.visits.target.literal[0] >= 0
+
+
+def test_an_element_that_a_routine_sets_by_reference_is_not_known():
+    more = routine("take", "q:=p2;", given="(INOUT robtarget q)")
+    found = once("take list{2};", L.format("list{2}"), more=more)
     assert found.visits.target.meaning.tolist() == [Meaning.UNKNOWN]
 
 

@@ -73,9 +73,9 @@ def test_every_number_can_be_written_where_it_stands(path):
     """Numbers put back as they are give the file; others change nothing else."""
     file = read(path)
     data, text = file.text.source.data, file.text
-    spans = [
-        Span(a, b) for a, b in zip(text.start.tolist(), text.stop.tolist(), strict=True)
-    ]
+    start, end = text.numbers.start.tolist(), text.numbers.end.tolist()
+    places = zip(start, end, strict=True)
+    spans = [Span(a, b) for a, b in places]
     same = Replacements.of(Edit(span, data[span.start : span.end]) for span in spans)
     assert same.apply(data) == data
     other = apply(data, [Edit(span, b"7.25") for span in spans])

@@ -10,7 +10,7 @@ from postproc.exceptions import ProgramError
 from postproc.language import ir
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.parser import parse_statement
-from postproc.language.rapid.statements import read_statements
+from postproc.language.rapid.program import read_statements
 from postproc.language.text.source import Source
 from tests.reference.statements import BEGINNING, statements
 
@@ -85,14 +85,14 @@ X, P10 = ir.DataObject("x"), ir.DataObject("p10")
          said.ModuleHead("main", ("sysmodule", "nostepin"))),
         ("LOCAL PROC weld1(num a, \\switch b | INOUT robtarget p{*}, \\VAR num c)",
          ir.RoutineHead("proc", "weld1", (
-             given("a"), given("b", True, True),
+             given("a", type="num"), given("b", True, True),
              given("p", True), given("c", True, True)), True)),
         ("PROC weld(num a\\switch b|switch c,\\num d{*,*})",
          ir.RoutineHead("proc", "weld", (
-             given("a"), given("b", True, True),
-             given("c"), given("d", True, True)))),
+             given("a", type="num"), given("b", True, True),
+             given("c", type="switch"), given("d", True, True)))),
         ("FUNC robtarget near2(robtarget p)",
-         ir.RoutineHead("func", "near2", (given("p"),))),
+         ir.RoutineHead("func", "near2", (given("p", type="robtarget"),))),
         ("TRAP t_stop", ir.RoutineHead("trap", "t_stop")),
         ("LOCAL RECORD seam", said.RecordHead("seam")),
         ("EndProc", ir.BlockWord("endproc")),
@@ -188,7 +188,9 @@ def test_what_does_not_end_is_refused(data, said_of_it):
 def test_numbers_are_where_they_stand_and_what_they_are_worth():
     text = "MoveAbsJ [[-1.50,+2,9E+09,- 3,.5,0x10],[1,1,1,1,1,1]],v5,z1,t;"
     found = read_statements(Source("x.mod", text.encode()))
-    cut = [text[a:b] for a, b in zip(found.start, found.stop, strict=True)]
+    cut = [
+        text[a:b] for a, b in zip(found.numbers.start, found.numbers.end, strict=True)
+    ]
     assert cut == ["-1.50", "+2", "9E+09", "- 3", ".5", "0x10", *"111111"]
     np.testing.assert_array_equal(
         found.value, [-1.5, 2.0, 9e9, -3.0, 0.5, 16.0] + [1.0] * 6

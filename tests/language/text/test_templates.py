@@ -10,7 +10,7 @@ from postproc.language.pdl2.parser import parse_form, parse_value_form
 from postproc.language.text.lexer import form_of
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import source_from_bytes
-from postproc.language.text.templates import filler, parse_shapes
+from postproc.language.text.templates import filler
 
 
 def parse_line(mask: str) -> ir.SourceStatement:
@@ -45,8 +45,8 @@ def test_case_is_kept_where_it_is_shown_only() -> None:
     assert isinstance(declared, ast.Declare) and declared.names == ("Wp1", "WP2")
     moved = parse_line("MOVE TO Wp1")
     assert isinstance(moved, ast.Move) and moved.where == (ir.DataObject("wp1"),)
-    lines = read_lines(source_from_bytes("job.lsv", b"Wp1 XTND Arm: 1 Priv"))
-    (entered,) = parse_shapes(lines.shapes, parse_value_form)
+    source = source_from_bytes("job.lsv", b"Wp1 XTND Arm: 1 Priv")
+    (entered,) = read_lines(source, parse_value_form).said
     assert entered is not None and entered.name == "Wp1"
 
 

@@ -1,0 +1,93 @@
+"""What did best on a move of all points that were tried on it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from math import hypot
+
+import numpy as np
+
+from postproc.compensation.paths.arcs import Cut, halves
+from postproc.compensation.paths.insertion_plan import InsertionPlan
+from postproc.compensation.paths.insertion_prediction import PathPrediction
+
+BETTER = 1e-6  # [m] less is no matter
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """What was put on the way of a move.
+
+    Attributes:
+        size: How far the move left its path with it [m]; of an arc, of both halves.
+        points: The points by visit; of an arc, of both its halves.
+        stops: Those of these visits whose first point is a stop.
+        chords: Which of its pieces are chords.
+    """
+
+    size: float
+    points: Mapping[int, tuple[float, ...]]
+    stops: frozenset[int]
+    chords: frozenset[Cut]
+
+
+@dataclass(frozen=True)
+class BestPoints:
+    """What did best for every move that may be split, so far.
+
+    Points are put where a path is left the farthest, one after the other; near a place
+    where two joints turn back a next one can make the move worse.
+
+    Attributes:
+        best: What did best, by the first visit of each move.
+        refused: Why points of moves could not be corrected, what was said first.
+    """
+
+    best: Mapping[int, _Tried] = field(default_factory=dict)
+    refused: Mapping[int, str] = field(default_factory=dict)
+
+    def note(self, now: PathPrediction) -> BestPoints:
+        """Look at how the moves do with the points that they have now."""
+        best, bad = dict(self.best), _unfit(now)
+        for v, tried in _list_tried(now).items():
+            known = best.setdefault(v, tried)
+            if v not in bad and tried.size <= known.size + BETTER:  # the later one
+                best[v] = replace(tried, size=min(tried.size, known.size))
+        return BestPoints(best, {**now.refusals, **self.refused})
+
+    def restore(self, now: PathPrediction) -> InsertionPlan:
+        """Give moves back the points that did better than those they have."""
+        plan, bad = now.plan, _unfit(now)
+        for v, has in _list_tried(now).items():
+            best = self.best[v]
+            if v in bad or has.size > best.size + BETTER:
+                others = {k: s for k, s in plan.points.items() if k not in has.points}
+                plan = replace(
+                    plan,
+                    points={**others, **best.points},
+                    stops=plan.stops - has.stops | best.stops,
+                    chords=plan.chords - has.chords | best.chords,
+                )
+        for v in self.refused.keys() - plan.points.keys():
+            plan = plan.leave(v, self.refused[v])
+        return plan
+
+
+def _unfit(now: PathPrediction) -> set[int]:
+    """Return the moves with flat pieces, or refused points, by first visits."""
+    rows: Collection[int] = {*(v for v, _ in now.flat), *now.refusals}
+    return {halves(now.task.visits, v)[0] for v in rows}
+
+
+def _list_tried(now: PathPrediction) -> dict[int, _Tried]:
+    """Say what the moves have now, by their first visits, and how they do."""
+    plan, sizes, found = now.plan, now.sizes, dict[int, _Tried]()
+    for own in {halves(now.task.visits, v) for v in plan.open}:
+        found[own[0]] = _Tried(
+            hypot(*(sizes.get(row, np.inf) for row in own)),
+            {row: plan.points[row] for row in own if row in plan.points},
+            plan.stops.intersection(own),
+            frozenset(cut for cut in plan.chords if cut[0] in own),
+        )
+    return found

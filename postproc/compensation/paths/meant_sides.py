@@ -1,0 +1,124 @@
+"""From which sides of their gaps joints are meant to pass the points of a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.compensation.options import Job
+from postproc.compensation.paths.arcs import halves
+from postproc.compensation.paths.backlash_preload import (
+    cross_at_once,
+    find_drive_turns,
+)
+from postproc.compensation.paths.insertion_plan import InsertionPlan
+from postproc.compensation.timing_comparison import InTime
+from postproc.language.visits import Visits
+from postproc.model.flank_hypotheses import FlankOfJoint
+
+MeantKey = tuple[int, tuple[float, ...], bool]
+"""A visit, the points on its way, and whether they correct half of what flanks do."""
+
+
+@dataclass(frozen=True)
+class MeantSides:
+    """From which sides k points on a way are meant to be passed.
+
+    Attributes:
+        side: Where each joint is to lie in its play, (k, 6) from -1 to 1.
+        turn: What the tool turns by in its own frame, (k, 3) [rad].
+        between: Where it is to lie half way between a point and the one before, and
+            behind the last one, (k + 1, 6).
+    """
+
+    side: Floats
+    turn: Floats
+    between: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class PlanSides:
+    """From which sides points on the ways of a program are meant to be passed.
+
+    Attributes:
+        setting: What the program is compensated with.
+        visits: It without points, n visits.
+        first: .. in time.
+        flanks: What is known of joints 1 to 6.
+    """
+
+    setting: Job
+    visits: Visits
+    first: InTime
+    flanks: tuple[FlankOfJoint, ...]
+    _known: dict[MeantKey, MeantSides] = field(default_factory=dict, repr=False)
+
+    def of_plan(self, plan: InsertionPlan) -> dict[int, MeantSides]:
+        """Say from which sides points on ways are meant to be passed.
+
+        An arc is one way, from where it begins to where it ends.
+        """
+        found = dict[int, MeantSides]()
+        for move in {halves(self.visits, v) for v in plan.points}:
+            half = bool(plan.halved.intersection(move))
+            keys = {v: (v, plan.points[v], half) for v in move if v in plan.points}
+            if not self._known.keys() >= {*keys.values()}:
+                self._mean_on(move, keys.values(), half)
+            found.update({v: self._known[key] for v, key in keys.items()})
+        return found
+
+    def _mean_on(
+        self, move: tuple[int, ...], keys: Collection[MeantKey], half: bool
+    ) -> None:
+        """Say from which sides points on a move are meant to be passed, and keep it."""
+        paths = self.first.paths
+        own = [paths.samples_to(v) for v in move]
+        sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
+        side = np.array(paths.side[own[0].start : own[-1].stop])
+        side[:, sharp] = cross_at_once(side[:, sharp])
+        if half:
+            side = (side + _evenly(side, [paths.way[rows] for rows in own])) / 2
+        samples = dict(zip(move, own, strict=True))
+        for key in keys:
+            rows = samples[key[0]]
+            there = side[rows.start - own[0].start :]
+            self._known[key] = self._mean(key[0], key[1], rows, side[0], there)
+
+    def _mean(
+        self, v: int, points: Sequence[float], rows: slice, begin: Floats, side: Floats
+    ) -> MeantSides:
+        """Say from which sides the points of one way are meant to be passed.
+
+        Args:
+            v: The visit at its end.
+            points: Shares of the way, (k,).
+            rows: Its samples.
+            begin: Where joints lie in their play where the move begins, (6,).
+            side: .. at these samples, and any behind them, (s, 6).
+        """
+        paths = self.first.paths
+        way = paths.way[rows]
+        ends = np.array([0.0, *points, 1.0]) * way[-1]
+        at = np.searchsorted(way, ends).clip(0, len(way) - 1)
+        tool, there = self.first.after.targets.tool[v, :3, :3], side[at]
+        turn = find_drive_turns(
+            self.setting, self.visits, v, tool, paths.q[at + rows.start], there - begin
+        )
+        between = (there[:-1] + there[1:]) / 2
+        return MeantSides(there[1:-1], turn[1:-1], between)
+
+
+def _evenly(side: Floats, ways: list[Floats]) -> Floats:
+    """Let joints go evenly from where they lie first to where they lie last, (s, 6).
+
+    Args:
+        side: Where they lie along a move, (s, 6).
+        ways: Path length at the samples of its parts [m].
+    """
+    ends = np.cumsum([0.0, *(way[-1] for way in ways)])
+    along = np.concatenate([way + end for way, end in zip(ways, ends, strict=False)])
+    u = (along / max(ends[-1], 1e-12))[:, None]
+    return np.asarray((1 - u) * side[0] + u * side[-1])
