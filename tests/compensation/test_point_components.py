@@ -290,6 +290,10 @@ RETURN (o)
 ENDFCT
 DEF lifts()
 XQ.Z=XQ.Z+40
+END
+DEF raises(a:OUT)
+DECL E6POS a
+a.Z=a.Z+40
 END"""
 LIFT = "XQ.Z=XQ.Z+40"
 KRL_CERTAIN = {
@@ -299,6 +303,7 @@ KRL_CERTAIN = {
     "of another point": (["XQ=P1", "XQ.Z=Xp1.Z-PITCH", "LIN XQ"], [{"z": -20.0}]),
     "copied": (["XQ=P1", LIFT, "q=XQ", "LIN q"], [UP]),
     "in a called routine": (["XQ=P1", "lifts()", "LIN XQ"], [UP]),
+    "by a parameter": (["q=P1", "raises(q)", "LIN q"], [UP]),
     "linked with a frame": (
         ["q={X 0,Y 0,Z 40,A 0,B 0,C 0}:Xp1", "q.A=q.A", "LIN q"], [UP]),
     "a frame that is set": (
@@ -370,7 +375,6 @@ KRL_UNCERTAIN = {
         "INTERRUPT DECL 3 WHEN $IN[1] DO counts()", "INTERRUPT ON 3", "PITCH=5",
         "q=P1", "q.Z=q.Z+PITCH", "LIN q"],
     "by a function": ["XQ=P1", "XQ.X=V", "R=change()", "LIN XQ"],
-    "by a parameter": ["q=P1", "turn(q)", "LIN q"],
     "an element by a parameter": ["XS[1]=P1", "turn(XS[1])", "LIN XS[1]"],
     "in a loop that may go on": [
         "q=P1", "WHILE $IN[1]", "q.Z=q.Z+10", "ENDWHILE", "LIN q"],
