@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use crate::lines::{poses, Pose, Rotation};
 use crate::model::{Core, Rows, States};
 use crate::pose::{inverted, product};
-use crate::rows::{array, blocks, dot, in_parts, minus, Six, Three};
+use crate::rows::{array, blocks, dot, in_parts, minus, Six, Three, WORTH};
 use crate::solver::Solver;
 use crate::terms::State;
 
@@ -136,7 +136,7 @@ pub fn commands<'py>(
     let search = Search { core, solver, turns };
     let tool = |i: usize| if tools.len() == 1 { &tools[0] } else { &tools[i] };
     let one = |i: usize| search.command(&wanted[i], tool(i), &s, i);
-    let found = in_parts(py, n, |some| some.map(one).collect())?;
+    let found = in_parts(py, n, WORTH, |some| some.map(one).collect())?;
     let (mut q, mut pose, mut residual) =
         (Vec::with_capacity(n), Vec::with_capacity(n), Vec::with_capacity(n));
     for command in found {

@@ -1,12 +1,12 @@
 //! How far joint angles lead the arm from others: `postproc.motion.deviation`.
 
+use std::ops::Range;
+
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
-use crate::rows::{
-    array, at_best, detached, dot, minus, on_cores, row, rows, same_length, Six, Three,
-};
+use crate::rows::{array, at_best, dot, in_parts, minus, row, rows, same_length, Six, Three};
 
 /// Rows that are worth a thread.
 const LEAST: usize = 4096;
@@ -56,17 +56,11 @@ pub fn departure<'py>(
     let (old, new) = (rows::<6>(&angles.0)?, rows::<6>(&angles.1)?);
     let point = rows::<3>(&point)?;
     let n = same_length(&[old.len(), new.len(), point.len()])?;
-    let part = |some: std::ops::Range<usize>| -> (Vec<Six>, Vec<Three>) {
-        let one = |i: usize| -> (Six, Three) {
-            let joints = std::array::from_fn(|j| excess(new[i][j] - old[i][j], offset[j]));
-            (joints, displacement(&chain, &old[i], &new[i], &point[i]))
-        };
-        at_best(|| some.map(one).unzip())
+    let one = |i: usize| -> (Six, Three) {
+        let joints = std::array::from_fn(|j| excess(new[i][j] - old[i][j], offset[j]));
+        (joints, displacement(&chain, &old[i], &new[i], &point[i]))
     };
-    let (mut joints, mut sizes) = (Vec::with_capacity(n), Vec::with_capacity(n));
-    for (mut own, mut moved) in detached(py, || on_cores(0..n, LEAST, part))? {
-        joints.append(&mut own);
-        sizes.append(&mut moved);
-    }
+    let part = |some: Range<usize>| at_best(|| some.map(one).collect());
+    let (joints, sizes) = in_parts(py, n, LEAST, part)?.into_iter().unzip();
     Ok((array(py, joints), array(py, sizes)))
 }

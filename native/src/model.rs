@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use crate::chain::{Chain, Frame, Parameters};
 use crate::lines::rotation_vector;
-use crate::rows::{array, dot, flat, in_parts, minus, rows, same_length, Six, Three, SIDE};
+use crate::rows::{array, dot, flat, in_parts, minus, rows, same_length, Six, Three, SIDE, WORTH};
 use crate::terms::{faded, swept, Moves, State, Term, Written};
 use crate::trig::sin_cos;
 use crate::variance::{base_of, put, Form, Geometry};
@@ -326,8 +326,13 @@ impl Core {
     /// Actual minus nominal TCP position [m].
     #[inline(always)]
     pub fn error(&self, s: &State<'_>, tool: &Three) -> Three {
-        let (q, point) = self.deviated(s, tool);
-        let placed = self.real.placed(&q, &point);
+        self.error_of(s, tool, &self.deviated(s, tool))
+    }
+
+    /// The same where joint angles and TCP of the real arm are known.
+    #[inline(always)]
+    fn error_of(&self, s: &State<'_>, tool: &Three, (q, point): &(Six, Three)) -> Three {
+        let placed = self.real.placed(q, point);
         let [x, y, z] = &self.base.axes;
         let nominal = self.nominal.placed(s.q, tool);
         let mut out: Three = std::array::from_fn(|k| {
@@ -498,12 +503,12 @@ impl Core {
             for i in own.clone() {
                 let tool = s.tool(i);
                 self.with_state((&s.q[i], &s.side[i]), s.load(i), s.given(i), |state| {
-                    let (q, point) = self.deviated(state, tool);
-                    let walk = Walk::new(&self.real, &self.base, &q, &point);
+                    let real = self.deviated(state, tool);
+                    let walk = Walk::new(&self.real, &self.base, &real.0, &real.1);
                     let jacobian = walk.jacobian(&self.nominal);
                     let at = At { walk: &walk, jacobian, tool };
                     let [known, scatter] = self.unsure(state, &at);
-                    out.push((self.error(state, tool), known, scatter));
+                    out.push((self.error_of(state, tool, &real), known, scatter));
                     if let (Some(spread), Some(block)) = (&self.spread, &mut block) {
                         spread.fill(self, block, i - first, state, &at);
                     }
@@ -600,6 +605,24 @@ fn spread_of(written: WrittenSpread<'_>, given: usize) -> PyResult<Spread> {
     Ok(Spread { form, geometry, free, joints, nets })
 }
 
+impl Core {
+    /// Compute a vector of every state and its tool, (n, 3).
+    fn of_states<'py>(
+        &self,
+        py: Python<'py>,
+        states: &States<'py>,
+        compute: impl Fn(&State<'_>, &Three) -> Three + Sync,
+    ) -> PyResult<Block<'py>> {
+        let s = states.rows(self)?;
+        let one = |i: usize| {
+            self.with_state((&s.q[i], &s.side[i]), s.load(i), s.given(i), |state| {
+                compute(state, s.tool(i))
+            })
+        };
+        Ok(array(py, in_parts(py, s.len(), WORTH, |some| some.map(one).collect())?))
+    }
+}
+
 #[pymethods]
 impl Core {
     /// Put a model together.
@@ -647,24 +670,12 @@ impl Core {
 
     /// Predict errors, (n, 3) [m].
     fn errors<'py>(&self, py: Python<'py>, states: States<'py>) -> PyResult<Block<'py>> {
-        let s = states.rows(self)?;
-        let one = |i: usize| {
-            self.with_state((&s.q[i], &s.side[i]), s.load(i), s.given(i), |state| {
-                self.error(state, s.tool(i))
-            })
-        };
-        Ok(array(py, in_parts(py, s.len(), |some| some.map(one).collect())?))
+        self.of_states(py, &states, |state, tool| self.error(state, tool))
     }
 
     /// Predict the tool's rotations from nominal to actual, (n, 3) [rad].
     fn turns<'py>(&self, py: Python<'py>, states: States<'py>) -> PyResult<Block<'py>> {
-        let s = states.rows(self)?;
-        let one = |i: usize| {
-            self.with_state((&s.q[i], &s.side[i]), s.load(i), s.given(i), |state| {
-                self.turn(state, s.tool(i))
-            })
-        };
-        Ok(array(py, in_parts(py, s.len(), |some| some.map(one).collect())?))
+        self.of_states(py, &states, |state, tool| self.turn(state, tool))
     }
 
     /// Predict errors (n, 3) [m], and covariances of errors and of one arrival each,
@@ -676,7 +687,7 @@ impl Core {
         states: States<'py>,
     ) -> PyResult<(Block<'py>, Block<'py>, Block<'py>)> {
         let s = states.rows(self)?;
-        let found = in_parts(py, s.len(), |some| self.predict_rows(&s, some))?;
+        let found = in_parts(py, s.len(), WORTH, |some| self.predict_rows(&s, some))?;
         let mut parts = (Vec::new(), Vec::new(), Vec::new());
         for (error, known, arrival) in found {
             parts.0.push(error);

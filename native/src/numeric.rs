@@ -122,8 +122,8 @@ impl Numeric {
         let mut q = *near;
         for _ in 0..NEARBY_ROUNDS {
             let frames = self.chain.frames(&q);
-            let off = twist(&frames[6], pose);
-            if off.iter().all(|x| x.abs() < CLOSE) {
+            let (off, alike) = apart(pose, &frames[6].axes, &frames[6].origin);
+            if alike && off.iter().all(|x| x.abs() < CLOSE) {
                 return Some(q);
             }
             let columns = self.columns(&frames);
@@ -150,17 +150,6 @@ impl Numeric {
         let one_sided = first.is_some_and(|side| side.is_ne());
         one_sided && (1..LOOKED_AT).all(|k| sign(k) == first)
     }
-}
-
-/// Shift [m] and turn [rad] from a frame to a pose.
-fn twist(from: &crate::chain::Frame, to: &Pose) -> Six {
-    let wanted = |i: usize, j: usize| to[4 * i + j];
-    let turned: [Three; 3] = std::array::from_fn(|i| {
-        std::array::from_fn(|j| (0..3).map(|k| wanted(i, k) * from.axes[k][j]).sum())
-    });
-    let [x, y, z] = crate::lines::rotation_vector(&turned);
-    let shift = |i: usize| to[4 * i + 3] - from.origin[i];
-    [shift(0), shift(1), shift(2), x, y, z]
 }
 
 /// Return the smallest singular value, by turning pairs of columns until all are at right

@@ -123,22 +123,25 @@ pub fn on_cores<T: Send>(
     in_threads(parts.len(), |part| work(parts[part].clone()))
 }
 
-/// Rows that are worth a thread, and those between two looks at signals.
-const LEAST: usize = 512;
+/// Rows of a model or of inverse kinematics that are worth a thread.
+pub const WORTH: usize = 512;
+
+/// Rows between two looks at signals, of work on every core.
 const BLOCKS: usize = 1 << 16;
 
-/// Work on parts of the rows on every core, without the interpreter's lock; signals are
-/// heard as in `each`.
+/// Work on parts of the rows on every core, of which `least` rows are worth a thread:
+/// without the interpreter's lock; signals are heard as in `each`.
 pub fn in_parts<T: Send>(
     py: Python<'_>,
     n: usize,
+    least: usize,
     part: impl Fn(Range<usize>) -> Vec<T> + Sync,
 ) -> PyResult<Vec<T>> {
     let mut out = Vec::with_capacity(n);
     for first in (0..n).step_by(BLOCKS) {
         py.check_signals()?;
         let rows = first..n.min(first + BLOCKS);
-        for mut found in detached(py, || on_cores(rows, LEAST, &part))? {
+        for mut found in detached(py, || on_cores(rows, least, &part))? {
             out.append(&mut found);
         }
     }

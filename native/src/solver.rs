@@ -8,7 +8,7 @@ use crate::chain::Parameters;
 use crate::inverse::Arm;
 use crate::lines::{poses, Pose};
 use crate::numeric::{wrapped, Numeric};
-use crate::rows::{array, flat, in_parts, rows, same_length, Six};
+use crate::rows::{array, flat, in_parts, rows, same_length, Six, WORTH};
 
 /// Angles of its form, and back to those of the controller.
 struct Mixed {
@@ -90,6 +90,6 @@ impl Solver {
         let (flange, near, slot) = (poses(&flange)?, rows::<6>(&near)?, flat(&slot)?);
         let n = same_length(&[flange.len(), near.len(), slot.len()])?;
         let one = |i: usize| self.nearest(&flange[i], &near[i], slot[i]);
-        Ok(array(py, in_parts(py, n, |some| some.map(one).collect())?))
+        Ok(array(py, in_parts(py, n, WORTH, |some| some.map(one).collect())?))
     }
 }

@@ -11,10 +11,8 @@ use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
 
 use crate::number::{put_fixed, put_shortest, put_whole};
-use crate::rows::{detached, flat, on_cores};
+use crate::rows::{flat, in_parts};
 
-/// Rows that are written between two looks at signals.
-const AT_ONCE: usize = 1 << 16;
 /// Rows that are worth a thread.
 const LEAST: usize = 2000;
 
@@ -196,14 +194,8 @@ pub fn table<'py>(
 ) -> PyResult<Bound<'py, PyBytes>> {
     let cells = columns.iter().map(|c| c.extract()).collect::<PyResult<Vec<Cells<'_>>>>()?;
     let columns = cells.iter().map(|c| Column::new(c, n)).collect::<PyResult<Vec<_>>>()?;
-    let mut parts = Vec::new();
-    for first in (0..n).step_by(AT_ONCE) {
-        py.check_signals()?;
-        let rows = first..n.min(first + AT_ONCE);
-        let put = |rows| put_rows(&columns, &given, rows);
-        parts.append(&mut detached(py, || on_cores(rows, LEAST, put))?);
-    }
-    concatenated(py, &parts)
+    let put = |rows| vec![put_rows(&columns, &given, rows)];
+    concatenated(py, &in_parts(py, n, LEAST, put)?)
 }
 
 /// Give texts to Python as one.

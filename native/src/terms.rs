@@ -8,7 +8,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::chain::Frame;
-use crate::rows::{array, dot, in_parts, minus, rows, same_length, Six, Three};
+use crate::rows::{array, dot, in_parts, minus, rows, same_length, Six, Three, WORTH};
 use crate::trig::sin_cos;
 use crate::walk::cross;
 
@@ -608,7 +608,7 @@ pub fn turned<'py>(
         }
         out
     };
-    Ok(array(py, in_parts(py, n, |some| some.map(row).collect())?))
+    Ok(array(py, in_parts(py, n, WORTH, |some| some.map(row).collect())?))
 }
 
 /// The motion of the TCP by a turn about an axis through a point.
