@@ -174,9 +174,7 @@ def expect_errors(
     n = len(arrivals.visits)
     first, last = LengthLaw.unknown(n), LengthLaw.unknown(n)
     outside, (before, after, high) = np.zeros(n, dtype=bool), np.full((3, n), np.nan)
-    for some in chunks(
-        n, CHUNK
-    ):  # what is made of a row takes a hundred times its room
+    for some in chunks(n, CHUNK):  # predictions need many times the room
         found = arrivals.predict(np.arange(some.start, some.stop))
         error, covariance = found[:, 0], found[:, 1:3].reshape(-1, 6)
         unsure = np.isnan(found[:, 0] + found[:, 1] + correction[some]).any(axis=1)

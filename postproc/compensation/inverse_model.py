@@ -43,15 +43,6 @@ UNSURE_RAD = 3e-4  # [rad] 0.03 mm at 0.1 m from the TCP
 UNSURE_TURN = "the tool's rotation is not known well enough there to correct it"
 
 
-def turn(model: Model, arm: Arm, states: States) -> Floats:
-    """Predict the tool's rotation from nominal to actual.
-
-    Returns:
-        Rotation vectors in the base frame, (n, 3) [rad].
-    """
-    return model.evaluator(arm).turns(states)
-
-
 def turn_std(model: Model, arm: Arm, states: States) -> Floats:
     """Standard error of the predicted rotation per axis, (n, 3) [rad]."""
     effects, values, covariance = model.compensable()

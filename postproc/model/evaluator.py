@@ -127,13 +127,10 @@ def _loads(states: States) -> Floats:
     """Return mass and centre of what is carried, (n, 4) or (1, 4)."""
     if len(states) == 0:
         return np.empty((0, 4))
-    mass, com = few_rows(states.payload), few_rows(states.payload_com)
-    tool = few_rows(states.tool)
-    unknown = np.isnan(com)
-    n = max(len(mass), len(com), len(tool) if unknown.any() else 1)
-    out = np.empty((n, 4))
-    out[:, 0] = np.nan_to_num(mass)
-    out[:, 1:] = np.where(unknown, tool, com) if unknown.any() else com
+    mass, centre = few_rows(states.payload), few_rows(states.payload_com)
+    centre = np.where(np.isnan(centre), few_rows(states.tool), centre)
+    out = np.empty((max(len(mass), len(centre)), 4))
+    out[:, 0], out[:, 1:] = np.nan_to_num(mass), centre
     return out
 
 

@@ -264,11 +264,16 @@ def driver(
 # Laws that several effects have.
 
 
+def law(name: str, *numbers: float) -> TermLaw:
+    """Return a law by its name and numbers."""
+    return TermLaw(name, tuple(map(float, numbers)))
+
+
 def linear(k: float, middle: float = 0.0, half: float = 1.0) -> TermLaw:
     """Return k (x - middle) / half."""
-    return TermLaw("linear", (float(k), float(middle), float(half)))
+    return law("linear", k, middle, half)
 
 
 def constant(k: float) -> TermLaw:
     """Return k."""
-    return TermLaw("constant", (float(k),))
+    return law("constant", k)

@@ -24,6 +24,7 @@ from tests.bench.beside import TARGETS, Beside, side_by_side
 from tests.bench.languages import compared, files_table, measure_files
 from tests.bench.made import KINDS
 from tests.bench.memory import watched
+from tests.bench.stages import STAGES
 
 ROOT = Path(__file__).parents[2]
 CELL = ROOT / "programs" / "cell.toml"
@@ -31,10 +32,6 @@ WORK = ROOT / "demo"
 TABLE = ROOT / "docs" / "studies" / "benchmarks.md"
 LENGTHS = (1_000, 10_000, 100_000, 1_000_000)
 ALWAYS = 10_000  # targets that fit into any budget
-STAGES = (
-    "read", "parse", "plan", "solve", "decide", "plan again", "rewrite", "verify",
-    "report", "write",
-)  # fmt: skip
 LIBRARIES = ("numpy", "scipy", "toppra", "ruckig", "lark", "pin")
 ABOUT_STAGES = """Seconds. `all` is from opening the files to written output, record and
 JSON report; the start of Python is not in it. `unbroken` is one fly run without a stop,

@@ -33,6 +33,7 @@ from postproc.model.model import Model
 from postproc.robot.cell import Cell
 from postproc.robot.trajectory import Motion
 from tests.bench.memory import watched
+from tests.bench.stages import STAGES
 from tests.language.neutral_job import LANGUAGES, NeutralJob, NeutralMove, drawn
 from tests.language.true_error import fitted
 
@@ -110,10 +111,6 @@ def table(found: Mapping[str, dict[str, float]]) -> list[str]:
 
 
 FLY = re.compile(rb"^ *(MOVEFLY LINEAR TO POS|MoveL|SLIN) ?[({\[].*$", re.M)
-STAGES = (
-    "read", "parse", "plan", "solve", "decide", "plan again", "rewrite", "verify",
-    "report", "write",
-)  # fmt: skip
 
 
 def lengthened(text: bytes, times: int) -> bytes:

@@ -20,6 +20,10 @@ from tests.any_controller import any_controller
 from tests.bench.made import KINDS
 
 KIBI = 1024
+STAGES = (
+    "read", "parse", "plan", "solve", "decide", "plan again", "rewrite", "verify",
+    "report", "write",
+)  # fmt: skip
 ENOUGH = 10_000  # targets for the kernels
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.inverse_model import turn, turn_std
+from postproc.compensation.inverse_model import turn_std
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
@@ -158,7 +158,7 @@ def test_the_standard_error_of_the_rotation_covers_it(job_cell, job_model):
         @ np.swapaxes(arm.nominal_pose(reached)[:, :3, :3], 1, 2)
     )
     states = make_states(q, side, np.tile(tool[:3, 3], (len(q), 1)))
-    off = truth - turn(job_model, job_cell.arm, states)
+    off = truth - job_model.evaluator(job_cell.arm).turns(states)
     z = off / turn_std(job_model, job_cell.arm, states)
     assert np.sqrt((off**2).sum(axis=1).mean()) < 1e-4
     assert 0.5 < np.sqrt((z**2).mean()) < 2.0

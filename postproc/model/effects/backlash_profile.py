@@ -24,15 +24,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
-from postproc.model.terms import (
-    Term,
-    TermLaw,
-    Terms,
-    angle,
-    joint_angles,
-    side,
-    turn_joint,
-)
+from postproc.model.terms import Term, Terms, angle, joint_angles, law, side, turn_joint
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -107,8 +99,8 @@ class BacklashProfile(JointEffect):
             waves = np.zeros((max(self.orders, default=0), 2))
             waves[np.array(self.orders, dtype=int) - 1] = own[first:].reshape(-1, 2)
             ends = self.lower[j - 1], self.upper[j - 1], own[0] if first else 0.0
-            law = TermLaw("waves", (*map(float, ends), *waves.ravel().tolist()))
-            out.append(Term(turn_joint(j), law, (angle(j),), (side(j),)))
+            own_law = law("waves", *ends, *waves.ravel())
+            out.append(Term(turn_joint(j), own_law, (angle(j),), (side(j),)))
         return out
 
     def angles(self, batch: ArmStates, p: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -86,29 +87,18 @@ class BaseTilt(Effect):
 
     def terms(self, arm: Arm, p: Floats) -> Terms:
         """Turn the base by moments of weights that are scaled and moved."""
-        x, y, z = (carrier(f"base turn {a}") for a in "xyz")
-        left, out = list(p), []
-        for axis, turned in enumerate((x, y, z) if self.twist else (x, y)):
-            about = _take_moment(arm, left, axis)
-            out.append(Term(move(turned), linear(1.0), (about,)))
+        sizes, turns = [float(k) for k in p], [f"base turn {a}" for a in "xyz"]
+        count, out = len(PLACES), []
+        for axis, turned in enumerate(turns if self.twist else turns[:2]):
+            about, sizes = _moment(arm, sizes[:count], axis), sizes[count:]
+            out.append(Term(move(carrier(turned)), linear(1.0), (about,)))
         if self.skew:
-            about_x, about_y = (_take_moment(arm, list(left), axis) for axis in (0, 1))
-            hx, hy = left[len(PLACES) :]
-            whole = [1.0, 0.0, 0.0]
-            out += [
-                Term(move(x), linear(1.0), (about_y,)),
-                Term(move(y), linear(1.0), (about_x,)),
-                Term(
-                    move(carrier("base shift x")),
-                    linear(hx),
-                    (_take_moment(arm, list(whole), 1),),
-                ),
-                Term(
-                    move(carrier("base shift y")),
-                    linear(-hy),
-                    (_take_moment(arm, list(whole), 0),),
-                ),
-            ]
+            both, (hx, hy) = sizes[:count], sizes[count:]
+            for k, (shifted, h) in enumerate((("x", hx), ("y", -hy))):
+                about, alone = (_moment(arm, s, 1 - k) for s in (both, (1.0, 0.0, 0.0)))
+                out.append(Term(move(carrier(turns[k])), linear(1.0), (about,)))
+                shift = move(carrier(f"base shift {shifted}"))
+                out.append(Term(shift, linear(h), (alone,)))
         return out
 
     def columns(self, batch: ArmStates) -> Floats:
@@ -139,9 +129,9 @@ def uncertain_mass(arm: Arm) -> float:
     return LEAST if links is None else max(links.spread * arm.mass, LEAST)
 
 
-def _take_moment(arm: Arm, left: list[float], axis: int) -> Driver:
-    """Take the sizes of a moment, and of what is unsure of it, off a list."""
-    whole, elbow, wrist = (float(left.pop(0)) for _ in PLACES)
+def _moment(arm: Arm, sizes: Sequence[float], axis: int) -> Driver:
+    """Return a moment of weight, and of what may hang at elbow and wrist, by sizes."""
+    whole, elbow, wrist = sizes
     links = whole * arm.lumps
     links[1, 0] += elbow  # at the origins of D-H frames 2 and 4
     links[3, 0] += wrist

@@ -17,7 +17,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
-from postproc.model.terms import Term, TermLaw, Terms, angle, turn_joint
+from postproc.model.terms import Term, Terms, angle, law, turn_joint
 from postproc.robot.arm import Arm
 
 SCALE = 2e-4  # [rad] at the spring's largest torque
@@ -79,9 +79,8 @@ class Counterbalance(JointEffect):
 
     def terms(self, arm: Arm, p: Floats) -> Terms:
         """Turn axis 2 by the spring's torque."""
-        spring = self.ratio, self.upright, self.preload
-        law = TermLaw("spring", tuple(map(float, (p[0], *spring))))
-        return [Term(turn_joint(2), law, (angle(2),))]
+        spring = law("spring", p[0], self.ratio, self.upright, self.preload)
+        return [Term(turn_joint(2), spring, (angle(2),))]
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the spring's torque, 1 at u = 90 deg, (n, 1)."""

@@ -25,7 +25,7 @@ from postproc.model.effects.effect import (
 from postproc.model.effects.part_motion import CarriedEffect
 from postproc.model.effects.policies import NamingPolicy
 from postproc.model.kinematics import ArmStates
-from postproc.model.terms import Term, TermLaw
+from postproc.model.terms import Driver, TermLaw, law
 from postproc.robot.arm import Arm
 
 TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 16, 3, 5
@@ -168,18 +168,20 @@ class Curve(CarriedEffect):
             for k in self._orders()
         )  # fmt: skip
 
-    def law_terms(self, arm: Arm, p: Floats) -> list[Term]:
-        """Write the curve as the core evaluates it."""
+    def write_law(
+        self, arm: Arm, p: Floats
+    ) -> tuple[TermLaw, tuple[Driver, ...], tuple[Driver, ...]]:
+        """Write the curve as the core evaluates it, what drives it, and factors."""
         numbers = [float(len(self.source))]
         for name, low, high in zip(self.source, self.lower, self.upper, strict=True):
             beyond = BEYOND * name.startswith(LINEAR)
-            kinds = name.startswith(WAYS), not name.startswith(HELD), beyond
-            numbers += map(float, (low, high, *kinds))
+            kinds = name.startswith(WAYS), not name.startswith(HELD)
+            numbers += [low, high, *kinds, beyond]
         for order, size in zip(self._orders(), p, strict=True):
-            numbers += map(float, ((*order, 0)[0], (*order, 0)[1], size))
+            numbers += [*(*order, 0)[:2], size]
         by = tuple(self.drive(arm, name, unknown=np.nan) for name in self.source)
         times = (self.drive(arm, self.factor),) if self.factor else ()
-        return [Term(("", ()), TermLaw("curve", tuple(numbers)), by, times)]
+        return law("curve", *numbers), by, times
 
     def shape(self, batch: ArmStates) -> Floats:
         """Evaluate the terms without their direction in space, (n, p)."""

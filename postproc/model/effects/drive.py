@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Literal, Self
 
@@ -40,7 +40,9 @@ from postproc.model.effects.transmission import (
 )
 from postproc.model.kinematics import ArmStates, Loads
 from postproc.model.terms import (
+    Driver,
     Term,
+    TermLaw,
     Terms,
     about_joints,
     drive,
@@ -109,6 +111,10 @@ class DriveLoads(Loads):
         return torque
 
 
+DriveLaw = tuple[int, TermLaw, tuple[Driver, ...], tuple[Driver, ...]]
+"""A drive, from 1, a law, what drives that, and factors: see `Term`."""
+
+
 @dataclass(frozen=True)
 class DriveEffect(Effect):
     """What is an effect of a joint elsewhere, of drives.
@@ -159,13 +165,13 @@ class DriveEffect(Effect):
     def terms(self, arm: Arm, p: Floats) -> Terms:
         """Turn the joints that a drive moves, by its own law."""
         return [
-            replace(term, moves=turn_joints(self.inverse[:, j - 1]))
-            for j, term in self.list_laws(arm, p)
+            Term(turn_joints(self.inverse[:, j - 1]), own, by, times)
+            for j, own, by, times in self.list_laws(arm, p)
         ]
 
     @abstractmethod
-    def list_laws(self, arm: Arm, p: Floats) -> list[tuple[int, Term]]:
-        """List drives, from 1, with what turns them."""
+    def list_laws(self, arm: Arm, p: Floats) -> list[DriveLaw]:
+        """List what turns drives."""
 
     def only_joint(self) -> int | None:
         """Tell a drive that moves its own joint alone."""
@@ -221,12 +227,10 @@ class DriveBacklash(DriveEffect):
             out += alternatives([(one, f"lambda {j}")], j, driver)
         return out
 
-    def list_laws(self, arm: Arm, p: Floats) -> list[tuple[int, Term]]:
+    def list_laws(self, arm: Arm, p: Floats) -> list[DriveLaw]:
         """List drives with what their directions turn them by."""
-        return [
-            (j, Term(("", ()), linear(b), (side(j),)))
-            for j, b in zip(self.drives, p, strict=True)
-        ]
+        pairs = zip(self.drives, p, strict=True)
+        return [(j, linear(b), (side(j),), ()) for j, b in pairs]
 
     @property
     def law(self) -> Backlash:
@@ -299,11 +303,11 @@ class DriveTransmission(DriveEffect):
         """Return that of a single wave and its standard error [rad]."""
         return self.law.amplitude(p, covariance)
 
-    def list_laws(self, arm: Arm, p: Floats) -> list[tuple[int, Term]]:
+    def list_laws(self, arm: Arm, p: Floats) -> list[DriveLaw]:
         """List drives with what their angles turn them by."""
         return [
-            (j, replace(term, by=(drive(self.coupling[j - 1]),)))
-            for j, term in self.law.by_angle(p)
+            (j, wave, (drive(self.coupling[j - 1]),), ())
+            for j, wave in self.law.list_waves(p)
         ]
 
     @property
@@ -363,12 +367,11 @@ class DriveLoad(DriveEffect):
         """Tell the torque."""
         return self.law.nonlinear()
 
-    def list_laws(self, arm: Arm, p: Floats) -> list[tuple[int, Term]]:
+    def list_laws(self, arm: Arm, p: Floats) -> list[DriveLaw]:
         """List drives with what the torques on them turn them by."""
         return [
-            (j, replace(term, by=(weight(arm, about_joints(arm, shares)),)))
-            for j, term in self.law.by_torque(p)
-            for shares in [self.inverse[:, j - 1]]
+            (j, own, (weight(arm, about_joints(arm, self.inverse[:, j - 1])),), sided)
+            for j, own, sided in self.law.list_torque_laws(p)
         ]
 
     @property

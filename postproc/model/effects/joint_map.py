@@ -23,7 +23,7 @@ from postproc.model.effects.effect import (
 from postproc.model.effects.joint_spline import LONG_SURVEY
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
-from postproc.model.terms import Term, TermLaw, Terms, angle, turn_joint
+from postproc.model.terms import Term, Terms, angle, law, turn_joint
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -153,9 +153,9 @@ class JointMap(JointEffect):
         """Turn every joint by its bumps."""
         each: dict[int, list[float]] = {}
         for (j, centre), size in zip(self.bumps, p, strict=True):
-            each.setdefault(j, [float(self.width)]).extend([centre, float(size)])
+            each.setdefault(j, [self.width]).extend([centre, size])
         return [
-            Term(turn_joint(j), TermLaw("bumps", tuple(numbers)), (angle(j),))
+            Term(turn_joint(j), law("bumps", *numbers), (angle(j),))
             for j, numbers in each.items()
         ]
 

@@ -19,7 +19,7 @@ from postproc.model.effects.policies import FitPolicy
 from postproc.model.effects.smooth import smooth, smooth_count, smooth_mix
 from postproc.model.kinematics import ArmStates
 from postproc.model.splines import Splines
-from postproc.model.terms import Term, TermLaw, Terms, angle, joint_angles, turn_joint
+from postproc.model.terms import Term, Terms, angle, joint_angles, law, turn_joint
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -150,8 +150,8 @@ class JointSpline(JointEffect):
             middle = (self.lower[j] + self.upper[j]) / 2.0
             ends = part.lower, part.upper, not part.closed, self.turns, middle
             mix = smooth_mix(part.lower, part.upper, part.length, part.closed) @ own
-            law = TermLaw("spline", (*map(float, ends), *mix.tolist()))
-            out.append(Term(turn_joint(j + 1), law, (angle(j + 1),)))
+            spline = law("spline", *ends, *mix)
+            out.append(Term(turn_joint(j + 1), spline, (angle(j + 1),)))
         return out
 
     def list_ended(self, prior_std: Floats) -> tuple[float, ...]:

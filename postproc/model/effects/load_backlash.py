@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
@@ -23,7 +22,16 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
-from postproc.model.terms import Term, TermLaw, Terms, driver, side, turn_joint
+from postproc.model.terms import (
+    Driver,
+    Term,
+    TermLaw,
+    Terms,
+    driver,
+    law,
+    side,
+    turn_joint,
+)
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -126,18 +134,22 @@ class LoadBacklash(JointEffect):
     def terms(self, arm: Arm, p: Floats) -> Terms:
         """Turn every joint by the torque about it."""
         return [
-            replace(term, moves=turn_joint(j), by=(driver(arm, f"torque {j}"),))
-            for j, term in self.by_torque(p)
+            Term(turn_joint(j), own, (driver(arm, f"torque {j}"),), sided)
+            for j, own, sided in self.list_torque_laws(p)
         ]
 
-    def by_torque(self, p: Floats) -> Iterator[tuple[int, Term]]:
-        """Yield joints, or drives, with the laws of the torques about them."""
-        for j, (k, second) in zip(self.joints, p.reshape(-1, 2), strict=True):
-            law = TermLaw("size", (float(k), float(second), float(self.t0)))
-            if self.form != "load":
-                law = TermLaw("bend", (float(k), float(second), 0.0, float(self.t0)))
-            sided = () if self.form == "gravity_side" else (side(j),)
-            yield j, Term(turn_joint(j), law, times=sided)
+    def list_torque_laws(
+        self, p: Floats
+    ) -> list[tuple[int, TermLaw, tuple[Driver, ...]]]:
+        """List joints, or drives, with the laws of torques about them, and factors."""
+        shape = ("size", ()) if self.form == "load" else ("bend", (0.0,))
+        return [
+            (j, law(shape[0], *pair, *shape[1], self.t0), self._side_factor(j))
+            for j, pair in zip(self.joints, p.reshape(-1, 2), strict=True)
+        ]
+
+    def _side_factor(self, joint: int) -> tuple[Driver, ...]:
+        return () if self.form == "gravity_side" else (side(joint),)
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the laws and their corrections, (n, p)."""

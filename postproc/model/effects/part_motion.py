@@ -22,7 +22,16 @@ from postproc.model.effects.effect import (
     Parameter,
 )
 from postproc.model.kinematics import ArmStates
-from postproc.model.terms import Driver, Term, TermLaw, Terms, constant, driver, move
+from postproc.model.terms import (
+    Driver,
+    Term,
+    TermLaw,
+    Terms,
+    constant,
+    driver,
+    law,
+    move,
+)
 from postproc.robot.arm import Arm
 
 TURN, SHIFT = 1e-4, 1e-4  # [rad], [m] prior size of a motion
@@ -123,14 +132,15 @@ class CarriedEffect(Effect):
 
     def terms(self, arm: Arm, p: Floats) -> Terms:
         """Move the carrier by the law, and by its mean where that is fitted."""
-        own = self.law_terms(arm, p[: len(p) - self.loose])
-        mean = [Term(("", ()), constant(p[-1]))] if self.loose else []
         moves = move(self.carrier)
-        return [replace(term, moves=moves) for term in (*own, *mean)]
+        own = Term(moves, *self.write_law(arm, p[: len(p) - self.loose]))
+        return [own, Term(moves, constant(p[-1]))] if self.loose else [own]
 
     @abstractmethod
-    def law_terms(self, arm: Arm, p: Floats) -> list[Term]:
-        """Write the law as the core evaluates it."""
+    def write_law(
+        self, arm: Arm, p: Floats
+    ) -> tuple[TermLaw, tuple[Driver, ...], tuple[Driver, ...]]:
+        """Write the law as the core evaluates it, what drives it, and factors."""
 
     def drive(self, arm: Arm, name: str, unknown: float = 0.0) -> Driver:
         """Return what a covariate is in the core, with other weights of links."""
@@ -281,21 +291,20 @@ class PartMotion(CarriedEffect):
             value /= self.size
         return value
 
-    def law_terms(self, arm: Arm, p: Floats) -> list[Term]:
-        """Write the law as the core evaluates it."""
+    def write_law(
+        self, arm: Arm, p: Floats
+    ) -> tuple[TermLaw, tuple[Driver, ...], tuple[Driver, ...]]:
+        """Write the law as the core evaluates it, what drives it, and factors."""
         sizes = (p / self.size if self.factor else p).tolist()
-        place = float(self.middle), float(self.half)
-        if self.order:
-            law = TermLaw("wave", (float(self.order), sizes[1], sizes[0]))
-        elif self.law == "saturating":
-            law = TermLaw("bend", (sizes[0], 0.0, *place))
-        elif self.law == "constant":
-            law = constant(sizes[0])
-        else:
-            law = TermLaw(self.law, (sizes[0], *place))
-        by = () if self.law == "constant" else (self.drive(arm, self.source),)
         times = (self.drive(arm, self.factor),) if self.factor else ()
-        return [Term(("", ()), law, by, times)]
+        if self.law == "constant":
+            return constant(sizes[0]), (), times
+        by = (self.drive(arm, self.source),)
+        if self.order:
+            return law("wave", self.order, sizes[1], sizes[0]), by, times
+        if self.law == "saturating":
+            return law("bend", sizes[0], 0.0, self.middle, self.half), by, times
+        return law(self.law, sizes[0], self.middle, self.half), by, times
 
     def _law(self, x: Floats) -> Floats:
         """Evaluate it at values of its covariate."""

@@ -22,7 +22,7 @@ from postproc.model.effects.policies import FitPolicy, SearchPolicy
 from postproc.model.effects.step import moments
 from postproc.model.effects.tracker_drift import TrackerDrift
 from postproc.model.kinematics import ArmStates
-from postproc.model.terms import Term, TermLaw, Terms, linear, move, state_value
+from postproc.model.terms import Term, Terms, law, linear, move, state_value
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -241,9 +241,8 @@ class Thermal(Effect):
         if self.form == "temperature":
             driver = state_value("temperature", unknown=self.reference)
             return Term(move(along), linear(size, self.reference), (driver,))
-        numbers = size, self.level, self.start, self.time_constant
-        law = TermLaw("warming", tuple(map(float, numbers)))
-        return Term(move(along), law, (state_value(self.clock, unknown=np.nan),))
+        warming = law("warming", size, self.level, self.start, self.time_constant)
+        return Term(move(along), warming, (state_value(self.clock, unknown=np.nan),))
 
     def columns(self, batch: ArmStates) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""

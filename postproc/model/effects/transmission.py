@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -24,7 +23,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy, SearchPolicy
 from postproc.model.kinematics import ArmStates
-from postproc.model.terms import Term, TermLaw, Terms, angle, turn_joint
+from postproc.model.terms import Term, TermLaw, Terms, angle, law, turn_joint
 from postproc.robot.arm import Arm
 
 SCALE = 5e-5  # [rad]
@@ -129,15 +128,13 @@ class Transmission(JointEffect):
     def terms(self, arm: Arm, p: Floats) -> Terms:
         """Turn every joint by its waves."""
         return [
-            replace(term, moves=turn_joint(j), by=(angle(j),))
-            for j, term in self.by_angle(p)
+            Term(turn_joint(j), wave, (angle(j),)) for j, wave in self.list_waves(p)
         ]
 
-    def by_angle(self, p: Floats) -> Iterator[tuple[int, Term]]:
-        """Yield joints, or drives, with the waves of their angles."""
-        for (j, order), sizes in zip(self.waves, p.reshape(-1, 2), strict=True):
-            law = TermLaw("wave", (float(order), *map(float, sizes)))
-            yield j, Term(turn_joint(j), law)
+    def list_waves(self, p: Floats) -> list[tuple[int, TermLaw]]:
+        """List joints, or drives, with the waves of their angles."""
+        pairs = zip(self.waves, p.reshape(-1, 2), strict=True)
+        return [(j, law("wave", order, *sizes)) for (j, order), sizes in pairs]
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate the waves, (n, p)."""

@@ -22,7 +22,7 @@ from postproc.model.effects.effect import (
 )
 from postproc.model.effects.policies import FitPolicy
 from postproc.model.kinematics import ArmStates
-from postproc.model.terms import Term, TermLaw, Terms, side, state_value, turn_joint
+from postproc.model.terms import Term, Terms, law, side, state_value, turn_joint
 from postproc.robot.arm import Arm
 
 SCALE = 3e-5  # [rad]
@@ -109,8 +109,8 @@ class Windup(JointEffect):
         for j, w in zip(self.joints, p, strict=True):
             names = ("way", "turned") if self.form == "dahl" else ("way",)
             by = [state_value(f"{name} {j}", unknown=np.inf) for name in names]
-            law = TermLaw(self.form, (float(w), float(self.d0)))
-            out.append(Term(turn_joint(j), law, tuple(by), (side(j),)))
+            wound = law(self.form, w, self.d0)
+            out.append(Term(turn_joint(j), wound, tuple(by), (side(j),)))
         return out
 
     def basis(self, batch: ArmStates) -> Floats:
