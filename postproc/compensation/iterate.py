@@ -354,7 +354,8 @@ class Replanner:
 ROUNDS = 8  # of correcting for changed sides, before targets are settled for
 SAME = 0.01  # sides closer than this are the same
 OTHER = 1.0  # sides farther apart than this are different ones
-CORNERS = 3  # rounds for what is curved there
+CORNERS = 3  # rounds that bend the way at all corners; later where it is far off alone
+LAST = 2  # rounds of that behind the last one of other sides
 
 
 @dataclass(frozen=True)
@@ -415,7 +416,8 @@ def iterate(
     the whole correction, and move its neighbours' sides with it.
 
     A rounded fly point also moves with its neighbours' corrections, which its own makes
-    up for. The last look is at the numbers as they will be read from the output.
+    up for, as long as sides change: where a joint reverses, a change of sides bends the
+    corner anew. The last look is at the numbers as they will be read from the output.
 
     Programs side by side do not wait for each other: what has come to rest in one stays
     as it is while others go on. Only what the last look finds would come rounds later
@@ -444,7 +446,9 @@ def iterate(
         most = SAME if number < ROUNDS else OTHER
         moved = current.find_flank_changes(proposal, looked.side, most)
         missed, far = iteration.measure_misses(proposal, looked.aside, meant)
-        step = trail.take(moved, missed, far & (number < CORNERS))
+        if number >= CORNERS:
+            missed[~far] = 0.0
+        step = trail.take(moved, missed, far & (number < ROUNDS + LAST))
         if step == Step.READ_BACK:
             found, flipped = _read_back(course, current, proposal, number)
             swung = iteration.find_limit_violations(proposal, found)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.compensation.compensate import compensate
 from postproc.compensation.targets import rounding_of
 from postproc.language.visits import Blend, ZoneRule
 from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly
+from tests.bench.made import unbroken
 from tests.made_visits import visits
 
 NAN = float("nan")
@@ -48,3 +50,9 @@ def test_targets_make_up_for_what_their_neighbours_pull() -> None:
     moved = pull.to_move(wanted)
     np.testing.assert_allclose(moved + pull.on(moved), wanted, atol=2e-3)
     np.testing.assert_array_equal(BlendCoupling().to_move(wanted), wanted)
+
+
+def test_corners_are_bent_anew_as_sides_change(bench_cell, bench_model) -> None:
+    made = unbroken(1500)
+    found = compensate(made.source, bench_cell, bench_model, name="milled.pdl")
+    assert found.after.p95_mm < 0.008
