@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import count
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -254,13 +255,25 @@ T = TypeVar("T")
 CHUNK = 2048  # rows at a time
 
 
-def map_chunks(work: Callable[[slice], T], n: int, size: int = CHUNK) -> list[T]:
-    """Do the work on slices of n rows, one after the other.
+def map_chunks(
+    work: Callable[[slice], T], n: int, size: int = CHUNK, threads: int = 1
+) -> list[T]:
+    """Do the work on slices of n rows; return what comes of each, in order.
+
+    Args:
+        work: What to do.
+        n: How many rows there are.
+        size: Rows of a slice.
+        threads: How many slices are worked on at a time. The interpreter's lock is free
+            while numpy and the core work.
 
     >>> map_chunks(lambda rows: (rows.start, rows.stop), 5, 2)
     [(0, 2), (2, 4), (4, 5)]
     """
-    return [work(rows) for rows in chunks(n, size)]
+    if threads == 1 or n <= size:
+        return [work(rows) for rows in chunks(n, size)]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, chunks(n, size)))
 
 
 def chunks(n: int, size: int = CHUNK) -> Iterator[slice]:

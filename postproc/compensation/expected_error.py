@@ -10,6 +10,7 @@ of the same mean, variance and skewness (Pearson; Imhof 1961): its 95 % bound is
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -17,9 +18,10 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import gammaincinv, ndtr, ndtri
 
-from postproc.arrays import Bools, Floats, Indices, chunks
+from postproc.arrays import Bools, Floats, Indices, map_chunks
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.model.model import CHUNK
+from postproc.operating_system import count_cores
 
 BOUND = 0.95  # of the length of an error
 SIDED = float(ndtri(BOUND))  # standard deviations that hold it on one side
@@ -29,6 +31,8 @@ NODES, WEIGHTS = (  # of a probability from 0 to 1
 WIDE = 3.0  # times its mean is beyond the bound of any length
 LEAST = 1e-9  # standard deviation [m]
 FLAT = 1e-3  # .. and part of the mean: below it the error does not scatter
+MANY, FEW = 40_000, 4_000  # laws, and those that tell nearly what all of them do
+NEAR = 0.03  # of the length that these tell
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +178,8 @@ def expect_errors(
     n = len(arrivals.visits)
     first, last = LengthLaw.unknown(n), LengthLaw.unknown(n)
     outside, (before, after, high) = np.zeros(n, dtype=bool), np.full((3, n), np.nan)
-    for some in chunks(n, CHUNK):  # predictions need many times the room
+
+    def expect(some: slice) -> None:
         found = arrivals.predict(np.arange(some.start, some.stop))
         error, covariance = found[:, 0], found[:, 1:3].reshape(-1, 6)
         unsure = np.isnan(found[:, 0] + found[:, 1] + correction[some]).any(axis=1)
@@ -190,6 +195,8 @@ def expect_errors(
         before[rows], after[rows], high[rows] = (
             laws[0].mean, laws[1].mean, laws[1].bound
         )  # fmt: skip
+
+    map_chunks(expect, n, CHUNK, count_cores())  # predictions need many times the room
     known = ~np.isnan(high)
     return ExpectedErrors(
         judged, last, outside, before, after, high,
@@ -212,7 +219,21 @@ def pool_bound(law: LengthLaw, widest: float) -> float:
         return np.nan
 
     def more(length: float) -> float:
-        beyond = sum(float(law[some].beyond(length).sum()) for some in chunks(n))
-        return beyond / n - (1.0 - BOUND)
+        def beyond(some: slice) -> float:
+            return float(law[some].beyond(length).sum())
 
-    return widest if more(widest) >= 0.0 else float(brentq(more, 0.0, widest))
+        return sum(map_chunks(beyond, n, CHUNK, count_cores())) / n - (1.0 - BOUND)
+
+    least = 0.0
+    if n > MANY:  # some of them tell nearly the same
+        near = pool_bound(law[:: n // FEW], widest)
+        least, widest = _widen(more, near, widest)
+    return widest if more(widest) >= 0.0 else float(brentq(more, least, widest))
+
+
+def _widen(
+    more: Callable[[float], float], near: float, widest: float
+) -> tuple[float, float]:
+    """Put bounds round a length near the one that is looked for."""
+    low, high = near * (1.0 - NEAR), min(near * (1.0 + NEAR), widest)
+    return low if more(low) > 0.0 else 0.0, high if more(high) < 0.0 else widest
