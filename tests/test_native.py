@@ -260,11 +260,8 @@ def test_straight_ways(bench_cell, random):
     assert np.allclose(found.turn, turn, rtol=0, atol=1e-7)
     assert np.allclose(found.centre, begin, **CLOSE)
     assert np.allclose(found.chord, chord, **CLOSE)
-    length = np.linalg.norm(chord, axis=1)
-    tools = few_rows(targets.tool)
-    assert np.allclose(_native.chords(flange, tools, *ends), length, **CLOSE)
     with pytest.raises(IndexError, match="not there"):
-        _native.chords(flange, tools, np.array([-1]), np.array([0]))
+        _native.lines(flange, few_rows(tool), np.array([-1]), np.array([0]))
 
 
 def test_poses(random, laid_out):
@@ -381,15 +378,29 @@ def test_corners_of_a_program(bench_cell, bench_model, monkeypatch):
                 s = paths.nearest_on_parabola(*off)
                 assert abs(s - found.nearest[c]) < 1e-4
 
+    def zones(found, *given):
+        columns = paths.zones(*given)
+        own = found.visit, found.into, found.out, found.before, found.behind
+        for column, meant in zip(own, columns, strict=True):
+            assert np.allclose(column, meant, **CLOSE)
+
     def samples(found, *given):
-        path, share = paths.samples(*given)
+        path, share, start, uneven = paths.samples(*given)
         assert np.allclose(found[0].path, path, **CLOSE)
         assert np.allclose(found[1], share, **CLOSE)
+        assert np.array_equal(found[0].start, start)
+        assert np.array_equal(found[0].uneven, uneven)
 
     compared("_pass_corners", corners)
     compared("_resample", samples)
+    compared("zones", zones)
     compensate(made.milling(600).source, bench_cell, bench_model)
-    assert {"_pass_corners", "_resample"} <= set(seen)
+    jumps = b"  $FLY_TYPE := FLY_NORM\n" + b"".join(
+        b"  MOVEFLY TO {%d, 15, -130, -149, -74, -92} ADVANCE\n" % q for q in (9, 12, 5)
+    )
+    milled = made.milling(40).source.replace(b"  SpindleOn(18000)\n", jumps)
+    compensate(milled, bench_cell, bench_model)
+    assert {"_pass_corners", "_resample", "zones"} <= set(seen)
 
 
 # Long work lets other threads run, and ends when it is asked to.

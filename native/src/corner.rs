@@ -1,11 +1,13 @@
 //! How the path runs round fly points: `postproc.motion.blending`.
 
+use std::ops::Range;
+
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
 use crate::edges::{Edges, Paths, Way};
-use crate::rows::{array, each, flat, rows, same_length, Lanes, Six, Three, SIDE};
+use crate::rows::{array, flat, in_parts, rows, same_length, Lanes, Six, Three, SIDE, WORTH};
 
 const GRID: usize = 8; // steps of the first search for the nearest point
 const ROUNDS: usize = 5; // of Newton's method
@@ -24,6 +26,7 @@ pub struct Zones<'py> {
 }
 
 /// Two moves that are superposed.
+#[derive(Clone)]
 pub struct Corner<'a> {
     into: Way<'a>,
     out: Way<'a>,
@@ -59,9 +62,27 @@ impl Zones<'_> {
         };
         (0..n).map(corner).collect()
     }
+
+    /// List the edges into the corners, and those out of them.
+    pub fn edges(&self) -> PyResult<impl Iterator<Item = (usize, usize)> + '_> {
+        let (into, out) = (flat(&self.into)?, flat(&self.out)?);
+        Ok(into.iter().zip(out).map(|(into, out)| (*into as usize, *out as usize)))
+    }
 }
 
 impl Corner<'_> {
+    /// Tell whether every drive goes on from a straight move in another one.
+    pub fn goes_on(&self, drives: &[Six]) -> bool {
+        if self.into.count() != 1 || self.out.count() != 1 {
+            return false;
+        }
+        let (into, out) = (self.into.turns().1, self.out.turns().0);
+        let turned = |drive: &Six, turns: &Six| -> f64 {
+            drive.iter().zip(turns).map(|(share, turn)| share * turn).sum()
+        };
+        !drives.iter().any(|drive| turned(drive, &into) * turned(drive, &out) < 0.0)
+    }
+
     /// Follow the superposed moves, s from 0 to 1.
     pub fn at(&self, s: f64) -> Six {
         let into = self.into.at(1.0 - self.before * (1.0 - s) * (1.0 - s));
@@ -316,17 +337,19 @@ pub fn passed<'py>(
 ) -> PyResult<(Column<'py>, Column<'py>, Column<'py>, Block<'py>, Block<'py>, Block<'py>)> {
     let (chain, paths) = (Chain::new(&parameters)?, Paths::of(&edges, &q)?);
     let (tool, point, within) = (rows::<3>(&tool)?, rows::<3>(&point)?, flat(&within)?);
-    let mut corners = zones.corners(&paths)?;
+    let corners = zones.corners(&paths)?;
     let n = same_length(&[corners.len(), tool.len(), point.len(), within.len()])?;
-    let mut found = Vec::with_capacity(n);
-    let mut rest = corners.as_mut_slice();
-    each(py, n.div_ceil(SIDE), |at| {
-        let some = SIDE * at..n.min(SIDE * at + SIDE);
-        let (own, others) = std::mem::take(&mut rest).split_at_mut(some.len());
-        rest = others;
-        let group = Group::new(&chain, own, &tool[some.clone()], &point[some.clone()]);
-        found.extend(pass_at_best(group, &within[some]));
-    })?;
+    let part = |some: Range<usize>| {
+        let (mut found, mut own) = (Vec::with_capacity(some.len()), corners[some.clone()].to_vec());
+        for (at, group) in own.chunks_mut(SIDE).enumerate() {
+            let first = some.start + SIDE * at;
+            let these = first..first + group.len();
+            let group = Group::new(&chain, group, &tool[these.clone()], &point[these.clone()]);
+            found.extend(pass_at_best(group, &within[these]));
+        }
+        found
+    };
+    let found = in_parts(py, n, WORTH, part)?;
     let column = |value: fn(&Passed) -> f64| -> Column<'py> {
         found.iter().map(value).collect::<Vec<_>>().into_pyarray(py)
     };

@@ -23,6 +23,7 @@ pub struct Paths<'a> {
 }
 
 /// One way from visit to visit.
+#[derive(Clone)]
 pub struct Way<'a> {
     from: &'a Six,
     samples: &'a [Six],
@@ -36,6 +37,11 @@ impl<'a> Paths<'a> {
             source: flat(&edges.source)?,
             q: rows(q)?,
         })
+    }
+
+    /// Count the edges.
+    pub fn len(&self) -> usize {
+        self.source.len()
     }
 
     /// Return the joint angles at a visit.
@@ -73,6 +79,17 @@ impl<'a> Paths<'a> {
 }
 
 impl Way<'_> {
+    pub fn count(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Tell what joints turn by up to the first sample, and from the begin to the end.
+    pub fn turns(&self) -> (Six, Six) {
+        let (first, last) = (&self.samples[0], &self.samples[self.samples.len() - 1]);
+        let from = |to: &Six| std::array::from_fn(|j| to[j] - self.from[j]);
+        (from(first), from(last))
+    }
+
     /// Interpolate at the fraction u: straight, or a parabola through three samples.
     pub fn at(&self, u: f64) -> Six {
         if let [end] = self.samples {

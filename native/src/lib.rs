@@ -44,6 +44,7 @@ mod walk;
 mod walks;
 mod weave;
 mod words;
+mod zones;
 
 /// Names these sources: a test tells a core that was built from others.
 const SOURCES: &str = env!("SOURCES");
@@ -63,9 +64,9 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(chain::torque, module)?)?;
     module.add_function(wrap_pyfunction!(commands::commands, module)?)?;
     module.add_function(wrap_pyfunction!(corner::passed, module)?)?;
-    module.add_function(wrap_pyfunction!(rounding::resampled, module)?)?;
+    module.add_function(wrap_pyfunction!(rounding::rounded, module)?)?;
+    module.add_function(wrap_pyfunction!(zones::zones, module)?)?;
     module.add_function(wrap_pyfunction!(lines::lines, module)?)?;
-    module.add_function(wrap_pyfunction!(lines::chords, module)?)?;
     module.add_function(wrap_pyfunction!(turns::into_range, module)?)?;
     module.add_function(wrap_pyfunction!(turns::on_turns, module)?)?;
     module.add_function(wrap_pyfunction!(turns::on_other_turns, module)?)?;

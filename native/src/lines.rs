@@ -1,9 +1,6 @@
 //! Straight paths of the TCP: `postproc.motion.path` and `postproc.motion.blending`.
 
-use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray3,
-    PyUntypedArrayMethods,
-};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
@@ -24,7 +21,7 @@ pub fn poses<'a>(array: &'a PyReadonlyArray3<'_, f64>) -> PyResult<&'a [Pose]> {
 }
 
 /// Place the TCP.
-fn point(flange: &Pose, tool: &Pose) -> Three {
+pub fn point(flange: &Pose, tool: &Pose) -> Three {
     std::array::from_fn(|i| {
         let row = &flange[4 * i..];
         row[0] * tool[3] + row[1] * tool[7] + row[2] * tool[11] + row[3]
@@ -144,21 +141,4 @@ pub fn lines<'py>(
     })?;
     let rotations = blocks(py, all.len(), (3, 3), rotations);
     Ok((rotations, array(py, turns), array(py, begins), array(py, chords)))
-}
-
-/// Measure straight paths between targets, (m,) [m].
-#[pyfunction]
-pub fn chords<'py>(
-    py: Python<'py>,
-    flange: PyReadonlyArray3<'py, f64>,
-    tool: PyReadonlyArray3<'py, f64>,
-    begin: PyReadonlyArray1<'py, i64>,
-    end: PyReadonlyArray1<'py, i64>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let all = paths(&flange, &tool, &begin, &end)?;
-    let length = |path: &Ends<'_>| {
-        let chord = minus(&point(path.end, path.tool), &point(path.begin, path.tool));
-        dot(&chord, &chord).sqrt()
-    };
-    Ok(each(py, all.len(), |i| length(&all[i]))?.into_pyarray(py))
 }

@@ -5,8 +5,11 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
 use crate::corner::{Corner, Zones};
-use crate::edges::{Edges, Paths};
+use crate::edges::{Edges, Paths, Way};
 use crate::rows::{array, each, flat, rows, same_length, Six};
+
+const FLAT: f64 = 4e-5; // [rad] bend below which a corner's moves are as good as straight
+const EMPTY: f64 = 1e-9; // part of a move between two zones that is nothing
 
 /// `Corners` of the package.
 #[derive(FromPyObject)]
@@ -14,28 +17,29 @@ pub struct Corners<'py> {
     zones: Zones<'py>,
     nearest: PyReadonlyArray1<'py, f64>,
     q: PyReadonlyArray2<'py, f64>,
-}
-
-/// `_Pieces` of the package.
-#[derive(FromPyObject)]
-pub struct Pieces<'py> {
-    corner: PyReadonlyArray2<'py, i64>,
-    begin: PyReadonlyArray1<'py, f64>,
-    end: PyReadonlyArray1<'py, f64>,
-    count: PyReadonlyArray2<'py, i64>,
+    bend: PyReadonlyArray2<'py, f64>,
 }
 
 /// Samples, and their shares of their edges' ways.
+#[derive(Default)]
 struct Samples {
     path: Vec<Six>,
     share: Vec<f64>,
+    start: Vec<i64>,
+    uneven: Vec<i64>,
+    /// On each side of the nearest point of a corner that is not flat.
+    most: usize,
 }
 
 /// A corner, and where on it the path passes the fly point.
 struct Rounded<'a> {
-    corner: &'a Corner<'a>,
+    corner: Corner<'a>,
     nearest: f64,
     q: &'a Six,
+    /// The nearest point alone tells of it.
+    flat: bool,
+    /// No drive turns back on it, between straight moves.
+    goes_on: bool,
 }
 
 impl Rounded<'_> {
@@ -44,6 +48,15 @@ impl Rounded<'_> {
             *self.q
         } else {
             self.corner.at(s)
+        }
+    }
+
+    /// Count its samples before the nearest point, and behind it, of so many on each side.
+    fn counts(&self, most: usize) -> (usize, usize) {
+        if self.flat {
+            (1, 0)
+        } else {
+            (most, most)
         }
     }
 }
@@ -55,7 +68,7 @@ impl Samples {
     }
 
     /// Follow the end of a corner: from its nearest point on.
-    fn leave(&mut self, from: &Rounded<'_>, count: i64) {
+    fn leave(&mut self, from: &Rounded<'_>, count: usize) {
         let step = (1.0 - from.nearest) / count as f64;
         for part in 1..=count {
             let s = from.nearest + part as f64 * step;
@@ -64,73 +77,144 @@ impl Samples {
     }
 
     /// Follow the begin of a corner: up to its nearest point.
-    fn enter(&mut self, to: &Rounded<'_>, count: i64) {
+    fn enter(&mut self, to: &Rounded<'_>, count: usize) {
         let step = to.nearest / count as f64;
         for part in 1..=count {
             let s = 0.0 + part as f64 * step;
             self.push(to.at(s), 2.0 * to.corner.before * step);
         }
     }
+
+    /// Mark the last sample as one whose neighbours are not equally far along the path.
+    fn part(&mut self) {
+        let last = self.path.len() as i64 - 1;
+        if self.uneven.last() != Some(&last) {
+            self.uneven.push(last);
+        }
+    }
+
+    /// Follow an edge between two corners, of which there is one at least.
+    fn follow(&mut self, way: &Way<'_>, behind: Option<&Rounded<'_>>, ahead: Option<&Rounded<'_>>) {
+        let leaving = behind.map_or(0, |corner| corner.counts(self.most).1);
+        let begin = behind.map_or(0.0, |corner| corner.corner.behind);
+        let end = ahead.map_or(1.0, |corner| 1.0 - corner.corner.before);
+        if let Some(from) = behind.filter(|_| leaving > 0) {
+            self.leave(from, leaving);
+            self.part();
+        } else if behind.is_some() {
+            self.uneven.push(self.path.len() as i64);
+        }
+        let middle = way.count_between(begin, end);
+        if middle > 0 {
+            let long = (end - begin) / middle as f64;
+            for part in 1..=middle {
+                self.push(way.at(begin + part as f64 * long), long);
+            }
+            self.part();
+        }
+        if let Some(to) = ahead {
+            self.enter(to, to.counts(self.most).0);
+        }
+    }
 }
 
-fn lost(what: &str) -> PyErr {
-    PyIndexError::new_err(format!("{what} is not there"))
+impl Way<'_> {
+    /// Count the samples of a part of the way.
+    fn count_between(&self, begin: f64, end: f64) -> usize {
+        if end - begin > EMPTY {
+            let count = self.count();
+            ((count as f64 * (end - begin) - EMPTY).ceil() as usize).min(count)
+        } else {
+            0
+        }
+    }
+}
+
+/// Rounds the paths of a program.
+struct Rounding<'a> {
+    paths: Paths<'a>,
+    share: &'a [f64],
+    corners: Vec<Rounded<'a>>,
+    /// The corners at the begin and at the end of every edge.
+    at: Vec<[Option<usize>; 2]>,
+    /// Edges on which no drive turns are sampled where they end alone.
+    few: bool,
+}
+
+impl Rounding<'_> {
+    fn sample(&self, edge: usize, out: &mut Samples) -> PyResult<()> {
+        let [behind, ahead] = self.at[edge].map(|c| c.map(|c| &self.corners[c]));
+        match (behind, ahead) {
+            (None, None) => {
+                let kept = self.paths.span(edge)?;
+                out.path.extend_from_slice(self.paths.samples(kept.clone())?);
+                let lost = || PyIndexError::new_err("a share is not there");
+                out.share.extend_from_slice(self.share.get(kept).ok_or_else(lost)?);
+            }
+            (behind, Some(to))
+                if self.few && to.goes_on && behind.is_none_or(|corner| corner.goes_on) =>
+            {
+                if behind.is_some() {
+                    out.uneven.push(out.path.len() as i64);
+                }
+                out.enter(to, 1);
+            }
+            _ => out.follow(&self.paths.way(edge as i64)?, behind, ahead),
+        }
+        out.start.push(out.path.len() as i64);
+        Ok(())
+    }
 }
 
 /// Sample all edges anew.
 ///
 /// Args: the paths without corners and their samples' shares, joint angles at visits, the
-/// corners, what edges are made of, and how many samples there will be.
+/// corners; where edges on which no drive turns need no samples between, what drives do as
+/// joints turn, (6, 6); samples on each side of the nearest point of a corner that is not flat.
 ///
-/// Returns: samples (s, 6), and their shares (s,).
+/// Returns: samples (s, 6), their shares (s,), where those of each edge begin (e + 1,), and
+/// the samples whose neighbours are not equally far along the path.
 #[pyfunction]
 #[allow(clippy::type_complexity)]
-pub fn resampled<'py>(
+pub fn rounded<'py>(
     py: Python<'py>,
     edges: Edges<'py>,
     share: PyReadonlyArray1<'py, f64>,
     q: PyReadonlyArray2<'py, f64>,
     corners: Corners<'py>,
-    pieces: Pieces<'py>,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+    coupling: Option<PyReadonlyArray2<'py, f64>>,
+    most: usize,
+) -> PyResult<(
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<i64>>,
+)> {
     let (paths, share) = (Paths::of(&edges, &q)?, flat(&share)?);
+    let drives = coupling.as_ref().map(rows::<6>).transpose()?;
     let (all, nearest) = (corners.zones.corners(&paths)?, flat(&corners.nearest)?);
-    let passed = rows::<6>(&corners.q)?;
-    same_length(&[all.len(), nearest.len(), passed.len()])?;
-    let (corner, count) = (flat(&pieces.corner)?, flat(&pieces.count)?);
-    let (begin, end) = (flat(&pieces.begin)?, flat(&pieces.end)?);
-    let e = same_length(&[begin.len(), end.len(), corner.len() / 2, count.len() / 3])?;
-    let total = count.iter().sum::<i64>().max(0) as usize;
-    let mut out = Samples { path: Vec::with_capacity(total), share: Vec::with_capacity(total) };
-    let at = |c: i64| -> PyResult<Rounded<'_>> {
-        let found = usize::try_from(c).ok().filter(|c| *c < all.len());
-        let c = found.ok_or_else(|| lost("a corner"))?;
-        Ok(Rounded { corner: &all[c], nearest: nearest[c], q: &passed[c] })
-    };
-    let mut sample = |i: usize| -> PyResult<()> {
-        let (behind, ahead) = (corner[i], corner[e + i]);
-        if behind < 0 && ahead < 0 {
-            let kept = paths.span(i)?;
-            out.path.extend_from_slice(paths.samples(kept.clone())?);
-            let shares = share.get(kept);
-            out.share.extend_from_slice(shares.ok_or_else(|| lost("a share"))?);
-            return Ok(());
-        }
-        let (leaving, middle, entering) = (count[i], count[e + i], count[2 * e + i]);
-        if leaving > 0 {
-            out.leave(&at(behind)?, leaving);
-        }
-        if middle > 0 {
-            let (way, long) = (paths.way(i as i64)?, (end[i] - begin[i]) / middle as f64);
-            for part in 1..=middle {
-                out.push(way.at(begin[i] + part as f64 * long), long);
-            }
-        }
-        if entering > 0 {
-            out.enter(&at(ahead)?, entering);
-        }
-        Ok(())
-    };
-    each(py, e, &mut sample)?.into_iter().collect::<PyResult<()>>()?;
-    Ok((array(py, out.path), out.share.into_pyarray(py)))
+    let (passed, bend) = (rows::<6>(&corners.q)?, rows::<6>(&corners.bend)?);
+    same_length(&[all.len(), nearest.len(), passed.len(), bend.len()])?;
+    let mut at = vec![[None; 2]; paths.len()];
+    for (c, (into, out)) in corners.zones.edges()?.enumerate() {
+        (at[into][1], at[out][0]) = (Some(c), Some(c));
+    }
+    let few = drives.is_some();
+    let mut corners = Vec::with_capacity(all.len());
+    for (c, corner) in all.into_iter().enumerate() {
+        corners.push(Rounded {
+            nearest: nearest[c],
+            q: &passed[c],
+            flat: bend[c].iter().all(|bend| bend.abs() < FLAT),
+            goes_on: drives.is_some_and(|drives| corner.goes_on(drives)),
+            corner,
+        });
+    }
+    let work = Rounding { paths, share, corners, at, few };
+    let mut out = Samples { start: vec![0], most, ..Samples::default() };
+    each(py, work.at.len(), |edge| work.sample(edge, &mut out))?
+        .into_iter()
+        .collect::<PyResult<()>>()?;
+    let shares = out.share.into_pyarray(py);
+    Ok((array(py, out.path), shares, out.start.into_pyarray(py), out.uneven.into_pyarray(py)))
 }

@@ -11,6 +11,7 @@ from postproc.arrays import (
     Bools,
     Floats,
     Ints,
+    all_in_rows,
     any_in_rows,
     largest_in_rows,
     spans,
@@ -326,16 +327,18 @@ class Replanner:
         self._begin = begin
         self._last: Replanned | None = None
 
-    def after(self, values: Floats, lead: FlankState) -> Replanned:
+    def after(self, values: Floats, lead: FlankState, near: float) -> Replanned:
         """Find where the program leads with other numbers.
 
         Args:
             values: The numbers, (n, w) in the program's units.
             lead: What is known of the first sides, see `direction.arrivals`.
+            near: Numbers that differ by no more than this may stay as they were.
         """
-        new = self._visits.with_columns(values=values)
         old = self._visits.target.values
-        moved = any_in_rows((values != old) & ~(np.isnan(values) & np.isnan(old)))
+        same = (np.abs(values - old) <= near) | (np.isnan(values) & np.isnan(old))
+        moved = ~all_in_rows(same)
+        new = self._visits.with_columns(values=np.where(moved[:, None], values, old))
         moved |= ArcAngles.of(new).find_moved(moved)
         moved |= ArcTurns.of(new).find_moved(moved)
         rows = np.flatnonzero(moved)
@@ -355,6 +358,7 @@ ROUNDS = 8  # of correcting for changed sides, before targets are settled for
 SAME = 0.01  # sides closer than this are the same
 OTHER = 1.0  # sides farther apart than this are different ones
 CORNERS = 3  # rounds that bend the way at all corners; later where it is far off alone
+NEAR = 1e-7  # [mm, deg] that numbers may be off where the way is looked at
 LAST = 2  # rounds of that behind the last one of other sides
 
 
@@ -484,7 +488,8 @@ class _Course:
         """Find where a proposal leads."""
         values = proposal.decisions.corrected
         with self.iteration.setting.clock("plan again"):
-            found = self.replanner.after(values, lead_of(self.lead.looks, look))
+            near = 0.0 if look[1] else NEAR
+            found = self.replanner.after(values, lead_of(self.lead.looks, look), near)
         if self.iteration.part:
             self.trail.see(look, _glimpse(current, proposal, found))
         return found

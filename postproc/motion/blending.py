@@ -12,7 +12,6 @@ from postproc.arrays import (
     Floats,
     Ints,
     all_in_rows,
-    any_in_rows,
     few_rows,
     floats,
 )
@@ -21,7 +20,6 @@ from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly, Targets
 from postproc.robot.arm import Arm
 from postproc.robot.backlash_operator import Edges
-from postproc.robot.trajectory import Motion
 
 # Which fly points are rounded, and how much of the neighbouring moves that takes.
 #
@@ -35,9 +33,6 @@ from postproc.robot.trajectory import Motion
 # 100)^2 of the braking way.
 #
 # A zone never exceeds half of a neighbouring move: it ends before the next one begins.
-
-HALF = 0.5  # of a move that a zone may take
-NOTHING = 1e-9  # [m], [rad] a move that goes nowhere has no corner
 
 
 @dataclass(frozen=True)
@@ -64,116 +59,47 @@ class Zones:
         )  # fmt: skip
 
 
-def zones(arm: Arm, targets: Targets, traced: Trace) -> Zones:
-    """Find the corners with one way in and one way out, and their largest zones."""
-    visit, into, out = _corners(targets, traced)
-    to = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
-    cartesian = targets.move != Motion.JOINT
-    both = cartesian[visit] & cartesian[to[out]]
-    by_distance = both & (targets.rounding[visit] != Fly.OVERLAP)
-    edge = np.stack([into, out])
-    length, share = _lengths(targets, traced, to, edge), np.empty(edge.shape)
-    near, rest = np.flatnonzero(by_distance), np.flatnonzero(~by_distance)
-    share[:, near] = _by_distance(targets, visit[near], length[:, near])
-    ways = [
-        _Ways.on(traced, to, way[rest], long[rest])
-        for way, long in zip(edge, length, strict=True)
-    ]
-    # Moves overlap while the first brakes and the second starts, at full override: a
-    # path that changes with the override knob could not be proved.
-    ramps = [_ramp(arm, targets, way) for way in ways]
-    time = targets.overlap[visit[rest]] * np.minimum(ramps[0][1], ramps[1][1])
-    share[:, rest] = np.stack([push * time**2 / 2 for push, _ in ramps])
-    found = Zones(visit, into, out, share[0], share[1])
-    return found[np.asarray((share > 0).all(axis=0))]
-
-
-def _corners(targets: Targets, traced: Trace) -> tuple[Ints, Ints, Ints]:
-    """Pair the only edge into every rounded fly point with the only one out of it."""
-    n, source = len(targets), traced.edges.source
-    to = np.repeat(np.arange(n), np.diff(targets.pred_start))
-    told = np.flatnonzero(targets.pred >= 0)
-    ways_out = np.bincount(targets.pred[told], minlength=n)
-    out = np.full(n, -1)
-    out[targets.pred[told]] = told
-    known = (source >= 0) & ~np.isnan(traced.q[to, 0])
-    known &= ~np.isnan(traced.q[np.maximum(source, 0), 0])
-    round_ = targets.fly & ~targets.via & (targets.rounding < Fly.EXACT)
-    single = (np.diff(targets.pred_start) == 1) & (ways_out == 1)
-    visit = np.flatnonzero(round_ & single)
-    into = targets.pred_start[visit]
-    good = known[into] & known[out[visit]] & (to[out[visit]] != visit)
-    visit = visit[good]
-    return visit, targets.pred_start[visit], out[visit]
-
-
-def _lengths(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> Floats:
-    """Measure the TCP's ways on edges (2, c) [m], chords where they are no lines."""
-    used = np.zeros(len(to), dtype=bool)
-    used[edge] = True
-    at = np.flatnonzero(used)
-    chords = _native.chords(
-        traced.flange, few_rows(targets.tool), traced.edges.source[at], to[at]
-    )
-    length = np.zeros(len(to))
-    length[at] = np.fmax(traced.length[at], chords)
-    return length[edge]
-
-
-def _by_distance(targets: Targets, visit: Ints, length: Floats) -> Floats:
-    """Take the same length of both moves, all there is where only WITHIN bounds it.
-
-    Args:
-        targets: The moves.
-        visit: The fly points, (c,).
-        length: Lengths of the moves before and behind, (2, c) [m].
-    """
-    distance = targets.fly_distance[visit]
-    begin = np.where(targets.rounding[visit] == Fly.WITHIN, np.inf, distance)
-    shortest = length.min(axis=0)
-    zone = np.minimum(begin, HALF * shortest)
-    share: Floats = np.where(length > NOTHING, zone / np.maximum(length, NOTHING), 0.0)
-    return np.where(shortest > NOTHING, share, 0.0)
-
-
 @dataclass(frozen=True)
-class _Ways:
-    """The moves on c edges.
+class _Moves:
+    """Columns of `Targets` as the core takes them; one row is that of all moves."""
 
-    Attributes:
-        to: Target that they lead to, (c,).
-        length: Length of the TCP's way, (c,) [m].
-        turned: What the joints turn by, (c, 6) [rad].
-    """
-
-    to: Ints
-    length: Floats
-    turned: Floats
+    move: Ints
+    fly: Bools
+    via: Bools
+    rounding: Ints
+    fly_distance: Floats
+    overlap: Floats
+    linear_speed: Floats
+    tool: Floats
+    pred_start: Ints
+    pred: Ints
 
     @classmethod
-    def on(cls, traced: Trace, to: Ints, edge: Ints, length: Floats) -> _Ways:
-        """Describe the moves on edges of known lengths."""
-        end, begin = to[edge], traced.edges.source[edge]
-        return cls(end, length, np.abs(traced.q[end] - traced.q[begin]))
+    def of(cls, targets: Targets) -> _Moves:
+        """Take them over."""
+        own = (few_rows(getattr(targets, name)) for name in MOVES)
+        columns = zip(own, MOVES.values(), strict=True)
+        return cls(*(np.ascontiguousarray(c, kind) for c, kind in columns))
 
 
-def _ramp(arm: Arm, targets: Targets, way: _Ways) -> tuple[Floats, Floats]:
-    """Give the acceleration of u [1/s^2] along moves, and how long it lasts [s], (c,).
+MOVES = {
+    "move": np.int64, "fly": np.bool_, "via": np.bool_, "rounding": np.int64,
+    "fly_distance": np.float64, "overlap": np.float64, "linear_speed": np.float64,
+    "tool": np.float64, "pred_start": np.int64, "pred": np.int64,
+}  # fmt: skip
 
-    u goes from 0 to 1; the joints' limits are the bounds, and the programmed speed.
+
+def zones(arm: Arm, targets: Targets, traced: Trace) -> Zones:
+    """Find the corners with one way in and one way out, and their largest zones.
+
+    Moves overlap while the first brakes and the second starts, at full override: a path
+    that changes with the override knob could not be proved.
     """
-    turned = np.maximum(way.turned, NOTHING)
-    push = (arm.acceleration / turned).min(axis=1)
-    speed = (arm.velocity / turned).min(axis=1)
-    length = np.maximum(way.length, NOTHING)
-    joint = targets.move[way.to] == Motion.JOINT
-    programmed = np.where(joint, np.inf, targets.linear_speed[way.to] / length)
-    speed = np.fmin(speed, programmed)
-    moves = (turned > NOTHING).any(axis=1)
-    push = np.where(moves, push, 0.0)
-    with np.errstate(divide="ignore"):
-        lasts = np.minimum(speed / push, np.sqrt(1.0 / push))
-    return push, np.where(moves, lasts, 0.0)
+    found = _native.zones(
+        _Moves.of(targets), traced.edges.source, traced.q, traced.flange, traced.length,
+        (floats(arm.acceleration), floats(arm.velocity)),
+    )  # fmt: skip
+    return Zones(*found)
 
 
 # How the path runs round a fly point.
@@ -241,24 +167,6 @@ def _pass_corners(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Co
 # Paths whose fly points are rounded: new samples, and where each point is passed.
 
 SAMPLES = 4  # on each side of the nearest point of a corner that is not flat
-ONE_SAMPLE = [[0], [0], [1]]  # of the three pieces: where the next corner is passed
-EMPTY = 1e-9  # part of a move between two zones that is nothing
-
-
-@dataclass(frozen=True)
-class _Pieces:
-    """What e edges are made of: the end of a corner, a middle, the begin of a corner.
-
-    Attributes:
-        corner: Corner at both ends, (2, e), -1 where there is none.
-        begin, end: Where the middle begins and ends, (e,) in u.
-        count: Samples of the three pieces, (3, e).
-    """
-
-    corner: Ints
-    begin: Floats
-    end: Floats
-    count: Ints
 
 
 def blend(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Trace:
@@ -281,10 +189,8 @@ def blend(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Trac
         return traced
     q, aside = np.array(traced.q), np.array(traced.aside)
     q[visit], aside[visit] = found.q, found.aside
-    pieces = _pieces(traced, found)
-    if not timed:
-        pieces.count[:, _one_way(arm, traced, found)] = ONE_SAMPLE
-    edges, share = _resample(traced, found, pieces)
+    coupling = None if timed else floats(arm.coupling)
+    edges, share = _resample(traced, found, coupling)
     pull = _pull(targets, traced, found)
     return replace(traced, q=q, aside=aside, edges=edges, share=share, pull=pull)
 
@@ -303,63 +209,18 @@ def _pull(targets: Targets, traced: Trace, found: Corners) -> BlendCoupling:
     )  # fmt: skip
 
 
-def _one_way(arm: Arm, traced: Trace, found: Corners) -> Bools:
-    """Tell on which edges no joint's drive turns back, (e,).
+def _resample(
+    traced: Trace, found: Corners, coupling: Floats | None
+) -> tuple[Edges, Floats]:
+    """Sample all edges anew; return them and their samples' share of the way.
 
-    Straight ones into a corner, if at both ends every drive goes on as it goes here:
-    so it does on the parabolas between straight moves.
+    Args:
+        traced: The paths without corners.
+        found: The corners.
+        coupling: Drive-side angles = coupling @ q, (6, 6), where edges on which no
+            drive turns back need no samples; None: all are sampled.
     """
-    zones, edges = found.zones, traced.edges
-    one = np.diff(edges.start) == 1
-    here = traced.q.take(zones.visit, axis=0)
-    into = here - traced.q.take(edges.source[zones.into], axis=0)
-    out = edges.path.take(edges.start[zones.out], axis=0) - here
-    back = (into @ arm.coupling.T) * (out @ arm.coupling.T) < 0
-    goes_on = one[zones.into] & one[zones.out] & ~any_in_rows(back)
-    before, behind = np.ones_like(one), np.zeros_like(one)
-    before[zones.out], behind[zones.into] = goes_on, goes_on
-    return np.asarray(before & behind)
-
-
-def _pieces(traced: Trace, found: Corners) -> _Pieces:
-    """Cut the edges at the ends of the zones."""
-    e, zones = len(traced.edges.source), found.zones
-    rows = np.arange(len(zones.visit))
-    corner = np.full((2, e), -1)
-    corner[0, zones.out], corner[1, zones.into] = rows, rows
-    begin, end = np.zeros(e), np.ones(e)
-    begin[zones.out], end[zones.into] = zones.behind, 1 - zones.before
-    flat = found.flat
-    count = np.zeros((3, e), dtype=np.int64)
-    count[0, zones.out] = np.where(flat, 0, SAMPLES)
-    count[2, zones.into] = np.where(flat, 1, SAMPLES)
-    before = np.diff(traced.edges.start)
-    inner = np.ceil(before * (end - begin) - EMPTY).astype(np.int64)
-    count[1] = np.where(end - begin > EMPTY, np.minimum(inner, before), 0)
-    return _Pieces(corner, begin, end, count)
-
-
-def _resample(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, Floats]:
-    """Sample all edges anew; return them and their samples' share of the way."""
-    touched = np.asarray((pieces.corner >= 0).any(axis=0))
-    start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])
-    path, share = _native.resampled(traced.edges, traced.share, traced.q, found, pieces)
-    uneven = _uneven(pieces, touched, start)
+    path, share, start, uneven = _native.rounded(
+        traced.edges, traced.share, traced.q, found, coupling, SAMPLES
+    )
     return replace(traced.edges, path=path, start=start, uneven=uneven), share
-
-
-def _uneven(pieces: _Pieces, touched: Bools, start: Ints) -> Ints:
-    """List the samples whose neighbours are not equally far along the path.
-
-    The last one of a piece, and the first one where its piece does not begin at a
-    sample because the corner before is flat.
-    """
-    first, middle, _ = pieces.count
-    flat = (pieces.corner[0] >= 0) & (first == 0)
-    ends = [start[:-1] + first, start[:-1] + first + middle]
-    joints = [ends[0][touched & (first > 0)], ends[1][touched & (middle > 0)]]
-    after = start[:-1][touched & flat] + 1
-    uneven = np.zeros(start[-1] + 1, dtype=bool)
-    for samples in (*joints, after):
-        uneven[samples - 1] = True
-    return np.flatnonzero(uneven)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from tests.reference.kinematics import rotation_vector
 
 FLAT, STEP = 4e-5, 0.02  # [rad]; of s
+EMPTY = 1e-9  # part of a move
 
 
 def lines(tool, flange, begin, end):
@@ -45,6 +48,48 @@ def along(traced, edge, u):
     return here + t * (after - before) / 2 + t**2 / 2 * (after - 2 * here + before)
 
 
+def zones(arm, targets, traced):
+    """Find corners and what they take of their moves: see `blending`, move by move."""
+    source, out = traced.edges.source, []
+    to = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
+    for v in range(len(targets)):
+        into = np.flatnonzero(to == v)
+        leaving = np.flatnonzero(targets.pred == v)
+        rounded = targets.fly[v] and not targets.via[v] and targets.rounding[v] < 3
+        if not rounded or len(into) != 1 or len(leaving) != 1 or to[leaving[0]] == v:
+            continue
+        edges = int(into[0]), int(leaving[0])
+        ends = [(source[e], to[e]) for e in edges]
+        if min(a for a, _ in ends) < 0 or np.isnan(traced.q[np.array(ends)]).any():
+            continue
+        share = _shares(arm, targets, traced, v, edges, ends)
+        if min(share) > 0:
+            out.append((v, *edges, *share))
+    return [np.array(column) for column in zip(*out, strict=True)]
+
+
+def _shares(arm, targets, traced, v, edges, ends):
+    """Give the parts of the moves before and behind that a zone takes."""
+    places = [[(traced.flange[k] @ targets.tool[b])[:3, 3] for k in (a, b)]
+              for a, b in ends]  # fmt: skip
+    way = [np.fmax(traced.length[e], np.linalg.norm(p[1] - p[0]))
+           for e, p in zip(edges, places, strict=True)]  # fmt: skip
+    cartesian = targets.move[v] > 0 and targets.move[ends[1][1]] > 0
+    if cartesian and targets.rounding[v] > 0:
+        begin = np.inf if targets.rounding[v] == 2 else targets.fly_distance[v]
+        return [min(begin, min(way) / 2) / w if min(way) > 1e-9 else 0.0 for w in way]
+    push, lasts = [], []
+    for (a, b), w in zip(ends, way, strict=True):
+        turned = np.maximum(np.abs(traced.q[b] - traced.q[a]), 1e-9)
+        push.append((arm.acceleration / turned).min())
+        speed = (arm.velocity / turned).min()
+        if targets.move[b] > 0:
+            speed = np.fmin(speed, targets.linear_speed[b] / w)
+        lasts.append(min(speed / push[-1], push[-1] ** -0.5))
+    time = targets.overlap[v] * min(lasts)
+    return [p * time**2 / 2 for p in push]
+
+
 def on_corner(traced, zones, c, s):
     """Follow a corner: two moves superposed."""
     into = along(traced, zones.into[c], 1 - zones.before[c] * (1 - s) ** 2)
@@ -59,8 +104,57 @@ def nearest_on_parabola(begin, end):
     return float(s[np.argmin(away), 0])
 
 
-def samples(traced, found, pieces):
-    """Place the samples of all edges, and their shares of the way."""
+def one_way(coupling, traced, found):
+    """Tell on which edges no drive turns back: straight ones into a corner."""
+    zones, edges = found.zones, traced.edges
+    one = np.diff(edges.start) == 1
+    here = traced.q[zones.visit]
+    into = here - traced.q[edges.source[zones.into]]
+    out = edges.path[edges.start[zones.out]] - here
+    back = (into @ coupling.T) * (out @ coupling.T) < 0
+    goes_on = one[zones.into] & one[zones.out] & ~back.any(axis=1)
+    before, behind = np.ones_like(one), np.zeros_like(one)
+    before[zones.out], behind[zones.into] = goes_on, goes_on
+    return before & behind
+
+
+def pieces_of(traced, found, coupling, most):
+    """Cut edges at the ends of zones: corners, begins, ends, and counts of samples."""
+    e, zones = len(traced.edges.source), found.zones
+    rows = np.arange(len(zones.visit))
+    corner = np.full((2, e), -1)
+    corner[0, zones.out], corner[1, zones.into] = rows, rows
+    begin, end = np.zeros(e), np.ones(e)
+    begin[zones.out], end[zones.into] = zones.behind, 1 - zones.before
+    flat = (np.abs(found.bend) < FLAT).all(axis=1)
+    count = np.zeros((3, e), dtype=np.int64)
+    count[0, zones.out] = np.where(flat, 0, most)
+    count[2, zones.into] = np.where(flat, 1, most)
+    before = np.diff(traced.edges.start)
+    inner = np.ceil(before * (end - begin) - EMPTY).astype(np.int64)
+    count[1] = np.where(end - begin > EMPTY, np.minimum(inner, before), 0)
+    if coupling is not None:
+        count[:, one_way(coupling, traced, found)] = [[0], [0], [1]]
+    return SimpleNamespace(corner=corner, begin=begin, end=end, count=count)
+
+
+def uneven(pieces, start):
+    """List the samples whose neighbours are not equally far along the path.
+
+    The last one of a piece, and the first one where its piece does not begin at a
+    sample because the corner before is flat.
+    """
+    (first, middle, _), touched = pieces.count, (pieces.corner >= 0).any(axis=0)
+    flat = (pieces.corner[0] >= 0) & (first == 0)
+    ends = start[:-1] + first, start[:-1] + first + middle
+    found = [ends[0][touched & (first > 0)], ends[1][touched & (middle > 0)],
+             start[:-1][touched & flat] + 1]  # fmt: skip
+    return np.unique(np.concatenate(found)) - 1
+
+
+def samples(traced, found, coupling, most=4):
+    """Place the samples of all edges: their path, shares, starts, and uneven ones."""
+    pieces = pieces_of(traced, found, coupling, most)
     path, share, zones = [], [], found.zones
     for e in range(len(traced.edges.source)):
         behind, ahead = pieces.corner[:, e]
@@ -82,7 +176,8 @@ def samples(traced, found, pieces):
             step = found.nearest[ahead] / entering
             path.append(_at(traced, found, ahead, k * step))
             share.append(2 * zones.before[ahead] * step)
-    return np.array(path), np.array(share)
+    start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])
+    return np.array(path), np.array(share), start, uneven(pieces, start)
 
 
 def _at(traced, found, c, s):
