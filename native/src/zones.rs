@@ -160,7 +160,7 @@ impl Program<'_> {
         let within = self.rounding.at(visit) == WITHIN;
         let begin = if within { f64::INFINITY } else { self.distance.at(visit) };
         let shortest = ways[0].min(ways[1]);
-        if !(shortest > NOTHING) {
+        if shortest.is_nan() || shortest <= NOTHING {
             return [0.0; 2];
         }
         ways.map(|way| begin.min(HALF * shortest) / way)
