@@ -56,6 +56,32 @@ def on_path(visits: Visits) -> Ints:
 
 
 @dataclass(frozen=True)
+class PathLimits:
+    """How much corrections may change along continuous paths, n visits.
+
+    Attributes:
+        before: The visit before on the path, (n,), -1 where there is none.
+        allowed: Most that the correction may change since then, (n,) [m].
+    """
+
+    before: Ints
+    allowed: Floats
+
+    @classmethod
+    def of(cls, visits: Visits, tcp: Floats, step_mm: float) -> PathLimits:
+        """Find them.
+
+        Args:
+            visits: n visits.
+            tcp: TCP poses, (n, 4, 4) [m], base frame.
+            step_mm: Most that the correction may change along 100 mm [mm].
+        """
+        before = on_path(visits)
+        way = lengths(tcp[:, :3, 3] - tcp[np.maximum(before, 0), :3, 3])
+        return cls(before, np.maximum(step_mm * MM * way / PER, LEAST_STEP))
+
+
+@dataclass(frozen=True)
 class PathCorrection:
     """What n visits would be corrected by, and how far they lie apart.
 
@@ -114,35 +140,28 @@ class PathCorrection:
 
 
 def path_correction(
-    visits: Visits,
+    limits: PathLimits,
     arm: Arm,
     q: Floats,
-    tcp: Floats,
     tool: Floats,
     correction: Floats,
     side: Floats,
     gap: Floats,
-    step_mm: float,
 ) -> PathCorrection:
-    """Say how much the correction may change along the path.
+    """Say how much the correction changes along the path, and how much it may.
 
     Args:
-        visits: n visits.
+        limits: Where n visits follow each other.
         arm: The arm.
         q: Joint angles there, (n, 6) [rad].
-        tcp: TCP poses, (n, 4, 4) [m], base frame.
         tool: TCP in the flange frame, (n, 3) [m].
         correction: Change of the commanded TCP, (n, 3) [m].
         side: Where joints lie in their play, (n, 6) from -1 to 1.
         gap: Half the fitted gap between the flanks of every joint, (6,) [rad]; 0 where
             the model does not tell: a change of that joint's flank is not limited.
-        step_mm: Most that it may change along 100 mm [mm].
     """
-    before = on_path(visits)
-    last = np.maximum(before, 0)
-    way = lengths(tcp[:, :3, 3] - tcp[last, :3, 3])
-    allowed = np.maximum(step_mm * MM * way / PER, LEAST_STEP)
-    flanks = np.zeros(len(before))
+    before, allowed = limits.before, limits.allowed
+    last, flanks = np.maximum(before, 0), np.zeros(len(before))
     with np.errstate(invalid="ignore"):
         far = lengths(correction - correction[last]) > allowed
     rows = np.flatnonzero((before >= 0) & far)
@@ -222,7 +241,7 @@ def keep_whole(
         visits: n visits.
         given: Visits that had a reason before any guard spoke, (n,): they do not
             move, or not by us.
-        step_mm: See `path_correction`.
+        step_mm: See `PathLimits`.
     """
     steps = path.steps & reasons.none
     steps[path.before[steps]] = True

@@ -13,6 +13,7 @@ from postproc.compensation.agreement import LEVER_MM, Agreement, agree, average
 from postproc.compensation.arc_angles import ASTRAY
 from postproc.compensation.continuity import (
     PathCorrection,
+    PathLimits,
     keep_whole,
     path_correction,
 )
@@ -541,11 +542,41 @@ class Proposal:
 
 
 @dataclass(frozen=True)
+class Beforehand:
+    """What holds in every round, whatever is commanded.
+
+    Attributes:
+        reasons: Why visits do not move, or not by numbers of their own.
+        display: Visits whose target has no numbers in the program, (n,).
+        unchanged: Visits without a target, and taught points, (n,).
+        path: Where visits follow each other on a path.
+    """
+
+    reasons: Reasons
+    display: Bools
+    unchanged: Bools
+    path: PathLimits
+
+    @classmethod
+    def of(cls, visits: Visits, planned: PlannedProgram, setting: Job) -> Beforehand:
+        """Look at a program before any command of it is known."""
+        reasons, holds = Reasons(len(visits)), ~without_target(visits)
+        display = holds & ((visits.reason > 0) | (visits.target.literal < 0))
+        reasons.adopt(visits.reason, visits.reasons)
+        reasons.mark(display, NOT_WRITTEN)
+        unchanged = mark_unchanged(visits, reasons, setting.options)
+        step_mm = setting.cell.limits.correction_step_mm
+        path = PathLimits.of(visits, planned.plan.tcp, step_mm)
+        return cls(reasons, display, unchanged, path)
+
+
+@dataclass(frozen=True)
 class Round:
     """What is to be decided in a round: commands for all targets of a window.
 
     Attributes:
         reading: The program.
+        beforehand: What holds of it in every round.
         planned: Its plan, n visits.
         states: The same in the model's terms.
         solved: The corrected command of every visit.
@@ -557,6 +588,7 @@ class Round:
     """
 
     reading: ParsedProgram
+    beforehand: Beforehand
     planned: PlannedProgram
     states: States
     solved: Commands
@@ -571,9 +603,8 @@ class Round:
         """How the correction changes along continuous paths."""
         plan, setting = self.planned.plan, self.setting
         return path_correction(
-            self.reading.visits, setting.cell.arm, plan.q, plan.tcp,
-            plan.tool[:, :3, 3], self.correction, self.solved.direction,
-            setting.gap, setting.cell.limits.correction_step_mm,
+            self.beforehand.path, setting.cell.arm, plan.q, plan.tool[:, :3, 3],
+            self.correction, self.solved.direction, setting.gap,
         )  # fmt: skip
 
     @cached_property
@@ -640,12 +671,8 @@ class Round:
             strays: Visits whose correction would make another arc, (n,).
             border: Axes that would be on a border of flags, (n, 6).
         """
-        visits, reasons = self.reading.visits, Reasons(len(self.reading.visits))
-        holds = ~without_target(visits)
-        display = holds & ((visits.reason > 0) | (visits.target.literal < 0))
-        reasons.adopt(visits.reason, visits.reasons)
-        reasons.mark(display, NOT_WRITTEN)
-        unchanged = mark_unchanged(visits, reasons, self.setting.options)
+        visits, beforehand = self.reading.visits, self.beforehand
+        reasons = beforehand.reasons.copy()
         self._guard(reasons, strays, border)
         usable = reasons.none
         settled = self._settle(usable)
@@ -655,8 +682,8 @@ class Round:
         )
         status = np.where(reasons.none, Status.CORRECTED, Status.REJECTED)
         status[conflict] = Status.CONFLICT
-        status[display] = Status.RUNTIME
-        status[unchanged] = Status.UNCHANGED
+        status[beforehand.display] = Status.RUNTIME
+        status[beforehand.unchanged] = Status.UNCHANGED
         corrected = status == Status.CORRECTED
         left = np.zeros(len(visits))
         left[corrected] = agreement.radius_mm[agreement.group[corrected]]

@@ -38,6 +38,12 @@ class Reasons:
         self.index: Ints = np.zeros(n, dtype=np.int64)
         self._found = Interned([NO_REASON])
 
+    def copy(self) -> Reasons:
+        """Return the same, to go on from."""
+        other = Reasons(0)
+        other.index, other._found = np.array(self.index), Interned(self._found)
+        return other
+
     @property
     def all(self) -> tuple[Reason, ...]:
         """Return the reasons; index 0 is `NO_REASON`."""

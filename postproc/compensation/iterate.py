@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import count, pairwise
 
 import numpy as np
@@ -29,6 +30,7 @@ from postproc.compensation.consensus import (
     lead_of,
 )
 from postproc.compensation.decisions import (
+    Beforehand,
     Proposal,
     Round,
     limit_violations,
@@ -169,6 +171,11 @@ class Iteration:
     setting: Job
     part: bool
 
+    @cached_property
+    def beforehand(self) -> Beforehand:
+        """What holds in every round."""
+        return Beforehand.of(self.reading.visits, self.planned, self.setting)
+
     def first_aim(self) -> SolverState:
         """Correct for the sides that were planned, or are meant."""
         setting, none = self.setting, np.zeros(len(self.states), dtype=bool)
@@ -230,7 +237,7 @@ class Iteration:
         with self.setting.clock("decide"):
             plan = self.planned.plan
             aside = passing_after(plan, self.find_wanted_shifts(current)) + current.bent
-            given = self.reading, self.planned, self.states
+            given = self.reading, self.beforehand, self.planned, self.states
             found = current.solved, current.departure, aside
             left = current.held, current.swung
             return Round(*given, *found, *left, self.setting).propose(), aside

@@ -12,6 +12,7 @@ from postproc.compensation.continuity import (
     ARC,
     BENT,
     PathCorrection,
+    PathLimits,
     on_path,
     path_correction,
 )
@@ -67,9 +68,8 @@ def corrections(job_cell, way_mm, steps_mm, side=None, gap=0.0):
     q, tool = np.tile(HOME, (n, 1)), np.zeros((n, 3))
     visits = read(job_cell, *lines)
     gaps = np.full(6, gap)
-    return path_correction(
-        visits, ARM, q, tcp, tool, correction, sides, gaps, STEP_MM
-    )  # fmt: skip
+    limits = PathLimits.of(visits, tcp, STEP_MM)
+    return path_correction(limits, ARM, q, tool, correction, sides, gaps)
 
 
 @pytest.mark.parametrize(
