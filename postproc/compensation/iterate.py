@@ -254,16 +254,21 @@ class Iteration:
     ) -> tuple[Floats, Bools]:
         """Say by what targets miss theirs, (n, 3) [m], and where by too much, (n,).
 
+        Where the original path is as good as straight, only what is too much counts: a
+        correction bends it where a joint reverses.
+
         Args:
             proposal: Tells which targets can make up for it.
             aside: From targets to where the path passes them, (n, 3) [m].
             meant: .. to where it should.
         """
-        missed, sharp = np.zeros_like(aside), self.planned.plan.pull.visit
-        missed[sharp] = (aside - meant)[sharp]
-        missed[~proposal.corrected] = 0.0
+        flown = self.reading.visits.motion.fly & proposal.corrected
+        missed = np.where(flown[:, None], aside - meant, 0.0)
         missed[any_in_rows(np.isnan(missed))] = 0.0
         far = any_in_rows(np.abs(missed) > CLOSE)
+        bent = np.array(far)
+        bent[self.planned.plan.pull.visit] = True
+        missed[~bent] = 0.0
         begins = self.reading.begins
         if len(begins) > 1:  # those with a point that is not hit go on alone
             for first, end in pairwise((*begins, len(missed))):
