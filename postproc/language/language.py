@@ -13,6 +13,7 @@ from typing import Any, Protocol
 from postproc.arrays import Floats, Ints
 from postproc.files import FolderListing
 from postproc.language.archive import Archive
+from postproc.language.insert_moves import Splitter
 from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.pose_encoding import Dialect
 from postproc.language.text.comment_directives import (
@@ -173,109 +174,6 @@ class Cloner(ABC):
 
         Raises:
             CloneError: A value stands where it cannot be given twice.
-        """
-
-
-@dataclass(frozen=True)
-class ArcPiece:
-    """A piece of an arc that is cut, from where the piece before it ends.
-
-    Attributes:
-        end: Numbers of its end, (w,); None: as the move has them.
-        via: Numbers of the point on its own way, (w,); None: it is a chord.
-        at_via: Whether it ends at the point on the way of the arc.
-    """
-
-    end: Floats | None
-    via: Floats | None
-    at_via: bool = False
-
-
-class Splitter(ABC):
-    """The files of a job, to put points on the ways of its moves.
-
-    Attributes:
-        unsized: Why points stay out whose blending is not known, "" where the arm
-            passes them however they are blended.
-        keeps_aux: External axes stay where they are on the way to points.
-    """
-
-    unsized: str = ""
-    keeps_aux: bool = False
-
-    @abstractmethod
-    def hinders(self, file: int, line: int) -> str:
-        """Say what in the text of a move forbids points on its way, "" for nothing.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-        """
-
-    @abstractmethod
-    def stops(self, file: int, line: int) -> bool:
-        """Tell whether the arm may stop once more before a move.
-
-        Nothing that may begin a process stands between it and the move before.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-        """
-
-    @abstractmethod
-    def points(
-        self, file: int, line: int, numbers: Floats, config: str, stop: bool
-    ) -> Edit:
-        """Write moves to points in front of a LINEAR move, which they lead up to.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-            numbers: Of the points, one behind the other, (k, w).
-            config: Their configuration flags.
-            stop: The arm stops at the first of them.
-
-        Raises:
-            CloneError: They cannot be written there.
-        """
-
-    @abstractmethod
-    def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
-        """Write a stop in front of a LINEAR move, from where it leads to its target.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-            numbers: Of the stop, (w,).
-            config: Its configuration flags.
-
-        Raises:
-            CloneError: It cannot be written there.
-        """
-
-    @abstractmethod
-    def arc(
-        self,
-        file: int,
-        line: int,
-        pieces: Sequence[ArcPiece],
-        via: Floats,
-        config: str,
-        stop: bool,
-    ) -> list[Edit]:
-        """Write pieces in front of a CIRCULAR move, which becomes the last of them.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-            pieces: The pieces; one ends at the point on the way of the arc.
-            via: Numbers of the point on the way that the move has from then on, (w,).
-            config: Configuration flags of all points.
-            stop: The arm stops where the first piece ends.
-
-        Raises:
-            CloneError: They cannot be written there.
         """
 
 

@@ -12,6 +12,7 @@ from postproc.language import ir
 from postproc.language.analysis.task_language import TaskLanguage, check_routines
 from postproc.language.analysis.task_machine import follow
 from postproc.language.archive import Archive
+from postproc.language.insert_moves import Splitter
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
 from postproc.language.krl.clones import KrlCloner
@@ -25,7 +26,6 @@ from postproc.language.krl.user_sources import acting_sources
 from postproc.language.language import (
     Cloner,
     JobReading,
-    Splitter,
     Start,
 )
 from postproc.language.measuring_program import (

@@ -12,11 +12,11 @@ import numpy as np
 from postproc.arrays import release_memory
 from postproc.exceptions import ProgramError
 from postproc.files import base_name
+from postproc.language.insert_moves import Splitter
 from postproc.language.language import (
     Cloner,
     JobReading,
     Language,
-    Splitter,
     Start,
 )
 from postproc.language.measuring_program import MeasuringProgram

@@ -12,10 +12,10 @@ from postproc.files import FolderListing
 from postproc.language.analysis.task_language import TaskLanguage, check_routines
 from postproc.language.analysis.task_machine import follow
 from postproc.language.archive import Archive
+from postproc.language.insert_moves import Splitter
 from postproc.language.language import (
     Cloner,
     JobReading,
-    Splitter,
     Start,
 )
 from postproc.language.measuring_program import MeasuringProgram
