@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from postproc.exceptions import ProgramError
-from postproc.language.text.lexer import NAME_MARK, WHOLE, scan_lines
+from postproc.language.text.lexer import scan_lines
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source, source_from_bytes
 from tests.reference.text import form_of, mask_line, number_value
@@ -63,8 +63,6 @@ def test_files_are_scanned_as_lines_are_masked(parts: list[str]) -> None:
         at = int(starts[row])
         mine = slice(masked.first[row], masked.first[row + 1])
         form, names = form_of(wanted.mask)
-        if NAME_MARK in wanted.mask:
-            form = WHOLE.decode() + wanted.mask
         assert masked.masks[masked.shape[row]].decode("latin-1") == form
         own = masked.name[masked.name_first[row] : masked.name_first[row + 1]]
         assert tuple(masked.names[k] for k in own) == names

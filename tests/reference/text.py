@@ -85,6 +85,8 @@ def _mask(line: str, tokens: re.Pattern[str]) -> MaskedLine:
                 out.append(" ")
             idle = True
             continue
+        if kind == "string":
+            text = text.replace(NAME_MARK, HIDDEN)
         if kind == "number":
             starts.append(found.start() if sign < 0 else sign)
             if sign >= 0:
@@ -135,7 +137,7 @@ def decimals_of(text: str) -> int:
 
 
 NAME_MARK = "\x01"
-UNREADABLE = NAME_MARK * 2
+HIDDEN = "\r"  # stands for that character in a string
 
 # A name up to its first digit, and the rest: what cannot begin one is passed over, and
 # nothing is tried twice.
@@ -154,8 +156,6 @@ def form_of(mask: str) -> tuple[str, tuple[str, ...]]:
     >>> form_of("MOVE TO WP_1 WITH CONDITION[spot('g2', x3)]")
     ("MOVE TO \x01 WITH CONDITION[spot('g2', \x01)]", ('WP_1', 'x3'))
     """
-    if NAME_MARK in mask:  # the text holds that character: no line of any grammar
-        return UNREADABLE + mask, ()
     names: list[str] = []
 
     def mark(found: re.Match[str]) -> str:

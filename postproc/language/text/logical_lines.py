@@ -14,8 +14,6 @@ from postproc.exceptions import ProgramError
 from postproc.language.text.lexer import (
     NAME_MARK,
     NUMBER_MARK,
-    WHOLE,
-    mask_of,
     rescan_lines,
     scan_lines,
 )
@@ -43,21 +41,6 @@ _CLOSES = re.compile(rb" *(?:ENDMOVE|ENDOPEN)\b", re.I)
 
 
 @dataclass(frozen=True)
-class Names:
-    """The names that are taken out of lines.
-
-    Attributes:
-        at: Index into `name` of the first name of every line, (n,).
-        name: Index into `names`.
-        names: The distinct ones.
-    """
-
-    at: Indices
-    name: Indices
-    names: Sequence[str]
-
-
-@dataclass(frozen=True)
 class JoinedLines:
     """Lines of code, those of a statement in one.
 
@@ -72,29 +55,19 @@ class JoinedLines:
     rows: Indices
 
 
-def strip_mask(mask: bytes) -> bytes:
-    """Drop the blanks around the mask of a line, see `ScannedLines`."""
-    if mask[:1] == WHOLE:
-        own = mask.strip()
-        return WHOLE + own if own else own
-    return mask.strip()
-
-
-def join(masks: Sequence[bytes], shape: Indices, names: Names) -> JoinedLines:
+def join(masks: Sequence[bytes], shape: Indices) -> JoinedLines:
     """Join the lines of every statement.
 
     Args:
         masks: The distinct masks of lines.
         shape: Index into `masks` of every line that holds code, (n,).
-        names: What is taken out of the masks.
     """
-    own = [strip_mask(mask) for mask in masks]
-    bare = [mask.removeprefix(WHOLE) for mask in own]
+    own = tuple(mask.strip() for mask in masks)
     opens = np.array(
-        [mask.endswith(b",") and bool(_OPENS.match(mask)) for mask in bare], dtype=bool
+        [mask.endswith(b",") and bool(_OPENS.match(mask)) for mask in own], dtype=bool
     )
     starts = np.flatnonzero(opens[shape])
-    length = _lengths(tuple(bare), shape, starts)
+    length = _lengths(own, shape, starts)
     starts, length = starts[length > 1], length[length > 1]
     kind = alike(shape, starts, starts + length)
     shape, keep = shape.copy(), np.ones(len(shape), dtype=bool)
@@ -104,28 +77,10 @@ def join(masks: Sequence[bytes], shape: Indices, names: Names) -> JoinedLines:
     parts, of_kind = shape.tolist() if len(starts) else [], []
     for k in number_in_order(kind)[1].tolist():
         some = [own[part] for part in parts[starts[k] : starts[k] + length[k]]]
-        if any(mask[:1] == WHOLE for mask in some):
-            of_kind.append(-1)  # a row at a time: their names are filled in again
-        else:
-            of_kind.append(joined[b" ".join(some)])
-    found = np.array(of_kind, dtype=np.int64)[kind]
-    for k in np.flatnonzero(found < 0).tolist():
-        a, b = int(starts[k]), int(starts[k] + length[k])
-        found[k] = joined[_whole([own[part] for part in parts[a:b]], a, names)]
-    shape[starts] = len(masks) + found
+        of_kind.append(joined[b" ".join(some)])
+    shape[starts] = len(masks) + np.array(of_kind, dtype=np.int64)[kind]
     rows = np.flatnonzero(keep)
     return JoinedLines((*own, *joined), shape[rows], rows)
-
-
-def _whole(parts: Sequence[bytes], row: int, names: Names) -> bytes:
-    """Join lines some of which hold their names, from a row on: now all do."""
-    texts = []
-    for at, part in zip(names.at[row : row + len(parts)].tolist(), parts, strict=True):
-        count = 0 if part[:1] == WHOLE else part.count(NAME_MARK.encode())
-        words = [names.names[k] for k in names.name[at : at + count].tolist()]
-        mask = part.removeprefix(WHOLE).decode("latin-1")
-        texts.append(mask_of(mask, tuple(words)) if words else mask)
-    return WHOLE + " ".join(texts).encode("latin-1")
 
 
 def _lengths(masks: tuple[bytes, ...], shape: Indices, starts: Indices) -> Indices:
@@ -174,7 +129,7 @@ class LogicalRows:
     """Logical lines.
 
     Attributes:
-        masks: The distinct masks, stripped, see `ScannedLines`.
+        masks: The distinct masks, stripped.
         shape: Index into `masks`, (n,).
         line: Physical line, (n,).
         first: CSR offsets into the numbers, (n + 1,).
@@ -193,8 +148,7 @@ def with_block_rows(rows: LogicalRows) -> LogicalRows:
     found = {
         k: parts.groups()
         for k, mask in enumerate(rows.masks)
-        if (parts := _DIVIDED.fullmatch(mask.removeprefix(WHOLE)))
-        and not _CLOSED.search(parts[2])
+        if (parts := _DIVIDED.fullmatch(mask)) and not _CLOSED.search(parts[2])
     }
     if not found:
         return rows
@@ -205,8 +159,7 @@ def with_block_rows(rows: LogicalRows) -> LogicalRows:
     for k, (before, behind) in found.items():
         head[k], tail[k] = len(masks), len(masks) + 1
         numbers[k], names[k] = before.count(_NUMBER), before.count(_NAME)
-        kind = WHOLE if rows.masks[k][:1] == WHOLE else b""
-        masks += [kind + before, kind + behind]
+        masks += [before, behind]
     times = np.where(head[rows.shape] != rows.shape, 2, 1)
     row = np.repeat(np.arange(len(times)), times)
     second = np.append(False, row[1:] == row[:-1])
@@ -243,10 +196,10 @@ def read_lines(source: Source, parse: Callable[[str], Any] = str) -> Statements[
             line=1 + found.unterminated[0],
         )
     # Continued lines are joined and empty ones dropped.
-    code = np.array([*map(bool, map(strip_mask, found.masks))], dtype=bool)
+    code = np.array([bool(mask.strip()) for mask in found.masks], dtype=bool)
     rows = np.flatnonzero(code[found.shape])
     at = found.name_first[rows]
-    joined = join(found.masks, found.shape[rows], Names(at, found.name, found.names))
+    joined = join(found.masks, found.shape[rows])
     kept = rows[joined.rows]
     first = np.append(found.first[kept], np.int32(len(found.numbers)))
     lines = with_block_rows(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Indices, Interned, Ints
-from postproc.language.text.lexer import NAME_MARK, WHOLE, form_of, mask_of
+from postproc.language.text.lexer import NAME_MARK, mask_of
 from postproc.language.text.symbol_column import NameColumn
 
 # Rows that are alike, numbered in the order in which they appear.
@@ -162,41 +162,28 @@ def find_shapes(
     """Find the distinct shapes of lines, in the order of appearance.
 
     Args:
-        texts: Masks with their names marked, or `WHOLE` and the mask.
+        texts: Masks with their names marked.
         text: Index into `texts` of every line, (n,).
         at: Index into `name` of the first name of every line, (n,).
         name: Index into `names` of all names in order.
-        names: The distinct ones; those that only whole masks hold are not among them.
+        names: The distinct ones.
 
     Returns:
         The shapes, and that of every line, (n,).
     """
-    forms, whole = Interned[str](), any(one[:1] == WHOLE for one in texts)
-    entered = NameColumn(names) if whole else names
-    form = np.zeros(len(texts), dtype=np.int64)
-    count = np.zeros(len(texts), dtype=np.int64)
-    own = np.full(len(texts), -1, dtype=np.int64)
-    more: list[int] = []
-    for k in text[number_in_order(text)[1]].tolist():
-        one = texts[k].decode("latin-1")
-        found: tuple[str, ...] = ()
-        if texts[k][:1] == WHOLE:
-            one, found = form_of(one[1:])
-            own[k], count[k] = len(name) + len(more), len(found)
-            more += entered.of(found).tolist()
-        else:
-            count[k] = one.count(NAME_MARK)
-        form[k] = forms[one]
-    name = np.append(name, np.array(more, dtype=np.int64))
-    entered.settle()
-    begin = np.where(own[text] >= 0, own[text], at).astype(np.int64)
-    shape, example = _number_lines(form[text], begin, count[text], name, len(entered))
-    kept = text[example]
-    first = np.append(np.int32(0), np.cumsum(count[kept], dtype=np.int32))
-    steps = np.arange(first[-1]) - np.repeat(first[:-1], count[kept])
-    own_names = name[np.repeat(begin[example], count[kept]) + steps]
-    short = form[kept].astype(np.int32), first, own_names.astype(np.int32)
-    return Shapes(tuple(forms), *short, entered), shape
+    forms, used = Interned[str](), text[number_in_order(text)[1]]
+    form, count = np.zeros((2, len(texts)), dtype=np.int64)
+    form[used] = forms.of([texts[k].decode("latin-1") for k in used.tolist()])
+    count[used] = [texts[k].count(NAME_MARK.encode()) for k in used.tolist()]
+    names.settle()
+    form, count, begin = form[text], count[text], at.astype(np.int64)
+    shape, example = _number_lines(form, begin, count, name, len(names))
+    own = count[example]
+    first = np.append(np.int32(0), np.cumsum(own, dtype=np.int32))
+    steps = np.arange(first[-1]) - np.repeat(first[:-1], own)
+    own_names = name[np.repeat(begin[example], own) + steps]
+    short = form[example].astype(np.int32), first, own_names.astype(np.int32)
+    return Shapes(tuple(forms), *short, names), shape
 
 
 def _number_lines(

@@ -9,9 +9,9 @@ import lark
 import pytest
 
 from postproc.language.text import grammars
-from postproc.language.text.lexer import form_of
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import source_from_bytes
+from tests.reference.text import form_of
 
 ROOT = Path(__file__).parents[3]
 
