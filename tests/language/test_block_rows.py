@@ -4,13 +4,14 @@ import pytest
 
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import source_from_bytes
+from tests.reference.text import masks_of
 
 
 def rows(text: str) -> list[tuple[str, int, list[float]]]:
     lines = read_lines(source_from_bytes("job.pdl", text.encode("latin-1")))
     return [
         (
-            lines.shapes[int(lines.shape[row])].replace("\x00", "N"),
+            masks_of(lines.shapes)[int(lines.shape[row])].replace("\x00", "N"),
             int(lines.begin_line[row]),
             lines.value[lines.first[row] : lines.first[row + 1]].tolist(),
         )

@@ -11,7 +11,7 @@ from postproc.exceptions import ProgramError
 from postproc.language.text.lexer import scan_lines
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source, source_from_bytes
-from tests.reference.text import form_of, mask_line, number_value
+from tests.reference.text import form_of, mask_line, masks_of, number_value
 
 PIECES = (
     "1 0 9 . - , ( ) [ ] { } : = * ' \" \\ x e E $ -- .. TO 5.25 -0.5 0x3F 1..n "
@@ -141,7 +141,7 @@ def test_statements_are_joined_up_to_endmove() -> None:
     lines = read_lines(source_from_bytes("x", text))
     assert lines.begin_line.tolist() == [1, 7, 8]
     assert lines.value.tolist() == [3.0, 0.5]
-    assert lines.shapes[int(lines.shape[0])].endswith("ENDMOVE")
+    assert masks_of(lines.shapes)[int(lines.shape[0])].endswith("ENDMOVE")
 
 
 def test_an_open_string_is_refused_with_its_line() -> None:

@@ -10,7 +10,7 @@ from postproc.language.text.lexer import mask_of, scan_lines
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source, source_from_bytes
 from postproc.language.text.statement_table import Statements
-from tests.reference.text import HIDDEN, form_of, mask_line
+from tests.reference.text import HIDDEN, form_of, mask_line, masks_of
 
 PIECES = (
     "MOVE TO WP_1 p2 _a3b x $v1 a$b2 weld l1:: 7up 'p3' '\\'q4' \"r5\" :: , := ( ) [ ] "
@@ -45,7 +45,7 @@ def test_whole_files_are_read_as_line_by_line() -> None:
 
 def shapes_of(data: bytes) -> tuple[Statements[Any], list[str]]:
     lines = read_lines(source_from_bytes("x", data))
-    return lines, [lines.shapes[int(lines.shape[row])] for row in range(len(lines))]
+    return lines, [masks_of(lines.shapes)[k] for k in lines.shape.tolist()]
 
 
 def test_shapes_are_what_lines_say_without_numbers() -> None:
@@ -55,8 +55,8 @@ def test_shapes_are_what_lines_say_without_numbers() -> None:
     lines, found = shapes_of("\n".join(said).encode("latin-1"))
     masks = [mask_line(line).mask.strip() for line in said]
     assert found == [mask for mask in masks if mask]
-    assert len(lines.shapes) == len({*found}) == len({*lines.shapes})
-    assert [*dict.fromkeys(found)] == [*lines.shapes]
+    assert len(lines.shapes) == len({*found}) == len({*masks_of(lines.shapes)})
+    assert [*dict.fromkeys(found)] == masks_of(lines.shapes)
     forms = {form_of(mask)[0] for mask in found}
     assert {*lines.shapes.texts} == forms
 

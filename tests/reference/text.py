@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from postproc.language.text.lexer import mask_of
+from postproc.language.text.templates import Shapes
+
 NUMBER_MARK = "\0"
 
 NUMBER = (
@@ -145,6 +148,12 @@ _NUMBERED = r"[A-Za-z_](?<![\w$].)[A-Za-z_]*+[^\W\d]*+\d\w*+(?! *::)"
 _STRING_OR_NAME = re.compile(
     rf"(?P<string>'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\")|{_NUMBERED}"
 )
+
+
+def masks_of(shapes: Shapes) -> list[str]:
+    """Return the masks of some shapes, with their names."""
+    forms = [shapes.texts[k] for k in shapes.form.tolist()]
+    return [mask_of(form, shapes.names_of(k)) for k, form in enumerate(forms)]
 
 
 def form_of(mask: str) -> tuple[str, tuple[str, ...]]:

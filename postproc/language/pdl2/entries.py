@@ -119,7 +119,7 @@ class Rows(Mapping[str, int]):
 
 
 @dataclass(frozen=True, eq=False)
-class Entries(Mapping[str, Entry]):
+class Entries:
     """k entries, and those of them that have a name of their own by that.
 
     Attributes:
@@ -180,18 +180,6 @@ class Entries(Mapping[str, Entry]):
         """Let go of the numbers of positions: they can be read again."""
         known = slim(np.isfinite(self.numbers))
         return replace(self, numbers=np.empty((0, 6)), known=known)
-
-    def __len__(self) -> int:
-        """Return how many names have one entry."""
-        return len(self.row)
-
-    def __iter__(self) -> Iterator[str]:
-        """Go through the names in the order of the file."""
-        return iter(self.row)
-
-    def __getitem__(self, name: str) -> Entry:
-        """Return the entry of a lower-case name."""
-        return self.entry(self.row[name])
 
     def entry(self, row: int) -> Entry:
         """Return the entry of a row."""

@@ -6,13 +6,13 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
-from typing import Any, Generic, TypeVar, overload
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Indices, Interned, Ints
-from postproc.language.text.lexer import NAME_MARK, mask_of
+from postproc.language.text.lexer import NAME_MARK
 from postproc.language.text.symbol_column import NameColumn
 
 # Rows that are alike, numbered in the order in which they appear.
@@ -87,7 +87,7 @@ AnyInts = NDArray[np.signedinteger[Any]]
 
 
 @dataclass(frozen=True, eq=False)
-class Shapes(Sequence[str]):
+class Shapes:
     """k distinct masks of lines; the text of one is made when it is asked for.
 
     Attributes:
@@ -107,22 +107,6 @@ class Shapes(Sequence[str]):
     def __len__(self) -> int:
         """Return the number of shapes."""
         return len(self.form)
-
-    @overload
-    def __getitem__(self, shape: int) -> str: ...
-    @overload
-    def __getitem__(self, shape: slice) -> Sequence[str]: ...
-    def __getitem__(self, shape: int | slice) -> str | Sequence[str]:
-        """Return the mask of a shape."""
-        if isinstance(shape, slice):
-            return [self[k] for k in range(*shape.indices(len(self)))]
-        if not 0 <= shape < len(self):
-            raise IndexError(shape)
-        return mask_of(self.texts[self.form[shape]], self.names_of(shape))
-
-    def __iter__(self) -> Iterator[str]:
-        """Go through the masks."""
-        return (self[k] for k in range(len(self)))
 
     def __eq__(self, other: object) -> bool:
         """Tell whether the masks are those of other shapes."""
@@ -277,7 +261,7 @@ def _match_case(name: str, letters: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class ParsedShapes(Sequence[T], Generic[T]):
+class ParsedShapes(Generic[T]):
     """What each of k shapes says, made from its form when it is asked for.
 
     Attributes:
@@ -294,14 +278,8 @@ class ParsedShapes(Sequence[T], Generic[T]):
         """Return the number of shapes."""
         return len(self.shapes)
 
-    @overload
-    def __getitem__(self, shape: int) -> T: ...
-    @overload
-    def __getitem__(self, shape: slice) -> Sequence[T]: ...
-    def __getitem__(self, shape: int | slice) -> T | Sequence[T]:
+    def __getitem__(self, shape: int) -> T:
         """Return what a shape says."""
-        if isinstance(shape, slice):
-            return [self[k] for k in range(*shape.indices(len(self)))]
         made = self._made.get(shape)
         if made is None:
             made = self._made[shape] = self.once(shape)

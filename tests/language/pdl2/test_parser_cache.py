@@ -11,7 +11,6 @@ import pytest
 from postproc.language.text import grammars
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import source_from_bytes
-from tests.reference.text import form_of
 
 ROOT = Path(__file__).parents[3]
 
@@ -56,8 +55,8 @@ def forms() -> list[str]:
     """Return the forms of all sample programs, and of each one broken in its middle."""
     found: dict[str, None] = {}
     for path in sorted((ROOT / "programs").glob("*.pdl")):
-        masks = read_lines(source_from_bytes(path.name, path.read_bytes())).shapes
-        found |= dict.fromkeys(form_of(mask)[0] for mask in masks)
+        lines = read_lines(source_from_bytes(path.name, path.read_bytes()))
+        found |= dict.fromkeys(lines.shapes.texts)
     return [*found, *(f[: len(f) // 2] + ") ::" + f[len(f) // 2 :] for f in found)]
 
 
