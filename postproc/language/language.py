@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from postproc.arrays import Floats, Ints
 from postproc.files import FolderListing
@@ -190,6 +191,8 @@ class Language(ABC):
             on its own; else the cell must say so itself.
         names_numbers: Positions stand in braces, with a name before every number.
         via_first: The point on the way of an arc stands before its end.
+        names: What lines begin with that name a point, tried in order.
+        goes_on: What names a point may stand on a line before its numbers.
     """
 
     name: str
@@ -200,6 +203,8 @@ class Language(ABC):
     tells_accuracy: bool = True
     names_numbers: bool = False
     via_first: bool = True
+    names: ClassVar[Sequence[re.Pattern[str]]]
+    goes_on: ClassVar[bool] = False
 
     @abstractmethod
     def recognises(self, text: bytes) -> bool:
@@ -245,7 +250,6 @@ class Language(ABC):
         """Tell whether the numbers of a line are joint angles, as far as it shows."""
         return False
 
-    @abstractmethod
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
     ) -> Iterator[str]:
@@ -256,6 +260,19 @@ class Language(ABC):
             lines: All of them.
             wanted: 1-based lines, ascending but for 0: those that it does not have.
         """
+        name, seen = "", 0
+        for line in wanted:
+            if line:
+                first = seen if self.goes_on else line - 1
+                before = (self._name(lines[k]) for k in range(line - 1, first - 1, -1))
+                name, seen = next(filter(None, before), name * self.goes_on), line
+            yield name if line else ""
+
+    def _name(self, line: bytes) -> str:
+        """Name what a line begins, "" where it goes on with what another began."""
+        text = line.decode("latin-1")
+        found = next(filter(None, (one.match(text) for one in self.names)), None)
+        return " ".join(filter(None, found.groups())) if found else ""
 
     def read_archive(self, folder: Path) -> Archive | None:
         """Return what the archive of a controller gives, None for any other folder."""

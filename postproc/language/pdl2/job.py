@@ -177,11 +177,6 @@ class InitialValues:
         own = self.points.parts() if self.points is not None else ()
         return chain(own, (key for key in self.other if self.point(key) < 0))
 
-    def __iter__(self) -> Iterator[str]:
-        """Go through the keys."""
-        own = self.points.keys() if self.points is not None else ()
-        return chain(own, (key for key in self.other if self.point(key) < 0))
-
 
 # The files together: what a name means where, and what must stay.
 
