@@ -13,7 +13,6 @@ from typing import Any, ClassVar, Protocol
 
 from postproc.arrays import Floats, Ints
 from postproc.files import FolderListing
-from postproc.language.archive import Archive
 from postproc.language.insert_moves import Splitter
 from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.pose_encoding import Dialect
@@ -176,6 +175,28 @@ class Cloner(ABC):
         Raises:
             CloneError: A value stands where it cannot be given twice.
         """
+
+
+@dataclass(frozen=True)
+class Archive:
+    """What the archive of a controller gives.
+
+    Attributes:
+        place: Of the list of frames, below the folder that was asked for.
+        entries: Numbers of what is set, by the plural that names it.
+        load: The first load: mass [kg] and centre [mm], () for none.
+        home: Joint angles of the home position [deg], () where there is none.
+        root: Base of the arm as a position record, () where it is not known.
+        external: Its external axes by number, and what the archive calls them, if
+            anything.
+    """
+
+    place: str
+    entries: Mapping[str, tuple[int, ...]]
+    load: tuple[float, ...]
+    home: tuple[float, ...]
+    root: tuple[float, ...]
+    external: Mapping[int, str]
 
 
 class Language(ABC):

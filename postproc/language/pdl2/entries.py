@@ -20,8 +20,6 @@ from postproc.language.text.templates import (
     number_in_order,
 )
 
-# The entries of a variable file as columns; single ones are made when asked for.
-
 EntryLines = Statements[EntryPart | None]
 POSITIONS = ("POS", "XTND", "JNTP")
 NESTED = ("REC", "NODE", "PATH")
@@ -41,39 +39,13 @@ def kind_of(code: str) -> tuple[str, bool]:
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One variable or array element with its value.
-
-    Attributes:
-        name: As it is written, array elements as ``tab[3]``.
-        kind: POS, JNTP, XTND, or another type's code, of which only a scalar is kept.
-        line: 1-based line of its head.
-        numbers: Six numbers of a position (or the one number of a scalar), None where
-            uninitialised or missing.
-        slots: Index of each number in the file, -1 for none.
-        aux: (axis, value) of auxiliary axes.
-        config: Configuration string or None.
-        shared: Other programs see it (Xport).
-        arm: Arm number, 0 where it is not said.
-    """
-
-    name: str
-    kind: str
-    line: int
-    numbers: tuple[float | None, ...]
-    slots: tuple[int, ...]
-    aux: tuple[tuple[int, float | None], ...]
-    config: str | None
-    shared: bool
-    arm: int
-
-
-@dataclass(frozen=True)
 class Layout:
     """What entries that are written alike have in common.
 
     Attributes:
-        kind, shared, config: See `Entry`.
+        kind: POS, JNTP, XTND, or another type's code, of which only a scalar is kept.
+        shared: Other programs see it (Xport).
+        config: Configuration string or None.
         axes: Auxiliary axes, ascending.
         seen: How many values are written, ``****`` counted.
     """
@@ -120,7 +92,7 @@ class Rows(Mapping[str, int]):
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """k entries, and those of them that have a name of their own by that.
+    """k variables or array elements, and those by name that have one of their own.
 
     Attributes:
         row: Row of each lower-case name; names with two entries are missing.
@@ -181,20 +153,18 @@ class Entries:
         known = slim(np.isfinite(self.numbers))
         return replace(self, numbers=np.empty((0, 6)), known=known)
 
-    def entry(self, row: int) -> Entry:
-        """Return the entry of a row."""
-        layout = self.layouts[int(self.layout[row])]
-        return Entry(
-            self.name[row],
-            layout.kind,
-            int(self.line[row]),
-            _numbers_or_none(self.numbers[row]),
-            tuple(self.slots[row].tolist()),
-            tuple(zip(layout.axes, _numbers_or_none(self.aux[row]), strict=False)),
-            layout.config,
-            layout.shared,
-            int(self.arm[row]),
-        )
+    def layout_of(self, row: int) -> Layout:
+        """Return how an entry is written."""
+        return self.layouts[int(self.layout[row])]
+
+    def numbers_of(self, row: int) -> tuple[float | None, ...]:
+        """Return the numbers of an entry, None where uninitialised or missing."""
+        return _numbers_or_none(self.numbers[row])
+
+    def aux_of(self, row: int) -> tuple[tuple[int, float | None], ...]:
+        """Return the auxiliary axes of an entry, each with its value."""
+        axes = self.layout_of(row).axes
+        return tuple(zip(axes, _numbers_or_none(self.aux[row]), strict=False))
 
 
 def _numbers_or_none(values: Floats) -> tuple[float | None, ...]:

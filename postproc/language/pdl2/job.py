@@ -92,14 +92,15 @@ class FilePoints:
 
     def position(self, row: int) -> Position:
         """Return the value of a point."""
-        entry = self.entries.entry(row)
+        entries, layout = self.entries, self.entries.layout_of(row)
+        slots = entries.slots[row].tolist()
         return Position(
-            entry.kind == "JNTP",
-            entry.numbers,
-            tuple(self.base + slot if slot >= 0 else -1 for slot in entry.slots),
-            entry.config,
-            entry.aux,
-            entry.name,
+            layout.kind == "JNTP",
+            entries.numbers_of(row),
+            tuple(self.base + slot if slot >= 0 else -1 for slot in slots),
+            layout.config,
+            entries.aux_of(row),
+            entries.name[row],
             taught=bool(self.taught[row]),
             shared=bool(self.shared[row]),
         )

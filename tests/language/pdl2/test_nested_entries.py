@@ -62,7 +62,7 @@ def known(found: Resolved) -> list[float | int]:
 
 def first_numbers(variables: VariableFile) -> dict[str, float | None]:
     entries = variables.entries
-    return {name: entries.entry(row).numbers[0] for name, row in entries.row.items()}
+    return {name: entries.numbers_of(row)[0] for name, row in entries.row.items()}
 
 
 @pytest.mark.parametrize(
@@ -102,12 +102,11 @@ def test_values_on_the_line_of_the_field():
         "NODE[2]\n$MAIN_XTND XTND Arm: 1 Ax: 1 X: 2 Y: 3 Z: 4 A: 5 E: 6 R: 7 1: 45\n"
     )
     entries = read(text).entries
-    first, second = (
-        entries.entry(entries.row[f"pth.node[{name}"])
-        for name in ("1].$main_jntp", "2].$main_xtnd")
-    )
-    assert first.numbers == (1.5, 0, -90, 0, 60, 0)
-    assert first.aux == ((1, 90.0),) and second.aux == ((1, 45.0),)
+    names = "pth.node[1].$main_jntp", "pth.node[2].$main_xtnd"
+    first, second = (entries.row[name] for name in names)
+    assert entries.numbers_of(first) == (1.5, 0, -90, 0, 60, 0)
+    assert entries.aux_of(first) == ((1, 90.0),)
+    assert entries.aux_of(second) == ((1, 45.0),)
     found = followed(text, "MOVE JOINT TO pth.NODE[1]", "MOVE LINEAR TO pth.NODE[2]")
     assert known(found) == [1.5, 2.0]
 
@@ -172,7 +171,7 @@ def test_too_many_values_are_none():
     text = path("NODE[1]") + " X: 7.00\n"
     variables = read(text)
     row = variables.entries.row["pth.node[1].$main_pos"]
-    assert variables.entries.entry(row).numbers == (None,) * 6
+    assert variables.entries.numbers_of(row) == (None,) * 6
     assert [d.code for d in variables.diagnostics] == ["lsv-too-many"]
 
 
