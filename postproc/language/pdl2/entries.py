@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -267,123 +267,84 @@ def _may_be_field(entered: EntryPart | None) -> bool:
     return entered.name.startswith("$") or not entered.variable
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Read:
-    """One entry of a layout, read for all of them: places instead of numbers."""
+    """One entry, read for all that are laid out alike.
 
-    kind: str
-    places: list[Place] = field(default_factory=lambda: [_NONE] * 6)
-    aux: dict[int, Place] = field(default_factory=dict)
-    config: str | None = None
-    seen: int = 0
+    Attributes:
+        places: Where its six numbers stand.
+        aux: Where the value of each auxiliary axis does.
+        layout: The layout.
+    """
 
-    def put(self, at: int, place: Place) -> None:
-        self.seen += 1
-        if at < 6:
-            self.places[at] = place
-
-    def take(self, row: int, entered: EntryPart, axes: Iterator[int]) -> None:
-        """Take in a line; `axes` are the numbers of the axes in it."""
-        for letter, slot in entered.components:
-            self.put(_LETTERS.index(letter.upper()), (row, slot))
-        for _, slot in entered.axes:
-            axis = next(axes)
-            joint = self.kind == "JNTP"
-            if joint and 1 <= axis <= 6:
-                self.put(axis - 1, (row, slot))
-            elif axis >= 1:
-                self.aux[axis - 6 if joint else axis] = (row, slot)
-        for slot in entered.plain:
-            self.put(self.seen, (row, slot))
-        if entered.config is not None:
-            self.config = entered.config
+    places: tuple[Place, ...]
+    aux: Mapping[int, Place]
+    layout: Layout
 
     @classmethod
     def of(
-        cls, kind: str, parts: Sequence[EntryPart | None], axes: Iterable[int]
+        cls, head: EntryPart, parts: Sequence[EntryPart | None], axes: Iterable[int]
     ) -> Self:
         """Take in all lines of an entry whose axes have these numbers."""
-        read, numbered = cls(kind), iter(axes)
-        for row, entered in enumerate(parts):
-            if entered is not None:
-                read.take(row, entered, numbered)
-        return read
-
-    def layout(self, shared: bool) -> Layout:
-        """Describe it."""
-        axes = tuple(sorted(self.aux))
-        return Layout(self.kind, shared, self.config, axes, self.seen)
-
-
-@dataclass
-class _Columns:
-    """What the entries of a file hold, as far as it has been read."""
-
-    numbers: Floats
-    slots: Indices
-    layout: Ints
-    arm: Ints
-    layouts: list[Layout] = field(default_factory=list)
-    aux: list[tuple[Ints, Floats]] = field(default_factory=list)
-
-    @classmethod
-    def blank(cls, k: int) -> Self:
-        """Make room for k entries."""
-        slots = np.full((k, 6), -1, dtype=np.int32)
-        layout, arm = np.zeros(k, dtype=np.int64), np.zeros(k, dtype=np.int64)
-        return cls(np.full((k, 6), np.nan), slots, layout, arm)
-
-    def fill(
-        self, lines: EntryLines, some: Ints, first: Ints, read: _Read, shared: bool
-    ) -> None:
-        """Enter those that are laid out alike.
-
-        Args:
-            lines: The file.
-            some: Which entries.
-            first: The row at which each begins.
-            read: What stands where in them.
-            shared: Whether other programs may read them.
-        """
-        for at, (row, slot) in enumerate(read.places):
-            if slot >= 0:
-                self.numbers[some, at] = _values(lines, first + row, slot)
-                self.slots[some, at] = lines.first[first + row] + slot
-        places = [read.aux[axis] for axis in sorted(read.aux)]
-        self.aux.append((some, _columns(lines, first, places)))
-        self.layout[some] = len(self.layouts)
-        self.layouts.append(read.layout(shared))
+        kind, numbered = kind_of(head.type)[0], iter(axes)
+        joint, places, aux = kind == "JNTP", [_NONE] * 6, dict[int, Place]()
+        config, seen = None, 0
+        for row, line in enumerate(parts):
+            if line is None:
+                continue
+            found = [(_LETTERS.index(k.upper()), slot) for k, slot in line.components]
+            for (_, slot), axis in zip(line.axes, numbered, strict=False):
+                if joint and 1 <= axis <= 6:
+                    found.append((axis - 1, slot))
+                elif axis >= 1:
+                    aux[axis - 6 if joint else axis] = row, slot
+            found += enumerate(line.plain, seen + len(found))
+            for at, slot in found:
+                if at < 6:
+                    places[at] = row, slot
+            seen += len(found)
+            config = config if line.config is None else line.config
+        layout = Layout(kind, head.shared, config, tuple(sorted(aux)), seen)
+        return cls(tuple(places), aux, layout)
 
 
 def read_records(lines: EntryLines, records: Records) -> Entries:
     """Read the entries of a file, layout by layout; no name is told yet to be twice."""
-    said = lines.said
-    form, k = said.form[lines.shape], len(records.first)
-    c = _Columns.blank(k)
+    said, k = lines.said, len(records.first)
+    form, layouts = said.form[lines.shape], list[Layout]()
+    numbers, slots = np.full((k, 6), np.nan), np.full((k, 6), -1, dtype=np.int32)
+    layout, arm = np.zeros((2, k), dtype=np.int64)
+    aux = list[tuple[Ints, Floats]]()
     for mine in _alike(form, records):
         a, b = int(records.first[mine[0]]), int(records.closed[mine[0]])
         parts = [said.said[f] for f in form[a:b].tolist()]
         head = said.said[int(form[records.head[mine[0]]])]
         assert head is not None
         if head.arm >= 0:
-            c.arm[mine] = _whole(_values(lines, records.head[mine], head.arm))
+            arm[mine] = _whole(_values(lines, records.head[mine], head.arm))
         for some, axes in _by_axes(lines, records.first, mine, parts):
-            read = _Read.of(kind_of(head.type)[0], parts, axes)
-            c.fill(lines, some, records.first[some], read, head.shared)
-    most = max((values.shape[1] for _, values in c.aux), default=0)
-    stacked = np.full((k, most), np.nan)
-    for rows, values in c.aux:
+            read, first = _Read.of(head, parts, axes), records.first[some]
+            for at, (row, slot) in enumerate(read.places):
+                if slot >= 0:
+                    numbers[some, at] = _values(lines, first + row, slot)
+                    slots[some, at] = lines.first[first + row] + slot
+            places = [read.aux[axis] for axis in read.layout.axes]
+            aux.append((some, _columns(lines, first, places)))
+            layout[some] = len(layouts)
+            layouts.append(read.layout)
+    stacked = np.full((k, max((v.shape[1] for _, v in aux), default=0)), np.nan)
+    for rows, values in aux:
         stacked[rows, : values.shape[1]] = values
     return Entries(
         Rows(NameColumn(), np.empty(0, dtype=np.int32)),
         _names(lines, records),
         lines.begin_line[records.first],
-        slim(c.layout),
-        tuple(c.layouts),
-        c.numbers,
-        c.slots,
+        slim(layout),
+        tuple(layouts),
+        numbers,
+        slots,
         stacked,
-        slim(c.arm),
+        slim(arm),
     )
 
 

@@ -418,7 +418,7 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
     shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
     shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
     named = entries.row.rows
-    own, other = known.copy(), {}
+    own, exported = known.copy(), dict[str, int]()
     marked = _list_rows_where(
         lambda v: v.taught or bool(v.exported), place.program, entries
     )
@@ -436,7 +436,7 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
             if key in world.imported:
                 world.initial[key + name[len(root) :]] = Nothing(IMPORTED)
             else:
-                other[key + name[len(root) :]] = row
+                exported[key + name[len(root) :]] = row
     for row in named[~known[named]].tolist():
         name = entries.name[row].lower()
         root = root_of(name)
@@ -445,8 +445,10 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
         _enter(world, file, row, key, arm)
     prefix = f"{place.program.name}/"
     world.initial.points = FilePoints(
-        prefix, own, other, entries, base, shared, taught, np.zeros(len(own), bool)
+        prefix, own, entries, base, shared, taught, np.zeros(len(own), bool)
     )
+    for key, row in exported.items():
+        world.initial[key] = world.initial.points.position(row)
 
 
 def _list_rows_where(
