@@ -249,6 +249,15 @@ class NameColumn(Sequence[str]):
 
 # text.rs: lines of a file, but for numbers and names (`postproc.language.lexer`)
 def line_starts(data: bytes) -> Indices: ...
+def scan_logical_lines(
+    data: bytes, starts: Indices
+) -> tuple[
+    list[bytes],
+    tuple[Indices, Indices, Indices, Indices],
+    tuple[SpanColumns, Floats],
+    tuple[NameColumn, Indices],
+    list[int],
+]: ...
 def scan_lines(
     data: bytes, starts: Indices
 ) -> tuple[

@@ -19,6 +19,7 @@ mod heap;
 mod interned;
 mod inverse;
 mod lines;
+mod logical;
 mod model;
 mod names;
 mod number;
@@ -96,6 +97,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(table::table, module)?)?;
     module.add_function(wrap_pyfunction!(text::line_starts, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
+    module.add_function(wrap_pyfunction!(logical::scan_logical_lines, module)?)?;
     module.add_function(wrap_pyfunction!(rescan::rescan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(spans::number_spans, module)?)?;
     module.add_function(wrap_pyfunction!(statements::scan_statements, module)?)?;

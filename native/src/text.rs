@@ -3,6 +3,8 @@
 //! `tests/reference/text.py` defines with regular expressions what is a number, a string,
 //! a comment and a name, one line at a time.
 
+use std::borrow::Cow;
+
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
@@ -243,7 +245,7 @@ impl Masked {
     }
 
     /// Take the numbered names out of the mask.
-    fn form(&self, form: &mut Vec<u8>, mut name: impl FnMut(&[u8])) {
+    pub fn form(&self, form: &mut Vec<u8>, mut name: impl FnMut(&[u8])) {
         let mask = &self.mask[..];
         form.clear();
         let mut at = 0;
@@ -343,6 +345,15 @@ impl<'a> Text<'a> {
         self.starts.get(i).map_or(self.data.len(), |at| *at as usize)
     }
 
+    /// Return the first line without its end, and blanks for a byte order mark.
+    pub fn unmarked(&self) -> Cow<'a, [u8]> {
+        let line = if self.len() == 0 { b"" } else { self.line(0) };
+        match line.strip_prefix(MARK) {
+            Some(rest) => Cow::Owned([b"   ", rest].concat()),
+            None => Cow::Borrowed(line),
+        }
+    }
+
     /// Return a line without its end.
     pub fn line(&self, i: usize) -> &'a [u8] {
         without_end(&self.data[self.begin(i)..self.begin(i + 1)])
@@ -377,23 +388,16 @@ pub fn scan_lines<'py>(
     Vec<usize>,
 )> {
     let lines = Text::new(data.as_bytes(), flat(&starts)?)?;
-    let data = lines.data;
     let (mut masks, mut names) = (Interned::default(), Interned::default());
     let (mut mask, mut comment) = (Vec::new(), Vec::new());
     let (mut first, mut name_first) = (vec![0_i32], vec![0_i32]);
     let (mut places, mut value) = (Spans::default(), Vec::new());
     let (mut name, mut open) = (Vec::new(), Vec::new());
     let (mut line, mut form) = (Masked::default(), Vec::new());
-    let unmarked: Vec<u8>;
-    let head = if lines.len() == 0 { 0 } else { lines.begin(1) };
-    let mut first_line = &data[..head];
-    if data.starts_with(MARK) {
-        unmarked = [b"   ", &data[MARK.len()..head]].concat();
-        first_line = &unmarked;
-    }
+    let first_line = lines.unmarked();
     each(py, lines.len(), |i| {
         let at = lines.begin(i);
-        let text = if i == 0 { without_end(first_line) } else { lines.line(i) };
+        let text = if i == 0 { &first_line[..] } else { lines.line(i) };
         if !line.read(text) {
             open.push(i);
         }
