@@ -339,7 +339,7 @@ def exits_of(
     while at is not None:
         here, raised = handlers(at), NO_NUMBERS
         lost = lost or here.moves
-        for number, end in _reached_ends(here, numbers):
+        for number, end in _list_ends(here, numbers):
             if end == "raise":
                 raised = together(raised, number)
             else:
@@ -350,9 +350,7 @@ def exits_of(
         at, row = caller_of(at)
 
 
-def _reached_ends(
-    here: ErrorHandlers, numbers: Numbers
-) -> Iterator[tuple[Numbers, str]]:
+def _list_ends(here: ErrorHandlers, numbers: Numbers) -> Iterator[tuple[Numbers, str]]:
     """Yield the words with which handlers go on, and the errors that lead there."""
     for clause in here.clauses:
         taken = clause.numbers if clause.listed else numbers
