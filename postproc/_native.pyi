@@ -249,6 +249,9 @@ class NameColumn(Sequence[str]):
 
 # text.rs: lines of a file, but for numbers and names (`postproc.language.lexer`)
 def line_starts(data: bytes) -> Indices: ...
+def number_in_order(
+    values: NDArray[np.int64], ends: tuple[NDArray[np.int64], NDArray[np.int64]] | None
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]: ...
 def scan_logical_lines(
     data: bytes, starts: Indices
 ) -> tuple[

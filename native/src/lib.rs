@@ -96,6 +96,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(compare::compare_lines, module)?)?;
     module.add_function(wrap_pyfunction!(table::table, module)?)?;
     module.add_function(wrap_pyfunction!(text::line_starts, module)?)?;
+    module.add_function(wrap_pyfunction!(interned::number_in_order, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(logical::scan_logical_lines, module)?)?;
     module.add_function(wrap_pyfunction!(rescan::rescan_lines, module)?)?;

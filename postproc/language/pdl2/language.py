@@ -22,7 +22,7 @@ from postproc.language.language import (
 from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve
-from postproc.language.pdl2.names import NESTED, part_names
+from postproc.language.pdl2.nested import name_parts
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import Program, parse, parse_again
 from postproc.language.pdl2.side_effects import dead_lines
@@ -37,6 +37,7 @@ from postproc.language.text.source import Source
 from postproc.language.visits import never_reached
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
+_NESTED = re.compile(rb"\s*[A-Za-z_]\w*\s+(?:A?REC|PATH)\b", re.I)
 Parsed = Program | VariableFile
 
 
@@ -121,8 +122,8 @@ class Pdl2(Language):
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
     ) -> Iterator[str]:
         """Name variables; in a file with records or paths their parts, too."""
-        if any(map(NESTED.match, lines)):
-            return part_names(lines, wanted)
+        if any(map(_NESTED.match, lines)):
+            return name_parts(Source(file, b"\n".join(lines)), wanted)
         return super().target_names(file, lines, wanted)
 
     def write_measuring(self, program: MeasuringProgram, file: Path) -> str:

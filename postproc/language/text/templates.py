@@ -11,13 +11,12 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc import _native
 from postproc.arrays import Bools, Indices, Interned, Ints
 from postproc.language.text.lexer import NAME_MARK
 from postproc.language.text.symbol_column import NameColumn
 
 # Rows that are alike, numbered in the order in which they appear.
-
-_SHORT = 12  # longer sequences are told apart in Python
 
 
 def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
@@ -31,31 +30,17 @@ def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
     >>> alike(np.array([7, 8, 7, 8, 9]), np.array([0, 2, 2]), np.array([2, 4, 5]))
     array([0, 0, 1])
     """
-    length = last - first
-    if int(length.max(initial=0)) <= _SHORT:
-        return _by_columns(values, first, length)
-    data = np.ascontiguousarray(values, dtype=np.int32).tobytes()
-    ends = zip((4 * first).tolist(), (4 * last).tolist(), strict=True)
-    return Interned[bytes]().of([data[a:b] for a, b in ends])
-
-
-def _by_columns(values: AnyInts, first: AnyInts, length: AnyInts) -> Ints:
-    """Number sequences: first by their lengths, then by one value after the other."""
-    kind, rows = number_in_order(length)[0], np.arange(len(first))
-    size = int(values.max(initial=0)) + 1
-    for at in range(int(length.max(initial=0))):
-        rows = rows[length[rows] > at]
-        others = int(kind.max()) + 1
-        pairs = kind[rows] * size + values[first[rows] + at]
-        kind[rows] = others + number_in_order(pairs)[0]
-    return number_in_order(kind)[0]
+    values, first, last = (
+        np.ascontiguousarray(x, np.int64) for x in (values, first, last)
+    )
+    return _native.number_in_order(values, (first, last))[0]
 
 
 def number_in_order(keys: AnyInts) -> tuple[Ints, Ints]:
     """Number keys in the order in which they appear.
 
     Args:
-        keys: Whole numbers from 0 on, (n,).
+        keys: Whole numbers, (n,).
 
     Returns:
         The number of every row, (n,), and the first row of every number.
@@ -63,22 +48,7 @@ def number_in_order(keys: AnyInts) -> tuple[Ints, Ints]:
     >>> number_in_order(np.array([5, 2, 5]))
     (array([0, 1, 0]), array([0, 1]))
     """
-    if len(keys) == 0:
-        none = np.zeros(0, dtype=np.int64)
-        return none, none
-    if int(keys.max()) <= 2 * len(keys) + 1000:
-        rows = np.arange(len(keys))[::-1]
-        at = np.full(int(keys.max()) + 1, -1)
-        at[keys[::-1]] = rows  # the last one that is written stays: the first row
-        first = np.sort(at[at >= 0])
-        rank = np.empty_like(at)
-        rank[keys[first]] = np.arange(len(first))
-        return rank[keys], first
-    _, example, which = np.unique(keys, return_index=True, return_inverse=True)
-    order = np.argsort(example)
-    ranks = np.empty(len(order), dtype=np.int64)
-    ranks[order] = np.arange(len(order))
-    return ranks[which.ravel()], example[order]
+    return _native.number_in_order(np.ascontiguousarray(keys, np.int64), None)
 
 
 # The shapes of the lines of a file: few forms, with many names filled in.

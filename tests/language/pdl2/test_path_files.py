@@ -7,7 +7,6 @@ import re
 import pytest
 
 from postproc.language.pdl2.language import Pdl2
-from postproc.language.pdl2.names import part_names
 from postproc.report.diff import target_name
 from tests.written import FIRST, LISTED, cli, program
 
@@ -141,7 +140,7 @@ def test_a_point_that_holds_a_node_is_not_cloned(desk):
 def test_names_of_lines_whatever_their_layout():
     text = VALUES.replace("\r\n ", "\r\n")
     lines = text.encode().split(b"\r\n")
-    names = [*part_names(lines, [0, 1, 5, 9, 11, 17, 22])]
+    names = [*Pdl2().target_names("job.lsv", lines, [0, 1, 5, 9, 11, 17, 22])]
     assert names == [
         "",
         "",
@@ -157,3 +156,5 @@ def test_names_of_lines_whatever_their_layout():
 def test_a_line_that_the_original_has_not_has_no_name():
     lines = [b"p1 POS Priv", b"X: 1.0", b"p2 POS Priv"]
     assert [*Pdl2().target_names("job.lsv", lines, [0, 2, 3])] == ["", "p1", "p2"]
+    lines = [b"pth PATH nd Priv", b"x STR 'open", b"p1 POS Priv"]
+    assert [*Pdl2().target_names("job.lsv", lines, [1, 3])] == ["", ""]
