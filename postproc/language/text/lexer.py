@@ -13,7 +13,6 @@ from postproc.language.text.symbol_column import NameColumn
 # any), the comment is gone and idle blanks are dropped. In its *form* every numbered
 # name (``WP_12``, ``p1``) is one mark, too: lines of one form are parsed once.
 
-NUMBER_MARK = "\0"
 NAME_MARK = "\x01"  # a numbered name; a string has CR for it, which no grammar reads
 
 BLANKS = "".join(chr(c) for c in (*range(1, 33), 127) if chr(c) not in "\r\n")

@@ -131,26 +131,15 @@ def find_shapes(
     count[used] = [texts[k].count(NAME_MARK.encode()) for k in used.tolist()]
     names.settle()
     form, count, begin = form[text], count[text], at.astype(np.int64)
-    shape, example = _number_lines(form, begin, count, name, len(names))
+    said, some = np.zeros(len(form), dtype=np.int64), np.flatnonzero(count)
+    said[some] = 1 + alike(name, begin[some], (begin + count)[some])
+    shape, example = number_in_order(form * (int(said.max(initial=0)) + 1) + said)
     own = count[example]
     first = np.append(np.int32(0), np.cumsum(own, dtype=np.int32))
     steps = np.arange(first[-1]) - np.repeat(first[:-1], own)
     own_names = name[np.repeat(begin[example], own) + steps]
     short = form[example].astype(np.int32), first, own_names.astype(np.int32)
     return Shapes(tuple(forms), *short, names), shape
-
-
-def _number_lines(
-    form: Ints, begin: Ints, count: Ints, name: Ints, names: int
-) -> tuple[Ints, Ints]:
-    """Number lines by their forms and their names; as `number_in_order`."""
-    if not len(form) or not count.any():
-        return number_in_order(form)
-    said = np.zeros(len(form), dtype=np.int64)
-    one, many = np.flatnonzero(count == 1), np.flatnonzero(count > 1)
-    said[one] = 1 + name[begin[one]]
-    said[many] = 1 + names + alike(name, begin[many], (begin + count)[many])
-    return number_in_order(form * (int(said.max()) + 1) + said)
 
 
 # What forms say.
