@@ -147,6 +147,7 @@ fn hash(text: &[u8]) -> u32 {
 }
 
 type Longs<'py> = PyReadonlyArray1<'py, i64>;
+type Found<'py> = Bound<'py, PyArray1<i64>>;
 
 /// See whole numbers as bytes.
 fn bytes_of(values: &[i64]) -> &[u8] {
@@ -164,7 +165,7 @@ pub fn number_in_order<'py>(
     py: Python<'py>,
     values: Longs<'py>,
     ends: Option<(Longs<'py>, Longs<'py>)>,
-) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>)> {
+) -> PyResult<(Found<'py>, Found<'py>)> {
     let values = flat(&values)?;
     let ends = match &ends {
         Some((first, last)) => Some((flat(first)?, flat(last)?)),
