@@ -274,8 +274,19 @@ class NameColumn(Sequence[str]):
     def __len__(self) -> int: ...
 
 # text.rs: lines of a file, but for numbers and names (`postproc.language.lexer`)
-def form_of(mask: bytes) -> tuple[bytes, list[str]]: ...
 def line_starts(data: bytes) -> Indices: ...
+def number_in_order(
+    values: NDArray[np.int64], ends: tuple[NDArray[np.int64], NDArray[np.int64]] | None
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]: ...
+def scan_logical_lines(
+    data: bytes, starts: Indices
+) -> tuple[
+    list[bytes],
+    tuple[Indices, Indices, Indices, Indices],
+    tuple[SpanColumns, Floats],
+    tuple[NameColumn, Indices],
+    list[int],
+]: ...
 def scan_lines(
     data: bytes, starts: Indices
 ) -> tuple[

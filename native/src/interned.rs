@@ -1,5 +1,10 @@
 //! Texts by number, in the order in which they are met first.
 
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+
+use crate::rows::{each, flat};
+
 /// A place of the table that holds none.
 const FREE: u32 = u32::MAX;
 /// Of the hash: an odd number without a pattern, 2^64 through the golden ratio.
@@ -139,4 +144,42 @@ fn hash(text: &[u8]) -> u32 {
         hash = (hash.rotate_left(23) ^ u64::from_le_bytes(word)).wrapping_mul(FACTOR);
     }
     (hash >> 32) as u32
+}
+
+type Longs<'py> = PyReadonlyArray1<'py, i64>;
+type Found<'py> = Bound<'py, PyArray1<i64>>;
+
+/// See whole numbers as bytes.
+fn bytes_of(values: &[i64]) -> &[u8] {
+    // SAFETY: the bytes of whole numbers lie behind each other, and any is a byte.
+    unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), size_of_val(values)) }
+}
+
+/// Number sequences of whole numbers, (k,), in the order in which they are met first.
+///
+/// `ends`: where each of them begins and ends; without, each number is one.
+///
+/// Returns: the number of every sequence, (k,), and the first sequence of every number.
+#[pyfunction]
+pub fn number_in_order<'py>(
+    py: Python<'py>,
+    values: Longs<'py>,
+    ends: Option<(Longs<'py>, Longs<'py>)>,
+) -> PyResult<(Found<'py>, Found<'py>)> {
+    let values = flat(&values)?;
+    let ends = match &ends {
+        Some((first, last)) => Some((flat(first)?, flat(last)?)),
+        None => None,
+    };
+    let (mut found, mut example) = (Interned::default(), Vec::new());
+    let count = ends.map_or(values.len(), |(first, last)| first.len().min(last.len()));
+    let numbers = each(py, count, |i| {
+        let (from, to) = ends.map_or((i, i + 1), |(a, b)| (a[i] as usize, b[i] as usize));
+        let number = found.of(bytes_of(&values[from..to]));
+        if number as usize == example.len() {
+            example.push(i as i64);
+        }
+        i64::from(number)
+    })?;
+    Ok((numbers.into_pyarray(py), example.into_pyarray(py)))
 }

@@ -13,7 +13,7 @@ use crate::names::NameColumn;
 use crate::number::value_of;
 use crate::rows::detached;
 use crate::text::{
-    is, number_end, while_is, Masked, DIGIT, FIRST, IN_NAME, MARK, NAME, NUMBER, UNARY, WHOLE,
+    is, number_end, push_hidden, while_is, Masked, DIGIT, FIRST, IN_NAME, MARK, NAME, NUMBER, UNARY,
 };
 
 /// Words that begin a statement, wherever they stand: what came before has no end.
@@ -112,20 +112,8 @@ impl Statement {
         if self.form.last().is_some_and(|last| wordy(*last) && wordy(text[0])) {
             self.form.push(b' ');
         }
-        self.form.extend_from_slice(text);
+        push_hidden(&mut self.form, text);
         self.end = end;
-    }
-
-    /// Keep the whole text as the form where that holds what stands for numbers and names.
-    fn finish(&mut self, data: &[u8]) {
-        let text = &data[self.begin..self.end];
-        if text.iter().any(|b| matches!(*b, NUMBER | NAME)) {
-            self.form.clear();
-            self.names.clear();
-            self.numbers.clear();
-            self.form.push(WHOLE);
-            self.form.extend_from_slice(text);
-        }
     }
 }
 
@@ -323,7 +311,6 @@ impl Cutting for Reader<'_> {
             let mut now = Progress::default();
             while self.token(out, &mut now) {}
         }
-        out.finish(self.data);
         true
     }
 }
@@ -471,7 +458,6 @@ impl Cutting for KrlReader<'_> {
         } else {
             while self.token(out) {}
         }
-        out.finish(self.data);
         true
     }
 }

@@ -3,6 +3,8 @@
 //! `tests/reference/text.py` defines with regular expressions what is a number, a string,
 //! a comment and a name, one line at a time.
 
+use std::borrow::Cow;
+
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
@@ -16,7 +18,7 @@ use crate::spans::{Columns, Spans};
 
 pub const NUMBER: u8 = 0; // stands for a number, in a mask
 pub const NAME: u8 = 1; // for a numbered name, in a form
-pub const WHOLE: u8 = b'\n'; // begins a mask with its names still in it
+pub const HIDDEN: u8 = b'\r'; // for that byte itself in a string, which no grammar reads then
 pub const MARK: &[u8] = b"\xef\xbb\xbf"; // of UTF-8
 
 // What a byte can be.
@@ -108,6 +110,15 @@ fn string_end(line: &[u8], at: usize, strings: Strings) -> Option<usize> {
         i += if line[i] == b'\\' && strings == Strings::Escaped { 2 } else { 1 };
     }
     None
+}
+
+/// Take a token over; a string may hold the byte that stands for a name.
+pub fn push_hidden(out: &mut Vec<u8>, token: &[u8]) {
+    let from = out.len();
+    out.extend_from_slice(token);
+    if matches!(token[0], b'\'' | b'"') {
+        out[from..].iter_mut().filter(|b| **b == NAME).for_each(|b| *b = HIDDEN);
+    }
 }
 
 pub fn while_is(line: &[u8], mut at: usize, kind: u16) -> usize {
@@ -217,7 +228,7 @@ impl Masked {
                 let unary = !begun || is(before, UNARY);
                 let is_sign = matches!(byte, b'-' | b'+') && unary;
                 sign = is_sign.then_some((at, self.mask.len()));
-                self.mask.extend_from_slice(&line[at..end]);
+                push_hidden(&mut self.mask, &line[at..end]);
                 before = line[end - 1];
                 idle = end == at + 1 && kind & IDLE != 0;
                 at = end;
@@ -234,14 +245,9 @@ impl Masked {
     }
 
     /// Take the numbered names out of the mask.
-    fn form(&self, form: &mut Vec<u8>, mut name: impl FnMut(&[u8])) {
+    pub fn form(&self, form: &mut Vec<u8>, mut name: impl FnMut(&[u8])) {
         let mask = &self.mask[..];
         form.clear();
-        if mask.contains(&NAME) {
-            form.push(WHOLE);
-            form.extend_from_slice(mask);
-            return;
-        }
         let mut at = 0;
         while at < mask.len() {
             let byte = mask[at];
@@ -277,17 +283,6 @@ fn is_label(mask: &[u8], end: usize) -> bool {
 
 pub fn latin_1(text: &[u8]) -> String {
     text.iter().map(|b| *b as char).collect()
-}
-
-/// Take the numbered names out of a mask.
-///
-/// Returns: its form, and the names; what holds the mark of a name itself stays whole.
-#[pyfunction]
-pub fn form_of<'py>(py: Python<'py>, mask: &[u8]) -> (Bound<'py, PyBytes>, Vec<String>) {
-    let line = Masked { mask: mask.to_vec(), ..Masked::default() };
-    let (mut form, mut names) = (Vec::new(), Vec::new());
-    line.form(&mut form, |name| names.push(latin_1(name)));
-    (PyBytes::new(py, &form), names)
 }
 
 /// Bytes that are looked at together for the end of a line.
@@ -350,6 +345,15 @@ impl<'a> Text<'a> {
         self.starts.get(i).map_or(self.data.len(), |at| *at as usize)
     }
 
+    /// Return the first line without its end, and blanks for a byte order mark.
+    pub fn unmarked(&self) -> Cow<'a, [u8]> {
+        let line = if self.len() == 0 { b"" } else { self.line(0) };
+        match line.strip_prefix(MARK) {
+            Some(rest) => Cow::Owned([b"   ", rest].concat()),
+            None => Cow::Borrowed(line),
+        }
+    }
+
     /// Return a line without its end.
     pub fn line(&self, i: usize) -> &'a [u8] {
         without_end(&self.data[self.begin(i)..self.begin(i + 1)])
@@ -384,23 +388,16 @@ pub fn scan_lines<'py>(
     Vec<usize>,
 )> {
     let lines = Text::new(data.as_bytes(), flat(&starts)?)?;
-    let data = lines.data;
     let (mut masks, mut names) = (Interned::default(), Interned::default());
     let (mut mask, mut comment) = (Vec::new(), Vec::new());
     let (mut first, mut name_first) = (vec![0_i32], vec![0_i32]);
     let (mut places, mut value) = (Spans::default(), Vec::new());
     let (mut name, mut open) = (Vec::new(), Vec::new());
     let (mut line, mut form) = (Masked::default(), Vec::new());
-    let unmarked: Vec<u8>;
-    let head = if lines.len() == 0 { 0 } else { lines.begin(1) };
-    let mut first_line = &data[..head];
-    if data.starts_with(MARK) {
-        unmarked = [b"   ", &data[MARK.len()..head]].concat();
-        first_line = &unmarked;
-    }
+    let first_line = lines.unmarked();
     each(py, lines.len(), |i| {
         let at = lines.begin(i);
-        let text = if i == 0 { without_end(first_line) } else { lines.line(i) };
+        let text = if i == 0 { &first_line[..] } else { lines.line(i) };
         if !line.read(text) {
             open.push(i);
         }

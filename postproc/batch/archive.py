@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from postproc.language.archive import Archive
+from postproc.language.language import Archive
 from postproc.robot.cell import Cell
 from postproc.robot.pose import record_from_pose
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from postproc.arrays import Floats
-from postproc.language.language import ArcPiece, Splitter
 from postproc.language.text.comment_directives import AT_APPROACH, AT_VIA, INSERTED
 from postproc.language.text.source import (
     LONGEST_LINE,
@@ -70,8 +69,52 @@ class MoveLayout(ABC):
         return Edit(Span(self.start, self.start), text.encode("latin-1"))
 
 
-class LayoutSplitter(Splitter):
-    """Puts points on ways by the layouts of moves."""
+@dataclass(frozen=True)
+class ArcPiece:
+    """A piece of an arc that is cut, from where the piece before it ends.
+
+    Attributes:
+        end: Numbers of its end, (w,); None: as the move has them.
+        via: Numbers of the point on its own way, (w,); None: it is a chord.
+        at_via: Whether it ends at the point on the way of the arc.
+    """
+
+    end: Floats | None
+    via: Floats | None
+    at_via: bool = False
+
+
+class Splitter(ABC):
+    """The files of a job, to put points on the ways of its moves.
+
+    Attributes:
+        unsized: Why points stay out whose blending is not known, "" where the arm
+            passes them however they are blended.
+        keeps_aux: External axes stay where they are on the way to points.
+    """
+
+    unsized: str = ""
+    keeps_aux: bool = False
+
+    @abstractmethod
+    def hinders(self, file: int, line: int) -> str:
+        """Say what in the text of a move forbids points on its way, "" for nothing.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+        """
+
+    @abstractmethod
+    def stops(self, file: int, line: int) -> bool:
+        """Tell whether the arm may stop once more before a move.
+
+        Nothing that may begin a process stands between it and the move before.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+        """
 
     @abstractmethod
     def layout(self, file: int, line: int) -> MoveLayout:
@@ -84,14 +127,35 @@ class LayoutSplitter(Splitter):
     def points(
         self, file: int, line: int, numbers: Floats, config: str, stop: bool
     ) -> Edit:
-        """Write moves to points before another one, see `Splitter.points`."""
+        """Write moves to points in front of a LINEAR move, which they lead up to.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            numbers: Of the points, one behind the other, (k, w).
+            config: Their configuration flags.
+            stop: The arm stops at the first of them.
+
+        Raises:
+            CloneError: They cannot be written there.
+        """
         layout, text = self.layout(file, line), ""
         for number, own in enumerate(numbers):
             text += layout.line(layout.place(own, config), None, stop and number == 0)
         return layout.before(text)
 
     def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
-        """Write a stop to approach a target from, see `Splitter.approach`."""
+        """Write a stop in front of a LINEAR move, from where it leads to its target.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            numbers: Of the stop, (w,).
+            config: Its configuration flags.
+
+        Raises:
+            CloneError: It cannot be written there.
+        """
         layout = self.layout(file, line)
         place = layout.place(numbers, config)
         return layout.before(layout.line(place, None, True, AT_APPROACH))
@@ -105,7 +169,19 @@ class LayoutSplitter(Splitter):
         config: str,
         stop: bool,
     ) -> list[Edit]:
-        """Write pieces of an arc before its move, see `Splitter.arc`."""
+        """Write pieces in front of a CIRCULAR move, which becomes the last of them.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            pieces: The pieces; one ends at the point on the way of the arc.
+            via: Numbers of the point on the way that the move has from then on, (w,).
+            config: Configuration flags of all points.
+            stop: The arm stops where the first piece ends.
+
+        Raises:
+            CloneError: They cannot be written there.
+        """
         layout, text = self.layout(file, line), ""
         begin, behind = layout.via
         old, new = layout.code[begin:behind], layout.place(via, config)

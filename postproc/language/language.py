@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from postproc.arrays import Floats, Ints
 from postproc.files import FolderListing
-from postproc.language.archive import Archive
+from postproc.language.insert_moves import Splitter
 from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.pose_encoding import Dialect
 from postproc.language.text.comment_directives import (
@@ -177,106 +178,25 @@ class Cloner(ABC):
 
 
 @dataclass(frozen=True)
-class ArcPiece:
-    """A piece of an arc that is cut, from where the piece before it ends.
+class Archive:
+    """What the archive of a controller gives.
 
     Attributes:
-        end: Numbers of its end, (w,); None: as the move has them.
-        via: Numbers of the point on its own way, (w,); None: it is a chord.
-        at_via: Whether it ends at the point on the way of the arc.
+        place: Of the list of frames, below the folder that was asked for.
+        entries: Numbers of what is set, by the plural that names it.
+        load: The first load: mass [kg] and centre [mm], () for none.
+        home: Joint angles of the home position [deg], () where there is none.
+        root: Base of the arm as a position record, () where it is not known.
+        external: Its external axes by number, and what the archive calls them, if
+            anything.
     """
 
-    end: Floats | None
-    via: Floats | None
-    at_via: bool = False
-
-
-class Splitter(ABC):
-    """The files of a job, to put points on the ways of its moves.
-
-    Attributes:
-        unsized: Why points stay out whose blending is not known, "" where the arm
-            passes them however they are blended.
-        keeps_aux: External axes stay where they are on the way to points.
-    """
-
-    unsized: str = ""
-    keeps_aux: bool = False
-
-    @abstractmethod
-    def hinders(self, file: int, line: int) -> str:
-        """Say what in the text of a move forbids points on its way, "" for nothing.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-        """
-
-    @abstractmethod
-    def stops(self, file: int, line: int) -> bool:
-        """Tell whether the arm may stop once more before a move.
-
-        Nothing that may begin a process stands between it and the move before.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-        """
-
-    @abstractmethod
-    def points(
-        self, file: int, line: int, numbers: Floats, config: str, stop: bool
-    ) -> Edit:
-        """Write moves to points in front of a LINEAR move, which they lead up to.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-            numbers: Of the points, one behind the other, (k, w).
-            config: Their configuration flags.
-            stop: The arm stops at the first of them.
-
-        Raises:
-            CloneError: They cannot be written there.
-        """
-
-    @abstractmethod
-    def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
-        """Write a stop in front of a LINEAR move, from where it leads to its target.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-            numbers: Of the stop, (w,).
-            config: Its configuration flags.
-
-        Raises:
-            CloneError: It cannot be written there.
-        """
-
-    @abstractmethod
-    def arc(
-        self,
-        file: int,
-        line: int,
-        pieces: Sequence[ArcPiece],
-        via: Floats,
-        config: str,
-        stop: bool,
-    ) -> list[Edit]:
-        """Write pieces in front of a CIRCULAR move, which becomes the last of them.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-            pieces: The pieces; one ends at the point on the way of the arc.
-            via: Numbers of the point on the way that the move has from then on, (w,).
-            config: Configuration flags of all points.
-            stop: The arm stops where the first piece ends.
-
-        Raises:
-            CloneError: They cannot be written there.
-        """
+    place: str
+    entries: Mapping[str, tuple[int, ...]]
+    load: tuple[float, ...]
+    home: tuple[float, ...]
+    root: tuple[float, ...]
+    external: Mapping[int, str]
 
 
 class Language(ABC):
@@ -292,6 +212,8 @@ class Language(ABC):
             on its own; else the cell must say so itself.
         names_numbers: Positions stand in braces, with a name before every number.
         via_first: The point on the way of an arc stands before its end.
+        names: What lines begin with that name a point, tried in order.
+        goes_on: What names a point may stand on a line before its numbers.
     """
 
     name: str
@@ -302,6 +224,8 @@ class Language(ABC):
     tells_accuracy: bool = True
     names_numbers: bool = False
     via_first: bool = True
+    names: ClassVar[Sequence[re.Pattern[str]]]
+    goes_on: ClassVar[bool] = False
 
     @abstractmethod
     def recognises(self, text: bytes) -> bool:
@@ -347,7 +271,6 @@ class Language(ABC):
         """Tell whether the numbers of a line are joint angles, as far as it shows."""
         return False
 
-    @abstractmethod
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
     ) -> Iterator[str]:
@@ -358,6 +281,19 @@ class Language(ABC):
             lines: All of them.
             wanted: 1-based lines, ascending but for 0: those that it does not have.
         """
+        name, seen = "", 0
+        for line in wanted:
+            if line:
+                first = seen if self.goes_on else line - 1
+                before = (self._name(lines[k]) for k in range(line - 1, first - 1, -1))
+                name, seen = next(filter(None, before), name * self.goes_on), line
+            yield name if line else ""
+
+    def _name(self, line: bytes) -> str:
+        """Name what a line begins, "" where it goes on with what another began."""
+        text = line.decode("latin-1")
+        found = next(filter(None, (one.match(text) for one in self.names)), None)
+        return " ".join(filter(None, found.groups())) if found else ""
 
     def read_archive(self, folder: Path) -> Archive | None:
         """Return what the archive of a controller gives, None for any other folder."""

@@ -22,6 +22,7 @@ from postproc.robot.arm import Arm
 from postproc.robot.cell import load_cell
 from postproc.robot.state import States
 from tests.bench.made import milling
+from tests.reference.text import masks_of
 
 Array = NDArray[np.float64]
 
@@ -80,7 +81,8 @@ def _parsing() -> tuple[float, float]:
     """Lines a second with lark for every line, and by shapes."""
     few, many = milling(LINES), milling(100_000)
     read = read_lines(source_from_bytes("a", few.source))
-    masks = [read.shapes[k] for k in read.shape.tolist()]
+    texts = masks_of(read.shapes)
+    masks = [texts[k] for k in read.shape.tolist()]
     parser = line_parser("pdl2", "line")
     start = time.perf_counter()
     for mask in masks:

@@ -8,10 +8,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from postproc.exceptions import ProgramError
-from postproc.language.text.lexer import NAME_MARK, WHOLE, scan_lines
+from postproc.language.text.lexer import scan_lines
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source, source_from_bytes
-from tests.reference.text import form_of, mask_line, number_value
+from tests.reference.text import form_of, mask_line, masks_of, number_value
 
 PIECES = (
     "1 0 9 . - , ( ) [ ] { } : = * ' \" \\ x e E $ -- .. TO 5.25 -0.5 0x3F 1..n "
@@ -63,8 +63,6 @@ def test_files_are_scanned_as_lines_are_masked(parts: list[str]) -> None:
         at = int(starts[row])
         mine = slice(masked.first[row], masked.first[row + 1])
         form, names = form_of(wanted.mask)
-        if NAME_MARK in wanted.mask:
-            form = WHOLE.decode() + wanted.mask
         assert masked.masks[masked.shape[row]].decode("latin-1") == form
         own = masked.name[masked.name_first[row] : masked.name_first[row + 1]]
         assert tuple(masked.names[k] for k in own) == names
@@ -143,7 +141,7 @@ def test_statements_are_joined_up_to_endmove() -> None:
     lines = read_lines(source_from_bytes("x", text))
     assert lines.begin_line.tolist() == [1, 7, 8]
     assert lines.value.tolist() == [3.0, 0.5]
-    assert lines.shapes[int(lines.shape[0])].endswith("ENDMOVE")
+    assert masks_of(lines.shapes)[int(lines.shape[0])].endswith("ENDMOVE")
 
 
 def test_an_open_string_is_refused_with_its_line() -> None:

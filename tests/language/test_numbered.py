@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from postproc.language.text.lexer import NAME_MARK, form_of, mask_of, scan_lines
+from postproc.language.text.lexer import mask_of, scan_lines
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source, source_from_bytes
 from postproc.language.text.statement_table import Statements
-from tests.reference import text as plain
-from tests.reference.text import mask_line
+from tests.reference.text import HIDDEN, form_of, mask_line, masks_of
 
 PIECES = (
     "MOVE TO WP_1 p2 _a3b x $v1 a$b2 weld l1:: 7up 'p3' '\\'q4' \"r5\" :: , := ( ) [ ] "
@@ -35,13 +34,10 @@ def test_whole_files_are_read_as_line_by_line() -> None:
     taken = 0
     for row, line in enumerate(data.split(b"\n")):
         wanted = mask_line(line.decode("latin-1")).mask
-        assert form_of(wanted) == plain.form_of(wanted)
-        if NAME_MARK in wanted:
-            continue
         own = found.name[found.name_first[row] : found.name_first[row + 1]]
         names = tuple(found.names[k] for k in own)
         mask = found.masks[found.shape[row]].decode("latin-1")
-        assert (mask, names) == plain.form_of(wanted)
+        assert (mask, names) == form_of(wanted)
         assert mask_of(*form_of(wanted)) == wanted
         taken += len(names)
     assert taken > 300
@@ -49,7 +45,7 @@ def test_whole_files_are_read_as_line_by_line() -> None:
 
 def shapes_of(data: bytes) -> tuple[Statements[Any], list[str]]:
     lines = read_lines(source_from_bytes("x", data))
-    return lines, [lines.shapes[int(lines.shape[row])] for row in range(len(lines))]
+    return lines, [masks_of(lines.shapes)[k] for k in lines.shape.tolist()]
 
 
 def test_shapes_are_what_lines_say_without_numbers() -> None:
@@ -59,8 +55,8 @@ def test_shapes_are_what_lines_say_without_numbers() -> None:
     lines, found = shapes_of("\n".join(said).encode("latin-1"))
     masks = [mask_line(line).mask.strip() for line in said]
     assert found == [mask for mask in masks if mask]
-    assert len(lines.shapes) == len({*found}) == len({*lines.shapes})
-    assert [*dict.fromkeys(found)] == [*lines.shapes]
+    assert len(lines.shapes) == len({*found}) == len({*masks_of(lines.shapes)})
+    assert [*dict.fromkeys(found)] == masks_of(lines.shapes)
     forms = {form_of(mask)[0] for mask in found}
     assert {*lines.shapes.texts} == forms
 
@@ -80,6 +76,6 @@ def test_a_name_is_the_same_where_its_line_is_odd(behind: str) -> None:
     assert lines.shapes.names[name] == "p1"
 
 
-def test_the_character_that_marks_names_is_kept() -> None:
+def test_a_string_may_hold_the_character_that_marks_names() -> None:
     _, found = shapes_of(b"x1 := '\x01'\nx2 := 'y'")
-    assert found == [f"x1 := '{NAME_MARK}'", "x2 := 'y'"]
+    assert found == [f"x1 := '{HIDDEN}'", "x2 := 'y'"]

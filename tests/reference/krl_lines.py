@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from tests.reference.statements import StatementText
-from tests.reference.text import NUMBER, UNARY_CONTEXT
+from tests.reference.text import HIDDEN, NUMBER, UNARY_CONTEXT
 
 WORDS = frozenset("E6POS E6AXIS A1 A2 A3 A4 A5 A6 E1 E2 E3 E4 E5 E6 STOOL2".split())
 _BLANK = r"[\x01-\x09\x0b\x0c\x0e-\x20\x7f]"
@@ -24,9 +24,6 @@ def krl_lines(text: str) -> list[StatementText]:
     at = _BETWEEN.match(text, 3 if text.startswith("\xef\xbb\xbf") else 0).end()
     while at < len(text):
         one = _header(text, at) if text[at] == "&" else _statement(text, at)
-        if re.search(r"[\x00\x01]", text[one.begin : one.end]):
-            form = "\n" + text[one.begin : one.end]
-            one = StatementText(form, one.begin, one.end, (), (), one.open)
         found.append(one)
         at = _BETWEEN.match(text, one.end).end()
     return found
@@ -53,6 +50,8 @@ def _written(tokens):
         if kind == "open" and opened < 0:
             opened = token.start()
         named = before in ("{", ",", ":") and brackets[-1:] == ["{"]
+        if kind in ("string", "open"):
+            text = text.replace("\x01", HIDDEN)
         if kind == "number":
             numbers.append((sign if sign is not None else token.start(), token.end()))
             if sign is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from tests.reference.text import NUMBER, UNARY_CONTEXT
+from tests.reference.text import HIDDEN, NUMBER, UNARY_CONTEXT
 
 BEGINNING = frozenset(
     "MODULE ENDMODULE PROC ENDPROC FUNC ENDFUNC TRAP ENDTRAP RECORD ENDRECORD ALIAS "
@@ -51,9 +51,6 @@ def statements(text: str) -> list[StatementText]:
     at = _IDLE.match(text, 3 if text.startswith("\xef\xbb\xbf") else 0).end()
     while at < len(text):
         one = _header(text, at) if text.startswith("%%%", at) else _statement(text, at)
-        if re.search(r"[\x00\x01]", text[one.begin : one.end]):
-            form = "\n" + text[one.begin : one.end]
-            one = StatementText(form, one.begin, one.end, (), (), one.open)
         found.append(one)
         at = _IDLE.match(text, one.end).end()
     return found
@@ -89,9 +86,14 @@ def _words(tokens):
     return words, firsts
 
 
+def _last_sign(token):
+    """Return what a token ends with; the dot of a number is its own."""
+    return "" if token.lastgroup == "number" else token.group()[-1]
+
+
 def _begins(text, found, tokens):
     word = found.group().upper()
-    if found.lastgroup != "word" or tokens[-1].group()[-1] in "\\.":
+    if found.lastgroup != "word" or _last_sign(tokens[-1]) in ("\\", "."):
         return False
     if not _words(tokens)[1]:
         return False
@@ -101,7 +103,7 @@ def _begins(text, found, tokens):
 
 
 def _complete(tokens, following):
-    last, before = tokens[-1], tokens[-2].group()[-1] if len(tokens) > 1 else ""
+    last, before = tokens[-1], _last_sign(tokens[-2]) if len(tokens) > 1 else ""
     words, firsts = _words(tokens)
     head = words[0] if words and firsts[0] == words[0] else ""
     text = last.group().upper()
@@ -124,6 +126,8 @@ def _written(tokens, opened):
     form, numbers, names, sign, before = [], [], [], None, ""
     for token in tokens:
         kind, text = token.lastgroup, token.group()
+        if kind in ("string", "open"):
+            text = text.replace("\x01", HIDDEN)
         if kind == "number":
             numbers.append((sign if sign is not None else token.start(), token.end()))
             if sign is not None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from postproc.language.text.lexer import mask_of
+from postproc.language.text.templates import Shapes
+
 NUMBER_MARK = "\0"
 
 NUMBER = (
@@ -85,6 +88,8 @@ def _mask(line: str, tokens: re.Pattern[str]) -> MaskedLine:
                 out.append(" ")
             idle = True
             continue
+        if kind == "string":
+            text = text.replace(NAME_MARK, HIDDEN)
         if kind == "number":
             starts.append(found.start() if sign < 0 else sign)
             if sign >= 0:
@@ -135,7 +140,7 @@ def decimals_of(text: str) -> int:
 
 
 NAME_MARK = "\x01"
-UNREADABLE = NAME_MARK * 2
+HIDDEN = "\r"  # stands for that character in a string
 
 # A name up to its first digit, and the rest: what cannot begin one is passed over, and
 # nothing is tried twice.
@@ -143,6 +148,12 @@ _NUMBERED = r"[A-Za-z_](?<![\w$].)[A-Za-z_]*+[^\W\d]*+\d\w*+(?! *::)"
 _STRING_OR_NAME = re.compile(
     rf"(?P<string>'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\")|{_NUMBERED}"
 )
+
+
+def masks_of(shapes: Shapes) -> list[str]:
+    """Return the masks of some shapes, with their names."""
+    forms = [shapes.texts[k] for k in shapes.form.tolist()]
+    return [mask_of(form, shapes.names_of(k)) for k, form in enumerate(forms)]
 
 
 def form_of(mask: str) -> tuple[str, tuple[str, ...]]:
@@ -154,8 +165,6 @@ def form_of(mask: str) -> tuple[str, tuple[str, ...]]:
     >>> form_of("MOVE TO WP_1 WITH CONDITION[spot('g2', x3)]")
     ("MOVE TO \x01 WITH CONDITION[spot('g2', \x01)]", ('WP_1', 'x3'))
     """
-    if NAME_MARK in mask:  # the text holds that character: no line of any grammar
-        return UNREADABLE + mask, ()
     names: list[str] = []
 
     def mark(found: re.Match[str]) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.paths.insertion_report import Points
-from postproc.language.language import ArcPiece
+from postproc.language.insert_moves import ArcPiece
 from postproc.language.visits import Visits
 from postproc.motion.blending import zones
 from postproc.motion.cycle_time import ProgramCycle

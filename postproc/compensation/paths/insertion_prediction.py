@@ -49,7 +49,7 @@ from postproc.compensation.pipeline import (
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.rewrite import Output
 from postproc.compensation.timing_comparison import InTime, run_in_time
-from postproc.language.language import Splitter
+from postproc.language.insert_moves import Splitter
 from postproc.language.visits import Visits
 from postproc.model.flank_hypotheses import FlankOfJoint, flanks_of
 from postproc.robot.pose import MM

@@ -19,7 +19,7 @@ from postproc.compensation.paths.arcs import (
     is_arc,
 )
 from postproc.compensation.payload import payload_of
-from postproc.language.language import ArcPiece, Splitter
+from postproc.language.insert_moves import ArcPiece, Splitter
 from postproc.language.text.source import CloneError
 from postproc.language.visits import Meaning, OrientationLaw, Visits
 from postproc.model.model import Model

@@ -20,7 +20,7 @@ from postproc.compensation.paths.insertion_report import Points
 from postproc.compensation.paths.meant_sides import MeantSides
 from postproc.compensation.program import ParsedProgram, read_program
 from postproc.compensation.rewrite import VerificationError
-from postproc.language.language import Splitter
+from postproc.language.insert_moves import Splitter
 from postproc.language.languages import language_of
 from postproc.language.text.source import Edit, Source, apply, compose
 from postproc.language.visits import Graph, Visits

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator
+from collections.abc import Iterator
 from functools import total_ordering
-from typing import Any, TypeVar
+from typing import Any
 
 CALLED, HANDLED, HERE = -1, -3, -2
-K = TypeVar("K", bound=Hashable)
 
 
 class Context:
@@ -138,34 +137,3 @@ class Point:
             return (self.at, HERE) < (b.at, b.kind)
         a = mine.up_to(depth + 1)
         return (a.at, a.kind) < (other.at, HERE)
-
-
-def in_program_order(keys: Iterable[tuple[Context, int, int]]) -> list[int]:
-    """Sort places as a program comes to them.
-
-    Args:
-        keys: Context, job-wide row, and number within the row, of each.
-
-    Returns:
-        Their indices, in order.
-    """
-    own: dict[Context, list[tuple[int, int, int, Any]]] = {}
-    outermost: Context | None = None
-    for k, (context, at, number) in enumerate(keys):
-        known = context in own
-        own.setdefault(context, []).append((at, HERE, number, k))
-        while not known and context.outer is not context:
-            inner, context = context, context.outer
-            known = context in own
-            own.setdefault(context, []).append((inner.at, inner.kind, 0, inner))
-        outermost = context if context.outer is context else outermost
-    order: list[int] = []
-    waiting: list[Any] = [] if outermost is None else [outermost]
-    while waiting:
-        one = waiting.pop()
-        if isinstance(one, Context):
-            inside = sorted(own[one], key=lambda entry: entry[:3], reverse=True)
-            waiting += [entry[3] for entry in inside]
-        else:
-            order.append(one)
-    return order

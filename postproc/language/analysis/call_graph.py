@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from graphlib import CycleError, TopologicalSorter
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -34,37 +36,18 @@ def reach(
             waiting += calls(one)
 
 
-def find_recursive(calls: Mapping[K, set[K]]) -> frozenset[K]:
-    """Return the routines that may call themselves, and those between such.
+def lead_to_recursion(calls: Mapping[K, set[K]]) -> frozenset[K]:
+    """Return the routines that call themselves, or come to one that does.
 
-    Routines that call none that is left are taken out, then those that none calls.
+    Routines that call none that is left are taken out, again and again.
 
-    >>> sorted(find_recursive({1: {2}, 2: {1, 3}, 3: set(), 4: {1}}))
-    [1, 2]
+    >>> sorted(lead_to_recursion({1: {2}, 2: {1, 3}, 3: set(), 4: {1}}))
+    [1, 2, 4]
     """
-    callers = _reverse_edges(_without_sinks(calls))
-    return frozenset(_without_sinks(callers))
-
-
-def _without_sinks(edges: Mapping[K, set[K]]) -> dict[K, set[K]]:
-    """Take out, again and again, what leads to nothing that is left."""
-    back, count = _reverse_edges(edges), {one: len(to) for one, to in edges.items()}
-    waiting = [one for one, left in count.items() if not left]
-    gone: set[K] = set()
-    while waiting:
-        sink = waiting.pop()
-        gone.add(sink)
-        for one in back[sink]:
-            count[one] -= 1
-            if not count[one]:
-                waiting.append(one)
-    return {one: to - gone for one, to in edges.items() if one not in gone}
-
-
-def _reverse_edges(edges: Mapping[K, set[K]]) -> dict[K, set[K]]:
-    """Turn the edges of a graph round."""
-    back: dict[K, set[K]] = {one: set() for one in edges}
-    for one, to in edges.items():
-        for other in to:
-            back[other].add(one)
-    return back
+    order, left = TopologicalSorter(calls), set(calls)
+    with suppress(CycleError):
+        order.prepare()
+    while ready := order.get_ready():
+        left.difference_update(ready)
+        order.done(*ready)
+    return frozenset(left)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,16 +25,12 @@ class TaskLanguage(Language):
         grammar: Name of its grammar of statements.
         begins: What its programs begin with.
         joints: What begins a line with joint angles.
-        names: What lines begin with that name a point, tried in order.
-        goes_on: A statement may stand on several lines.
     """
 
     tells_accuracy = False
     grammar: ClassVar[str]
     begins: ClassVar[re.Pattern[bytes]]
     joints: ClassVar[re.Pattern[str]]
-    names: ClassVar[Sequence[re.Pattern[str]]]
-    goes_on: ClassVar[bool] = False
 
     def read_file(self, source: Source) -> TaskFile:
         """Read a file.
@@ -51,24 +47,6 @@ class TaskLanguage(Language):
     def holds_joints(self, line: str) -> bool:
         """Return True if a line declares joint angles, or moves to some."""
         return self.joints.match(line) is not None
-
-    def target_names(
-        self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
-    ) -> Iterator[str]:
-        """Name data by their declarations, and other lines by how they begin."""
-        name, seen = "", 0
-        for line in wanted:
-            if line:
-                first = seen if self.goes_on else line - 1
-                before = (self._name(lines[k]) for k in range(line - 1, first - 1, -1))
-                name, seen = next(filter(None, before), name * self.goes_on), line
-            yield name if line else ""
-
-    def _name(self, line: bytes) -> str:
-        """Name what a line begins, "" where it goes on with what another began."""
-        text = line.decode("latin-1")
-        found = next(filter(None, (one.match(text) for one in self.names)), None)
-        return " ".join(filter(None, found.groups())) if found else ""
 
     def prepare(self) -> None:
         """Load the parser of statements."""

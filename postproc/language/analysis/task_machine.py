@@ -128,6 +128,9 @@ class TaskMachine(Interpreter[Arrived]):
 
     Attributes:
         procedures: Kinds of routines that are followed where they are called.
+        acting: Statements that move, call, or change what moves are made with; they
+            lead to the next statement or into a routine.
+        passed: Statements that lead to the next one and do nothing.
         task: What its names mean.
         texts: The statements of its files, the main one first.
         start: What the cell says.
@@ -143,6 +146,8 @@ class TaskMachine(Interpreter[Arrived]):
     """
 
     procedures: ClassVar[Collection[str]]
+    acting: ClassVar[tuple[type[ir.SourceStatement], ...]]
+    passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
     task: TaskSymbols[Any] = field(kw_only=True)
     texts: Sequence[StatementText[Any]]
     start: Start
@@ -171,21 +176,10 @@ class TaskMachine(Interpreter[Arrived]):
         """Follow every way from where the task begins."""
 
     @abstractmethod
-    def acts(self, one: ir.SourceStatement) -> bool:
-        """Tell whether a statement moves, calls, or changes what moves are made with.
-
-        It leads to the next statement or into a routine.
-        """
-
-    @abstractmethod
     def carry_out(
         self, context: Context, row: int, one: Any, here: Arrived
     ) -> Arrived | None:
-        """Carry such a statement out; None where it goes on in a routine."""
-
-    @abstractmethod
-    def goes_on(self, one: ir.SourceStatement) -> bool:
-        """Tell whether a statement leads to the next one and does nothing."""
+        """Carry an acting statement out; None where it goes on in a routine."""
 
     @abstractmethod
     def after_functions(
@@ -234,7 +228,7 @@ class TaskMachine(Interpreter[Arrived]):
         """Return rows that are read by themselves, None where all are."""
         return set()
 
-    def acting(self, one: ir.SourceStatement) -> ir.SourceStatement:
+    def inside(self, one: ir.SourceStatement) -> ir.SourceStatement:
         """Return what a statement does: what stands behind its condition, or itself."""
         return one
 
@@ -286,7 +280,7 @@ class TaskMachine(Interpreter[Arrived]):
         found = defaultdict[str, list[tuple[TaskRoutine, int, ir.Instruction]]](list)
         for routine in (one for own in self.task.routines.values() for one in own):
             for row in routine.inside:
-                one = self.acting(self.texts[routine.file].statement(row))
+                one = self.inside(self.texts[routine.file].statement(row))
                 if isinstance(one, ir.Instruction):
                     found[one.name].append((routine, row, one))
         return found
@@ -313,10 +307,10 @@ class TaskMachine(Interpreter[Arrived]):
         self, context: Context, row: int, one: ir.SourceStatement, state: Arrived
     ) -> Arrived | None:
         """Carry out a statement that leads to the next one."""
-        if self.acts(one):
+        if isinstance(one, self.acting):
             return self.carry_out(context, row, one, state)
         state = self.after_functions(context, row, one, state)
-        if type(one) in _PLAIN or self.goes_on(one):
+        if type(one) in _PLAIN or isinstance(one, self.passed):
             return self.assign_point(context, row, one, state)
         return self.part_otherwise(context, row, one, state)
 
@@ -532,7 +526,7 @@ class TaskMachine(Interpreter[Arrived]):
         """
         if caller is self.root or not found.rows.head.parameters:
             return None
-        call = self.acting(self.texts[caller.place.scope.file].statement(row))
+        call = self.inside(self.texts[caller.place.scope.file].statement(row))
         if not isinstance(call, ir.Instruction) or call.name != found.rows.head.name:
             return None
         return None if self._is_recursive(found) else call

@@ -20,7 +20,7 @@ import numpy as np
 
 from postproc.arrays import Floats, Indices, Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.analysis.call_context import in_program_order
+from postproc.language.analysis.call_context import Point
 from postproc.language.analysis.conditions import Conditions, Zone
 from postproc.language.analysis.found_visits import (
     FoundGoal,
@@ -110,7 +110,8 @@ def visits_of(
         dialect: What the numbers mean.
         arrive: Says what an arrival is carried out with.
     """
-    order = in_program_order(machine.keys)
+    keys = [(Point(context, at), k) for context, at, k in machine.keys]
+    order = sorted(range(len(keys)), key=keys.__getitem__)
     found: list[FoundVisit] = [machine.visits[k] for k in order]
     runs = _Runs.of(found)
     numbering = Numbering.of([(text.source, text.numbers) for text in machine.texts])

@@ -12,11 +12,11 @@ from postproc.exceptions import ProgramError
 from postproc.files import read_input
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.values import KnownRecord
-from postproc.language.archive import Archive
 from postproc.language.krl.files import SHARED_LIST
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.symbols import AXES, OUTSIDE, KrlTask
+from postproc.language.language import Archive
 from postproc.language.text.source import source_from_bytes
 from postproc.robot.pose import record_from_pose
 

@@ -12,8 +12,8 @@ from postproc.arrays import Floats
 from postproc.language import ir
 from postproc.language.insert_moves import (
     PASSED_MM,
-    LayoutSplitter,
     MoveLayout,
+    Splitter,
     spell,
     split_arguments,
 )
@@ -36,7 +36,7 @@ _Row = tuple[int, int]  # a file, and a statement of it
 
 
 @dataclass(frozen=True)
-class KrlSplitter(LayoutSplitter):
+class KrlSplitter(Splitter):
     """The files of a job, to put points on the ways of moves.
 
     Attributes:
@@ -124,7 +124,7 @@ class KrlSplitter(LayoutSplitter):
         return False
 
     def layout(self, file: int, line: int) -> KrlLayout:
-        """Look at a move, see `LayoutSplitter.layout`."""
+        """Look at a move, see `Splitter.layout`."""
         text = self.files[file].text
         source, (_, end) = text.source, text.span(self.files[file].find_move(line))
         start = int(source.line_starts[line - 1])

@@ -44,13 +44,6 @@ from postproc.language.krl.symbols import (
 from postproc.language.language import Start
 from postproc.language.visits import START
 
-_PASSED = (
-    said.AccessHeader, ir.Declaration, said.OutsideName, said.SpeedPart,
-)  # fmt: skip
-_ACTING = (
-    ir.Assignment, ir.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
-    said.ContinueWord, said.InterruptSwitched, said.PathTrigger, said.InterruptDeclared,
-)  # fmt: skip
 _INTERRUPT = Reason(
     Code.BESIDE_PROGRAM,
     "an interrupt or a trigger may move the arm, or change its settings",
@@ -95,6 +88,14 @@ class KrlMachine(TaskMachine):
     """
 
     procedures = ("def",)
+    passed = (
+        said.AccessHeader, ir.Declaration, said.OutsideName, said.SpeedPart,
+    )  # fmt: skip
+    acting = (
+        ir.Assignment, ir.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
+        said.ContinueWord, said.InterruptSwitched, said.PathTrigger,
+        said.InterruptDeclared,
+    )  # fmt: skip
     task: KrlTask = field(kw_only=True)
     goals: KrlGoals = field(kw_only=True)
     _met: set[tuple[int, int]] = field(default_factory=set)
@@ -139,14 +140,6 @@ class KrlMachine(TaskMachine):
             return None
         blocks = file.splines
         return {row for rows in blocks for row in rows}
-
-    def acts(self, one: ir.SourceStatement) -> bool:
-        """Tell what moves, calls or sets, see `TaskMachine.acts`."""
-        return isinstance(one, _ACTING)
-
-    def goes_on(self, one: ir.SourceStatement) -> bool:
-        """Tell what does nothing, see `TaskMachine.goes_on`."""
-        return isinstance(one, _PASSED)
 
     def counts_alone(self, context: Context, row: int, one: ir.ForLoop) -> bool:
         """Return True if only the loop changes its variable, see `TaskMachine`.

@@ -11,7 +11,7 @@ from postproc.files import FolderListing
 from postproc.language import ir
 from postproc.language.analysis.task_language import TaskLanguage, check_routines
 from postproc.language.analysis.task_machine import follow
-from postproc.language.archive import Archive
+from postproc.language.insert_moves import Splitter
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
 from postproc.language.krl.clones import KrlCloner
@@ -23,9 +23,9 @@ from postproc.language.krl.symbols import KrlTask
 from postproc.language.krl.to_visits import visits_of
 from postproc.language.krl.user_sources import acting_sources
 from postproc.language.language import (
+    Archive,
     Cloner,
     JobReading,
-    Splitter,
     Start,
 )
 from postproc.language.measuring_program import (

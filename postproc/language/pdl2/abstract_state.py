@@ -100,18 +100,8 @@ class Store:
 
     def copy(self) -> Store:
         """Return a store that can change on its own."""
-        return Store(
-            self.initial,
-            self.values.copy(),
-            self.logs.copy(),
-            self.settings,
-            self.last,
-            self.compound,
-            self.changing,
-            self.exposed,
-            self.given,
-            self.lost,
-        )
+        values, logs = self.values.copy(), self.logs.copy()
+        return replace(self, values=values, logs=logs)
 
     def read(self, key: str) -> Value:
         """Return what a key holds."""

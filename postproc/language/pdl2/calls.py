@@ -10,6 +10,7 @@ from postproc.language import ir
 from postproc.language.language import Record
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
+from postproc.language.pdl2.conditions import DISTURBING
 from postproc.language.pdl2.evaluate import (
     bare,
     component_index,
@@ -44,7 +45,6 @@ from postproc.language.pdl2.side_effects import (
     call_graph_of,
     list_changed_arguments,
 )
-from postproc.language.pdl2.untracked_settings import DISTURBING
 from postproc.language.pdl2.values import (
     Alias,
     Location,

@@ -25,7 +25,6 @@ from postproc.language.visits import (
 )
 
 _COMPUTED = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)  # may move along with a literal
-MOST_CODES = 2**62  # combinations of columns that an integer tells apart
 _UNREAD = Reason(Code.UNREADABLE_NUMBER, "a number of the target cannot be read")
 
 
@@ -365,14 +364,10 @@ def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:
     Returns:
         The combination of every row, (n,), and a row of every combination.
     """
-    code, codes = np.zeros(len(kinds[0]), dtype=np.int64), 1
+    code = example = np.zeros(len(kinds[0]), dtype=np.int64)
     for kind in kinds:
-        size = int(kind.max()) + 1
-        if codes * size > MOST_CODES:
-            code = np.unique(code, return_inverse=True)[1]
-            codes = len(code)
-        code, codes = code * size + kind, codes * size
-    return number_in_order(code)
+        code, example = number_in_order(code * (int(kind.max()) + 1) + kind)
+    return code, example
 
 
 def _find_measured(program: Program) -> tuple[Ints, list[str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -19,8 +19,6 @@ from postproc.language.text.templates import (
     name_index,
     number_in_order,
 )
-
-# The entries of a variable file as columns; single ones are made when asked for.
 
 EntryLines = Statements[EntryPart | None]
 POSITIONS = ("POS", "XTND", "JNTP")
@@ -41,39 +39,13 @@ def kind_of(code: str) -> tuple[str, bool]:
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One variable or array element with its value.
-
-    Attributes:
-        name: As it is written, array elements as ``tab[3]``.
-        kind: POS, JNTP, XTND, or another type's code, of which only a scalar is kept.
-        line: 1-based line of its head.
-        numbers: Six numbers of a position (or the one number of a scalar), None where
-            uninitialised or missing.
-        slots: Index of each number in the file, -1 for none.
-        aux: (axis, value) of auxiliary axes.
-        config: Configuration string or None.
-        shared: Other programs see it (Xport).
-        arm: Arm number, 0 where it is not said.
-    """
-
-    name: str
-    kind: str
-    line: int
-    numbers: tuple[float | None, ...]
-    slots: tuple[int, ...]
-    aux: tuple[tuple[int, float | None], ...]
-    config: str | None
-    shared: bool
-    arm: int
-
-
-@dataclass(frozen=True)
 class Layout:
     """What entries that are written alike have in common.
 
     Attributes:
-        kind, shared, config: See `Entry`.
+        kind: POS, JNTP, XTND, or another type's code, of which only a scalar is kept.
+        shared: Other programs see it (Xport).
+        config: Configuration string or None.
         axes: Auxiliary axes, ascending.
         seen: How many values are written, ``****`` counted.
     """
@@ -119,8 +91,8 @@ class Rows(Mapping[str, int]):
 
 
 @dataclass(frozen=True, eq=False)
-class Entries(Mapping[str, Entry]):
-    """k entries, and those of them that have a name of their own by that.
+class Entries:
+    """k variables or array elements, and those by name that have one of their own.
 
     Attributes:
         row: Row of each lower-case name; names with two entries are missing.
@@ -181,32 +153,18 @@ class Entries(Mapping[str, Entry]):
         known = slim(np.isfinite(self.numbers))
         return replace(self, numbers=np.empty((0, 6)), known=known)
 
-    def __len__(self) -> int:
-        """Return how many names have one entry."""
-        return len(self.row)
+    def layout_of(self, row: int) -> Layout:
+        """Return how an entry is written."""
+        return self.layouts[int(self.layout[row])]
 
-    def __iter__(self) -> Iterator[str]:
-        """Go through the names in the order of the file."""
-        return iter(self.row)
+    def numbers_of(self, row: int) -> tuple[float | None, ...]:
+        """Return the numbers of an entry, None where uninitialised or missing."""
+        return _numbers_or_none(self.numbers[row])
 
-    def __getitem__(self, name: str) -> Entry:
-        """Return the entry of a lower-case name."""
-        return self.entry(self.row[name])
-
-    def entry(self, row: int) -> Entry:
-        """Return the entry of a row."""
-        layout = self.layouts[int(self.layout[row])]
-        return Entry(
-            self.name[row],
-            layout.kind,
-            int(self.line[row]),
-            _numbers_or_none(self.numbers[row]),
-            tuple(self.slots[row].tolist()),
-            tuple(zip(layout.axes, _numbers_or_none(self.aux[row]), strict=False)),
-            layout.config,
-            layout.shared,
-            int(self.arm[row]),
-        )
+    def aux_of(self, row: int) -> tuple[tuple[int, float | None], ...]:
+        """Return the auxiliary axes of an entry, each with its value."""
+        axes = self.layout_of(row).axes
+        return tuple(zip(axes, _numbers_or_none(self.aux[row]), strict=False))
 
 
 def _numbers_or_none(values: Floats) -> tuple[float | None, ...]:
@@ -309,123 +267,84 @@ def _may_be_field(entered: EntryPart | None) -> bool:
     return entered.name.startswith("$") or not entered.variable
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Read:
-    """One entry of a layout, read for all of them: places instead of numbers."""
+    """One entry, read for all that are laid out alike.
 
-    kind: str
-    places: list[Place] = field(default_factory=lambda: [_NONE] * 6)
-    aux: dict[int, Place] = field(default_factory=dict)
-    config: str | None = None
-    seen: int = 0
+    Attributes:
+        places: Where its six numbers stand.
+        aux: Where the value of each auxiliary axis does.
+        layout: The layout.
+    """
 
-    def put(self, at: int, place: Place) -> None:
-        self.seen += 1
-        if at < 6:
-            self.places[at] = place
-
-    def take(self, row: int, entered: EntryPart, axes: Iterator[int]) -> None:
-        """Take in a line; `axes` are the numbers of the axes in it."""
-        for letter, slot in entered.components:
-            self.put(_LETTERS.index(letter.upper()), (row, slot))
-        for _, slot in entered.axes:
-            axis = next(axes)
-            joint = self.kind == "JNTP"
-            if joint and 1 <= axis <= 6:
-                self.put(axis - 1, (row, slot))
-            elif axis >= 1:
-                self.aux[axis - 6 if joint else axis] = (row, slot)
-        for slot in entered.plain:
-            self.put(self.seen, (row, slot))
-        if entered.config is not None:
-            self.config = entered.config
+    places: tuple[Place, ...]
+    aux: Mapping[int, Place]
+    layout: Layout
 
     @classmethod
     def of(
-        cls, kind: str, parts: Sequence[EntryPart | None], axes: Iterable[int]
+        cls, head: EntryPart, parts: Sequence[EntryPart | None], axes: Iterable[int]
     ) -> Self:
         """Take in all lines of an entry whose axes have these numbers."""
-        read, numbered = cls(kind), iter(axes)
-        for row, entered in enumerate(parts):
-            if entered is not None:
-                read.take(row, entered, numbered)
-        return read
-
-    def layout(self, shared: bool) -> Layout:
-        """Describe it."""
-        axes = tuple(sorted(self.aux))
-        return Layout(self.kind, shared, self.config, axes, self.seen)
-
-
-@dataclass
-class _Columns:
-    """What the entries of a file hold, as far as it has been read."""
-
-    numbers: Floats
-    slots: Indices
-    layout: Ints
-    arm: Ints
-    layouts: list[Layout] = field(default_factory=list)
-    aux: list[tuple[Ints, Floats]] = field(default_factory=list)
-
-    @classmethod
-    def blank(cls, k: int) -> Self:
-        """Make room for k entries."""
-        slots = np.full((k, 6), -1, dtype=np.int32)
-        layout, arm = np.zeros(k, dtype=np.int64), np.zeros(k, dtype=np.int64)
-        return cls(np.full((k, 6), np.nan), slots, layout, arm)
-
-    def fill(
-        self, lines: EntryLines, some: Ints, first: Ints, read: _Read, shared: bool
-    ) -> None:
-        """Enter those that are laid out alike.
-
-        Args:
-            lines: The file.
-            some: Which entries.
-            first: The row at which each begins.
-            read: What stands where in them.
-            shared: Whether other programs may read them.
-        """
-        for at, (row, slot) in enumerate(read.places):
-            if slot >= 0:
-                self.numbers[some, at] = _values(lines, first + row, slot)
-                self.slots[some, at] = lines.first[first + row] + slot
-        places = [read.aux[axis] for axis in sorted(read.aux)]
-        self.aux.append((some, _columns(lines, first, places)))
-        self.layout[some] = len(self.layouts)
-        self.layouts.append(read.layout(shared))
+        kind, numbered = kind_of(head.type)[0], iter(axes)
+        joint, places, aux = kind == "JNTP", [_NONE] * 6, dict[int, Place]()
+        config, seen = None, 0
+        for row, line in enumerate(parts):
+            if line is None:
+                continue
+            found = [(_LETTERS.index(k.upper()), slot) for k, slot in line.components]
+            for (_, slot), axis in zip(line.axes, numbered, strict=False):
+                if joint and 1 <= axis <= 6:
+                    found.append((axis - 1, slot))
+                elif axis >= 1:
+                    aux[axis - 6 if joint else axis] = row, slot
+            found += enumerate(line.plain, seen + len(found))
+            for at, slot in found:
+                if at < 6:
+                    places[at] = row, slot
+            seen += len(found)
+            config = config if line.config is None else line.config
+        layout = Layout(kind, head.shared, config, tuple(sorted(aux)), seen)
+        return cls(tuple(places), aux, layout)
 
 
 def read_records(lines: EntryLines, records: Records) -> Entries:
     """Read the entries of a file, layout by layout; no name is told yet to be twice."""
-    said = lines.said
-    form, k = said.form[lines.shape], len(records.first)
-    c = _Columns.blank(k)
+    said, k = lines.said, len(records.first)
+    form, layouts = said.form[lines.shape], list[Layout]()
+    numbers, slots = np.full((k, 6), np.nan), np.full((k, 6), -1, dtype=np.int32)
+    layout, arm = np.zeros((2, k), dtype=np.int64)
+    aux = list[tuple[Ints, Floats]]()
     for mine in _alike(form, records):
         a, b = int(records.first[mine[0]]), int(records.closed[mine[0]])
         parts = [said.said[f] for f in form[a:b].tolist()]
         head = said.said[int(form[records.head[mine[0]]])]
         assert head is not None
         if head.arm >= 0:
-            c.arm[mine] = _whole(_values(lines, records.head[mine], head.arm))
+            arm[mine] = _whole(_values(lines, records.head[mine], head.arm))
         for some, axes in _by_axes(lines, records.first, mine, parts):
-            read = _Read.of(kind_of(head.type)[0], parts, axes)
-            c.fill(lines, some, records.first[some], read, head.shared)
-    most = max((values.shape[1] for _, values in c.aux), default=0)
-    stacked = np.full((k, most), np.nan)
-    for rows, values in c.aux:
+            read, first = _Read.of(head, parts, axes), records.first[some]
+            for at, (row, slot) in enumerate(read.places):
+                if slot >= 0:
+                    numbers[some, at] = _values(lines, first + row, slot)
+                    slots[some, at] = lines.first[first + row] + slot
+            places = [read.aux[axis] for axis in read.layout.axes]
+            aux.append((some, _columns(lines, first, places)))
+            layout[some] = len(layouts)
+            layouts.append(read.layout)
+    stacked = np.full((k, max((v.shape[1] for _, v in aux), default=0)), np.nan)
+    for rows, values in aux:
         stacked[rows, : values.shape[1]] = values
     return Entries(
         Rows(NameColumn(), np.empty(0, dtype=np.int32)),
         _names(lines, records),
         lines.begin_line[records.first],
-        slim(c.layout),
-        tuple(c.layouts),
-        c.numbers,
-        c.slots,
+        slim(layout),
+        tuple(layouts),
+        numbers,
+        slots,
         stacked,
-        slim(c.arm),
+        slim(arm),
     )
 
 

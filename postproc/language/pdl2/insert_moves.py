@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.language import ir
-from postproc.language.insert_moves import LayoutSplitter, MoveLayout, spell
+from postproc.language.insert_moves import MoveLayout, Splitter, spell
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.clones import code_of
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
@@ -34,7 +34,7 @@ _MOTION = frozenset(
 
 
 @dataclass(frozen=True)
-class Pdl2Splitter(LayoutSplitter):
+class Pdl2Splitter(Splitter):
     """The program files of a job, to put points on the ways of moves.
 
     Attributes:
@@ -85,7 +85,7 @@ class Pdl2Splitter(LayoutSplitter):
         return False
 
     def layout(self, file: int, line: int) -> Pdl2Layout:
-        """Look at a move, see `LayoutSplitter.layout`."""
+        """Look at a move, see `Splitter.layout`."""
         program = self.programs[file]
         source, code = program.lines.source, code_of(program, line).rstrip()
         head, settings = _HEAD.match(code), _WITH.search(code)

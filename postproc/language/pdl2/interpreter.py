@@ -23,7 +23,7 @@ from postproc.language.pdl2.calls import (
     list_moves,
     take_effects,
 )
-from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
+from postproc.language.pdl2.entries import POSITIONS, Entries
 from postproc.language.pdl2.evaluate import ProgramPoint
 from postproc.language.pdl2.exported_variables import (
     IMPORTED,
@@ -418,7 +418,7 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
     shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
     shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
     named = entries.row.rows
-    own, other = known.copy(), {}
+    own, exported = known.copy(), dict[str, int]()
     marked = _list_rows_where(
         lambda v: v.taught or bool(v.exported), place.program, entries
     )
@@ -436,17 +436,19 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
             if key in world.imported:
                 world.initial[key + name[len(root) :]] = Nothing(IMPORTED)
             else:
-                other[key + name[len(root) :]] = row
+                exported[key + name[len(root) :]] = row
     for row in named[~known[named]].tolist():
         name = entries.name[row].lower()
         root = root_of(name)
         key = world.root(place, root) + name[len(root) :]
         arm = world.other_arm(place, root)
-        _enter(world, file, entries.entry(row), key, arm)
+        _enter(world, file, row, key, arm)
     prefix = f"{place.program.name}/"
     world.initial.points = FilePoints(
-        prefix, own, other, entries, base, shared, taught, np.zeros(len(own), bool)
+        prefix, own, entries, base, shared, taught, np.zeros(len(own), bool)
     )
+    for key, row in exported.items():
+        world.initial[key] = world.initial.points.position(row)
 
 
 def _list_rows_where(
@@ -459,21 +461,23 @@ def _list_rows_where(
     return [row for name, row in entries.row.items() if root_of(name) in names]
 
 
-def _enter(world: World, file: ValueFile, entry: Entry, key: str, arm: int) -> None:
+def _enter(world: World, file: ValueFile, row: int, key: str, arm: int) -> None:
     """Enter a value that is no known point, where there is any, or another arm's."""
-    value: Value | None = entry.numbers[0] if entry.numbers else None
-    if entry.kind in POSITIONS:
+    entries, kind = file.entries, file.entries.layout_of(row).kind
+    numbers, own = entries.numbers_of(row), int(entries.arm[row])
+    value: Value | None = numbers[0]
+    if kind in POSITIONS:
         value = Nothing(
             f"its value is not initialised in {file.source.name}",
             code=Code.LSV_UNINITIALISED,
         )
-    if entry.kind == "VEC":
-        x, y, z = entry.numbers[:3]
+    if kind == "VEC":
+        x, y, z = numbers[:3]
         value = Vector((x, y, z))
-    if value is None and "." in entry.name:  # that it is there counts, see `nodes`
+    if value is None and "." in entries.name[row]:  # that it is there counts
         value = Nothing(f"its value in {file.source.name} is no number")
-    if arm or entry.arm not in (0, world.arm):
-        value = Nothing(points_of(arm or entry.arm))
+    if arm or own not in (0, world.arm):
+        value = Nothing(points_of(arm or own))
     if value is not None:
         why = _why_untrusted(world, root_of(key))
         world.initial[key] = Nothing(why) if why else value

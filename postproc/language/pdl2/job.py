@@ -41,7 +41,6 @@ class FilePoints:
     Attributes:
         prefix: What keys of the program's own variables begin with, before their names.
         own: Which rows of `entries` are points of such variables.
-        other: Rows of points of variables of other programs, by key.
         entries: The entries of the file.
         base: Global index of the file's first number.
         shared: Another program may read it too, by row of `entries`.
@@ -51,7 +50,6 @@ class FilePoints:
 
     prefix: str
     own: Bools
-    other: dict[str, int]
     entries: Entries
     base: int
     shared: Bools
@@ -64,7 +62,7 @@ class FilePoints:
             row = self.entries.row.get(key[len(self.prefix) :], -1)
             if row >= 0 and self.own[row]:
                 return row
-        return self.other.get(key, -1)
+        return -1
 
     def rows(self, names: NameColumn) -> Ints:
         """Return the rows of the program's own variables, (m,), -1 for no points.
@@ -78,28 +76,26 @@ class FilePoints:
 
     def keys(self) -> Iterator[str]:
         """Go through the keys, in the order of the file."""
-        elsewhere = {row: key for key, row in self.other.items()}
         for name, row in self.entries.row.items():
             if self.own[row]:
                 yield self.prefix + name
-            elif row in elsewhere:
-                yield elsewhere[row]
 
     def parts(self) -> Iterator[str]:
         """Go through the keys that may be elements or fields."""
-        if self.entries.parts or self.other or any(c in self.prefix for c in "[."):
+        if self.entries.parts or any(c in self.prefix for c in "[."):
             yield from self.keys()
 
     def position(self, row: int) -> Position:
         """Return the value of a point."""
-        entry = self.entries.entry(row)
+        entries, layout = self.entries, self.entries.layout_of(row)
+        slots = entries.slots[row].tolist()
         return Position(
-            entry.kind == "JNTP",
-            entry.numbers,
-            tuple(self.base + slot if slot >= 0 else -1 for slot in entry.slots),
-            entry.config,
-            entry.aux,
-            entry.name,
+            layout.kind == "JNTP",
+            entries.numbers_of(row),
+            tuple(self.base + slot if slot >= 0 else -1 for slot in slots),
+            layout.config,
+            entries.aux_of(row),
+            entries.name[row],
             taught=bool(self.taught[row]),
             shared=bool(self.shared[row]),
         )
@@ -160,7 +156,6 @@ class InitialValues:
         row = self.point(key)
         if row >= 0 and self.points is not None:
             self.points.own[row] = False
-            self.points.other.pop(key, None)
             self.asked.add(key)
         self.other[key] = value
 
@@ -175,11 +170,6 @@ class InitialValues:
     def parts(self) -> Iterator[str]:
         """Go through the keys, but for most of those that are no parts of others."""
         own = self.points.parts() if self.points is not None else ()
-        return chain(own, (key for key in self.other if self.point(key) < 0))
-
-    def __iter__(self) -> Iterator[str]:
-        """Go through the keys."""
-        own = self.points.keys() if self.points is not None else ()
         return chain(own, (key for key in self.other if self.point(key) < 0))
 
 

@@ -12,16 +12,17 @@ import numpy as np
 from postproc.arrays import release_memory
 from postproc.exceptions import ProgramError
 from postproc.files import base_name
+from postproc.language.insert_moves import Splitter
 from postproc.language.language import (
     Cloner,
     JobReading,
     Language,
-    Splitter,
     Start,
 )
 from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.nested import name_parts
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import Program, parse, parse_again
 from postproc.language.pdl2.side_effects import dead_lines
@@ -36,6 +37,7 @@ from postproc.language.text.source import Source
 from postproc.language.visits import never_reached
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
+_NESTED = re.compile(rb"\s*[A-Za-z_]\w*\s+(?:A?REC|PATH)\b", re.I)
 Parsed = Program | VariableFile
 
 
@@ -51,6 +53,8 @@ class Pdl2(Language):
     comment = "--"
     dialect = PDL2_DIALECT
     via_first = False
+    names = (re.compile(r"([A-Za-z_]\w*(?:\[[\d, ]+\])?)\s+[A-Z]{3,4}\b"),)
+    goes_on = True
 
     def recognises(self, text: bytes) -> bool:
         """Tell that a text may be PDL2: what begins as nothing else is taken for it."""
@@ -117,10 +121,10 @@ class Pdl2(Language):
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
     ) -> Iterator[str]:
-        """Name the variables that lines of a variable file belong to."""
-        from postproc.language.pdl2.names import entry_names
-
-        return entry_names(lines, wanted)
+        """Name variables; in a file with records or paths their parts, too."""
+        if any(map(_NESTED.match, lines)):
+            return name_parts(Source(file, b"\n".join(lines)), wanted)
+        return super().target_names(file, lines, wanted)
 
     def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
         """Write joint moves that stop, with comments ``MEASURE``."""

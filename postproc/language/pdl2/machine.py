@@ -254,7 +254,7 @@ class Machine(Interpreter[Store]):
 
     @cached_property
     def _circles(self) -> frozenset[int]:
-        """Bodies (by id) that may call themselves, directly or not."""
+        """Bodies (by id) that call themselves, or come to one that does."""
         return circles(self.world)
 
 

@@ -71,7 +71,6 @@ class PlainMoves:
         forms: What moves of each variant have in common, but for their trajectory;
             None for calls.
         calls: Which of them call something.
-        named: Which of them are moves to points.
         points: The point that lines of a shape go to, unless `name` tells it.
         prefix: What keys of the program's own variables begin with.
         names: Names, in lower case, of the program's own variables that lines go to.
@@ -85,7 +84,6 @@ class PlainMoves:
     statements: tuple[ir.SourceStatement, ...]
     forms: tuple[MoveForm | None, ...]
     calls: tuple[bool, ...]
-    named: tuple[bool, ...]
     points: Mapping[int, PointVariable]
     prefix: str
     names: NameColumn
@@ -133,10 +131,6 @@ def find_plain_moves(
         tuple(said),
         tuple(_form(one) if isinstance(one, ast.Move) else None for one in said),
         tuple(any(_calls(world, place, one)) for one in said),
-        tuple(
-            isinstance(one, ast.Move) and isinstance(one.where[0], ir.DataObject)
-            for one in said
-        ),
         variants.points,
         variants.prefix,
         variants.names,
@@ -219,7 +213,6 @@ class _Variants:
     def __post_init__(self) -> None:
         self.statements: list[ir.SourceStatement] = []
         self.points: dict[int, PointVariable] = {}
-        self._known: dict[tuple[int, tuple[str, ...]], int] = {}
         self._parameters = {p.name for p in self.place.body.parameters}
         self.prefix = f"{self.place.program.name}/"
         self.names = NameColumn()
@@ -230,8 +223,6 @@ class _Variants:
         said = self.place.program.lines.said
         one = said.said[form]
         where = one.where[0] if isinstance(one, ast.Move) else None
-        if len(shapes) == 1:
-            return np.array([self._add_one(int(shapes[0]), where)])
         names = said.shapes.names_at(shapes)
         if not isinstance(where, ir.DataObject):
             return self._variants(shapes, names)
@@ -247,18 +238,6 @@ class _Variants:
         quiet = self._points(shapes, goal, which, index, array=bool(where.steps))
         variants[quiet] = self._variants(shapes[quiet], names[quiet])
         return variants
-
-    def _add_one(self, shape: int, where: ir.Operand | None) -> int:
-        """Return the variant of the one shape of a form: not worth an array pass."""
-        names = self.place.program.lines.shapes.names_of(shape)
-        if isinstance(where, ir.DataObject):
-            index, at = _number_slots(where.steps), name_index(where.name)
-            name = names[at].lower() if at >= 0 else where.name
-            if index is None or not self._is_point(name, array=bool(where.steps)):
-                return -1
-            self.points[shape] = PointVariable(self.world.root(self.place, name), index)
-            names = names[:at] + names[at + 1 :] if at >= 0 else names
-        return self._variant(shape, names)
 
     def _points(
         self,
@@ -299,26 +278,13 @@ class _Variants:
         """Return the variants of shapes of one form with some names, (m,)."""
         ends = names.shape[1] * np.arange(1, len(shapes) + 1)
         kind = alike(names.ravel(), ends - names.shape[1], ends)
-        texts = self.place.program.lines.shapes.names
-        found = [
-            self._variant(int(shapes[k]), tuple([texts[i] for i in names[k].tolist()]))
-            for k in number_in_order(kind)[1].tolist()
-        ]
+        found = []
+        for k in number_in_order(kind)[1].tolist():
+            one = self.place.program.lines.said[int(shapes[k])]
+            quiet = all(map(self._does_nothing, _calls(self.world, self.place, one)))
+            found.append(len(self.statements) if quiet else -1)
+            self.statements += [one] if quiet else []
         return np.array(found, dtype=np.int64)[kind]
-
-    def _variant(self, shape: int, names: tuple[str, ...]) -> int:
-        """Return the variant of a shape, which its form and some names tell."""
-        said = self.place.program.lines.said
-        key = int(said.form[shape]), names
-        variant = self._known.get(key)
-        if variant is None:
-            variant = -1
-            calls = _calls(self.world, self.place, said[shape])
-            if all(self._does_nothing(call) for call in calls):
-                variant = len(self.statements)
-                self.statements.append(said[shape])
-            self._known[key] = variant
-        return variant
 
     def _is_point(self, name: str, array: bool) -> bool:
         """Tell whether a name is a variable whose value no call changes unseen."""
@@ -486,7 +452,8 @@ def _points(
     program, initial = here.place.program, here.world.initial
     point = np.full(len(rows), WRITTEN, dtype=np.int64)
     goals: dict[int, Goal] = {}
-    named = np.flatnonzero(np.array(quiet.named, dtype=bool)[variant])
+    to_points = [form is not None and not form.slots for form in quiet.forms]
+    named = np.flatnonzero(np.array(to_points, dtype=bool)[variant])
     shapes = program.lines.shape[rows[named]]
     own = quiet.name[rows[named] - quiet.first]
     point[named] = HELD

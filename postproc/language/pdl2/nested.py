@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from postproc.arrays import Ints
 from postproc.diagnostics import Code
+from postproc.exceptions import ProgramError
 from postproc.language.pdl2.entries import (
     NESTED,
     POSITIONS,
@@ -18,9 +20,12 @@ from postproc.language.pdl2.entries import (
     Records,
     is_nested,
     kind_of,
+    last_head,
 )
-from postproc.language.pdl2.parser import EntryPart
+from postproc.language.pdl2.parser import EntryPart, parse_value_form
 from postproc.language.pdl2.values import COMPONENTS
+from postproc.language.text.logical_lines import read_lines
+from postproc.language.text.source import Source
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import Diagnostic
 
@@ -345,3 +350,27 @@ def complete_entries(entries: Entries, fields: Fields) -> Entries:
         numbers=numbers,
         arm=np.append(arm[:-k], np.where(arm[-k:] == 0, given, arm[-k:])),
     )
+
+
+def name_parts(source: Source, wanted: Sequence[int]) -> Iterator[str]:
+    """Name the variables, fields and nodes that lines of a variable file belong to.
+
+    Args:
+        source: The file.
+        wanted: 1-based lines, 0 for those that it does not have.
+    """
+    try:
+        lines: EntryLines = read_lines(source, parse_value_form)
+    except ProgramError:  # a string does not end
+        yield from ("" for _ in wanted)
+        return
+    head = last_head(lines)
+    fields = {f.first: f for f in find_fields(lines, head).each}
+    firsts = sorted(fields)
+    for line in wanted:
+        row = int(np.searchsorted(lines.begin_line, line, side="right")) - 1
+        at = bisect_right(firsts, row) - 1
+        inside = at >= 0 and row < fields[firsts[at]].closed
+        entered = lines.statement(int(head[row])) if row >= 0 <= head[row] else None
+        name = "" if entered is None else entered.name
+        yield fields[firsts[at]].name if inside else name

@@ -20,7 +20,7 @@ from postproc.language.text.common_rules import (
     part,
     parts,
 )
-from postproc.language.text.lexer import NAME_MARK, UNREADABLE
+from postproc.language.text.lexer import NAME_MARK
 from postproc.language.text.template_parser import FAILED, Children, FormParser, Word
 from postproc.language.text.templates import open_name
 
@@ -338,7 +338,7 @@ def parse_form(form: str) -> ir.SourceStatement:
     if found is FAILED:
         numbered = count()
         text = re.sub(NAME_MARK, lambda _: open_name(next(numbered)), form)
-        return ir.NotUnderstood(text if form[:2] != UNREADABLE else form[2:])
+        return ir.NotUnderstood(text)
     return found if isinstance(found, ir.SourceStatement) else ir.SourceStatement()
 
 

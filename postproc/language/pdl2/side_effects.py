@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.language import ir
-from postproc.language.analysis.call_graph import find_recursive, reach
+from postproc.language.analysis.call_graph import lead_to_recursion, reach
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES
 from postproc.language.pdl2.external_routines import (
@@ -312,13 +312,13 @@ def _list_called(world: World, place: Place, first: int, last: int) -> Iterator[
 
 
 def circles(world: World) -> frozenset[int]:
-    """Return the bodies (by id) that may call themselves, and those between such."""
+    """Return the bodies (by id) that call themselves, or come to one that does."""
     calls: dict[int, set[int]] = {}
     for place in world.places():
         body = place.body
         called = _list_called(world, place, body.first, body.last)
         calls[id(body)] = {id(one.body) for one in called}
-    return find_recursive(calls)
+    return lead_to_recursion(calls)
 
 
 # Moves that a program never comes to: their targets keep their values.

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnostics import Code
-from postproc.language.analysis.functions import apply_function
+from postproc.language.analysis.functions import COMPARISONS, apply_function
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
 # What the analysis knows of a value: a number, a text, a position, or why nothing.
@@ -267,14 +267,6 @@ _ARITHMETIC: dict[str, Callable[[float, float], float]] = {
     "DIV": lambda a, b: float(math.trunc(a / b)),
     "MOD": math.fmod,
 }
-_COMPARE: dict[str, Callable[[float, float], bool]] = {
-    "=": operator.eq,
-    "<>": operator.ne,
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-}
 
 
 def part_of(held: Value, component: tuple[str, int] | tuple[()] | None) -> Value:
@@ -318,8 +310,8 @@ def binary(sign: str, a: Value, b: Value) -> Value:
         return compose_frames(a, b)
     if isinstance(a, Vector) and isinstance(b, Vector) and sign in "+-":
         return _add(a, b, sign)
-    if sign in _COMPARE and type(a) is type(b) and isinstance(a, float | str | bool):
-        return _COMPARE[sign](a, b)  # type: ignore[arg-type]
+    if sign in COMPARISONS and type(a) is type(b) and isinstance(a, float | str | bool):
+        return COMPARISONS[sign](a, b)  # type: ignore[arg-type]
     if isinstance(a, float) and isinstance(b, float) and sign in _ARITHMETIC:
         try:
             return _ARITHMETIC[sign](a, b)

@@ -13,7 +13,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.exceptions import ProgramError
 from postproc.files import read_input
-from postproc.language.archive import Archive
+from postproc.language.language import Archive
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import read_rapid

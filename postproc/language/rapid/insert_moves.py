@@ -9,8 +9,8 @@ from functools import cached_property
 from postproc.arrays import Floats
 from postproc.language import ir
 from postproc.language.insert_moves import (
-    LayoutSplitter,
     MoveLayout,
+    Splitter,
     spell,
     split_arguments,
 )
@@ -38,7 +38,7 @@ _UNUSED = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 
 
 @dataclass(frozen=True)
-class RapidSplitter(LayoutSplitter):
+class RapidSplitter(Splitter):
     """The modules of a task, to put points on the ways of moves.
 
     Attributes:
@@ -97,7 +97,7 @@ class RapidSplitter(LayoutSplitter):
         return False
 
     def layout(self, file: int, line: int) -> RapidLayout:
-        """Look at a move, see `LayoutSplitter.layout`."""
+        """Look at a move, see `Splitter.layout`."""
         text = self.task.files[file].text
         source, row = text.source, self.task.files[file].find_move(line)
         start, (begin, end) = int(source.line_starts[line - 1]), text.span(row)

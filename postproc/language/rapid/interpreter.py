@@ -22,14 +22,16 @@ from postproc.language.analysis.task_machine import (
 )
 from postproc.language.language import Start
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.error_paths import ErrorExit, ErrorHandlers, exits_of
 from postproc.language.rapid.errors import (
     EXIT_CYCLE,
     PATH_ERRORS,
+    ErrorExit,
+    ErrorHandlers,
     Numbers,
     begins_handler,
     clauses_of,
     common,
+    exits_of,
     key_of,
     may_be_skipped,
     may_raise,
@@ -83,6 +85,8 @@ class RapidMachine(TaskMachine):
     """
 
     procedures = ("proc",)
+    acting = (ir.Instruction,)
+    passed = _PLAIN
     task: RapidTask = field(kw_only=True)
     goals: Goals = field(kw_only=True)
     ends: list[Arrived] = field(default_factory=list)
@@ -164,14 +168,6 @@ class RapidMachine(TaskMachine):
         routines = (one for found in self.task.routines.values() for one in found)
         return [one for one in routines if one.rows.head.kind == "proc"]
 
-    def acts(self, one: ir.SourceStatement) -> bool:
-        """Tell instructions, see `TaskMachine.acts`."""
-        return isinstance(one, ir.Instruction)
-
-    def goes_on(self, one: ir.SourceStatement) -> bool:
-        """Tell what does nothing, see `TaskMachine.goes_on`."""
-        return type(one) in _PLAIN
-
     def places_of(self, one: ir.SourceStatement) -> Sequence[int] | None:
         """Return place and turn of MoveL to numbers, see `TaskMachine.places_of`."""
         if not isinstance(one, ir.Instruction) or "movel" in self.task.routines:
@@ -179,7 +175,7 @@ class RapidMachine(TaskMachine):
         return own_numbers(one)
 
     is_plain = staticmethod(are_targets)
-    acting = staticmethod(inside)
+    inside = staticmethod(inside)
 
     @staticmethod
     def usual_step(first: float, last: float) -> float:

@@ -11,11 +11,11 @@ from postproc.arrays import Floats
 from postproc.files import FolderListing
 from postproc.language.analysis.task_language import TaskLanguage, check_routines
 from postproc.language.analysis.task_machine import follow
-from postproc.language.archive import Archive
+from postproc.language.insert_moves import Splitter
 from postproc.language.language import (
+    Archive,
     Cloner,
     JobReading,
-    Splitter,
     Start,
 )
 from postproc.language.measuring_program import MeasuringProgram

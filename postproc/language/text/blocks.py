@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language import ir
 from postproc.language.analysis.control_flow import HeadedRows
-from postproc.language.analysis.declarations import Datum, list_data
+from postproc.language.analysis.declarations import Datum, TaskFile, list_data
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Diagnostic
@@ -155,19 +155,7 @@ class Outline:
         self.diagnostics.append(self.text.diagnostic(row, code, message))
 
 
-class StatementFile(Protocol):
-    """A file that was read: its statements, and what is not understood."""
-
-    @property
-    def text(self) -> StatementText[Any]:
-        """Its statements."""
-
-    @property
-    def diagnostics(self) -> Sequence[Diagnostic]:
-        """What is not understood."""
-
-
-File = TypeVar("File", bound=StatementFile)
+File = TypeVar("File", bound=TaskFile)
 
 
 def read_once(

@@ -13,10 +13,7 @@ from postproc.language.text.symbol_column import NameColumn
 # any), the comment is gone and idle blanks are dropped. In its *form* every numbered
 # name (``WP_12``, ``p1``) is one mark, too: lines of one form are parsed once.
 
-NUMBER_MARK = "\0"
-NAME_MARK = "\x01"  # a numbered name, in a form
-UNREADABLE = NAME_MARK * 2  # begins the form of a line that holds such a mark itself
-WHOLE = b"\n"  # begins the mask of such a line: no other mask holds it
+NAME_MARK = "\x01"  # a numbered name; a string has CR for it, which no grammar reads
 
 BLANKS = "".join(chr(c) for c in (*range(1, 33), 127) if chr(c) not in "\r\n")
 
@@ -26,8 +23,7 @@ class ScannedLines:
     """The n physical lines of a file with m numbers and p numbered names.
 
     Attributes:
-        masks: Their distinct masks, names taken out; that of a line which holds the
-            mark of a name itself begins with `WHOLE`, and its names stay.
+        masks: Their distinct masks, names taken out.
         shape: Index into `masks`, (n,).
         comment: Byte offset of each line's comment, (n,), -1 where there is none.
         first: CSR offsets into the numbers, (n + 1,).
@@ -101,25 +97,8 @@ def rescan_lines(
     return RescannedLines(added, NumberSpans(*places), value, changed)
 
 
-def form_of(mask: str) -> tuple[str, tuple[str, ...]]:
-    r"""Take the numbered names out of the mask of a line.
-
-    Returns:
-        Its form and the names.
-
-    >>> form_of("MOVE TO WP_1 WITH CONDITION[spot('g2', x3)]")
-    ("MOVE TO \x01 WITH CONDITION[spot('g2', \x01)]", ('WP_1', 'x3'))
-    """
-    form, names = _native.form_of(mask.encode("latin-1"))
-    if form[:1] == WHOLE:
-        return UNREADABLE + mask, ()
-    return form.decode("latin-1"), tuple(names)
-
-
 def mask_of(form: str, names: tuple[str, ...]) -> str:
     """Fill the names into a form again."""
-    if not names:
-        return form.removeprefix(UNREADABLE)
     parts = form.split(NAME_MARK)
     pairs = zip(parts, names, strict=False)
     return "".join([text for pair in pairs for text in pair]) + parts[-1]

@@ -2,230 +2,29 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from postproc.arrays import Bools, Indices, Interned, Ints, spans
+from postproc import _native
+from postproc.arrays import Bools, Ints, spans
 from postproc.exceptions import ProgramError
-from postproc.language.text.lexer import (
-    NAME_MARK,
-    NUMBER_MARK,
-    WHOLE,
-    mask_of,
-    rescan_lines,
-    scan_lines,
-)
-from postproc.language.text.source import Source
+from postproc.language.text.lexer import rescan_lines
+from postproc.language.text.source import NumberSpans, Source
 from postproc.language.text.statement_table import Statements
-from postproc.language.text.templates import (
-    alike,
-    find_shapes,
-    number_in_order,
-    parse_shapes,
-)
+from postproc.language.text.templates import find_shapes, parse_shapes
 from postproc.language.visits import Diagnostic
 
 T = TypeVar("T")
 
-# Statements over several lines: one that ends with a comma goes on with clauses.
-
-_OPENS = re.compile(rb" *(?:\w+ *:: *)?(?:MOVE|MOVEFLY|OPEN)\b[^\n]*, *\Z", re.I)
-_CLAUSE = re.compile(
-    rb" *(?:WITH|ADVANCE|TIL|VIA|SYNCMOVE|SYNCMOVEFLY|CONDITION|\$)", re.I
-)
-_WITH = re.compile(rb" *(?:WITH|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
-_COMMA = re.compile(rb"[^\n]*,\s*\Z")
-_CLOSES = re.compile(rb" *(?:ENDMOVE|ENDOPEN)\b", re.I)
-
-
-@dataclass(frozen=True)
-class Names:
-    """The names that are taken out of lines.
-
-    Attributes:
-        at: Index into `name` of the first name of every line, (n,).
-        name: Index into `names`.
-        names: The distinct ones.
-    """
-
-    at: Indices
-    name: Indices
-    names: Sequence[str]
-
-
-@dataclass(frozen=True)
-class JoinedLines:
-    """Lines of code, those of a statement in one.
-
-    Attributes:
-        masks: Their distinct masks, stripped.
-        shape: Index into `masks`, (k,).
-        rows: The first line of each, (k,).
-    """
-
-    masks: tuple[bytes, ...]
-    shape: Indices
-    rows: Indices
-
-
-def strip_mask(mask: bytes) -> bytes:
-    """Drop the blanks around the mask of a line, see `ScannedLines`."""
-    if mask[:1] == WHOLE:
-        own = mask.strip()
-        return WHOLE + own if own else own
-    return mask.strip()
-
-
-def join(masks: Sequence[bytes], shape: Indices, names: Names) -> JoinedLines:
-    """Join the lines of every statement.
-
-    Args:
-        masks: The distinct masks of lines.
-        shape: Index into `masks` of every line that holds code, (n,).
-        names: What is taken out of the masks.
-    """
-    own = [strip_mask(mask) for mask in masks]
-    bare = [mask.removeprefix(WHOLE) for mask in own]
-    opens = np.array(
-        [mask.endswith(b",") and bool(_OPENS.match(mask)) for mask in bare], dtype=bool
-    )
-    starts = np.flatnonzero(opens[shape])
-    length = _lengths(tuple(bare), shape, starts)
-    starts, length = starts[length > 1], length[length > 1]
-    kind = alike(shape, starts, starts + length)
-    shape, keep = shape.copy(), np.ones(len(shape), dtype=bool)
-    inner = np.repeat(starts - np.cumsum(length - 1) + length, length - 1)
-    keep[inner + np.arange(len(inner))] = False
-    joined = Interned[bytes]()
-    parts, of_kind = shape.tolist() if len(starts) else [], []
-    for k in number_in_order(kind)[1].tolist():
-        some = [own[part] for part in parts[starts[k] : starts[k] + length[k]]]
-        if any(mask[:1] == WHOLE for mask in some):
-            of_kind.append(-1)  # a row at a time: their names are filled in again
-        else:
-            of_kind.append(joined[b" ".join(some)])
-    found = np.array(of_kind, dtype=np.int64)[kind]
-    for k in np.flatnonzero(found < 0).tolist():
-        a, b = int(starts[k]), int(starts[k] + length[k])
-        found[k] = joined[_whole([own[part] for part in parts[a:b]], a, names)]
-    shape[starts] = len(masks) + found
-    rows = np.flatnonzero(keep)
-    return JoinedLines((*own, *joined), shape[rows], rows)
-
-
-def _whole(parts: Sequence[bytes], row: int, names: Names) -> bytes:
-    """Join lines some of which hold their names, from a row on: now all do."""
-    texts = []
-    for at, part in zip(names.at[row : row + len(parts)].tolist(), parts, strict=True):
-        count = 0 if part[:1] == WHOLE else part.count(NAME_MARK.encode())
-        words = [names.names[k] for k in names.name[at : at + count].tolist()]
-        mask = part.removeprefix(WHOLE).decode("latin-1")
-        texts.append(mask_of(mask, tuple(words)) if words else mask)
-    return WHOLE + " ".join(texts).encode("latin-1")
-
-
-def _lengths(masks: tuple[bytes, ...], shape: Indices, starts: Indices) -> Indices:
-    """Count the lines of the statements that start at some lines of code, (k,).
-
-    All statements grow by one line at a time, for as long as the next one belongs.
-    """
-    length = np.ones(len(starts), dtype=np.int64)
-    growing = np.arange(len(starts))
-    while len(growing := growing[(starts + length)[growing] < len(shape)]):
-        following = shape[(starts + length)[growing]]
-        closes = _which(masks, following, _CLOSES)
-        comma = _which(masks, shape[(starts + length - 1)[growing]], _COMMA)
-        clause = _which(masks, following, _CLAUSE)
-        more = ~closes & np.where(comma, clause, _which(masks, following, _WITH))
-        length[growing[closes | more]] += 1
-        growing = growing[more]
-    return length
-
-
-def _which(
-    masks: tuple[bytes, ...], shape: Indices, pattern: re.Pattern[bytes]
-) -> Bools:
-    """Tell which of some lines match a pattern."""
-    used, at = np.unique(shape, return_inverse=True)
-    found = [bool(pattern.match(masks[k])) for k in used.tolist()]
-    return np.array(found, dtype=bool)[at]
-
-
-# Lines that divide a block and open another one: each of both gets a row.
-#
-# ``CASE (1): IF a THEN`` belongs to two blocks, which end in different lines.
-
-_NUMBER, _NAME = NUMBER_MARK.encode(), NAME_MARK.encode()
-_IN_PARENTHESES = rb"\((?:'[^']*'|[^'()]|\([^()]*\))*\)"
-_DIVIDED = re.compile(
-    rb"(CASE *" + _IN_PARENTHESES + rb" *:|ELSE *:) *"
-    rb"((?:IF|SELECT|FOR|WHILE|CONDITION)\b.*|REPEAT *;?)",
-    re.I | re.S,
-)
-_CLOSED = re.compile(rb"\bEND(?:IF|SELECT|FOR|WHILE|CONDITION)\b", re.I)
-
-
-@dataclass(frozen=True)
-class LogicalRows:
-    """Logical lines.
-
-    Attributes:
-        masks: The distinct masks, stripped, see `ScannedLines`.
-        shape: Index into `masks`, (n,).
-        line: Physical line, (n,).
-        first: CSR offsets into the numbers, (n + 1,).
-        name: Index of the first name that is taken out of the line, (n,).
-    """
-
-    masks: tuple[bytes, ...]
-    shape: Indices
-    line: Indices
-    first: Indices
-    name: Indices
-
-
-def with_block_rows(rows: LogicalRows) -> LogicalRows:
-    """Give the block that opens behind CASE or ELSE a row of its own."""
-    found = {
-        k: parts.groups()
-        for k, mask in enumerate(rows.masks)
-        if (parts := _DIVIDED.fullmatch(mask.removeprefix(WHOLE)))
-        and not _CLOSED.search(parts[2])
-    }
-    if not found:
-        return rows
-    m = len(rows.masks)
-    head, tail = np.arange(m), np.arange(m)
-    numbers, names = np.zeros(m, dtype=np.int64), np.zeros(m, dtype=np.int64)
-    masks = list(rows.masks)
-    for k, (before, behind) in found.items():
-        head[k], tail[k] = len(masks), len(masks) + 1
-        numbers[k], names[k] = before.count(_NUMBER), before.count(_NAME)
-        kind = WHOLE if rows.masks[k][:1] == WHOLE else b""
-        masks += [kind + before, kind + behind]
-    times = np.where(head[rows.shape] != rows.shape, 2, 1)
-    row = np.repeat(np.arange(len(times)), times)
-    second = np.append(False, row[1:] == row[:-1])
-    shape = rows.shape[row]
-    first = rows.first[row] + np.where(second, numbers[shape], 0)
-    return LogicalRows(
-        tuple(masks),
-        np.where(second, tail[shape], head[shape]).astype(rows.shape.dtype),
-        rows.line[row],
-        np.append(first, rows.first[-1]).astype(rows.first.dtype),
-        rows.name[row] + np.where(second, names[shape], 0),
-    )
-
-
-# All lines of a file.
-
 
 def read_lines(source: Source, parse: Callable[[str], Any] = str) -> Statements[Any]:
     """Split a source into logical lines with masked numbers.
+
+    A statement may go on over lines; a block that opens behind CASE or ELSE has a row
+    of its own.
 
     Args:
         source: The file.
@@ -234,36 +33,18 @@ def read_lines(source: Source, parse: Callable[[str], Any] = str) -> Statements[
     Raises:
         ProgramError: A string does not end on its line.
     """
-    found = scan_lines(source.data, source.line_starts)
-    if found.unterminated:
+    found = _native.scan_logical_lines(source.data, source.line_starts)
+    forms, (form, line, at, first), (places, value), (names, name), unterminated = found
+    if unterminated:
         raise ProgramError(
             source.name,
             "a string is not terminated",
             "Close it with an apostrophe on the same line.",
-            line=1 + found.unterminated[0],
+            line=1 + unterminated[0],
         )
-    # Continued lines are joined and empty ones dropped.
-    code = np.array([*map(bool, map(strip_mask, found.masks))], dtype=bool)
-    rows = np.flatnonzero(code[found.shape])
-    at = found.name_first[rows]
-    joined = join(found.masks, found.shape[rows], Names(at, found.name, found.names))
-    kept = rows[joined.rows]
-    first = np.append(found.first[kept], np.int32(len(found.numbers)))
-    lines = with_block_rows(
-        LogicalRows(joined.masks, joined.shape, kept + 1, first, at[joined.rows])
-    )
-    shapes, shape = find_shapes(
-        lines.masks, lines.shape, lines.name, found.name, found.names
-    )
-    return Statements(
-        source,
-        parse_shapes(shapes, parse),
-        shape.astype(np.int32),
-        lines.line.astype(np.int32),
-        lines.first,
-        found.numbers,
-        found.value,
-    )
+    shapes, shape = find_shapes(forms, form, at, name, names)
+    said, numbers = parse_shapes(shapes, parse), NumberSpans(*places)
+    return Statements(source, said, shape.astype(np.int32), line, first, numbers, value)
 
 
 # The lines of a text that was read before, with other numbers.

@@ -11,7 +11,7 @@ import lark
 
 from postproc.language.ir import NotUnderstood, Num, SourceStatement
 from postproc.language.text.grammars import line_parser
-from postproc.language.text.lexer import NAME_MARK, UNREADABLE
+from postproc.language.text.lexer import NAME_MARK
 from postproc.language.text.templates import open_name
 
 Children = Sequence[Any]
@@ -61,7 +61,7 @@ class FormParser:
 
     def parse(self, form: str) -> object:
         """Build what a form says, `FAILED` where the grammar cannot read it."""
-        if form.startswith(UNREADABLE) or len(form) > self.longest:
+        if len(form) > self.longest:
             return FAILED
         try:
             return self._build(line_parser(self.grammar, self.start).parse(form))

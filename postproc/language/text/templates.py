@@ -6,18 +6,17 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
-from typing import Any, Generic, TypeVar, overload
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc import _native
 from postproc.arrays import Bools, Indices, Interned, Ints
-from postproc.language.text.lexer import NAME_MARK, WHOLE, form_of, mask_of
+from postproc.language.text.lexer import NAME_MARK
 from postproc.language.text.symbol_column import NameColumn
 
 # Rows that are alike, numbered in the order in which they appear.
-
-_SHORT = 12  # longer sequences are told apart in Python
 
 
 def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
@@ -31,31 +30,17 @@ def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
     >>> alike(np.array([7, 8, 7, 8, 9]), np.array([0, 2, 2]), np.array([2, 4, 5]))
     array([0, 0, 1])
     """
-    length = last - first
-    if int(length.max(initial=0)) <= _SHORT:
-        return _by_columns(values, first, length)
-    data = np.ascontiguousarray(values, dtype=np.int32).tobytes()
-    ends = zip((4 * first).tolist(), (4 * last).tolist(), strict=True)
-    return Interned[bytes]().of([data[a:b] for a, b in ends])
-
-
-def _by_columns(values: AnyInts, first: AnyInts, length: AnyInts) -> Ints:
-    """Number sequences: first by their lengths, then by one value after the other."""
-    kind, rows = number_in_order(length)[0], np.arange(len(first))
-    size = int(values.max(initial=0)) + 1
-    for at in range(int(length.max(initial=0))):
-        rows = rows[length[rows] > at]
-        others = int(kind.max()) + 1
-        pairs = kind[rows] * size + values[first[rows] + at]
-        kind[rows] = others + number_in_order(pairs)[0]
-    return number_in_order(kind)[0]
+    values, first, last = (
+        np.ascontiguousarray(x, np.int64) for x in (values, first, last)
+    )
+    return _native.number_in_order(values, (first, last))[0]
 
 
 def number_in_order(keys: AnyInts) -> tuple[Ints, Ints]:
     """Number keys in the order in which they appear.
 
     Args:
-        keys: Whole numbers from 0 on, (n,).
+        keys: Whole numbers, (n,).
 
     Returns:
         The number of every row, (n,), and the first row of every number.
@@ -63,22 +48,7 @@ def number_in_order(keys: AnyInts) -> tuple[Ints, Ints]:
     >>> number_in_order(np.array([5, 2, 5]))
     (array([0, 1, 0]), array([0, 1]))
     """
-    if len(keys) == 0:
-        none = np.zeros(0, dtype=np.int64)
-        return none, none
-    if int(keys.max()) <= 2 * len(keys) + 1000:
-        rows = np.arange(len(keys))[::-1]
-        at = np.full(int(keys.max()) + 1, -1)
-        at[keys[::-1]] = rows  # the last one that is written stays: the first row
-        first = np.sort(at[at >= 0])
-        rank = np.empty_like(at)
-        rank[keys[first]] = np.arange(len(first))
-        return rank[keys], first
-    _, example, which = np.unique(keys, return_index=True, return_inverse=True)
-    order = np.argsort(example)
-    ranks = np.empty(len(order), dtype=np.int64)
-    ranks[order] = np.arange(len(order))
-    return ranks[which.ravel()], example[order]
+    return _native.number_in_order(np.ascontiguousarray(keys, np.int64), None)
 
 
 # The shapes of the lines of a file: few forms, with many names filled in.
@@ -87,7 +57,7 @@ AnyInts = NDArray[np.signedinteger[Any]]
 
 
 @dataclass(frozen=True, eq=False)
-class Shapes(Sequence[str]):
+class Shapes:
     """k distinct masks of lines; the text of one is made when it is asked for.
 
     Attributes:
@@ -107,22 +77,6 @@ class Shapes(Sequence[str]):
     def __len__(self) -> int:
         """Return the number of shapes."""
         return len(self.form)
-
-    @overload
-    def __getitem__(self, shape: int) -> str: ...
-    @overload
-    def __getitem__(self, shape: slice) -> Sequence[str]: ...
-    def __getitem__(self, shape: int | slice) -> str | Sequence[str]:
-        """Return the mask of a shape."""
-        if isinstance(shape, slice):
-            return [self[k] for k in range(*shape.indices(len(self)))]
-        if not 0 <= shape < len(self):
-            raise IndexError(shape)
-        return mask_of(self.texts[self.form[shape]], self.names_of(shape))
-
-    def __iter__(self) -> Iterator[str]:
-        """Go through the masks."""
-        return (self[k] for k in range(len(self)))
 
     def __eq__(self, other: object) -> bool:
         """Tell whether the masks are those of other shapes."""
@@ -162,54 +116,30 @@ def find_shapes(
     """Find the distinct shapes of lines, in the order of appearance.
 
     Args:
-        texts: Masks with their names marked, or `WHOLE` and the mask.
+        texts: Masks with their names marked.
         text: Index into `texts` of every line, (n,).
         at: Index into `name` of the first name of every line, (n,).
         name: Index into `names` of all names in order.
-        names: The distinct ones; those that only whole masks hold are not among them.
+        names: The distinct ones.
 
     Returns:
         The shapes, and that of every line, (n,).
     """
-    forms, whole = Interned[str](), any(one[:1] == WHOLE for one in texts)
-    entered = NameColumn(names) if whole else names
-    form = np.zeros(len(texts), dtype=np.int64)
-    count = np.zeros(len(texts), dtype=np.int64)
-    own = np.full(len(texts), -1, dtype=np.int64)
-    more: list[int] = []
-    for k in text[number_in_order(text)[1]].tolist():
-        one = texts[k].decode("latin-1")
-        found: tuple[str, ...] = ()
-        if texts[k][:1] == WHOLE:
-            one, found = form_of(one[1:])
-            own[k], count[k] = len(name) + len(more), len(found)
-            more += entered.of(found).tolist()
-        else:
-            count[k] = one.count(NAME_MARK)
-        form[k] = forms[one]
-    name = np.append(name, np.array(more, dtype=np.int64))
-    entered.settle()
-    begin = np.where(own[text] >= 0, own[text], at).astype(np.int64)
-    shape, example = _number_lines(form[text], begin, count[text], name, len(entered))
-    kept = text[example]
-    first = np.append(np.int32(0), np.cumsum(count[kept], dtype=np.int32))
-    steps = np.arange(first[-1]) - np.repeat(first[:-1], count[kept])
-    own_names = name[np.repeat(begin[example], count[kept]) + steps]
-    short = form[kept].astype(np.int32), first, own_names.astype(np.int32)
-    return Shapes(tuple(forms), *short, entered), shape
-
-
-def _number_lines(
-    form: Ints, begin: Ints, count: Ints, name: Ints, names: int
-) -> tuple[Ints, Ints]:
-    """Number lines by their forms and their names; as `number_in_order`."""
-    if not len(form) or not count.any():
-        return number_in_order(form)
-    said = np.zeros(len(form), dtype=np.int64)
-    one, many = np.flatnonzero(count == 1), np.flatnonzero(count > 1)
-    said[one] = 1 + name[begin[one]]
-    said[many] = 1 + names + alike(name, begin[many], (begin + count)[many])
-    return number_in_order(form * (int(said.max()) + 1) + said)
+    forms, used = Interned[str](), text[number_in_order(text)[1]]
+    form, count = np.zeros((2, len(texts)), dtype=np.int64)
+    form[used] = forms.of([texts[k].decode("latin-1") for k in used.tolist()])
+    count[used] = [texts[k].count(NAME_MARK.encode()) for k in used.tolist()]
+    names.settle()
+    form, count, begin = form[text], count[text], at.astype(np.int64)
+    said, some = np.zeros(len(form), dtype=np.int64), np.flatnonzero(count)
+    said[some] = 1 + alike(name, begin[some], (begin + count)[some])
+    shape, example = number_in_order(form * (int(said.max(initial=0)) + 1) + said)
+    own = count[example]
+    first = np.append(np.int32(0), np.cumsum(own, dtype=np.int32))
+    steps = np.arange(first[-1]) - np.repeat(first[:-1], own)
+    own_names = name[np.repeat(begin[example], own) + steps]
+    short = form[example].astype(np.int32), first, own_names.astype(np.int32)
+    return Shapes(tuple(forms), *short, names), shape
 
 
 # What forms say.
@@ -290,7 +220,7 @@ def _match_case(name: str, letters: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class ParsedShapes(Sequence[T], Generic[T]):
+class ParsedShapes(Generic[T]):
     """What each of k shapes says, made from its form when it is asked for.
 
     Attributes:
@@ -307,14 +237,8 @@ class ParsedShapes(Sequence[T], Generic[T]):
         """Return the number of shapes."""
         return len(self.shapes)
 
-    @overload
-    def __getitem__(self, shape: int) -> T: ...
-    @overload
-    def __getitem__(self, shape: slice) -> Sequence[T]: ...
-    def __getitem__(self, shape: int | slice) -> T | Sequence[T]:
+    def __getitem__(self, shape: int) -> T:
         """Return what a shape says."""
-        if isinstance(shape, slice):
-            return [self[k] for k in range(*shape.indices(len(self)))]
         made = self._made.get(shape)
         if made is None:
             made = self._made[shape] = self.once(shape)

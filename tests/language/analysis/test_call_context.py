@@ -6,9 +6,9 @@ import random
 
 from postproc.language.analysis.call_context import (
     CALLED,
+    HERE,
     Context,
     Point,
-    in_program_order,
 )
 
 
@@ -25,18 +25,17 @@ def drawn(seed: int) -> list[tuple[Context, int, int]]:
     return found
 
 
-def test_places_are_sorted_as_points_are() -> None:
-    """Points compare two places; the order of all of them is found in one pass."""
+def path(context: Context, at: int) -> list[tuple[int, int]]:
+    """List the calls and rounds around a place from the outermost one on, then it."""
+    around = [(one.at, one.kind) for one in context.around()]
+    return [*around[-2::-1], (at, HERE)]
+
+
+def test_points_are_in_the_order_in_which_a_program_comes_to_them() -> None:
     for seed in range(30):
-        keys = drawn(seed)
-        wanted = sorted(
-            range(len(keys)), key=lambda k: (Point(*keys[k][:2]), keys[k][2])
-        )
-        assert in_program_order(keys) == wanted
-
-
-def test_nothing_has_an_order_too() -> None:
-    assert in_program_order([]) == []
+        places = [(context, at) for context, at, _ in drawn(seed)]
+        found = sorted(places, key=lambda place: Point(*place))
+        assert [path(*one) for one in found] == sorted(path(*one) for one in places)
 
 
 def test_a_context_is_one_object_at_any_depth() -> None:

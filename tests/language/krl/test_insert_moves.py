@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.language.insert_moves import ArcPiece
 from postproc.language.krl.language import Krl
-from postproc.language.language import ArcPiece
 from postproc.language.text.source import CloneError, Source, apply
 
 HERE = "{X 1,Y 2,Z 3,A 0,B 0,C 0,S 2,T 10,E1 0,E2 0,E3 0,E4 0,E5 0,E6 0}"

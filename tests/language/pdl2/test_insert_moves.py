@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.language.language import ArcPiece
+from postproc.language.insert_moves import ArcPiece
 from postproc.language.languages import language_of
 from postproc.language.pdl2.language import Pdl2
 from postproc.language.text.source import CloneError, Source, apply

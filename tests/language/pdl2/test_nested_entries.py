@@ -61,7 +61,8 @@ def known(found: Resolved) -> list[float | int]:
 
 
 def first_numbers(variables: VariableFile) -> dict[str, float | None]:
-    return {name: entry.numbers[0] for name, entry in variables.entries.items()}
+    entries = variables.entries
+    return {name: entries.numbers_of(row)[0] for name, row in entries.row.items()}
 
 
 @pytest.mark.parametrize(
@@ -101,9 +102,11 @@ def test_values_on_the_line_of_the_field():
         "NODE[2]\n$MAIN_XTND XTND Arm: 1 Ax: 1 X: 2 Y: 3 Z: 4 A: 5 E: 6 R: 7 1: 45\n"
     )
     entries = read(text).entries
-    assert entries["pth.node[1].$main_jntp"].numbers == (1.5, 0, -90, 0, 60, 0)
-    assert entries["pth.node[1].$main_jntp"].aux == ((1, 90.0),)
-    assert entries["pth.node[2].$main_xtnd"].aux == ((1, 45.0),)
+    names = "pth.node[1].$main_jntp", "pth.node[2].$main_xtnd"
+    first, second = (entries.row[name] for name in names)
+    assert entries.numbers_of(first) == (1.5, 0, -90, 0, 60, 0)
+    assert entries.aux_of(first) == ((1, 90.0),)
+    assert entries.aux_of(second) == ((1, 45.0),)
     found = followed(text, "MOVE JOINT TO pth.NODE[1]", "MOVE LINEAR TO pth.NODE[2]")
     assert known(found) == [1.5, 2.0]
 
@@ -146,7 +149,7 @@ def test_an_odd_line_leaves_the_whole_entry_unread(entry, why):
 def test_a_node_that_is_not_sure_is_left_out(more, why):
     text = path("NODE[1]") + more + path("NODE[3]").partition("\n")[2]
     variables = read(text + "q POS Priv\n" + place(9))
-    assert set(variables.entries) == {"pth.node[3].$main_pos", "q"}
+    assert set(variables.entries.row) == {"pth.node[3].$main_pos", "q"}
     (found,) = variables.diagnostics
     assert why in found.message
 
@@ -160,14 +163,15 @@ def test_elements_of_a_field_are_not_nodes():
 
 def test_a_name_that_a_path_and_something_else_have_is_neither():
     variables = read(path("NODE[1]") + "pth POS Priv\n" + place(5))
-    assert not variables.entries
+    assert not variables.entries.row
     assert {d.code for d in variables.diagnostics} == {"lsv-duplicate"}
 
 
 def test_too_many_values_are_none():
     text = path("NODE[1]") + " X: 7.00\n"
     variables = read(text)
-    assert variables.entries["pth.node[1].$main_pos"].numbers == (None,) * 6
+    row = variables.entries.row["pth.node[1].$main_pos"]
+    assert variables.entries.numbers_of(row) == (None,) * 6
     assert [d.code for d in variables.diagnostics] == ["lsv-too-many"]
 
 

@@ -9,7 +9,6 @@ import lark
 import pytest
 
 from postproc.language.text import grammars
-from postproc.language.text.lexer import form_of
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import source_from_bytes
 
@@ -56,8 +55,8 @@ def forms() -> list[str]:
     """Return the forms of all sample programs, and of each one broken in its middle."""
     found: dict[str, None] = {}
     for path in sorted((ROOT / "programs").glob("*.pdl")):
-        masks = read_lines(source_from_bytes(path.name, path.read_bytes())).shapes
-        found |= dict.fromkeys(form_of(mask)[0] for mask in masks)
+        lines = read_lines(source_from_bytes(path.name, path.read_bytes()))
+        found |= dict.fromkeys(lines.shapes.texts)
     return [*found, *(f[: len(f) // 2] + ") ::" + f[len(f) // 2 :] for f in found)]
 
 

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from postproc.language.pdl2.names import entry_names
+from postproc.language.pdl2.language import Pdl2
 from postproc.report.diff import target_name
 from tests.written import FIRST, LISTED, cli, program
 
@@ -140,8 +140,9 @@ def test_a_point_that_holds_a_node_is_not_cloned(desk):
 def test_names_of_lines_whatever_their_layout():
     text = VALUES.replace("\r\n ", "\r\n")
     lines = text.encode().split(b"\r\n")
-    names = [*entry_names(lines, [1, 5, 9, 11, 17, 22])]
+    names = [*Pdl2().target_names("job.lsv", lines, [0, 1, 5, 9, 11, 17, 22])]
     assert names == [
+        "",
         "",
         MOVED[0],
         MOVED[1],
@@ -150,3 +151,10 @@ def test_names_of_lines_whatever_their_layout():
         "rec[2].p",
     ]
     assert target_name(lines[4].decode()) == "X"
+
+
+def test_a_line_that_the_original_has_not_has_no_name():
+    lines = [b"p1 POS Priv", b"X: 1.0", b"p2 POS Priv"]
+    assert [*Pdl2().target_names("job.lsv", lines, [0, 2, 3])] == ["", "p1", "p2"]
+    lines = [b"pth PATH nd Priv", b"x STR 'open", b"p1 POS Priv"]
+    assert [*Pdl2().target_names("job.lsv", lines, [1, 3])] == ["", ""]

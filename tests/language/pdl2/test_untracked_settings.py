@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from postproc.language.pdl2.untracked_settings import disturbance
+from postproc.language.pdl2.conditions import disturbance
 from postproc.language.pdl2.values import Nothing
 from tests.language.pdl2.test_external_routines import (
     FIRST,

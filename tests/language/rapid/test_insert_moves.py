@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.language.language import ArcPiece
+from postproc.language.insert_moves import ArcPiece
 from postproc.language.rapid.language import Rapid
 from postproc.language.text.source import CloneError, Source, apply
 

@@ -81,7 +81,7 @@ def test_every_number_can_be_written_where_it_stands(path):
     other = apply(data, [Edit(span, b"7.25") for span in spans])
     again = read_rapid(Source(path.name, other))
     assert len(again.text) == len(text) and (again.text.value == 7.25).all()
-    assert list(again.text.said.shapes) == list(text.said.shapes)
+    assert again.text.said.shapes == text.said.shapes
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)

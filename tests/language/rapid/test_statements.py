@@ -20,7 +20,7 @@ PIECES = st.sampled_from([
     "}", "=", "-", "+", "-1.5", "9E+09", "1", ".5", "0x1F", "2e", "! it; \"s\"", "\n",
     "\r\n",
     " ", "\t", '"a;b"', '"a""b"', '"open', '""', "%%%", "%", "<", "\xe4\xb2",
-    "\x01", "\x00", "x1y", "_2", "?", "|", "*", "/", "@", "\x7f",
+    "\x01", '"\x01"', "x1y", "_2", "?", "|", "*", "/", "@", "\x7f",
 ])  # fmt: skip
 TEXTS = st.lists(PIECES, max_size=30).map("".join)
 
@@ -43,6 +43,7 @@ def scanned(data):
 @settings(deadline=None)
 @given(TEXTS)
 @example("LOCAL TASK PROC p1()ENDPROC")
+@example("ALIAS9E+09.ALIAS")
 @example("\xef\xbb\xbfMODULE m")
 def test_the_core_reads_what_the_expressions_say(text):
     wanted = statements(text)

@@ -7,10 +7,10 @@ import pytest
 from postproc.language import ir
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_form, parse_value_form
-from postproc.language.text.lexer import form_of
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import source_from_bytes
 from postproc.language.text.templates import filler
+from tests.reference.text import form_of
 
 
 def parse_line(mask: str) -> ir.SourceStatement:
@@ -50,6 +50,6 @@ def test_case_is_kept_where_it_is_shown_only() -> None:
     assert entered is not None and entered.name == "Wp1"
 
 
-@pytest.mark.parametrize("mask", ["?? Wp1 ?? x2", "MOVE TO \x01", "\x01\x01 p1"])
+@pytest.mark.parametrize("mask", ["?? Wp1 ?? x2", "MOVE TO '\r'"])
 def test_what_is_not_understood_keeps_its_text(mask) -> None:
     assert parse_line(mask) == ir.NotUnderstood(mask)
