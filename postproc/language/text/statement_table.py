@@ -9,7 +9,7 @@ from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Indices
+from postproc.arrays import Bools, Floats, Indices, release_memory
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language.text.source import NumberSpans, Source, Span
@@ -181,6 +181,7 @@ def read_text(
     places, value = numbers
     value[~np.isfinite(value)] = np.nan
     line = source.lines_of(begin).astype(np.int32)
+    release_memory(len(value))
     return StatementText(
         source, said, shape.astype(np.int32), line, first, NumberSpans(*places), value,
         begin, end,
